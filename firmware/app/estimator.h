@@ -1,0 +1,76 @@
+/* The estimator without CAN: samples in, modes, health, estimates out. What lever_cdkf.h promises is done here. */
+#ifndef APP_ESTIMATOR_H
+#define APP_ESTIMATOR_H
+
+#include "app/dither.h"
+#include "filter/adaptation.h"
+#include "filter/detrend.h"
+#include "filter/dual.h"
+#include "lever_cdkf.h"
+#include "model/model.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* The first samples, averaged. */
+typedef struct alignment {
+    float theta_sum; /* [rad] */
+    float count;     /* valid angles in the sum */
+    float time;      /* since the first sample [s] */
+} alignment_t;
+
+/* Slow companions of the estimate. */
+typedef struct followed {
+    detrend_t theta; /* its level is the trim angle [rad] */
+    detrend_t theta_dot;
+    detrend_t z_ddot;
+    detrend_t tau_m;
+    float excitation_square; /* mean square of theta_dot [rad^2/s^2] */
+    float innovation_mean;   /* mean of nis / nis_size */
+    float restart_debt;      /* restarts, forgotten over RESTART_MEMORY */
+} followed_t;
+
+typedef struct estimator {
+    lever_config_t config;
+    const model_t *model;
+    model_constants_t constants;
+    adaptation_t adaptation;
+    dual_t dual;
+    followed_t followed;
+    alignment_t alignment;
+    enum lever_mode mode;
+    bool frozen;
+    uint32_t time_us;  /* of the last sample */
+    float last_z_ddot; /* inputs as they came [m/s^2], [N m] */
+    float last_tau_m;
+    float z_ddot; /* inputs of the last sample, deviations in preload trim, as the state is: */
+    float tau_m;
+    float origin[MODEL_STATES];  /* what the state counts from: levels at the last sample, 0 in preload fixed */
+    float missing[MODEL_STATES]; /* time since the last sample of each output [s] */
+    float unsettled;             /* time still to wait before learning, after an outage [s] */
+    float nis;                   /* of the last sample */
+    uint8_t nis_size;
+    uint16_t faults;
+    bool communication_fault; /* reported by the CAN side for the next sample */
+    dither_t dither;
+    uint32_t samples;
+    uint32_t lost;
+    uint32_t corrupt;
+    uint32_t late;
+    uint32_t recoveries;
+} estimator_t;
+
+/* Starts from a checked configuration; all counts are zero. */
+void estimator_init(estimator_t *estimator, const lever_config_t *config);
+
+/* The functions of lever_cdkf.h of the same names. */
+enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample);
+bool estimator_command(estimator_t *estimator, const lever_command_t *command);
+void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate);
+
+/* The part of the estimate that is derived from the parameters, and its standard deviations. */
+void estimator_dynamics(const estimator_t *estimator, model_dynamics_t *dynamics, model_dynamics_t *sigma);
+
+void estimator_health(const estimator_t *estimator, lever_health_t *health);
+
+#endif

@@ -1,0 +1,242 @@
+#include "app/link.h"
+
+#include "filter/derived.h"
+
+#include <string.h>
+
+/* The order in which frames are fetched: the motor first, STATE_ESTIMATE last. */
+enum output {
+    OUTPUT_MOTOR_COMMAND,
+    OUTPUT_PARAMETERS,
+    OUTPUT_SIGMA,
+    OUTPUT_DYNAMICS,
+    OUTPUT_HEALTH,
+    OUTPUT_STATE_ESTIMATE
+};
+
+#define BIT(output) (1u << (uint32_t)(output))
+#define DIVIDED_OUTPUTS (BIT(OUTPUT_PARAMETERS) | BIT(OUTPUT_SIGMA) | BIT(OUTPUT_DYNAMICS) | BIT(OUTPUT_HEALTH))
+
+static const uint8_t data_ids[LINK_OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_PILOT_PARAMETERS_DATA_ID,
+    MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID, MESSAGE_HEALTH_DATA_ID,
+    MESSAGE_STATE_ESTIMATE_DATA_ID};
+
+/* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame that
+ * is repeated or one step late (which a sample's time would tell, too). */
+static const e2e_tolerance_t tolerance = {13u, 14u, 0u};
+
+/* A new session of the sender: its counters may start anywhere. */
+static void start_session(link_t *link)
+{
+    e2e_receiver_init(&link->lever_receiver, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, tolerance);
+    e2e_receiver_init(&link->base_receiver, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, tolerance);
+    link->has_lever_sample = false;
+    link->has_published = false;
+}
+
+void link_init(link_t *link)
+{
+    (void)memset(link, 0, sizeof *link);
+    e2e_receiver_init(&link->command_receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, tolerance);
+    start_session(link);
+}
+
+/* --- in -------------------------------------------------------------------------------------------------------- */
+
+/* E2E check; counts what is refused. An event may come in any order: its sequence is checked by nobody. */
+static bool accept(e2e_receiver_t *receiver, estimator_t *estimator, const lever_frame_t *frame, bool event)
+{
+    const e2e_status_t status = e2e_check(receiver, frame);
+    const bool usable = event ? (status != E2E_CRC_ERROR) : e2e_is_usable(status);
+    if (status == E2E_CRC_ERROR) {
+        estimator->corrupt++;
+    } else if (!usable) {
+        estimator->late++;
+    } else {
+        /* usable: nothing to count */
+    }
+    return usable;
+}
+
+static enum lever_frame_result on_lever_sample(link_t *link, const lever_frame_t *frame)
+{
+    link->has_lever_sample = message_lever_sample_decode(&link->lever_sample, frame);
+    link->lever_counter = e2e_counter(frame);
+    return LEVER_FRAME_TAKEN;
+}
+
+/* Completes the sample with the LEVER_SAMPLE of the same counter, if it has come. */
+static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
+{
+    message_base_sample_t base;
+    (void)message_base_sample_decode(&base, frame);
+    const bool paired = link->has_lever_sample && (link->lever_counter == e2e_counter(frame));
+    const message_lever_sample_t *lever = &link->lever_sample;
+    lever_sample_t *sample = &link->sample;
+    sample->time_us = base.time_us;
+    sample->z_ddot = base.z_ddot;
+    sample->z_ddot_valid = base.z_ddot_valid;
+    sample->theta = lever->theta;
+    sample->theta_dot = lever->theta_dot;
+    sample->tau_m = lever->tau_m;
+    sample->theta_valid = paired && lever->theta_valid;
+    sample->theta_dot_valid = paired && lever->theta_dot_valid;
+    sample->tau_m_valid = paired && lever->tau_m_valid;
+    estimator->lost += paired ? 0u : 1u;
+    link->has_lever_sample = false;
+    link->has_sample = true;
+    return LEVER_FRAME_SAMPLE;
+}
+
+static enum lever_frame_result on_command(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
+{
+    lever_command_t command;
+    const bool done = message_command_decode(&command, frame) && estimator_command(estimator, &command);
+    if (done && (command.request == (uint8_t)LEVER_REQUEST_RESET)) {
+        start_session(link);
+    }
+    return done ? LEVER_FRAME_TAKEN : LEVER_FRAME_REFUSED;
+}
+
+enum lever_frame_result link_on_frame(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
+{
+    enum lever_frame_result result = LEVER_FRAME_REFUSED;
+    if (frame->id == (uint32_t)MESSAGE_LEVER_SAMPLE_ID) {
+        if (accept(&link->lever_receiver, estimator, frame, false)) {
+            result = on_lever_sample(link, frame);
+        }
+    } else if (frame->id == (uint32_t)MESSAGE_BASE_SAMPLE_ID) {
+        if (accept(&link->base_receiver, estimator, frame, false)) {
+            result = on_base_sample(link, estimator, frame);
+        }
+    } else if (frame->id == (uint32_t)MESSAGE_COMMAND_ID) {
+        if (accept(&link->command_receiver, estimator, frame, true)) {
+            result = on_command(link, estimator, frame);
+        }
+    } else {
+        result = LEVER_FRAME_IGNORED;
+    }
+    if (result == LEVER_FRAME_REFUSED) {
+        estimator->communication_fault = true;
+    }
+    return result;
+}
+
+/* --- step ------------------------------------------------------------------------------------------------------ */
+
+static bool is_publication_due(link_t *link, const estimator_t *estimator)
+{
+    const float rounded = (estimator->config.settings.publish_period * 1.0e6f) + 0.5f;
+    const uint32_t period_us = (uint32_t)rounded;
+    const bool due = !link->has_published || ((link->sample.time_us - link->published_us) >= period_us);
+    if (due) {
+        link->has_published = true;
+        link->published_us = link->sample.time_us;
+    }
+    return due;
+}
+
+enum lever_mode link_step(link_t *link, estimator_t *estimator)
+{
+    if (link->has_sample) {
+        const bool was_on = dither_is_on(&estimator->dither);
+        link->has_sample = false;
+        (void)estimator_update(estimator, &link->sample);
+        uint32_t due = BIT(OUTPUT_STATE_ESTIMATE);
+        if (is_publication_due(link, estimator)) {
+            due |= DIVIDED_OUTPUTS;
+        }
+        if (was_on || dither_is_on(&estimator->dither)) {
+            due |= BIT(OUTPUT_MOTOR_COMMAND);
+        }
+        link->due = (uint8_t)due;
+    }
+    return estimator->mode;
+}
+
+/* --- out ------------------------------------------------------------------------------------------------------- */
+
+static bool encode_motor_command(const estimator_t *estimator, lever_frame_t *frame)
+{
+    message_motor_command_t message;
+    message.model = estimator->config.model;
+    message.torque = estimator->dither.torque;
+    message.dither = estimator->dither.torque;
+    return message_motor_command_encode(frame, &message);
+}
+
+static bool encode_parameters(const estimator_t *estimator, lever_frame_t *frame)
+{
+    message_pilot_parameters_t message;
+    message.model = estimator->config.model;
+    parameter_filter_physical(&estimator->dual.parameters, message.parameter);
+    return message_pilot_parameters_encode(frame, &message);
+}
+
+static bool encode_sigma(const estimator_t *estimator, lever_frame_t *frame)
+{
+    message_pilot_sigma_t message;
+    float parameter[MODEL_PARAMETERS];
+    message.model = estimator->config.model;
+    derived_parameters(&estimator->dual.parameters, parameter, message.sigma);
+    return message_pilot_sigma_encode(frame, &message);
+}
+
+static bool encode_dynamics(const estimator_t *estimator, lever_frame_t *frame)
+{
+    message_pilot_dynamics_t message;
+    model_dynamics_t dynamics;
+    model_dynamics_t sigma;
+    estimator_dynamics(estimator, &dynamics, &sigma);
+    message.model = estimator->config.model;
+    message.natural_frequency = dynamics.natural_frequency;
+    message.natural_frequency_sigma = sigma.natural_frequency;
+    message.damping_ratio = dynamics.damping_ratio;
+    message.damping_ratio_sigma = sigma.damping_ratio;
+    return message_pilot_dynamics_encode(frame, &message);
+}
+
+static bool encode_health(const estimator_t *estimator, lever_frame_t *frame)
+{
+    message_health_t message;
+    lever_health_t health;
+    estimator_health(estimator, &health);
+    message.model = estimator->config.model;
+    message.mode = (uint8_t)health.mode;
+    message.faults = health.faults;
+    message.lost = (uint8_t)(health.lost & 0xFFu);
+    message.corrupt = (uint8_t)(health.corrupt & 0xFFu);
+    message.late = (uint8_t)(health.late & 0xFFu);
+    message.excitation = health.excitation;
+    return message_health_encode(frame, &message);
+}
+
+static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *frame)
+{
+    message_state_estimate_t message;
+    message.model = estimator->config.model;
+    message.theta = estimator->origin[0] + estimator->dual.state.x[0];
+    message.theta_dot = estimator->origin[1] + estimator->dual.state.x[1];
+    message.nis = estimator->nis;
+    return message_state_estimate_encode(frame, &message);
+}
+
+static bool (*const encoders[LINK_OUTPUTS])(const estimator_t *, lever_frame_t *) = {
+    encode_motor_command, encode_parameters, encode_sigma, encode_dynamics, encode_health, encode_state_estimate};
+
+bool link_next_frame(link_t *link, const estimator_t *estimator, lever_frame_t *frame)
+{
+    bool sent = false;
+    for (uint32_t i = 0u; (i < (uint32_t)LINK_OUTPUTS) && !sent; i++) {
+        const uint32_t bit = BIT(i);
+        if ((link->due & bit) != 0u) {
+            link->due = (uint8_t)(link->due & ~bit);
+            sent = encoders[i](estimator, frame);
+            if (sent) {
+                e2e_protect(frame, data_ids[i], link->counter[i]);
+                link->counter[i] = (uint8_t)((link->counter[i] + 1u) & 15u);
+            }
+        }
+    }
+    return sent;
+}

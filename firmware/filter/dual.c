@@ -1,0 +1,65 @@
+#include "filter/dual.h"
+
+#include "math/factor.h"
+
+#include <string.h>
+
+#define N ((uint32_t)MODEL_STATES)
+#define L ((uint32_t)MODEL_PARAMETERS)
+#define OUTPUTS ((uint32_t)MEASUREMENT_OUTPUTS)
+
+void dual_predict(
+    dual_t *dual, const model_t *model, const model_constants_t *constants, const model_step_t *step, bool learn)
+{
+    model_points_t points;
+    float increment[MODEL_POINTS][MODEL_STATES];
+    state_filter_points(&dual->state, &points);
+    parameter_filter_points(&dual->parameters, &points);
+    model->propagate(constants, step, &points, increment);
+    parameter_filter_predict(&dual->parameters, increment, learn ? step->period : 0.0f);
+    state_filter_predict(&dual->state, increment, step->period);
+}
+
+float dual_update(dual_t *dual, const measurement_t *measurement, bool learn, float correction[MODEL_PARAMETERS])
+{
+    float *sensitivity = parameter_filter_sensitivity(&dual->parameters);
+    float noise[OUTPUTS * OUTPUTS];
+    float output[OUTPUTS * L];
+    float innovation[OUTPUTS];
+    state_filter_innovation(&dual->state, measurement, noise);
+    for (uint32_t i = 0u; i < OUTPUTS; i++) {
+        innovation[i] = measurement->valid[i] ? (measurement->y[i] - dual->state.x[i]) : 0.0f;
+        for (uint32_t j = 0u; j < L; j++) {
+            output[(i * L) + j] = measurement->valid[i] ? sensitivity[(i * L) + j] : 0.0f;
+        }
+    }
+    float nis = state_filter_update(&dual->state, measurement, sensitivity);
+
+    float change[PARAMETER_FILTER_ROWS] = {0.0f}; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    if (learn) {
+        nis = parameter_filter_update(&dual->parameters, output, innovation, noise, change);
+        for (uint32_t i = 0u; i < N; i++) {
+            dual->state.x[i] += change[L + i];
+        }
+    }
+    (void)memcpy(correction, change, L * sizeof correction[0]);
+    return nis;
+}
+
+float dual_state_sigma(const dual_t *dual, uint32_t i)
+{
+    const float *sensitivity = &dual->parameters.s[(L + i) * L];
+    float square = 0.0f;
+    for (uint32_t k = 0u; k < L; k++) {
+        square += sensitivity[k] * sensitivity[k];
+    }
+    for (uint32_t k = 0u; k < N; k++) {
+        square += dual->state.s[(i * N) + k] * dual->state.s[(i * N) + k];
+    }
+    return sqrtf(square);
+}
+
+bool dual_is_valid(const dual_t *dual)
+{
+    return state_filter_is_valid(&dual->state) && parameter_filter_is_valid(&dual->parameters);
+}

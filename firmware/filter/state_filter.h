@@ -1,0 +1,41 @@
+/* Square-root central difference Kalman filter for the lever's state [theta, theta_dot], parameters given.
+ *
+ * Additive process noise, outputs equal to the states with independent noise (so the measurement is linear, and exact
+ * without sigma points of its own). The model is called by the owner (dual.c), once for this and the parameter filter.
+ */
+#ifndef FILTER_STATE_FILTER_H
+#define FILTER_STATE_FILTER_H
+
+#include "filter/measurement.h"
+#include "model/model.h"
+
+#include <stdbool.h>
+
+typedef struct state_filter {
+    float x[MODEL_STATES];                /* theta [rad], theta_dot [rad/s] */
+    float s[MODEL_STATES * MODEL_STATES]; /* factor of their covariance, parameters given */
+    float process_noise[MODEL_STATES];    /* random walk of each [unit / sqrt(s)] */
+    float output_noise[MODEL_STATES];     /* standard deviation of each sample [unit] */
+} state_filter_t;
+
+/* Draws the points of the state pairs, and the mean, into `points`. */
+void state_filter_points(const state_filter_t *filter, model_points_t *points);
+
+/* Time update over `period` [s] from the increments that the model gave. */
+void state_filter_predict(state_filter_t *filter, float increment[MODEL_POINTS][MODEL_STATES], float period);
+
+/* Factor of the predicted covariance of y, S S^T + R, parameters given. An output that is not valid gets a row of the
+ * identity, so that with its innovation set to zero later steps pass over it. */
+void state_filter_innovation(const state_filter_t *filter, const measurement_t *measurement,
+    float factor[MEASUREMENT_OUTPUTS * MEASUREMENT_OUTPUTS]);
+
+/* Measurement update with the outputs that are valid; none of them: nothing changes. `sensitivity`, columns of
+ * deviations of the state [MODEL_STATES x MODEL_PARAMETERS], shrinks as the state's own errors do: by I - K H. Returns the
+ * normalised innovation squared, parameters given. */
+float state_filter_update(
+    state_filter_t *filter, const measurement_t *measurement, float sensitivity[MODEL_STATES * MODEL_PARAMETERS]);
+
+/* Finite estimate of a plausible angle (a few turns), valid factor. */
+bool state_filter_is_valid(const state_filter_t *filter);
+
+#endif

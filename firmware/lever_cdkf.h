@@ -1,0 +1,254 @@
+/* Lever CDKF: a helicopter pilot's equivalent mass, damping and stiffness on the collective lever, estimated on line.
+ *
+ * This header is the whole outside of the firmware; no other header is needed, and nothing below it is promised.
+ *
+ * What it does. A square-root Central Difference Kalman Filter (single precision, fixed size) estimates the angle and
+ * rate of the lever and, in step with them, the pilot's parameters [m_p, c_p, k_p], each with its standard deviation.
+ *
+ * What it needs. A sample each sample_period: lever angle and rate, base vertical acceleration, motor torque. It uses no
+ * heap, operating system, clock, thread, or mutable static; all memory is the caller's, time comes with the samples.
+ *
+ * Two ways to use it, on the same instance type:
+ *
+ *     lever_memory_t memory;                        // caller owned, e.g. static
+ *     lever_config_t config;
+ *     lever_config_default(&config);
+ *     lever_t *lever = lever_init(&memory, &config);   // NULL: config refused, lever_config_check() says where
+ *
+ *     // without CAN                                // with CAN
+ *     lever_update(lever, &sample);                 if (lever_on_frame(lever, &rx) == LEVER_FRAME_SAMPLE) {
+ *     lever_estimate(lever, &estimate);                 lever_step(lever);
+ *                                                       while (lever_next_frame(lever, &tx)) { transmit(&tx); }
+ *                                                   }
+ *
+ * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent.
+ * Cost. Every call is bounded; lever_update() is the expensive one (about 2,000 instructions on a Cortex-M4F).
+ * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
+ */
+#ifndef LEVER_CDKF_H
+#define LEVER_CDKF_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --- configuration --------------------------------------------------------------------------------------------- */
+
+/* Model of arm and lever: see firmware/model. */
+enum lever_model { LEVER_MODEL_LEVER = 0, LEVER_MODEL_COUNT };
+
+/* Where the springs rest. FIXED: at the two preload angles of the settings. TRIM: the pilot re-trims; gravity
+ * cancels at a trim angle that follows theta slowly, and all signals count from their slow part (trim_corner). */
+enum lever_preload { LEVER_PRELOAD_FIXED = 0, LEVER_PRELOAD_TRIM = 1, LEVER_PRELOAD_COUNT };
+
+/* How state and parameters are estimated together: DUAL, two filters in step. */
+enum lever_estimator { LEVER_ESTIMATOR_DUAL = 0, LEVER_ESTIMATOR_COUNT };
+
+/* How the parameter noise is set: FIXED walk; ANNEALING from ceiling to floor; ROBBINS_MONRO between floor and ceiling. */
+enum lever_adaptation {
+    LEVER_ADAPTATION_FIXED = 0,
+    LEVER_ADAPTATION_ANNEALING = 1,
+    LEVER_ADAPTATION_ROBBINS_MONRO = 2,
+    LEVER_ADAPTATION_COUNT
+};
+
+/* Every tunable number, in SI units; see lever_settings.def for unit, default, range and meaning of each. */
+typedef struct lever_settings {
+/* cppcheck-suppress misra-c2012-20.7 ; D1 */
+#define LEVER_SETTING(name, unit, value, least, greatest, meaning) float name;
+#include "lever_settings.def"
+} lever_settings_t;
+
+typedef struct lever_config {
+    uint8_t model;      /* enum lever_model */
+    uint8_t preload;    /* enum lever_preload */
+    uint8_t estimator;  /* enum lever_estimator */
+    uint8_t adaptation; /* enum lever_adaptation */
+    lever_settings_t settings;
+} lever_config_t;
+
+/* One row of lever_settings.def. */
+typedef struct lever_setting {
+    const char *name;
+    const char *unit;
+    const char *meaning;
+    float value; /* default */
+    float least;
+    float greatest;
+} lever_setting_t;
+
+/* Number of settings, and the row at `index` (NULL when index >= count). lever_settings_t is an array of that many
+ * floats in the order of the rows. */
+uint32_t lever_setting_count(void);
+const lever_setting_t *lever_setting(uint32_t index);
+
+/* Fills in the defaults: lever model, trim preload, dual estimator, Robbins-Monro. */
+void lever_config_default(lever_config_t *config);
+
+/* NULL when the configuration is usable, otherwise the name of the first thing that is out of range (a setting, or
+ * "model", "preload", "estimator", "adaptation"). */
+const char *lever_config_check(const lever_config_t *config);
+
+/* --- life ------------------------------------------------------------------------------------------------------ */
+
+/* Room for one instance. */
+enum lever_limits { LEVER_MEMORY_BYTES = 1024 };
+typedef union lever_memory {
+    uint64_t aligned;
+    uint8_t bytes[LEVER_MEMORY_BYTES];
+} lever_memory_t;
+
+typedef struct lever lever_t;
+
+/* Makes an instance in `memory`, which must outlive it; there is nothing to release. Returns NULL, touching nothing, if
+ * the configuration is not usable. Also the way to start over with another configuration. */
+lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config);
+
+/* --- samples in ------------------------------------------------------------------------------------------------ */
+
+/* One sample. A value whose flag is false is not read; a flagged value that is not finite counts as invalid. */
+typedef struct lever_sample {
+    uint32_t time_us; /* sample time [us], wraps at 2^32 */
+    float theta;      /* lever angle from the floor [rad] */
+    float theta_dot;  /* lever rate [rad/s] */
+    float tau_m;      /* motor torque on the lever [N m]; when not valid, 0 is used */
+    float
+        z_ddot; /* base vertical acceleration, up positive, without gravity [m/s^2]; when not valid, the last is held */
+    bool theta_valid;
+    bool theta_dot_valid;
+    bool tau_m_valid;
+    bool z_ddot_valid;
+} lever_sample_t;
+
+enum lever_mode {
+    LEVER_MODE_INIT = 0,   /* no sample yet */
+    LEVER_MODE_ALIGN = 1,  /* averaging the first samples; estimates are the first guess */
+    LEVER_MODE_RUN = 2,    /* estimating */
+    LEVER_MODE_COAST = 3,  /* no usable theta or theta_dot: predicting, uncertainty grows */
+    LEVER_MODE_FROZEN = 4, /* by command: states are estimated, parameters held */
+    LEVER_MODE_FAULT = 5   /* the filter had to be restarted too often; only a reset leaves this mode */
+};
+
+/* Takes one sample: predicts to its time (through up to gap_limit of missing samples), then updates. Inputs between two
+ * samples are taken as the mean of both. A sample not newer than the last is counted as late and ignored. Returns the
+ * mode after the sample. */
+enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample);
+
+enum lever_request {
+    LEVER_REQUEST_NONE = 0,
+    LEVER_REQUEST_RUN = 1,    /* leave frozen */
+    LEVER_REQUEST_FREEZE = 2, /* hold the parameters */
+    LEVER_REQUEST_RESET = 3   /* back to the first guess, for a new series of samples; also leaves fault */
+};
+
+enum lever_keep { LEVER_KEEP = 15 };
+
+/* A command; a choice that is LEVER_KEEP stays as it is. */
+typedef struct lever_command {
+    uint8_t request;    /* enum lever_request */
+    uint8_t model;      /* enum lever_model or LEVER_KEEP; a change resets the estimator */
+    uint8_t preload;    /* enum lever_preload or LEVER_KEEP; a change resets the estimator */
+    uint8_t estimator;  /* enum lever_estimator or LEVER_KEEP; a change resets the estimator */
+    uint8_t adaptation; /* enum lever_adaptation or LEVER_KEEP */
+    float dither_rms;   /* identification torque [N m]: 0 fades it out, dither_limit limits it, from LEVER_KEEP on it
+                           stays as it is (on CAN: 65.535) */
+} lever_command_t;
+
+/* Carries a command out before the next sample. Returns false, changing nothing, if any part of it is not known. */
+bool lever_command(lever_t *lever, const lever_command_t *command);
+
+/* --- estimates out --------------------------------------------------------------------------------------------- */
+
+enum lever_parameter_limits { LEVER_PARAMETERS = 3 };
+
+typedef struct lever_estimate {
+    uint32_t time_us; /* of the sample that this belongs to [us] */
+    float theta;      /* lever angle [rad] and its standard deviation */
+    float theta_sigma;
+    float theta_dot; /* lever rate [rad/s] and its standard deviation */
+    float theta_dot_sigma;
+    float parameter[LEVER_PARAMETERS];       /* [m_p kg, c_p N s/m, k_p N/m] for the lever model */
+    float parameter_sigma[LEVER_PARAMETERS]; /* their standard deviations, in the same units */
+    float natural_frequency;                 /* undamped, of arm and lever about the trim [Hz] */
+    float natural_frequency_sigma;
+    float damping_ratio; /* [1] */
+    float damping_ratio_sigma;
+    float trim;       /* angle about which the dynamics are linearised [rad] */
+    float nis;        /* normalised innovation squared of the last update, chi-square with nis_size
+                                                degrees of freedom when the filter is consistent; 0 without measurement */
+    uint8_t nis_size; /* 0, 1 or 2 outputs used in the last update */
+} lever_estimate_t;
+
+/* The estimate after the last sample. Derived values are computed here, so this is not free (about 600 instructions). */
+void lever_estimate(const lever_t *lever, lever_estimate_t *estimate);
+
+/* Name ("m_p") and unit ("kg") of a parameter of a model; NULL for an index or model that does not exist. */
+const char *lever_parameter_name(uint8_t model, uint32_t index);
+const char *lever_parameter_unit(uint8_t model, uint32_t index);
+
+/* --- health ---------------------------------------------------------------------------------------------------- */
+
+/* Conditions present at the last sample; none of them stops the estimator. */
+enum lever_fault {
+    LEVER_FAULT_THETA = 1,          /* theta missing or invalid */
+    LEVER_FAULT_THETA_DOT = 2,      /* theta_dot missing or invalid */
+    LEVER_FAULT_TORQUE = 4,         /* motor torque missing or invalid, taken as 0 */
+    LEVER_FAULT_BASE = 8,           /* base acceleration invalid, the last one held */
+    LEVER_FAULT_GAP = 16,           /* samples were missing before this one */
+    LEVER_FAULT_COMMUNICATION = 32, /* a frame since the last sample was corrupt, repeated or out of sequence */
+    LEVER_FAULT_INNOVATION = 64,    /* innovations persistently larger than their predicted covariance */
+    LEVER_FAULT_EXCITATION = 128,   /* too little motion to learn from; parameters held at their floor of noise */
+    LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model */
+    LEVER_FAULT_RECOVERED = 512     /* an invalid factor or estimate was refused and restarted at this sample */
+};
+
+typedef struct lever_health {
+    enum lever_mode mode;
+    uint16_t faults;     /* of enum lever_fault */
+    uint32_t samples;    /* samples taken */
+    uint32_t lost;       /* samples or frames that never came */
+    uint32_t corrupt;    /* frames with a wrong CRC or length, samples with a value that is not finite */
+    uint32_t late;       /* samples or frames that came twice, out of order or too late */
+    uint32_t recoveries; /* times that the filter was restarted */
+    float excitation;    /* rms of theta_dot over excitation_time [rad/s] */
+    float dither;        /* identification torque asked of the motor for the next sample [N m] */
+} lever_health_t;
+
+void lever_health(const lever_t *lever, lever_health_t *health);
+
+/* --- CAN ------------------------------------------------------------------------------------------------------- */
+
+/* A classic CAN frame with an 11-bit identifier; the messages are in firmware/can/lever.dbc. */
+typedef struct lever_frame {
+    uint32_t id;
+    uint8_t length;
+    uint8_t data[8];
+} lever_frame_t;
+
+enum lever_frame_result {
+    LEVER_FRAME_IGNORED = 0, /* not for us */
+    LEVER_FRAME_TAKEN = 1,   /* ours, and more is needed */
+    LEVER_FRAME_SAMPLE = 2,  /* completed a sample: call lever_step() now */
+    LEVER_FRAME_REFUSED = 3  /* ours, but corrupt, repeated, late or not understood; counted */
+};
+
+/* Takes a received frame. BASE_SAMPLE completes the sample of its counter, with or without its LEVER_SAMPLE, so send
+ * LEVER_SAMPLE first. */
+enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *frame);
+
+/* lever_update() with the sample that lever_on_frame() has completed; without one it does nothing. Returns the mode. */
+enum lever_mode lever_step(lever_t *lever);
+
+/* The next frame to send; false when there is none left. MOTOR_COMMAND comes first. Every step ends with one
+ * STATE_ESTIMATE, so who has received that has everything the step gives. Frames not fetched before the next step are
+ * replaced by newer ones. */
+bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
