@@ -1,0 +1,162 @@
+#define _GNU_SOURCE /* getopt_long */
+
+#include "port/linux/options.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <stdio.h>
+#include <string.h>
+
+#ifndef LEVER_VERSION
+#define LEVER_VERSION "(unversioned build)"
+#endif
+
+static const char help[] =
+    "lever_can: estimates a pilot's mass, damping and stiffness on the collective lever, on a CAN interface.\n"
+    "\n"
+    "usage: lever_can --can INTERFACE [option]...\n"
+    "\n"
+    "It receives LEVER_SAMPLE (0x110), BASE_SAMPLE (0x111) and COMMAND (0x120), and answers each pair of samples with\n"
+    "estimates, the last of which is STATE_ESTIMATE (0x210). All messages are in firmware/can/lever.dbc.\n"
+    "\n"
+    "  --can INTERFACE      SocketCAN interface, for instance can0 or vcan0; it must be up\n"
+    "  --settings FILE      read settings from FILE: one `name = value` a line, # starts a comment\n"
+    "  --set NAME=VALUE     set one of the settings below; may be repeated\n"
+    "  --model NAME         the same as --set model=NAME, and so for\n"
+    "  --preload NAME       where the springs rest: fixed, or at a trim angle that is followed\n"
+    "  --estimator NAME     how state and parameters are estimated together\n"
+    "  --adaptation NAME    how the parameter noise is set\n"
+    "  --verbose            also print all settings, and every change of mode\n"
+    "  --help, --version    print this, or the version, and exit\n"
+    "\n"
+    "Options take effect in the order given. SIGINT (Ctrl-C) or SIGTERM ends it with a line of totals and status 0.\n"
+    "If the interface goes down or away it waits for it and goes on with the estimate as it was.\n"
+    "Exit status 1: the interface cannot be used; 2: the command line or a settings file is wrong.\n"
+    "\n"
+    "A session on a virtual interface:\n"
+    "\n"
+    "    sudo modprobe vcan\n"
+    "    sudo ip link add dev vcan0 type vcan && sudo ip link set vcan0 up\n"
+    "    lever_can --can vcan0 --set theta_noise=0.002 &\n"
+    "    candump -L vcan0 > session.log &             # watch or record everything on the bus\n"
+    "    lever sim steady --interface socketcan --channel vcan0\n"
+    "\n";
+
+static const struct option known[] = {
+    {"can", required_argument, NULL, 'c'},
+    {"settings", required_argument, NULL, 'f'},
+    {"set", required_argument, NULL, 's'},
+    {"model", required_argument, NULL, '='},
+    {"preload", required_argument, NULL, '='},
+    {"estimator", required_argument, NULL, '='},
+    {"adaptation", required_argument, NULL, '='},
+    {"verbose", no_argument, NULL, 'v'},
+    {"help", no_argument, NULL, 'h'},
+    {"version", no_argument, NULL, 'V'},
+    {NULL, 0, NULL, 0},
+};
+
+static bool refuse(settings_error_t *error, const char *what, const char *which)
+{
+    (void)snprintf(error->text, sizeof error->text, "%.200s%.200s", what, which);
+    return false;
+}
+
+static bool read_file(lever_config_t *config, const char *path, settings_error_t *error)
+{
+    FILE *file = fopen(path, "r");
+    bool good = false;
+
+    if (file == NULL) {
+        (void)snprintf(error->text, sizeof error->text, "%.200s: %s", path, strerror(errno));
+    } else {
+        good = settings_read(config, file, path, error);
+        (void)fclose(file);
+    }
+    return good;
+}
+
+static bool read_option(options_t *options, int option, const char *name, const char *argument, settings_error_t *error)
+{
+    bool good = true;
+
+    switch (option) {
+    case 'c':
+        options->interface = argument;
+        break;
+    case 'f':
+        good = read_file(&options->config, argument, error);
+        break;
+    case 's':
+        good = settings_assign(&options->config, argument, error);
+        break;
+    case '=':
+        good = settings_set(&options->config, name, argument, error);
+        break;
+    case 'v':
+        options->verbose = true;
+        break;
+    case 'h':
+        options->action = OPTIONS_HELP;
+        break;
+    default:
+        options->action = OPTIONS_VERSION;
+        break;
+    }
+    return good;
+}
+
+/* What must hold for the options together. */
+static bool check(const options_t *options, int rest, char *argv[], settings_error_t *error)
+{
+    const char *bad = lever_config_check(&options->config);
+
+    if (argv[rest] != NULL) {
+        return refuse(error, "no argument is expected outside the options: ", argv[rest]);
+    }
+    if (bad != NULL) {
+        return refuse(error, bad, ": does not fit the other settings");
+    }
+    if ((options->action == OPTIONS_RUN) && (options->interface == NULL)) {
+        return refuse(error, "which interface? Say --can vcan0, for instance; --help tells more", "");
+    }
+    return true;
+}
+
+bool options_read(options_t *options, int argc, char *argv[], settings_error_t *error)
+{
+    int which = 0;
+
+    (void)memset(options, 0, sizeof *options);
+    lever_config_default(&options->config);
+    opterr = 0;
+    optind = 0; /* from the start, also when called again */
+    for (int option = 0; option != -1;) {
+        option = getopt_long(argc, argv, ":", known, &which);
+        if (option == ':') {
+            return refuse(error, "a value is missing after ", argv[optind - 1]);
+        }
+        if (option == '?') {
+            return refuse(error, "unknown option (see --help): ", argv[optind - 1]);
+        }
+        if ((option != -1) && !read_option(options, option, known[which].name, optarg, error)) {
+            return false;
+        }
+    }
+    return check(options, optind, argv, error);
+}
+
+void options_print_help(void)
+{
+    lever_config_t config;
+
+    lever_config_default(&config);
+    (void)fputs(help, stdout);
+    (void)puts("Settings, with their defaults:\n");
+    settings_write(&config, stdout);
+}
+
+void options_print_version(void)
+{
+    (void)puts("lever_can " LEVER_VERSION);
+}

@@ -1,0 +1,27 @@
+/* The command line of lever_can. */
+#ifndef LEVER_PORT_OPTIONS_H
+#define LEVER_PORT_OPTIONS_H
+
+#include <stdbool.h>
+
+#include "lever_cdkf.h"
+#include "port/linux/settings.h"
+
+enum options_action { OPTIONS_RUN = 0, OPTIONS_HELP = 1, OPTIONS_VERSION = 2 };
+
+typedef struct options {
+    enum options_action action;
+    const char *interface; /* of argv */
+    bool verbose;
+    lever_config_t config; /* checked */
+} options_t;
+
+/* Reads the command line. Options take effect in the order given, so a --set after --settings has the last word.
+ * Returns false, with `error` filled in, if it cannot be followed. */
+bool options_read(options_t *options, int argc, char *argv[], settings_error_t *error);
+
+/* Writes the help, or name and version, to standard output. */
+void options_print_help(void);
+void options_print_version(void);
+
+#endif

@@ -1,0 +1,40 @@
+/* A configuration from text: from the command line, one `name=value` at a time, or from a file.
+ *
+ * Names are those of lever_settings.def, in its units, and the four choices model, preload, estimator and adaptation.
+ * A settings file has one `name = value` a line; `#` starts a comment; the last of two equal names counts:
+ *
+ *     preload = trim
+ *     theta_noise = 0.002      # rad
+ */
+#ifndef LEVER_PORT_SETTINGS_H
+#define LEVER_PORT_SETTINGS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include "lever_cdkf.h"
+
+/* What is wrong, in one line without a full stop. */
+typedef struct settings_error {
+    char text[512];
+} settings_error_t;
+
+/* Sets one setting or choice. False, with `config` untouched and `error` filled in, when it is not known, not a number
+ * or out of range. */
+bool settings_set(lever_config_t *config, const char *name, const char *value, settings_error_t *error);
+
+/* The same for a text "name = value", as in --set and in a line of a file. */
+bool settings_assign(lever_config_t *config, const char *text, settings_error_t *error);
+
+/* Reads a whole file; `path` is only for the messages, which say path:line. Stops at the first error, when `config`
+ * already has what came before. */
+bool settings_read(lever_config_t *config, FILE *file, const char *path, settings_error_t *error);
+
+/* The names that a choice ("model") can take, as "fixed, trim", in `text` of `size` bytes; false if it is no choice. */
+bool settings_choice_names(const char *choice, char *text, size_t size);
+
+/* One line for each choice and setting of `config`, in the form that settings_read() takes, with unit and meaning. */
+void settings_write(const lever_config_t *config, FILE *file);
+
+#endif

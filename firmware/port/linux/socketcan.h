@@ -1,0 +1,33 @@
+/* A transport over a SocketCAN interface: classic frames with 11-bit identifiers, through a raw socket. */
+#ifndef LEVER_PORT_SOCKETCAN_H
+#define LEVER_PORT_SOCKETCAN_H
+
+#include <net/if.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "port/linux/transport.h"
+
+typedef struct socketcan {
+    char interface[IF_NAMESIZE];
+    int socket;                  /* -1: none */
+    int stop;                    /* descriptor that becomes readable when the loop is to end; not owned */
+    uint32_t overflow;           /* received frames that the kernel had no room for, in all */
+    uint32_t overflow_of_socket; /* the part of it that the present socket has counted */
+    const char *bus_state;       /* the last condition of the bus that was reported, NULL: none */
+    void (*on_bus_state)(void *context, const char *words); /* bus-off and the like, once a change; may be NULL */
+    void *context;
+    char reason[256];
+} socketcan_t;
+
+/* Opens `interface` ("vcan0"), which must exist and be up. `stop` is a descriptor, see stop.h. Returns false when that
+ * cannot be done; socketcan->reason then says, in one line, what is wrong and what to do. */
+bool socketcan_open(socketcan_t *socketcan, const char *interface, int stop);
+
+/* Releases what open has taken; also right after a failed open. */
+void socketcan_close(socketcan_t *socketcan);
+
+/* The callbacks; the result refers to `socketcan`, which must outlive it. */
+transport_t socketcan_transport(socketcan_t *socketcan);
+
+#endif
