@@ -1,0 +1,240 @@
+/* Commands: what each changes, what it leaves alone, and that unknown ones change nothing. */
+#include "app/estimator.h"
+#include "rig.h"
+
+static lever_config_t config;
+static lever_memory_t memory;
+static lever_t *lever;
+static rig_t rig;
+
+void setUp(void)
+{
+    rig = rig_typical();
+    lever_config_default(&config);
+    lever = lever_init(&memory, &config);
+    TEST_ASSERT_NOT_NULL(lever);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 3000u));
+}
+
+void tearDown(void)
+{
+}
+
+static void assert_refused(const lever_command_t *command)
+{
+    const lever_memory_t before = memory;
+    TEST_ASSERT_FALSE(lever_command(lever, command));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
+}
+
+static void test_unknown_codes_are_refused_and_change_nothing(void)
+{
+    for (uint32_t part = 0u; part < 5u; part++) {
+        for (uint32_t code = 0u; code < 256u; code++) {
+            lever_command_t command = rig_command();
+            uint8_t *const parts[5] = {
+                &command.request, &command.model, &command.preload, &command.estimator, &command.adaptation};
+            const uint32_t known[5] = {(uint32_t)LEVER_REQUEST_RESET + 1u, (uint32_t)LEVER_MODEL_COUNT,
+                (uint32_t)LEVER_PRELOAD_COUNT, (uint32_t)LEVER_ESTIMATOR_COUNT, (uint32_t)LEVER_ADAPTATION_COUNT};
+            const bool keep = (part > 0u) && (code == (uint32_t)LEVER_KEEP);
+            *parts[part] = (uint8_t)code;
+            if ((code >= known[part]) && !keep) {
+                assert_refused(&command);
+            }
+        }
+    }
+}
+
+static void test_a_command_with_one_unknown_part_is_refused_as_a_whole(void)
+{
+    lever_command_t command = rig_command();
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+    command.dither_rms = 0.3f;
+    command.adaptation = 7u;
+    assert_refused(&command);
+}
+
+static void test_a_dither_that_is_no_amplitude_is_refused(void)
+{
+    const float bad[] = {NAN, INFINITY, -INFINITY, -0.1f};
+    for (uint32_t k = 0u; k < 4u; k++) {
+        lever_command_t command = rig_command();
+        command.dither_rms = bad[k];
+        assert_refused(&command);
+    }
+}
+
+static void test_a_command_that_keeps_everything_changes_no_estimate(void)
+{
+    lever_memory_t other_memory;
+    rig_t same = rig_typical();
+    lever_t *other = lever_init(&other_memory, &config);
+    (void)rig_run(&same, other, 3000u);
+    const lever_command_t command = rig_command();
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    (void)rig_run(&rig, lever, 1000u);
+    (void)rig_run(&same, other, 1000u);
+    rig_assert_same_estimates(lever, other);
+}
+
+static void test_choosing_what_is_chosen_already_is_no_reset(void)
+{
+    lever_command_t command = rig_command();
+    command.model = config.model;
+    command.preload = config.preload;
+    command.estimator = config.estimator;
+    command.adaptation = config.adaptation;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_health(lever).mode);
+}
+
+static void test_reset_goes_back_to_the_first_guess(void)
+{
+    rig_request(lever, LEVER_REQUEST_RESET);
+    const lever_estimate_t estimate = rig_estimate(lever);
+    TEST_ASSERT_EQUAL(LEVER_MODE_INIT, rig_health(lever).mode);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p, estimate.parameter[2]);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p * config.settings.k_p_sigma, estimate.parameter_sigma[2]);
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, rig_run(&rig, lever, 1u));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
+}
+
+static void test_after_a_reset_it_is_like_new_but_for_its_counts(void)
+{
+    lever_memory_t other_memory;
+    lever_t *other = lever_init(&other_memory, &config);
+    const uint32_t samples = rig_health(lever).samples;
+    rig_request(lever, LEVER_REQUEST_RESET);
+    rig_t same = rig;
+    (void)rig_run(&rig, lever, 2000u);
+    (void)rig_run(&same, other, 2000u);
+    rig_assert_same_estimates(lever, other);
+    TEST_ASSERT_EQUAL_UINT32(samples + 2000u, rig_health(lever).samples);
+}
+
+static void test_reset_accepts_a_time_that_starts_anew(void)
+{
+    rig_request(lever, LEVER_REQUEST_RESET);
+    rig.time_us = 0u;
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).late);
+}
+
+static void test_reset_unfreezes(void)
+{
+    rig_request(lever, LEVER_REQUEST_FREEZE);
+    (void)rig_run(&rig, lever, 1u);
+    rig_request(lever, LEVER_REQUEST_RESET);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
+}
+
+static void test_a_change_of_preload_resets(void)
+{
+    lever_command_t command = rig_command();
+    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    TEST_ASSERT_EQUAL(LEVER_MODE_INIT, rig_health(lever).mode);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p, rig_estimate(lever).parameter[2]);
+}
+
+static void test_a_changed_preload_is_the_one_that_is_used(void)
+{
+    lever_memory_t other_memory;
+    lever_command_t command = rig_command();
+    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    config.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+    lever_t *other = lever_init(&other_memory, &config);
+    rig_t same = rig;
+    (void)rig_run(&rig, lever, 2000u);
+    (void)rig_run(&same, other, 2000u);
+    rig_assert_same_estimates(lever, other);
+}
+
+static void test_freeze_and_a_change_in_one_command_start_over_frozen(void)
+{
+    lever_command_t command = rig_command();
+    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+    command.request = (uint8_t)LEVER_REQUEST_FREEZE;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 400u));
+}
+
+static void test_a_change_of_adaptation_does_not_reset(void)
+{
+    lever_command_t command = rig_command();
+    const lever_estimate_t before = rig_estimate(lever);
+    command.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_health(lever).mode);
+    const lever_estimate_t after = rig_estimate(lever);
+    TEST_ASSERT_EQUAL_MEMORY(before.parameter, after.parameter, sizeof before.parameter);
+}
+
+static void test_dither_of_keep_or_more_stays_as_it_is(void)
+{
+    lever_command_t command = rig_command();
+    command.dither_rms = 0.3f;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    (void)rig_run(&rig, lever, 2000u);
+    command.dither_rms = (float)LEVER_KEEP;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    (void)rig_run(&rig, lever, 2000u);
+    TEST_ASSERT_TRUE(rig_health(lever).dither != 0.0f);
+    command.dither_rms = 0.0f;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    (void)rig_run(&rig, lever, 1001u);
+    TEST_ASSERT_TRUE(rig_health(lever).dither == 0.0f);
+}
+
+static void test_a_chosen_adaptation_starts_its_walk_anew(void)
+{
+    estimator_t estimator;
+    lever_command_t command = rig_command();
+    estimator_init(&estimator, &config);
+    command.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
+    TEST_ASSERT_TRUE(estimator_command(&estimator, &command));
+    const float ceiling = config.settings.k_p_walk * config.settings.walk_ceiling;
+    TEST_ASSERT_EQUAL_FLOAT(ceiling * ceiling, estimator.dual.parameters.walk[2]);
+    command.adaptation = (uint8_t)LEVER_ADAPTATION_FIXED;
+    TEST_ASSERT_TRUE(estimator_command(&estimator, &command));
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p_walk * config.settings.k_p_walk, estimator.dual.parameters.walk[2]);
+}
+
+static void test_a_chosen_adaptation_is_the_one_that_is_used(void)
+{
+    lever_memory_t other_memory;
+    lever_command_t command = rig_command();
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    command.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    config.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
+    lever_t *other = lever_init(&other_memory, &config);
+    rig_t same = rig;
+    (void)rig_run(&rig, lever, 2000u);
+    (void)rig_run(&same, other, 2000u);
+    rig_assert_same_estimates(lever, other);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_unknown_codes_are_refused_and_change_nothing);
+    RUN_TEST(test_a_command_with_one_unknown_part_is_refused_as_a_whole);
+    RUN_TEST(test_a_dither_that_is_no_amplitude_is_refused);
+    RUN_TEST(test_a_command_that_keeps_everything_changes_no_estimate);
+    RUN_TEST(test_choosing_what_is_chosen_already_is_no_reset);
+    RUN_TEST(test_reset_goes_back_to_the_first_guess);
+    RUN_TEST(test_after_a_reset_it_is_like_new_but_for_its_counts);
+    RUN_TEST(test_reset_accepts_a_time_that_starts_anew);
+    RUN_TEST(test_reset_unfreezes);
+    RUN_TEST(test_a_change_of_preload_resets);
+    RUN_TEST(test_a_changed_preload_is_the_one_that_is_used);
+    RUN_TEST(test_freeze_and_a_change_in_one_command_start_over_frozen);
+    RUN_TEST(test_a_change_of_adaptation_does_not_reset);
+    RUN_TEST(test_dither_of_keep_or_more_stays_as_it_is);
+    RUN_TEST(test_a_chosen_adaptation_starts_its_walk_anew);
+    RUN_TEST(test_a_chosen_adaptation_is_the_one_that_is_used);
+    return UNITY_END();
+}

@@ -1,0 +1,166 @@
+/* Are the standard deviations honest? Many pilots, many seeds, with default settings: the error over its claimed standard
+ * deviation must have an rms of about 1, from the first second on, and the innovations be as large as predicted. */
+#include "rig.h"
+
+enum { RUNS = 40, PARAMETERS = LEVER_PARAMETERS };
+
+static lever_config_t config;
+static lever_memory_t memory;
+static lever_t *lever;
+static rig_t rig;
+
+void setUp(void)
+{
+    lever_config_default(&config);
+}
+
+void tearDown(void)
+{
+}
+
+/* Run `run` of many: a pilot from the filter's own prior, the base already moving when the first sample comes. */
+static void start(uint32_t run)
+{
+    random_source_t pilot = {1000u + (31u * run)};
+    rig = rig_typical();
+    rig.simulation.source.state = 977u * (run + 1u);
+    rig.simulation.time = 0.731 * (double)run;
+    plant_t *plant = &rig.simulation.plant;
+    plant->m_p = (double)config.settings.m_p * exp(0.3 * random_normal(&pilot));
+    plant->c_p = (double)config.settings.c_p * exp(0.4 * random_normal(&pilot));
+    plant->k_p = (double)config.settings.k_p * exp(0.4 * random_normal(&pilot));
+    plant->follows_trim = (config.preload == (uint8_t)LEVER_PRELOAD_TRIM);
+    plant->arm_preload_angle = (double)config.settings.arm_preload_angle;
+    for (uint32_t k = 0u; k < 2000u; k++) {
+        simulation_advance(&rig.simulation, 1.0e-3);
+    }
+    lever = lever_init(&memory, &config);
+    TEST_ASSERT_NOT_NULL(lever);
+}
+
+/* Sum over the parameters of (ln error / relative standard deviation)^2. */
+static double squared_error_in_sigmas(void)
+{
+    const double truth[PARAMETERS] = {rig.simulation.plant.m_p, rig.simulation.plant.c_p, rig.simulation.plant.k_p};
+    const lever_estimate_t estimate = rig_estimate(lever);
+    double sum = 0.0;
+    for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
+        const double relative = (double)estimate.parameter_sigma[i] / (double)estimate.parameter[i];
+        const double error = log((double)estimate.parameter[i] / truth[i]) / relative;
+        sum += error * error;
+    }
+    return sum;
+}
+
+/* Rms error in standard deviations at 0.5, 1, 2, 5 and 10 s must be below 1.4 (1 expected; too small is no harm). */
+static void assert_honest(void)
+{
+    const uint32_t samples[5] = {500u, 500u, 1000u, 3000u, 5000u};
+    double sum[5] = {0.0};
+    for (uint32_t run = 0u; run < RUNS; run++) {
+        start(run);
+        for (uint32_t t = 0u; t < 5u; t++) {
+            (void)rig_run(&rig, lever, samples[t]);
+            sum[t] += squared_error_in_sigmas();
+        }
+    }
+    for (uint32_t t = 0u; t < 5u; t++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1.4, 0.0, sqrt(sum[t] / (double)(RUNS * PARAMETERS)));
+    }
+}
+
+static void test_standard_deviations_are_honest_with_preload_trim(void)
+{
+    assert_honest();
+}
+
+static void test_standard_deviations_are_honest_with_preload_fixed(void)
+{
+    config.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+    config.settings.arm_preload_angle = 0.4f;
+    assert_honest();
+}
+
+static void test_standard_deviations_are_honest_with_a_fixed_walk(void)
+{
+    config.adaptation = (uint8_t)LEVER_ADAPTATION_FIXED;
+    assert_honest();
+}
+
+static void test_standard_deviations_are_honest_at_five_hundred_samples_a_second(void)
+{
+    config.settings.sample_period = 2.0e-3f;
+    double sum = 0.0;
+    for (uint32_t run = 0u; run < RUNS; run++) {
+        start(run);
+        for (uint32_t k = 0u; k < 2500u; k++) {
+            const lever_sample_t sample = rig_sample_after(&rig, 2u);
+            (void)lever_update(lever, &sample);
+        }
+        TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).lost);
+        sum += squared_error_in_sigmas();
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1.4, 0.0, sqrt(sum / (double)(RUNS * PARAMETERS)));
+}
+
+static void test_innovations_are_as_large_as_predicted(void)
+{
+    double sum = 0.0;
+    start(0u);
+    (void)rig_run(&rig, lever, 5000u);
+    for (uint32_t k = 0u; k < 50000u; k++) {
+        (void)rig_run(&rig, lever, 1u);
+        sum += (double)rig_estimate(lever).nis;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 2.0, sum / 50000.0);
+}
+
+static void test_state_sigma_is_honest(void)
+{
+    double sum[2] = {0.0, 0.0};
+    start(0u);
+    (void)rig_run(&rig, lever, 5000u);
+    for (uint32_t k = 0u; k < 50000u; k++) {
+        (void)rig_run(&rig, lever, 1u);
+        const lever_estimate_t estimate = rig_estimate(lever);
+        const double theta = ((double)estimate.theta - rig.simulation.plant.theta) / (double)estimate.theta_sigma;
+        const double rate =
+            ((double)estimate.theta_dot - rig.simulation.plant.theta_dot) / (double)estimate.theta_dot_sigma;
+        sum[0] += theta * theta;
+        sum[1] += rate * rate;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1.5, 0.0, sqrt(sum[0] / 50000.0)); /* that of the trim level is not in theta's */
+    TEST_ASSERT_DOUBLE_WITHIN(1.2, 0.0, sqrt(sum[1] / 50000.0));
+}
+
+/* Natural frequency and damping ratio with their own standard deviations, over pilots. */
+static void test_dynamics_and_their_sigma_are_honest(void)
+{
+    double sum[2] = {0.0, 0.0};
+    for (uint32_t run = 0u; run < RUNS; run++) {
+        start(run);
+        (void)rig_run(&rig, lever, 8000u);
+        const lever_estimate_t estimate = rig_estimate(lever);
+        const double frequency = ((double)estimate.natural_frequency - plant_natural_frequency(&rig.simulation.plant)) /
+                                 (double)estimate.natural_frequency_sigma;
+        const double ratio = ((double)estimate.damping_ratio - plant_damping_ratio(&rig.simulation.plant)) /
+                             (double)estimate.damping_ratio_sigma;
+        sum[0] += frequency * frequency;
+        sum[1] += ratio * ratio;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1.4, 0.0, sqrt(sum[0] / (double)RUNS));
+    TEST_ASSERT_DOUBLE_WITHIN(1.4, 0.0, sqrt(sum[1] / (double)RUNS));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_standard_deviations_are_honest_with_preload_trim);
+    RUN_TEST(test_standard_deviations_are_honest_with_preload_fixed);
+    RUN_TEST(test_standard_deviations_are_honest_with_a_fixed_walk);
+    RUN_TEST(test_standard_deviations_are_honest_at_five_hundred_samples_a_second);
+    RUN_TEST(test_innovations_are_as_large_as_predicted);
+    RUN_TEST(test_state_sigma_is_honest);
+    RUN_TEST(test_dynamics_and_their_sigma_are_honest);
+    return UNITY_END();
+}

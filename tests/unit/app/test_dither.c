@@ -1,0 +1,264 @@
+/* The identification torque: off by default, of the rms that is asked, inside its band and its limit, faded in and out. */
+#include "app/dither.h"
+
+#include "rig.h"
+
+#define PERIOD 1.0e-3f
+
+static dither_t dither;
+
+static void start(double low, double high, double period, double limit, double fade)
+{
+    dither_init(&dither, (float)low, (float)high, (float)period, (float)limit, (float)fade);
+}
+
+void setUp(void)
+{
+    start(1.0, 10.0, (double)PERIOD, 1.5, 1.0);
+}
+
+void tearDown(void)
+{
+}
+
+static void step(uint32_t count)
+{
+    for (uint32_t k = 0u; k < count; k++) {
+        dither_step(&dither, PERIOD);
+    }
+}
+
+/* Rms of the torque over the next samples; each must be finite and within the limit. */
+static double rms_over(uint32_t count, float period)
+{
+    double square = 0.0;
+    for (uint32_t k = 0u; k < count; k++) {
+        dither_step(&dither, period);
+        TEST_ASSERT_TRUE(fabsf(dither.torque) <= dither.limit);
+        square += (double)dither.torque * (double)dither.torque;
+    }
+    return sqrt(square / (double)count);
+}
+
+/* --- off and on ---------------------------------------------------------------------------------------------------- */
+
+static void test_is_off_until_it_is_asked_for(void)
+{
+    TEST_ASSERT_FALSE(dither_is_on(&dither));
+    TEST_ASSERT_TRUE(rms_over(5000u, PERIOD) == 0.0);
+    TEST_ASSERT_FALSE(dither_is_on(&dither));
+}
+
+static void test_has_the_rms_that_is_asked(void)
+{
+    dither_set(&dither, 0.3f);
+    step(2000u);
+    TEST_ASSERT_TRUE(dither_is_on(&dither));
+    TEST_ASSERT_DOUBLE_WITHIN(0.03 * 0.3, 0.3, rms_over(500000u, PERIOD)); /* 0.75 % its standard deviation */
+}
+
+static void test_has_no_mean(void)
+{
+    double sum = 0.0;
+    dither_set(&dither, 0.3f);
+    step(2000u);
+    for (uint32_t k = 0u; k < 200000u; k++) {
+        step(1u);
+        sum += (double)dither.torque;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.0, sum / 200000.0);
+}
+
+static void test_is_the_same_in_every_run(void)
+{
+    dither_t first;
+    dither_set(&dither, 0.3f);
+    step(3000u);
+    first = dither;
+    setUp();
+    dither_set(&dither, 0.3f);
+    step(3000u);
+    TEST_ASSERT_TRUE(first.torque == dither.torque);
+}
+
+static float limit_of(const char *name, bool greatest)
+{
+    const lever_setting_t *row = lever_setting(0u);
+    for (uint32_t i = 0u; strcmp(row->name, name) != 0; i++) {
+        row = lever_setting(i);
+        TEST_ASSERT_NOT_NULL_MESSAGE(row, name);
+    }
+    return greatest ? row->greatest : row->least;
+}
+
+/* Every corner of what the settings allow; a band of 1 Hz needs some hundred seconds to show its rms within 15 %. */
+static void test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow(void)
+{
+    for (uint32_t corner = 0u; corner < 8u; corner++) {
+        const float low = limit_of("dither_low", (corner & 1u) != 0u);
+        const float high = limit_of("dither_high", (corner & 2u) != 0u);
+        const float period = limit_of("sample_period", (corner & 4u) != 0u);
+        start((double)low, (double)high, (double)period, 20.0, 0.0);
+        dither_set(&dither, 0.3f);
+        (void)rms_over(200000u, period);
+        TEST_ASSERT_DOUBLE_WITHIN(0.15 * 0.3, 0.3, rms_over(2000000u, period));
+    }
+}
+
+/* --- limit --------------------------------------------------------------------------------------------------------- */
+
+static void test_never_exceeds_its_limit_though_asked_for_more(void)
+{
+    float greatest = 0.0f;
+    dither_set(&dither, 100.0f);
+    for (uint32_t k = 0u; k < 100000u; k++) {
+        step(1u);
+        greatest = (fabsf(dither.torque) > greatest) ? fabsf(dither.torque) : greatest;
+    }
+    TEST_ASSERT_TRUE(greatest == 1.5f); /* of both signs, as the mean shows */
+    TEST_ASSERT_TRUE(dither.level == 1.5f);
+}
+
+static void test_a_limit_of_zero_is_off(void)
+{
+    start(1.0, 10.0, (double)PERIOD, 0.0, 1.0);
+    dither_set(&dither, 0.3f);
+    TEST_ASSERT_TRUE(rms_over(5000u, PERIOD) == 0.0);
+    TEST_ASSERT_FALSE(dither_is_on(&dither));
+}
+
+/* --- fades --------------------------------------------------------------------------------------------------------- */
+
+static void test_fades_in_linearly_over_its_time(void)
+{
+    dither_set(&dither, 0.4f);
+    step(250u);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.1, (double)dither.level);
+    step(500u);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.3, (double)dither.level);
+    step(251u);
+    TEST_ASSERT_TRUE(dither.level == 0.4f);
+}
+
+static void test_fading_in_starts_with_less_torque_than_it_ends_with(void)
+{
+    dither_set(&dither, 0.4f);
+    const double beginning = rms_over(200u, PERIOD);
+    step(1000u);
+    TEST_ASSERT_TRUE(beginning < 0.3 * rms_over(20000u, PERIOD));
+}
+
+static void test_fades_out_over_its_time_and_is_off(void)
+{
+    dither_set(&dither, 0.4f);
+    step(2000u);
+    dither_set(&dither, 0.0f);
+    step(500u);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.2, (double)dither.level);
+    TEST_ASSERT_TRUE(dither_is_on(&dither));
+    step(502u);
+    TEST_ASSERT_FALSE(dither_is_on(&dither));
+    TEST_ASSERT_TRUE(rms_over(1000u, PERIOD) == 0.0);
+}
+
+static void test_a_change_takes_the_whole_fade_time_however_small(void)
+{
+    dither_set(&dither, 0.4f);
+    step(2000u);
+    dither_set(&dither, 0.3f);
+    step(500u);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.35, (double)dither.level);
+}
+
+static void test_without_a_fade_time_it_is_there_at_once(void)
+{
+    start(1.0, 10.0, (double)PERIOD, 1.5, 0.0);
+    dither_set(&dither, 0.4f);
+    step(1u);
+    TEST_ASSERT_TRUE(dither.level == 0.4f);
+}
+
+/* --- spectrum ------------------------------------------------------------------------------------------------------ */
+
+enum { SEGMENT = 10000, SEGMENTS = 200, FREQUENCIES = 8 };
+
+/* Mean power of the torque at each frequency [Hz], by a Fourier sum with Hann's window over segments of 10 s. */
+static void spectrum(const double frequency[FREQUENCIES], double power[FREQUENCIES])
+{
+    for (uint32_t s = 0u; s < SEGMENTS; s++) {
+        double real[FREQUENCIES] = {0.0};
+        double imaginary[FREQUENCIES] = {0.0};
+        for (uint32_t k = 0u; k < SEGMENT; k++) {
+            const double turn = 6.283185307179586 * (double)k / (double)SEGMENT;
+            step(1u);
+            const double value = (1.0 - cos(turn)) * (double)dither.torque;
+            for (uint32_t f = 0u; f < FREQUENCIES; f++) {
+                real[f] += value * cos(turn * 10.0 * frequency[f]);
+                imaginary[f] += value * sin(turn * 10.0 * frequency[f]);
+            }
+        }
+        for (uint32_t f = 0u; f < FREQUENCIES; f++) {
+            power[f] += ((real[f] * real[f]) + (imaginary[f] * imaginary[f])) / (double)SEGMENTS;
+        }
+    }
+}
+
+static void test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyond(void)
+{
+    const double frequency[FREQUENCIES] = {3.2, 2.5, 5.0, 1.0, 10.0, 0.1, 100.0, 300.0};
+    double power[FREQUENCIES] = {0.0};
+    start(1.0, 10.0, (double)PERIOD, 20.0, 0.0);
+    dither_set(&dither, 0.3f);
+    step(5000u);
+    spectrum(frequency, power);
+    TEST_ASSERT_DOUBLE_WITHIN(0.25, 1.0, power[1] / power[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.25, 1.0, power[2] / power[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.15, 0.5, power[3] / power[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.15, 0.5, power[4] / power[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.0, power[5] / power[0]); /* 40 dB a decade: 1e-4 expected */
+    TEST_ASSERT_DOUBLE_WITHIN(2.0e-4, 0.0, power[6] / power[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, 0.0, power[7] / power[0]);
+}
+
+/* --- in the estimator ---------------------------------------------------------------------------------------------- */
+
+static void test_a_command_fades_it_in_and_health_tells_the_torque(void)
+{
+    lever_memory_t memory;
+    lever_config_t config;
+    rig_t rig = rig_typical();
+    lever_config_default(&config);
+    lever_t *lever = lever_init(&memory, &config);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 400u));
+    TEST_ASSERT_TRUE(rig_health(lever).dither == 0.0f);
+    lever_command_t command = rig_command();
+    command.dither_rms = 0.3f;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    (void)rig_run(&rig, lever, 2000u);
+    double square = 0.0;
+    for (uint32_t k = 0u; k < 60000u; k++) {
+        (void)rig_run(&rig, lever, 1u);
+        square += (double)rig_health(lever).dither * (double)rig_health(lever).dither;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * 0.3, 0.3, sqrt(square / 60000.0));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_is_off_until_it_is_asked_for);
+    RUN_TEST(test_has_the_rms_that_is_asked);
+    RUN_TEST(test_has_no_mean);
+    RUN_TEST(test_is_the_same_in_every_run);
+    RUN_TEST(test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow);
+    RUN_TEST(test_never_exceeds_its_limit_though_asked_for_more);
+    RUN_TEST(test_a_limit_of_zero_is_off);
+    RUN_TEST(test_fades_in_linearly_over_its_time);
+    RUN_TEST(test_fading_in_starts_with_less_torque_than_it_ends_with);
+    RUN_TEST(test_fades_out_over_its_time_and_is_off);
+    RUN_TEST(test_a_change_takes_the_whole_fade_time_however_small);
+    RUN_TEST(test_without_a_fade_time_it_is_there_at_once);
+    RUN_TEST(test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyond);
+    RUN_TEST(test_a_command_fades_it_in_and_health_tells_the_torque);
+    return UNITY_END();
+}

@@ -1,0 +1,326 @@
+/* Received frames: pairing by counter, frames that are lost, corrupt, repeated, out of order or not for us; commands. */
+#include "frames.h"
+
+static lever_memory_t memory;
+static lever_t *lever;
+static sender_t sender;
+
+void setUp(void)
+{
+    lever_config_t config;
+    lever_config_default(&config);
+    lever = lever_init(&memory, &config);
+    sender = sender_typical();
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_run(&sender, lever, 400u));
+}
+
+void tearDown(void)
+{
+}
+
+static uint16_t faults(void)
+{
+    return rig_health(lever).faults;
+}
+
+static void assert_counts(uint32_t lost, uint32_t corrupt, uint32_t late)
+{
+    const lever_health_t health = rig_health(lever);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(lost, health.lost, "lost");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(corrupt, health.corrupt, "corrupt");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(late, health.late, "late");
+}
+
+/* --- pairing ------------------------------------------------------------------------------------------------------- */
+
+static void test_a_pair_is_a_sample_without_fault(void)
+{
+    (void)sender_run(&sender, lever, 3000u);
+    TEST_ASSERT_EQUAL_UINT16(0u, faults());
+    assert_counts(0u, 0u, 0u);
+    TEST_ASSERT_EQUAL_UINT32(3400u, rig_health(lever).samples);
+}
+
+static void test_estimates_over_can_are_those_of_the_decoded_samples(void)
+{
+    lever_memory_t other_memory;
+    lever_config_t config;
+    lever_config_default(&config);
+    lever_t *other = lever_init(&other_memory, &config);
+    setUp();
+    sender = sender_typical();
+    lever = lever_init(&memory, &config);
+    for (uint32_t k = 0u; k < 2000u; k++) {
+        message_lever_sample_t decoded;
+        message_base_sample_t base;
+        (void)sender_deliver(&sender, lever);
+        TEST_ASSERT_TRUE(message_lever_sample_decode(&decoded, &sender.lever));
+        TEST_ASSERT_TRUE(message_base_sample_decode(&base, &sender.base));
+        lever_sample_t sample = sender.sample;
+        sample.theta = decoded.theta;
+        sample.theta_dot = decoded.theta_dot;
+        sample.tau_m = decoded.tau_m;
+        sample.z_ddot = base.z_ddot;
+        (void)lever_update(other, &sample);
+        rig_assert_same_estimates(lever, other);
+    }
+}
+
+static void test_a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost(void)
+{
+    sender_next(&sender);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &sender.base));
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
+    const uint16_t missing =
+        (uint16_t)LEVER_FAULT_THETA | (uint16_t)LEVER_FAULT_THETA_DOT | (uint16_t)LEVER_FAULT_TORQUE;
+    TEST_ASSERT_EQUAL_UINT16(missing, faults() & missing);
+    assert_counts(1u, 0u, 0u);
+}
+
+static void test_a_lever_sample_of_another_counter_is_not_paired(void)
+{
+    sender_next(&sender);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &sender.lever));
+    sender_next(&sender);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &sender.base));
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
+    assert_counts(2u, 0u, 0u); /* this lever sample, and a sample by time */
+}
+
+static void test_a_lever_sample_serves_one_base_sample_only(void)
+{
+    (void)sender_run(&sender, lever, 1u);
+    for (uint32_t k = 0u; k < 16u; k++) { /* until the counter comes round again */
+        sender_next(&sender);
+        (void)lever_on_frame(lever, &sender.base);
+        TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
+    }
+    assert_counts(16u, 0u, 0u);
+}
+
+static void test_a_lever_sample_that_comes_after_its_base_sample_is_not_used(void)
+{
+    sender_next(&sender);
+    (void)lever_on_frame(lever, &sender.base);
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &sender.lever));
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever)); /* nothing to step with */
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
+}
+
+static void test_step_without_a_sample_does_nothing(void)
+{
+    lever_frame_t frames[FRAMES_MOST];
+    (void)fetch_all(lever, frames);
+    const lever_memory_t before = memory;
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
+    TEST_ASSERT_EQUAL_UINT32(0u, fetch_all(lever, frames));
+}
+
+static void test_validity_bits_are_those_of_each_value(void)
+{
+    const uint16_t fault[4] = {(uint16_t)LEVER_FAULT_THETA, (uint16_t)LEVER_FAULT_THETA_DOT,
+        (uint16_t)LEVER_FAULT_TORQUE, (uint16_t)LEVER_FAULT_BASE};
+    (void)sender_run(&sender, lever, 3000u);
+    for (uint32_t which = 0u; which < 4u; which++) {
+        sender_next(&sender);
+        const uint8_t bit = (uint8_t)(0x10u << ((which < 3u) ? which : 0u));
+        lever_frame_t *const frame = (which < 3u) ? &sender.lever : &sender.base;
+        frame->data[1] &= (uint8_t)(0xFFu - bit);
+        e2e_protect(frame, (uint8_t)((which < 3u) ? 1u : 17u), e2e_counter(frame));
+        (void)lever_on_frame(lever, &sender.lever);
+        (void)lever_on_frame(lever, &sender.base);
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
+        TEST_ASSERT_EQUAL_UINT16(fault[which], faults());
+    }
+}
+
+/* --- lost ---------------------------------------------------------------------------------------------------------- */
+
+static void test_lost_pairs_are_counted_by_time(void)
+{
+    sender_next(&sender);
+    sender_next(&sender);
+    sender_next(&sender);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
+    assert_counts(3u, 0u, 0u);
+    TEST_ASSERT_TRUE((faults() & (uint16_t)LEVER_FAULT_GAP) != 0u);
+}
+
+/* An outage may end at any counter: those that look like a repetition or a step back cost a few frames more. */
+static void test_after_an_outage_of_any_length_samples_are_taken_again_within_three(void)
+{
+    for (uint32_t outage = 1u; outage < 70u; outage++) {
+        setUp();
+        for (uint32_t k = 0u; k < outage; k++) {
+            sender_next(&sender);
+        }
+        enum lever_frame_result result = LEVER_FRAME_REFUSED;
+        for (uint32_t k = 0u; (k < 3u) && (result != LEVER_FRAME_SAMPLE); k++) {
+            sender_next(&sender);
+            (void)lever_on_frame(lever, &sender.lever);
+            result = lever_on_frame(lever, &sender.base);
+        }
+        TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, result);
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
+    }
+}
+
+/* --- corrupt and repeated ------------------------------------------------------------------------------------------ */
+
+static void test_every_single_bit_error_is_refused_counted_and_said(void)
+{
+    sender_next(&sender);
+    for (uint32_t bit = 0u; bit < 64u; bit++) {
+        lever_frame_t damaged = sender.lever;
+        damaged.data[bit / 8u] ^= (uint8_t)(1u << (bit % 8u));
+        TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &damaged));
+        damaged = sender.base;
+        damaged.data[bit / 8u] ^= (uint8_t)(1u << (bit % 8u));
+        TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &damaged));
+    }
+    assert_counts(0u, 128u, 0u);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &sender.lever));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &sender.base));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
+    TEST_ASSERT_TRUE((faults() & (uint16_t)LEVER_FAULT_COMMUNICATION) != 0u);
+    (void)sender_deliver(&sender, lever);
+    TEST_ASSERT_EQUAL_UINT16(0u, faults() & (uint16_t)LEVER_FAULT_COMMUNICATION);
+}
+
+static void test_a_wrong_length_is_corrupt(void)
+{
+    sender_next(&sender);
+    sender.lever.length = 7u;
+    sender.base.length = 0u;
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.lever));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.base));
+    assert_counts(0u, 2u, 0u);
+}
+
+static void test_a_repeated_pair_is_refused_as_late(void)
+{
+    (void)sender_deliver(&sender, lever);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.lever));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.base));
+    assert_counts(0u, 0u, 2u);
+}
+
+static void test_a_pair_that_was_overtaken_is_refused_as_late(void)
+{
+    sender_next(&sender);
+    const sender_t overtaken = sender;
+    (void)sender_deliver(&sender, lever);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &overtaken.lever));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &overtaken.base));
+    assert_counts(1u, 0u, 2u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
+}
+
+static void test_a_frame_under_the_identifier_of_the_other_is_corrupt(void)
+{
+    sender_next(&sender);
+    sender.lever.id = (uint32_t)MESSAGE_BASE_SAMPLE_ID;
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.lever));
+    assert_counts(0u, 1u, 0u);
+}
+
+static void test_foreign_frames_are_ignored_without_a_trace(void)
+{
+    const lever_memory_t before = memory;
+    for (uint32_t id = 0u; id <= 0x7FFu; id++) {
+        const lever_frame_t frame = {.id = id, .length = 8u};
+        if ((id != (uint32_t)MESSAGE_LEVER_SAMPLE_ID) && (id != (uint32_t)MESSAGE_BASE_SAMPLE_ID) &&
+            (id != (uint32_t)MESSAGE_COMMAND_ID)) {
+            TEST_ASSERT_EQUAL(LEVER_FRAME_IGNORED, lever_on_frame(lever, &frame));
+        }
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
+}
+
+/* --- commands ------------------------------------------------------------------------------------------------------ */
+
+static enum lever_frame_result send_command(const lever_command_t *command)
+{
+    const lever_frame_t frame = sender_command(&sender, command);
+    return lever_on_frame(lever, &frame);
+}
+
+static void test_a_command_is_carried_out_before_the_next_sample(void)
+{
+    lever_command_t command = rig_command();
+    command.request = (uint8_t)LEVER_REQUEST_FREEZE;
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, send_command(&command));
+    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, sender_deliver(&sender, lever));
+}
+
+static void test_an_unknown_command_is_refused_said_and_changes_nothing(void)
+{
+    lever_command_t command = rig_command();
+    command.request = 9u;
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, send_command(&command));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
+    TEST_ASSERT_TRUE((faults() & (uint16_t)LEVER_FAULT_COMMUNICATION) != 0u);
+}
+
+static void test_commands_are_taken_whatever_their_counter(void)
+{
+    const uint8_t counters[] = {3u, 3u, 2u, 9u, 8u, 0u};
+    lever_command_t command = rig_command();
+    command.request = (uint8_t)LEVER_REQUEST_RUN;
+    for (uint32_t k = 0u; k < 6u; k++) {
+        sender.command_counter = counters[k];
+        TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, send_command(&command));
+    }
+    assert_counts(0u, 0u, 0u);
+}
+
+static void test_a_damaged_command_is_refused_as_corrupt(void)
+{
+    lever_command_t command = rig_command();
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    lever_frame_t frame = sender_command(&sender, &command);
+    frame.data[2] ^= 1u;
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &frame));
+    assert_counts(0u, 1u, 0u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_health(lever).mode);
+}
+
+static void test_after_a_reset_a_sender_may_start_anew_with_any_counter_and_time(void)
+{
+    lever_command_t command = rig_command();
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, send_command(&command));
+    sender.counter = (uint8_t)((sender.counter + 15u) & 15u); /* the last one again */
+    sender.rig.time_us = 0u;
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_run(&sender, lever, 310u));
+    assert_counts(0u, 0u, 0u);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_a_pair_is_a_sample_without_fault);
+    RUN_TEST(test_estimates_over_can_are_those_of_the_decoded_samples);
+    RUN_TEST(test_a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost);
+    RUN_TEST(test_a_lever_sample_of_another_counter_is_not_paired);
+    RUN_TEST(test_a_lever_sample_serves_one_base_sample_only);
+    RUN_TEST(test_a_lever_sample_that_comes_after_its_base_sample_is_not_used);
+    RUN_TEST(test_step_without_a_sample_does_nothing);
+    RUN_TEST(test_validity_bits_are_those_of_each_value);
+    RUN_TEST(test_lost_pairs_are_counted_by_time);
+    RUN_TEST(test_after_an_outage_of_any_length_samples_are_taken_again_within_three);
+    RUN_TEST(test_every_single_bit_error_is_refused_counted_and_said);
+    RUN_TEST(test_a_wrong_length_is_corrupt);
+    RUN_TEST(test_a_repeated_pair_is_refused_as_late);
+    RUN_TEST(test_a_pair_that_was_overtaken_is_refused_as_late);
+    RUN_TEST(test_a_frame_under_the_identifier_of_the_other_is_corrupt);
+    RUN_TEST(test_foreign_frames_are_ignored_without_a_trace);
+    RUN_TEST(test_a_command_is_carried_out_before_the_next_sample);
+    RUN_TEST(test_an_unknown_command_is_refused_said_and_changes_nothing);
+    RUN_TEST(test_commands_are_taken_whatever_their_counter);
+    RUN_TEST(test_a_damaged_command_is_refused_as_corrupt);
+    RUN_TEST(test_after_a_reset_a_sender_may_start_anew_with_any_counter_and_time);
+    return UNITY_END();
+}

@@ -1,0 +1,301 @@
+/* Modes: init, align, run, coast, frozen, and what leads from one to the other (fault: test_recovery.c). */
+#include "model/model.h"
+#include "rig.h"
+
+static lever_config_t config;
+static lever_memory_t memory;
+static lever_t *lever;
+static rig_t rig;
+
+static void start(void)
+{
+    rig = rig_typical();
+    lever = lever_init(&memory, &config);
+    TEST_ASSERT_NOT_NULL(lever);
+}
+
+void setUp(void)
+{
+    lever_config_default(&config);
+    start();
+}
+
+void tearDown(void)
+{
+}
+
+/* Through alignment and on for as many samples. */
+static void run_for(uint32_t samples)
+{
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u + samples));
+}
+
+/* Error of each parameter over the standard deviation that the estimate claims. */
+static void assert_parameters_within(double sigmas)
+{
+    const double truth[3] = {rig.simulation.plant.m_p, rig.simulation.plant.c_p, rig.simulation.plant.k_p};
+    const lever_estimate_t estimate = rig_estimate(lever);
+    for (uint32_t i = 0u; i < 3u; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(
+            sigmas * (double)estimate.parameter_sigma[i], truth[i], (double)estimate.parameter[i]);
+    }
+}
+
+/* --- init and align ------------------------------------------------------------------------------------------------ */
+
+static void test_starts_in_init_at_the_first_guess(void)
+{
+    const lever_health_t health = rig_health(lever);
+    const lever_estimate_t estimate = rig_estimate(lever);
+    TEST_ASSERT_EQUAL(LEVER_MODE_INIT, health.mode);
+    TEST_ASSERT_EQUAL_UINT32(0u, health.samples);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.m_p, estimate.parameter[0]);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.m_p * config.settings.m_p_sigma, estimate.parameter_sigma[0]);
+}
+
+static void test_aligns_for_align_time_and_then_runs(void)
+{
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, rig_run(&rig, lever, 300u)); /* 0.299 s after the first sample */
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 2u));
+}
+
+static void test_without_align_time_it_runs_from_the_first_sample(void)
+{
+    config.settings.align_time = 0.0f;
+    start();
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1u));
+}
+
+static void test_while_aligning_the_parameters_are_the_first_guess(void)
+{
+    (void)rig_run(&rig, lever, 300u);
+    const lever_estimate_t estimate = rig_estimate(lever);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p, estimate.parameter[2]);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p * config.settings.k_p_sigma, estimate.parameter_sigma[2]);
+}
+
+static void test_trim_after_alignment_is_the_mean_angle(void)
+{
+    double sum = 0.0;
+    for (uint32_t k = 0u; k < 300u; k++) {
+        const lever_sample_t sample = rig_sample(&rig);
+        sum += (double)sample.theta;
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, sum / 300.0, (double)rig_estimate(lever).trim);
+}
+
+static void test_alignment_waits_for_a_valid_theta(void)
+{
+    (void)rig_run(&rig, lever, 100u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, rig_run_blind(&rig, lever, 1000u));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1u));
+}
+
+static void test_alignment_leaves_samples_without_theta_out_of_the_mean(void)
+{
+    lever_sample_t sample = rig_sample(&rig);
+    sample.theta = 0.2f;
+    (void)lever_update(lever, &sample);
+    sample.time_us += 1000u;
+    sample.theta = NAN;
+    sample.theta_valid = false;
+    (void)lever_update(lever, &sample);
+    sample.time_us += 1000u;
+    sample.theta = 0.4f;
+    sample.theta_valid = true;
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, 0.3, (double)rig_estimate(lever).trim);
+}
+
+static void test_a_rate_that_was_never_measured_is_unknown(void)
+{
+    for (uint32_t k = 0u; k < 302u; k++) {
+        lever_sample_t sample = rig_sample(&rig);
+        sample.theta_dot_valid = false;
+        (void)lever_update(lever, &sample);
+        const lever_estimate_t estimate = rig_estimate(lever);
+        TEST_ASSERT_DOUBLE_WITHIN(
+            4.0 * (double)estimate.theta_dot_sigma, rig.simulation.plant.theta_dot, (double)estimate.theta_dot);
+    }
+}
+
+/* A re-trim by 0.1 rad in two seconds: the trim follows, and the parameters take little notice. */
+static void test_trim_follows_a_retrim(void)
+{
+    run_for(20000u);
+    for (uint32_t k = 0u; k < 2000u; k++) {
+        rig.simulation.plant.trim += 0.05e-3;
+        (void)rig_run(&rig, lever, 1u);
+    }
+    (void)rig_run(&rig, lever, 1000u);
+    const lever_estimate_t estimate = rig_estimate(lever);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, rig.simulation.plant.trim, (double)estimate.trim);
+    TEST_ASSERT_DOUBLE_WITHIN(4.0 * (double)estimate.theta_sigma, rig.simulation.plant.theta, (double)estimate.theta);
+    assert_parameters_within(4.0);
+}
+
+/* --- coast --------------------------------------------------------------------------------------------------------- */
+
+static void test_without_theta_and_theta_dot_it_coasts_and_then_runs_again(void)
+{
+    run_for(0u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, rig_run_blind(&rig, lever, 1u));
+    TEST_ASSERT_EQUAL_UINT8(0u, rig_estimate(lever).nis_size);
+    TEST_ASSERT_TRUE(rig_estimate(lever).nis == 0.0f);
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, rig_run_blind(&rig, lever, 299u));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1u));
+}
+
+static void test_coasting_grows_the_uncertainty_of_state_and_parameters(void)
+{
+    run_for(10000u);
+    const lever_estimate_t before = rig_estimate(lever);
+    (void)rig_run_blind(&rig, lever, 400u);
+    const lever_estimate_t after = rig_estimate(lever);
+    TEST_ASSERT_TRUE(after.theta_sigma > 1.5f * before.theta_sigma);
+    TEST_ASSERT_TRUE(after.theta_dot_sigma > 1.5f * before.theta_dot_sigma);
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+        TEST_ASSERT_TRUE(after.parameter_sigma[i] > before.parameter_sigma[i]);
+        TEST_ASSERT_TRUE(after.parameter[i] == before.parameter[i]);
+    }
+}
+
+static void test_coasting_still_predicts_the_motion(void)
+{
+    run_for(30000u);
+    (void)rig_run_blind(&rig, lever, 50u);
+    const lever_estimate_t estimate = rig_estimate(lever);
+    const plant_t *plant = &rig.simulation.plant;
+    TEST_ASSERT_DOUBLE_WITHIN(4.0 * (double)estimate.theta_sigma, plant->theta, (double)estimate.theta);
+    TEST_ASSERT_DOUBLE_WITHIN(4.0 * (double)estimate.theta_dot_sigma, plant->theta_dot, (double)estimate.theta_dot);
+    TEST_ASSERT_TRUE(fabs(plant->theta_dot) > 2.0 * (double)estimate.theta_dot_sigma); /* it did move */
+}
+
+static void test_theta_stays_within_its_sigma_however_long_the_coast(void)
+{
+    run_for(20000u);
+    for (uint32_t second = 0u; second < 60u; second++) {
+        (void)rig_run_blind(&rig, lever, 1000u);
+        const lever_estimate_t estimate = rig_estimate(lever);
+        TEST_ASSERT_DOUBLE_WITHIN(
+            5.0 * (double)estimate.theta_sigma, rig.simulation.plant.theta, (double)estimate.theta);
+    }
+}
+
+static void test_parameters_survive_a_short_coast(void)
+{
+    run_for(20000u);
+    for (uint32_t k = 0u; k < 20u; k++) {
+        (void)rig_run_blind(&rig, lever, 300u);
+        (void)rig_run(&rig, lever, 1000u);
+        assert_parameters_within(4.0);
+    }
+}
+
+static void test_parameters_survive_a_long_coast(void)
+{
+    run_for(20000u);
+    (void)rig_run_blind(&rig, lever, 60000u);
+    for (uint32_t k = 0u; k < 10u; k++) {
+        (void)rig_run(&rig, lever, 500u);
+        assert_parameters_within(4.0);
+    }
+}
+
+static void test_parameters_survive_a_coast_that_one_output_ends_before_the_other(void)
+{
+    run_for(20000u);
+    for (uint32_t k = 0u; k < 10u; k++) {
+        (void)rig_run_blind(&rig, lever, 300u);
+        for (uint32_t m = 0u; m < 700u; m++) {
+            lever_sample_t sample = rig_sample(&rig);
+            sample.theta_valid = ((k % 2u) == 0u);
+            sample.theta_dot_valid = !sample.theta_valid;
+            TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
+        }
+        (void)rig_run(&rig, lever, 500u);
+        assert_parameters_within(4.0);
+    }
+}
+
+/* --- frozen -------------------------------------------------------------------------------------------------------- */
+
+static void test_frozen_holds_the_parameters_and_goes_on_with_the_state(void)
+{
+    run_for(2000u);
+    rig_request(lever, LEVER_REQUEST_FREEZE);
+    const lever_estimate_t before = rig_estimate(lever);
+    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 2000u));
+    const lever_estimate_t after = rig_estimate(lever);
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+        TEST_ASSERT_TRUE(after.parameter[i] == before.parameter[i]);
+        TEST_ASSERT_TRUE(after.parameter_sigma[i] == before.parameter_sigma[i]);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(5.0e-3, rig.simulation.plant.theta, (double)after.theta);
+    TEST_ASSERT_DOUBLE_WITHIN(5.0e-2, rig.simulation.plant.theta_dot, (double)after.theta_dot);
+}
+
+static void test_run_leaves_frozen_and_learns_on(void)
+{
+    run_for(1000u);
+    rig_request(lever, LEVER_REQUEST_FREEZE);
+    (void)rig_run(&rig, lever, 1000u);
+    const lever_estimate_t before = rig_estimate(lever);
+    rig_request(lever, LEVER_REQUEST_RUN);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1000u));
+    TEST_ASSERT_TRUE(rig_estimate(lever).parameter[2] != before.parameter[2]);
+}
+
+static void test_frozen_before_the_first_sample_freezes_after_alignment(void)
+{
+    rig_request(lever, LEVER_REQUEST_FREEZE);
+    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 400u));
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p, rig_estimate(lever).parameter[2]);
+}
+
+/* Frozen from the start at a first guess on a bound of the model, where nothing can correct it. */
+static void assert_can_be_frozen_at(float m_p, float c_p, float k_p)
+{
+    config.settings.m_p = m_p;
+    config.settings.c_p = c_p;
+    config.settings.k_p = k_p;
+    start();
+    rig_request(lever, LEVER_REQUEST_FREEZE);
+    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 400u));
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
+    TEST_ASSERT_EQUAL_FLOAT(m_p, rig_estimate(lever).parameter[0]);
+}
+
+static void test_frozen_at_the_least_or_greatest_first_guess_is_no_fault(void)
+{
+    const model_parameter_t *p = model_lever.parameter;
+    assert_can_be_frozen_at(p[0].least, p[1].least, p[2].least);
+    assert_can_be_frozen_at(p[0].greatest, p[1].greatest, p[2].greatest);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_starts_in_init_at_the_first_guess);
+    RUN_TEST(test_aligns_for_align_time_and_then_runs);
+    RUN_TEST(test_without_align_time_it_runs_from_the_first_sample);
+    RUN_TEST(test_while_aligning_the_parameters_are_the_first_guess);
+    RUN_TEST(test_trim_after_alignment_is_the_mean_angle);
+    RUN_TEST(test_alignment_waits_for_a_valid_theta);
+    RUN_TEST(test_alignment_leaves_samples_without_theta_out_of_the_mean);
+    RUN_TEST(test_a_rate_that_was_never_measured_is_unknown);
+    RUN_TEST(test_trim_follows_a_retrim);
+    RUN_TEST(test_without_theta_and_theta_dot_it_coasts_and_then_runs_again);
+    RUN_TEST(test_coasting_grows_the_uncertainty_of_state_and_parameters);
+    RUN_TEST(test_coasting_still_predicts_the_motion);
+    RUN_TEST(test_theta_stays_within_its_sigma_however_long_the_coast);
+    RUN_TEST(test_parameters_survive_a_short_coast);
+    RUN_TEST(test_parameters_survive_a_long_coast);
+    RUN_TEST(test_parameters_survive_a_coast_that_one_output_ends_before_the_other);
+    RUN_TEST(test_frozen_holds_the_parameters_and_goes_on_with_the_state);
+    RUN_TEST(test_run_leaves_frozen_and_learns_on);
+    RUN_TEST(test_frozen_before_the_first_sample_freezes_after_alignment);
+    RUN_TEST(test_frozen_at_the_least_or_greatest_first_guess_is_no_fault);
+    return UNITY_END();
+}

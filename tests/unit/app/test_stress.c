@@ -1,0 +1,198 @@
+/* Where single precision hurts most: measurement noise near its resolution, R set to match, little process noise. Most
+ * known filters turn to NaN, stick, or are silently wrong by 30 to 60 % here. Through the C API. */
+#include "rig.h"
+
+static lever_config_t config;
+static lever_memory_t memory;
+static lever_t *lever;
+static rig_t rig;
+
+void setUp(void)
+{
+    lever_config_default(&config);
+    rig = rig_typical();
+}
+
+void tearDown(void)
+{
+}
+
+/* Noise of the simulation, and what the filter is told of it. */
+static void start(double theta_noise, double theta_dot_noise, double process_noise)
+{
+    rig.simulation.theta_noise = theta_noise;
+    rig.simulation.theta_dot_noise = theta_dot_noise;
+    rig.simulation.process_noise = process_noise;
+    config.settings.theta_noise = (float)theta_noise;
+    config.settings.theta_dot_noise = (float)theta_dot_noise;
+    config.settings.theta_dot_process_noise = (float)process_noise;
+    lever = lever_init(&memory, &config);
+    TEST_ASSERT_NOT_NULL(lever);
+}
+
+/* Every parameter within 2 % from `from` to `to` seconds, never a restart. */
+static void assert_within_two_per_cent(uint32_t from, uint32_t to)
+{
+    const double truth[3] = {rig.simulation.plant.m_p, rig.simulation.plant.c_p, rig.simulation.plant.k_p};
+    (void)rig_run(&rig, lever, 1000u * from);
+    for (uint32_t tenth = 0u; tenth < (10u * (to - from)); tenth++) {
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 100u));
+        const lever_estimate_t estimate = rig_estimate(lever);
+        for (uint32_t i = 0u; i < 3u; i++) {
+            TEST_ASSERT_DOUBLE_WITHIN(0.02 * truth[i], truth[i], (double)estimate.parameter[i]);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
+}
+
+static void test_a_microradian_converges_within_two_per_cent_and_stays(void)
+{
+    start(1.0e-6, 1.0e-5, 5.0e-4);
+    assert_within_two_per_cent(10u, 60u);
+}
+
+/* The lever has to fall into its springs first, which shows the filter how wrong its first guess is a million times more
+ * clearly than it can be right about anything: what it then believes must be honest. */
+static void test_a_microradian_with_preload_fixed_stays_within_four_sigma(void)
+{
+    const double truth[3] = {3.2, 60.0, 2100.0};
+    config.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+    rig.simulation.plant.follows_trim = false;
+    rig.simulation.plant.arm_preload_angle = 0.4;
+    config.settings.arm_preload_angle = 0.4f;
+    start(1.0e-6, 1.0e-5, 5.0e-4);
+    for (uint32_t k = 0u; k < 60u; k++) {
+        (void)rig_run(&rig, lever, 1000u);
+        const lever_estimate_t estimate = rig_estimate(lever);
+        for (uint32_t i = 0u; i < 3u; i++) {
+            TEST_ASSERT_DOUBLE_WITHIN(
+                4.0 * (double)estimate.parameter_sigma[i], truth[i], (double)estimate.parameter[i]);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
+}
+
+static void test_a_microradian_with_annealing(void)
+{
+    config.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
+    start(1.0e-6, 1.0e-5, 5.0e-4);
+    assert_within_two_per_cent(20u, 60u);
+}
+
+static void test_a_microradian_with_a_fixed_walk(void)
+{
+    config.adaptation = (uint8_t)LEVER_ADAPTATION_FIXED;
+    start(1.0e-6, 1.0e-5, 5.0e-4);
+    assert_within_two_per_cent(10u, 60u);
+}
+
+static void test_the_least_noise_that_the_settings_allow_never_loses_the_factor(void)
+{
+    start(1.0e-7, 1.0e-6, 5.0e-4);
+    (void)rig_run(&rig, lever, 60000u);
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
+}
+
+static void test_the_least_of_all_noise_settings_never_loses_the_factor(void)
+{
+    config.settings.m_p_walk = 0.0f;
+    config.settings.c_p_walk = 0.0f;
+    config.settings.k_p_walk = 0.0f;
+    start(1.0e-7, 1.0e-6, 0.0);
+    (void)rig_run(&rig, lever, 60000u);
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
+}
+
+static void test_the_greatest_of_all_noise_settings_never_loses_the_factor(void)
+{
+    config.settings.m_p_walk = 1.0f;
+    config.settings.c_p_walk = 1.0f;
+    config.settings.k_p_walk = 1.0f;
+    config.settings.walk_ceiling = 100.0f;
+    start(1.0e-3, 1.0e-2, 0.05);
+    config.settings.theta_process_noise = 1.0f;
+    config.settings.theta_dot_process_noise = 10.0f;
+    config.settings.theta_noise = 0.2f;
+    config.settings.theta_dot_noise = 2.0f;
+    lever = lever_init(&memory, &config);
+    (void)rig_run(&rig, lever, 60000u);
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
+}
+
+/* About half of the settings anywhere between their limits, the others as they are. */
+static void draw_config(random_source_t *source, uint32_t run)
+{
+    float *value = (float *)(void *)&config.settings; /* an array in the order of the table */
+    lever_config_default(&config);
+    config.preload = (uint8_t)(run % (uint32_t)LEVER_PRELOAD_COUNT);
+    config.adaptation = (uint8_t)(run % (uint32_t)LEVER_ADAPTATION_COUNT);
+    for (uint32_t i = 0u; i < lever_setting_count(); i++) {
+        const double least = (double)lever_setting(i)->least;
+        const double greatest = (double)lever_setting(i)->greatest;
+        const double share = 2.0 * random_unit(source);
+        if (share < 1.0) {
+            value[i] = (float)((least > 0.0) ? (least * pow(greatest / least, share))
+                                             : (least + (share * (greatest - least))));
+            value[i] = fminf(fmaxf(value[i], lever_setting(i)->least), lever_setting(i)->greatest);
+        }
+    }
+    TEST_ASSERT_NULL(lever_config_check(&config));
+}
+
+static void assert_finite(void)
+{
+    const lever_estimate_t estimate = rig_estimate(lever);
+    TEST_ASSERT_TRUE(isfinite(estimate.theta) && isfinite(estimate.theta_dot) && isfinite(estimate.nis));
+    TEST_ASSERT_TRUE(isfinite(estimate.theta_sigma) && isfinite(estimate.theta_dot_sigma) && isfinite(estimate.trim));
+    TEST_ASSERT_TRUE(isfinite(estimate.natural_frequency) && isfinite(estimate.natural_frequency_sigma));
+    TEST_ASSERT_TRUE(isfinite(estimate.damping_ratio) && isfinite(estimate.damping_ratio_sigma));
+    for (uint32_t i = 0u; i < 3u; i++) {
+        TEST_ASSERT_TRUE(isfinite(estimate.parameter[i]) && isfinite(estimate.parameter_sigma[i]));
+    }
+}
+
+static void test_any_accepted_configuration_stays_finite_without_a_restart(void)
+{
+    random_source_t source = {99u};
+    for (uint32_t run = 0u; run < 200u; run++) {
+        draw_config(&source, run);
+        rig = rig_typical();
+        lever = lever_init(&memory, &config);
+        const double period = (double)config.settings.sample_period;
+        for (uint32_t k = 1u; k <= 1000u; k++) {
+            simulation_advance(&rig.simulation, period);
+            lever_sample_t sample = rig_sample_after(&rig, 0u);
+            sample.time_us = (uint32_t)(1.0e6 * period * (double)k);
+            (void)lever_update(lever, &sample);
+            assert_finite();
+        }
+        TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
+    }
+}
+
+static void test_innovations_at_a_microradian_are_as_large_as_predicted(void)
+{
+    double sum = 0.0;
+    start(1.0e-6, 1.0e-5, 5.0e-4);
+    (void)rig_run(&rig, lever, 20000u);
+    for (uint32_t k = 0u; k < 20000u; k++) {
+        (void)rig_run(&rig, lever, 1u);
+        sum += (double)rig_estimate(lever).nis;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 2.0, sum / 20000.0);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_a_microradian_converges_within_two_per_cent_and_stays);
+    RUN_TEST(test_a_microradian_with_preload_fixed_stays_within_four_sigma);
+    RUN_TEST(test_a_microradian_with_annealing);
+    RUN_TEST(test_a_microradian_with_a_fixed_walk);
+    RUN_TEST(test_the_least_noise_that_the_settings_allow_never_loses_the_factor);
+    RUN_TEST(test_the_least_of_all_noise_settings_never_loses_the_factor);
+    RUN_TEST(test_the_greatest_of_all_noise_settings_never_loses_the_factor);
+    RUN_TEST(test_any_accepted_configuration_stays_finite_without_a_restart);
+    RUN_TEST(test_innovations_at_a_microradian_are_as_large_as_predicted);
+    return UNITY_END();
+}
