@@ -1,0 +1,105 @@
+"""The command `lever`. Each sub-command is a small module of its own, found through the entry points below."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from .errors import LeverError
+
+COMMANDS = "lever_cdkf.commands"
+"""Entry point group of modules that hold sub-commands. Such a module has
+
+    def add_parser(subparsers) -> None     registers one or more with subparsers.add_parser(name, help=…)
+    def run(args) -> int                   runs them and returns the exit status
+
+and imports what is heavy inside run(), because all are imported for every call of `lever`. A parser may have a run of
+its own, by set_defaults(run=…).
+"""
+
+_DESCRIPTION = """\
+Lever CDKF: estimates the equivalent mass, damping and stiffness of a helicopter pilot's arm on the collective lever,
+on line, from samples on a CAN bus. The estimator is C firmware; this command runs, feeds and inspects it.
+"""
+_EPILOG = """\
+a first session:
+  lever demo                              simulate a pilot, estimate, and write a report to open in a browser
+  lever sim --list                        all scenarios; `lever sim NAME` runs one
+  lever settings                          every tunable number of the estimator with unit, default and range
+  lever dbc                               the CAN messages
+
+`lever COMMAND --help` explains a command. Exit status: 0 when all went well, 2 with one line on standard error when the
+command line or an input is wrong, 130 after Ctrl-C.
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, but an error is one line that says where to read on, and help keeps its line breaks."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        kwargs.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        super().__init__(allow_abbrev=False, **kwargs)
+
+    def error(self, message: str) -> NoReturn:
+        raise LeverError(f"{message} (see `{self.prog} --help`)")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs a command line and returns its exit status: 0 only when all went well."""
+    try:
+        try:
+            args = _parser().parse_args(argv)
+            status: int = args.run(args)
+        except SystemExit as stop:  # --help and --version
+            status = int(stop.code or 0)
+        sys.stdout.flush()
+        return status
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader, such as `head`, has what it wants; nothing is left to say at exit either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except Exception as error:
+        if not isinstance(error, _expected()):
+            raise
+        print(f"lever: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+
+
+def _expected() -> tuple[type[Exception], ...]:
+    """Errors whose text tells a user enough."""
+    can = sys.modules.get("can")
+    return (LeverError, OSError) if can is None else (LeverError, OSError, can.CanError)
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="lever", description=_DESCRIPTION, epilog=_EPILOG)
+    parser.add_argument("--version", action="version", version=f"lever {_version()}")
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for entry in sorted(importlib.metadata.entry_points(group=COMMANDS)):
+        try:
+            module = entry.load()
+        except Exception as error:
+            print(f"lever: warning: no commands from {entry.value}: {error}", file=sys.stderr)
+            continue
+        before = set(subparsers.choices)
+        module.add_parser(subparsers)
+        for name in subparsers.choices.keys() - before:
+            if subparsers.choices[name].get_default("run") is None:
+                subparsers.choices[name].set_defaults(run=module.run)
+    return parser
+
+
+def _version() -> str:
+    try:
+        return importlib.metadata.version("lever-cdkf")
+    except importlib.metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""`lever dbc`: the CAN messages."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from ..tables import Row, add_json_option
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message, Signal
+
+_DESCRIPTION = """\
+Prints the CAN messages and their signals: classic CAN, 11-bit identifiers, 1 Mbit/s, little-endian. A physical value is
+the whole number in the frame times the step. Byte 0 and the low half of byte 1 are the CRC and counter of AUTOSAR E2E
+Profile 2, whose data ID is the message's base plus the counter.
+"""
+_EPILOG = """\
+examples:
+  lever dbc
+  lever dbc --path                                        where the DBC is, for other tools:
+  candump -L vcan0 | cantools decode "$(lever dbc --path)"
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "dbc",
+        help="the CAN messages and signals, with units",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+    )
+    output = parser.add_mutually_exclusive_group()
+    output.add_argument("--path", action="store_true", help="print only the path of the installed lever.dbc")
+    add_json_option(output)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..files import native_file
+    from ..tables import print_tables
+
+    if args.path:
+        print(native_file("lever.dbc"))
+        return 0
+
+    from ..codec import database
+
+    messages = database().messages
+    signals = [_signal_row(message, signal) for message in messages for signal in message.signals]
+    print_tables({"messages": [_message_row(message) for message in messages], "signals": signals}, args.json)
+    return 0
+
+
+def _message_row(message: Message) -> Row:
+    from ..codec import data_ids
+
+    return {
+        "message": message.name,
+        "id": f"{message.frame_id:#05x}",
+        "bytes": message.length,
+        "sender": ", ".join(message.senders),
+        "data ID base": data_ids(message.name)[0],
+        "meaning": message.comment,
+    }
+
+
+def _signal_row(message: Message, signal: Signal) -> Row:
+    choices = ", ".join(f"{raw} {name}" for raw, name in sorted((signal.choices or {}).items()))
+    return {
+        "message": message.name,
+        "signal": signal.name,
+        "first bit": signal.start,
+        "bits": signal.length,
+        "signed": signal.is_signed,
+        "step": float(signal.scale),
+        "unit": signal.unit,
+        "least": signal.minimum,
+        "greatest": signal.maximum,
+        "meaning": choices or signal.comment,
+    }

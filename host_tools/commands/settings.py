@@ -1,0 +1,76 @@
+"""`lever settings`: the table of settings, or a settings file."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+from typing import Any
+
+from ..tables import Row, add_json_option
+
+_DESCRIPTION = """\
+Without --set and --settings: prints every setting of the estimator with unit, default, range and meaning, after the
+four choices that are made by name.
+With them: prints a settings file with all values, for `lever_can --settings FILE` and can.Bus(interface="lever",
+settings="FILE"). Values are in the units of the table, without the unit.
+"""
+_EPILOG = """\
+examples:
+  lever settings
+  lever settings --set theta_noise=0.002 --set preload=fixed > my.settings
+  lever settings --settings my.settings --set m_p=3 --json my.json
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "settings",
+        help="the estimator's settings, with units and ranges",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+    )
+    parser.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
+    parser.add_argument(
+        "--set",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="set one value; may be repeated, the last counts, and all count more than --settings",
+    )
+    add_json_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..settings_file import format_config, make_config, parse_assignment, read_assignments
+    from ..tables import print_tables, write_json
+
+    assignments = read_assignments(args.settings) if args.settings is not None else {}
+    assignments |= dict(parse_assignment(text) for text in args.set)
+    config = make_config(assignments)
+    if args.settings is None and not args.set:
+        print_tables({"settings": _rows()}, args.json)
+        return 0
+    if args.json is not None:
+        values = config.choices | config.settings
+        write_json(args.json, {"settings": [{**row, "value": values[str(row["name"])]} for row in _rows()]})
+    sys.stdout.write(format_config(config))
+    return 0
+
+
+def _rows() -> list[Row]:
+    from ..config import Config, settings_table
+    from ..library import enum_names
+
+    choices: list[Row] = [
+        {
+            "name": what,
+            "unit": None,
+            "default": value,
+            "least": None,
+            "greatest": None,
+            "meaning": f"one of {', '.join(enum_names(f'lever_{what}').values())}",
+        }
+        for what, value in Config().choices.items()
+    ]
+    return choices + [dataclasses.asdict(row) for row in settings_table()]

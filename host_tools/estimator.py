@@ -1,0 +1,218 @@
+"""One estimator without CAN hardware: samples or frames in, estimates or frames out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .config import CHOICES, Config, choice_value
+from .errors import LeverError
+from .library import enum_names, ffi, lib
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+FRAME_SAMPLE: int = lib.LEVER_FRAME_SAMPLE
+"""What on_frame() returns when a sample is complete: call step() now."""
+
+_MODES = enum_names("lever_mode")
+
+
+class Estimate(NamedTuple):
+    """lever_estimate_t: the estimate after the last sample; _sigma: standard deviation, in the unit of its value."""
+
+    time_us: int
+    """Time of the sample [µs], wraps at 2**32."""
+    theta: float
+    """Lever angle [rad]."""
+    theta_sigma: float
+    theta_dot: float
+    """Lever rate [rad/s]."""
+    theta_dot_sigma: float
+    parameter: tuple[float, float, float]
+    """m_p [kg], c_p [N s/m], k_p [N/m]."""
+    parameter_sigma: tuple[float, float, float]
+    natural_frequency: float
+    """Undamped, of arm and lever about the trim [Hz]."""
+    natural_frequency_sigma: float
+    damping_ratio: float
+    """[1]"""
+    damping_ratio_sigma: float
+    trim: float
+    """Angle about which the dynamics are linearised [rad]."""
+    nis: float
+    """Normalised innovation squared [1], chi-square with nis_size degrees of freedom; 0 without measurement."""
+    nis_size: int
+
+
+class Health(NamedTuple):
+    """lever_health_t: mode, faults at the last sample, and counts since the start."""
+
+    mode: str
+    """A name of enum_names("lever_mode")."""
+    faults: tuple[str, ...]
+    """Names of enum_names("lever_fault")."""
+    samples: int
+    lost: int
+    corrupt: int
+    late: int
+    recoveries: int
+    excitation: float
+    """rms of theta_dot [rad/s]."""
+    dither: float
+    """Identification torque asked for the next sample [N m]."""
+
+
+def fault_names(faults: int) -> tuple[str, ...]:
+    """The names of the bits in a fault mask."""
+    return tuple(name for bit, name in enum_names("lever_fault").items() if faults & bit)
+
+
+class Estimator:
+    """An instance of the firmware. Any number may exist; each belongs to one thread at a time."""
+
+    def __init__(self, config: Config | None = None) -> None:
+        self._memory = ffi.new("lever_memory_t *")  # holds the instance, so it must live as long as this object
+        self._lever = lib.lever_init(self._memory, (config or Config()).pointer)
+        if self._lever == ffi.NULL:
+            raise LeverError("the firmware refused its configuration: Config.pointer was changed after its check")
+        self._sample = ffi.new("lever_sample_t *")
+        self._estimate = ffi.new("lever_estimate_t *")
+        self._health = ffi.new("lever_health_t *")
+        self._received = ffi.new("lever_frame_t *")
+        self._received_data = ffi.buffer(self._received.data)
+        self._answer = ffi.new("lever_frame_t *")
+        self._answer_data = ffi.buffer(self._answer.data)
+
+    def update(
+        self,
+        time_us: int,
+        theta: float | None = None,
+        theta_dot: float | None = None,
+        tau_m: float | None = None,
+        z_ddot: float | None = None,
+    ) -> str:
+        """Takes a sample and returns the mode after it.
+
+        Time [µs] (wrapped to 32 bits here), lever angle [rad] and rate [rad/s], motor torque [N m], vertical
+        acceleration of the base [m/s²]; None is missing or invalid.
+        """
+        sample = self._sample
+        sample.time_us = time_us & 0xFFFFFFFF
+        for name, value in (("theta", theta), ("theta_dot", theta_dot), ("tau_m", tau_m), ("z_ddot", z_ddot)):
+            setattr(sample, name, 0.0 if value is None else value)
+            setattr(sample, f"{name}_valid", value is not None)
+        return _MODES[lib.lever_update(self._lever, sample)]
+
+    def command(
+        self,
+        request: str = "none",
+        *,
+        model: str | None = None,
+        preload: str | None = None,
+        estimator: str | None = None,
+        adaptation: str | None = None,
+        dither_rms: float | None = None,
+    ) -> None:
+        """Carries out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
+
+        dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Raises LeverError.
+        """
+        command = ffi.new("lever_command_t *", {"dither_rms": lib.LEVER_KEEP if dither_rms is None else dither_rms})
+        command.request = choice_value("lever_request", "request", request)
+        for what, name in zip(CHOICES, (model, preload, estimator, adaptation), strict=True):
+            setattr(command, what, lib.LEVER_KEEP if name is None else choice_value(f"lever_{what}", what, name))
+        if not lib.lever_command(self._lever, command):
+            raise LeverError(f"the firmware refused the command {request!r}, dither_rms = {dither_rms} N m")
+
+    def estimate(self) -> Estimate:
+        """The estimate after the last sample."""
+        lib.lever_estimate(self._lever, self._estimate)
+        values = {name: getattr(self._estimate, name) for name in Estimate._fields}
+        for name in ("parameter", "parameter_sigma"):
+            values[name] = tuple(values[name])
+        return Estimate(**values)
+
+    def health(self) -> Health:
+        """Mode, faults and counts after the last sample."""
+        lib.lever_health(self._lever, self._health)
+        values = {name: getattr(self._health, name) for name in Health._fields}
+        return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
+
+    def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
+        """Takes a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""
+        length = len(data)
+        if length > 8:
+            raise LeverError(f"frame {identifier:#x} has {length} bytes; a classic CAN frame has at most 8")
+        received = self._received
+        received.id = identifier
+        received.length = length
+        self._received_data[0:length] = data
+        return lib.lever_on_frame(self._lever, received)  # type: ignore[no-any-return]
+
+    def step(self) -> int:
+        """Takes the sample that on_frame() has completed; returns the mode, a key of enum_names("lever_mode")."""
+        return lib.lever_step(self._lever)  # type: ignore[no-any-return]
+
+    def next_frame(self) -> tuple[int, bytes] | None:
+        """The next frame to send, as identifier and data; None when there is none left."""
+        answer = self._answer
+        if not lib.lever_next_frame(self._lever, answer):
+            return None
+        return answer.id, self._answer_data[0 : answer.length]
+
+
+def _dtype(ctype: str) -> np.dtype[Any]:
+    """The numpy dtype of a façade struct, padding included."""
+    import numpy as np
+
+    def scalar(kind: Any) -> str:
+        if kind.kind == "enum" or kind.cname == "_Bool":
+            return "bool" if kind.cname == "_Bool" else f"u{ffi.sizeof(kind)}"
+        return f"{'f' if kind.cname == 'float' else 'u'}{ffi.sizeof(kind)}"
+
+    struct = ffi.typeof(ctype)
+    names, formats, offsets = [], [], []
+    for name, field in struct.fields:
+        is_array = field.type.kind == "array"
+        base = scalar(field.type.item if is_array else field.type)
+        names.append(name)
+        formats.append((base, (field.type.length,)) if is_array else base)
+        offsets.append(field.offset)
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": ffi.sizeof(struct)})
+
+
+def run_samples(config: Config | None, samples: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Feeds N samples to a fresh estimator and returns what it says after each.
+
+    samples: arrays of N: time_us (whole numbers, wrapped here), theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot
+    [m/s²]; bool arrays theta_valid … may say what is valid, without them what is not NaN is. One that is missing is
+    never valid. Returned: each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma),
+    and mode and faults as the numbers of the façade's enums.
+    """
+    import numpy as np
+
+    estimator = Estimator(config)
+    count = len(samples["time_us"])
+    taken = np.zeros(count, _dtype("lever_sample_t"))
+    taken["time_us"] = np.asarray(samples["time_us"]).astype(np.int64)  # to 32 bits: wraps
+    for name in ("theta", "theta_dot", "tau_m", "z_ddot"):
+        if name in samples:
+            taken[name] = samples[name]
+            taken[f"{name}_valid"] = samples.get(f"{name}_valid", ~np.isnan(samples[name]))
+    unknown = set(samples) - set(taken.dtype.names or ())
+    if unknown:
+        raise LeverError(f"unknown columns of samples: {', '.join(sorted(unknown))}")
+    estimates = np.zeros(count, _dtype("lever_estimate_t"))
+    healths = np.zeros(count, _dtype("lever_health_t"))
+    lever = estimator._lever
+    sample = ffi.from_buffer("lever_sample_t[]", taken)
+    estimate = ffi.from_buffer("lever_estimate_t[]", estimates)
+    health = ffi.from_buffer("lever_health_t[]", healths)
+    for index in range(count):
+        lib.lever_update(lever, sample + index)
+        lib.lever_estimate(lever, estimate + index)
+        lib.lever_health(lever, health + index)
+    columns = {name: estimates[name].copy() for name in estimates.dtype.names or ()}
+    return columns | {"mode": healths["mode"].copy(), "faults": healths["faults"].copy()}

@@ -1,0 +1,24 @@
+"""The firmware in Python, without CAN hardware: what other packages import.
+
+`ffi` and `lib` are the whole façade (firmware/lever_cdkf.h), `Config` a checked configuration, `Estimator` one
+instance, `run_samples` a whole recording at once.
+"""
+
+from .config import Config, Setting, settings_table
+from .estimator import FRAME_SAMPLE, Estimate, Estimator, Health, fault_names, run_samples
+from .library import enum_names, ffi, lib
+
+__all__ = [
+    "FRAME_SAMPLE",
+    "Config",
+    "Estimate",
+    "Estimator",
+    "Health",
+    "Setting",
+    "enum_names",
+    "fault_names",
+    "ffi",
+    "lib",
+    "run_samples",
+    "settings_table",
+]

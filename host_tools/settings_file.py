@@ -1,0 +1,76 @@
+"""Settings files, which `lever settings` prints and `lever_can --settings` reads: a configuration as text.
+
+One `name = value` a line, `#` starts a comment, the last of two equal names counts. Names are those of
+settings_table(), in its units, and the four choices:
+
+    preload = trim           # one of fixed, trim
+    theta_noise = 0.002      # [rad] standard deviation of a theta sample
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .config import CHOICES, Config, choice_value, setting, settings_table
+from .errors import SettingsError
+from .library import enum_names
+
+Assignments = Mapping[str, str | float]
+"""Values by name, of settings (float) and choices (str)."""
+
+
+def parse_assignment(text: str) -> tuple[str, str | float]:
+    """Name and checked value of the text `name = value`. Raises SettingsError."""
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise SettingsError(f"{name!r} has no '=': write name = value")
+    if name in CHOICES:
+        choice_value(f"lever_{name}", name, value)
+        return name, value
+    row = setting(name)
+    try:
+        number = float(value)
+    except ValueError:
+        raise SettingsError(f"{name} = {value!r} is not a number (give it in {row.unit}, without the unit)") from None
+    row.check(number)
+    return name, number
+
+
+def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:
+    """What a settings file sets. Raises SettingsError with file and line."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise SettingsError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SettingsError(f"{path}: is not a text file") from None
+    assignments: dict[str, str | float] = {}
+    for number, line in enumerate(lines, start=1):
+        content = line.partition("#")[0].strip()
+        if content:
+            try:
+                name, value = parse_assignment(content)
+            except SettingsError as error:
+                raise SettingsError(f"{path}:{number}: {error}") from None
+            assignments[name] = value
+    return assignments
+
+
+def make_config(assignments: Assignments) -> Config:
+    """The configuration with the firmware's defaults in all but `assignments`. Raises SettingsError."""
+    choices: dict[str, Any] = {name: value for name, value in assignments.items() if name in CHOICES}
+    settings: dict[str, Any] = {name: value for name, value in assignments.items() if name not in CHOICES}
+    return Config(**choices, settings=settings)
+
+
+def format_config(config: Config) -> str:
+    """The text of a settings file that holds all of `config`."""
+    values: dict[str, str | float] = {**config.choices, **config.settings}
+    comments = {what: f"one of {', '.join(enum_names(f'lever_{what}').values())}" for what in CHOICES}
+    comments |= {row.name: f"[{row.unit}] {row.meaning}" for row in settings_table()}
+    assignments = {name: f"{name} = {value}" for name, value in values.items()}
+    width = max(len(assignment) for assignment in assignments.values())
+    return "".join(f"{assignments[name]:{width}}  # {comments[name]}\n" for name in values)

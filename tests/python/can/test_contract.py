@@ -1,0 +1,90 @@
+"""The constants of the C are those of lever.dbc, and the DBC keeps the rules that all its messages share."""
+
+from __future__ import annotations
+
+import pytest
+from python.can.codec import DBC, MULTIPLEXED, Codec, data_id_base, limits, scaled
+
+
+def test_identifiers(codec: Codec) -> None:
+    expected = {f"MESSAGE_{message.name}_ID": message.frame_id for message in DBC.messages}
+    assert codec.enum("message_id") == expected
+
+
+def test_data_ids(codec: Codec) -> None:
+    expected = {f"MESSAGE_{message.name}_DATA_ID": data_id_base(message) for message in DBC.messages}
+    assert codec.enum("message_data_id") == expected
+
+
+def test_no_two_messages_share_a_data_id() -> None:
+    used = [data_id_base(message) + counter for message in DBC.messages for counter in range(16)]
+    assert len(set(used)) == len(used) == 16 * 9
+    assert max(used) <= 255
+
+
+def test_every_message_has_eight_bytes_and_the_e2e_header() -> None:
+    for message in DBC.messages:
+        assert message.length == 8
+        assert not message.is_extended_frame
+        header = [(signal.name, signal.start, signal.length) for signal in message.signals[:2]]
+        assert header == [("crc", 0, 8), ("counter", 8, 4)]
+        assert all(signal.byte_order == "little_endian" for signal in message.signals)
+
+
+def test_structs_have_the_signals(codec: Codec) -> None:
+    for message in DBC.messages:
+        signals = {signal.name for signal in message.signals} - {"crc", "counter"}
+        if message.name in MULTIPLEXED:
+            signals = {signal for signal in signals if signal == "model"} | {MULTIPLEXED[message.name]}
+        assert set(codec.members(message.name)) == signals
+
+
+def test_every_model_has_its_parameters(codec: Codec) -> None:
+    models = codec.enum("lever_model")["LEVER_MODEL_COUNT"]
+    for name in MULTIPLEXED:
+        of_models = [
+            signal.multiplexer_ids for signal in DBC.get_message_by_name(name).signals if signal.multiplexer_ids
+        ]
+        assert sorted(of_models) == [[model] for model in range(models) for _ in range(3)]
+
+
+def test_ranges_use_all_bits() -> None:
+    """So that the limits at which the C saturates, those of the bits, are those of the DBC."""
+    for message in DBC.messages:
+        for signal in message.signals:
+            assert (signal.minimum, signal.maximum) == pytest.approx([scaled(signal, raw) for raw in limits(signal)])
+
+
+def test_scales_have_whole_reciprocals() -> None:
+    """So that the counts per unit of the C are exact in a float."""
+    for message in DBC.messages:
+        for signal in message.signals:
+            assert signal.offset == 0
+            assert float(signal.scale) == 1 / round(1 / signal.scale), signal.name
+
+
+def test_named_values_are_the_enums(codec: Codec) -> None:
+    choices = ("model", "preload", "estimator", "adaptation", "request", "mode")
+    enums = {name: codec.enum(f"lever_{name}") for name in choices}
+    tested = 0
+    for message in DBC.messages:
+        for signal in message.signals:
+            if signal.name not in choices:
+                assert not signal.choices, signal.name
+                continue
+            prefix = f"LEVER_{signal.name.upper()}_"
+            expected = {value: name.removeprefix(prefix).lower() for name, value in enums[signal.name].items()}
+            expected = {value: name for value, name in expected.items() if name != "count"}
+            if message.name == "COMMAND" and signal.name != "request":
+                expected[codec.enum("lever_keep")["LEVER_KEEP"]] = "keep"
+            assert signal.choices is not None
+            assert {value: str(name) for value, name in signal.choices.items()} == expected, signal.name
+            tested += 1
+    assert tested == 12
+
+
+def test_every_fault_has_its_bit(codec: Codec) -> None:
+    faults = DBC.get_message_by_name("HEALTH").get_signal_by_name("faults")
+    bits = codec.enum("lever_fault").values()
+    assert all(bit.bit_count() == 1 and bit < 1 << faults.length for bit in bits)
+    assert len(set(bits)) == len(bits)

@@ -1,0 +1,224 @@
+"""The C codec against cantools: every message and field, limits, beyond them, NaN, and many random values."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from cantools.database.can import Message, Signal
+from python.can.codec import DBC, MULTIPLEXED, Codec, limits, scaled
+
+MESSAGES = [pytest.param(message, id=message.name) for message in DBC.messages]
+SWEEP = 5000
+
+
+def is_quantity(signal: Signal) -> bool:
+    """A physical value, as opposed to a code, flag or count."""
+    return signal.scale != 1
+
+
+def fields(message: Message) -> list[Signal]:
+    """What the codec writes: all but CRC and counter."""
+    return [signal for signal in message.signals if signal.name not in ("crc", "counter")]
+
+
+FIELDS = [(message, signal) for message in DBC.messages for signal in fields(message)]
+QUANTITIES = [
+    pytest.param(message, signal, id=f"{message.name} {signal.name}")
+    for message, signal in FIELDS
+    if is_quantity(signal)
+]
+CODES = [
+    pytest.param(message, signal, id=f"{message.name} {signal.name}")
+    for message, signal in FIELDS
+    if not is_quantity(signal) and message.name not in MULTIPLEXED
+]
+
+
+def signals_of(message: Message, model: int) -> list[Signal]:
+    """What a frame of this message has, with this model if it is multiplexed."""
+    return [signal for signal in message.signals if signal.multiplexer_ids in (None, [model])]
+
+
+def parameters_of(message: Message, model: int) -> list[str]:
+    """The multiplexed signals of a model, in their order."""
+    return [signal.name for signal in signals_of(message, model) if signal.multiplexer_ids]
+
+
+def as_members(message: Message, values: dict[str, Any]) -> dict[str, Any]:
+    """The members of the struct that has these signals."""
+    array = MULTIPLEXED.get(message.name)
+    if array is None:
+        return values
+    return {
+        "model": values["model"],
+        array: [values.get(name, 0.0) for name in parameters_of(message, values["model"])],
+    }
+
+
+def as_signals(message: Message, members: dict[str, Any]) -> dict[str, Any]:
+    """The signals that a struct with these members has."""
+    array = MULTIPLEXED.get(message.name)
+    if array is None:
+        return members
+    return {"model": members["model"]} | dict(
+        zip(parameters_of(message, members["model"]), members[array], strict=True)
+    )
+
+
+def cantools_encode(message: Message, values: dict[str, Any]) -> bytes:
+    """By cantools, with the values brought into the range of their signals; those that are not given are 0."""
+    signals = signals_of(message, values.get("model", 0))
+    inside = {signal.name: 0 for signal in signals} | values
+    for signal in filter(is_quantity, signals):
+        inside[signal.name] = min(max(inside[signal.name], signal.minimum or 0.0), signal.maximum or 0.0)
+    return message.encode(inside)
+
+
+def context(message: Message, signal: Signal) -> dict[str, Any]:
+    """What must be set for a signal to be sent: its flag, or the model that has it."""
+    if signal.multiplexer_ids:
+        return {"model": signal.multiplexer_ids[0]}
+    flag = f"{signal.name}_valid"
+    return {flag: True} if any(other.name == flag for other in message.signals) else {}
+
+
+def encode_one(codec: Codec, message: Message, signal: Signal, value: float) -> tuple[bytes | None, bytes]:
+    """What the C and what cantools make of one value."""
+    values = {signal.name: value} | context(message, signal)
+    return codec.encode(message.name, as_members(message, values)), cantools_encode(message, values)
+
+
+@pytest.mark.parametrize(("message", "signal"), QUANTITIES)
+def test_limits_and_beyond(codec: Codec, message: Message, signal: Signal) -> None:
+    for raw in limits(signal):
+        limit = scaled(signal, raw)
+        for value in (limit, limit - signal.scale, limit + signal.scale, 1.01 * limit, 1e5 * limit):
+            got, expected = encode_one(codec, message, signal, float(np.float32(value)))
+            assert got == expected, value
+    for value in (-1e30, 1e30, -math.inf, math.inf, 0.0, -0.0):
+        got, expected = encode_one(codec, message, signal, value)
+        assert got == expected, value
+
+
+@pytest.mark.parametrize(("message", "signal"), QUANTITIES)
+def test_nan_is_refused(codec: Codec, message: Message, signal: Signal) -> None:
+    values = {signal.name: math.nan} | context(message, signal)
+    assert codec.encode(message.name, as_members(message, values)) is None
+
+
+@pytest.mark.parametrize(("message", "signal"), QUANTITIES)
+def test_counts_decode_to_the_nearest_float(codec: Codec, message: Message, signal: Signal) -> None:
+    """The C gives the float nearest to what cantools gives, and sends that as the same count."""
+    least, greatest = limits(signal)
+    step = 1 if greatest < 1024 else 37
+    around = context(message, signal)
+    for raw in [*range(least, greatest, step), greatest]:
+        value = float(np.float32(scaled(signal, raw)))
+        data = codec.encode(message.name, as_members(message, around | {signal.name: value}))
+        blank = {other.name: 0 for other in signals_of(message, around.get("model", 0))}
+        assert data == message.encode(blank | around | {signal.name: raw}, scaling=False, strict=False)
+        decoded = codec.decode(message.name, data or b"")
+        assert decoded is not None
+        assert as_signals(message, decoded)[signal.name] == value
+
+
+@pytest.mark.parametrize(("message", "signal"), CODES)
+def test_codes(codec: Codec, message: Message, signal: Signal) -> None:
+    _, greatest = limits(signal)
+    for value in {0, 1, greatest // 3, greatest - 1, greatest}:
+        data = codec.encode(message.name, {signal.name: value})
+        assert data == cantools_encode(message, {signal.name: value})
+        decoded = codec.decode(message.name, data or b"")
+        assert decoded is not None
+        assert decoded[signal.name] == value
+
+
+@pytest.mark.parametrize(("message", "signal"), CODES)
+def test_codes_that_do_not_fit_are_refused(codec: Codec, message: Message, signal: Signal) -> None:
+    """Where the member of the struct can hold more than the signal."""
+    member = dict(codec.ffi.typeof(f"message_{message.name.lower()}_t").fields)[signal.name].type
+    if member.cname != "_Bool" and 8 * codec.ffi.sizeof(member) > signal.length:
+        assert codec.encode(message.name, {signal.name: 1 << signal.length}) is None
+    else:
+        assert member.cname == "_Bool" or signal.length == 8 * codec.ffi.sizeof(member)
+
+
+def random_values(message: Message, dice: random.Random) -> dict[str, Any]:
+    """Values up to 10 % beyond the range of each signal, none within 0.01 counts of a tie (where the rule differs)."""
+    values: dict[str, Any] = {}
+    model = dice.choice([*{signal.multiplexer_ids[0] for signal in message.signals if signal.multiplexer_ids}] or [0])
+    for signal in signals_of(message, model)[2:]:
+        least, greatest = limits(signal)
+        if is_quantity(signal):
+            margin = (greatest - least) // 10
+            count = dice.randint(least - margin, greatest + margin) + dice.uniform(-0.49, 0.49)
+            values[signal.name] = float(np.float32(count * signal.scale))
+        else:
+            values[signal.name] = dice.randint(least, greatest)
+    if message.name in MULTIPLEXED:
+        values["model"] = model
+    for name in values:
+        if not values.get(f"{name}_valid", True):
+            values[name] = 0.0
+    return values
+
+
+@pytest.mark.parametrize("message", MESSAGES)
+def test_random_values_both_ways(codec: Codec, message: Message) -> None:
+    dice = random.Random(message.frame_id)
+    for _ in range(SWEEP):
+        values = random_values(message, dice)
+        data = codec.encode(message.name, as_members(message, values))
+        assert data == cantools_encode(message, values), values
+        decoded = codec.decode(message.name, data or b"")
+        assert decoded is not None
+        expected = cast(dict[str, float], message.decode(data or b"", decode_choices=False))
+        got = as_signals(message, decoded)
+        assert {name: float(value) for name, value in got.items()} == {
+            name: float(np.float32(value)) if is_quantity(message.get_signal_by_name(name)) else float(value)
+            for name, value in expected.items()
+            if name not in ("crc", "counter")
+        }
+
+
+def test_time_is_exact(codec: Codec) -> None:
+    message = DBC.get_message_by_name("BASE_SAMPLE")
+    for time_us in (0, 1, 16_777_217, 2**31 - 1, 2**31, 4_294_967_295, 3_141_592_653):
+        data = codec.encode(message.name, {"time_us": time_us})
+        assert data == cantools_encode(message, {"time_us": time_us})
+        decoded = codec.decode(message.name, data or b"")
+        assert decoded is not None
+        assert decoded["time_us"] == time_us
+
+
+@pytest.mark.parametrize(("value", "ours", "theirs"), [(0.0625, 63, 62), (-0.0625, -63, -62), (0.1875, 188, 188)])
+def test_ties_differ_from_cantools(codec: Codec, value: float, ours: int, theirs: int) -> None:
+    """62.5 and 187.5 counts exactly: the C goes away from zero, cantools to the even count."""
+    message = DBC.get_message_by_name("MOTOR_COMMAND")
+    got, expected = encode_one(codec, message, message.get_signal_by_name("torque"), value)
+    assert got is not None
+    assert int.from_bytes(got[2:4], "little", signed=True) == ours
+    assert int.from_bytes(expected[2:4], "little", signed=True) == theirs
+
+
+def test_values_without_flag_are_not_read(codec: Codec) -> None:
+    assert codec.encode("LEVER_SAMPLE", {"theta": math.nan, "theta_dot": 1.0, "tau_m": -math.inf}) == bytes(8)
+    assert codec.encode("BASE_SAMPLE", {"z_ddot": math.nan}) == bytes(8)
+
+
+@pytest.mark.parametrize("name", MULTIPLEXED)
+def test_unknown_model_is_refused(codec: Codec, name: str) -> None:
+    for model in range(codec.enum("lever_model")["LEVER_MODEL_COUNT"], 16):
+        assert codec.encode(name, {"model": model}) is None
+        assert codec.decode(name, bytes([0, model << 4, 0, 0, 0, 0, 0, 0])) is None
+
+
+@pytest.mark.parametrize("message", MESSAGES)
+def test_wrong_length_is_refused(codec: Codec, message: Message) -> None:
+    assert codec.decode(message.name, bytes(8)) is not None
+    for length in range(8):
+        assert codec.decode(message.name, bytes(length)) is None

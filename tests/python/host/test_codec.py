@@ -1,0 +1,308 @@
+"""codec.py against cantools, autosar-e2e, a CRC written out here, and the firmware's own receiver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import cantools
+import numpy as np
+import pytest
+from cantools.database.can import Database, Message, Signal
+from e2e.p02 import e2e_p02_check
+from lever_cdkf.host_tools import codec, native
+from lever_cdkf.host_tools.errors import CodecError
+from lever_cdkf.host_tools.files import native_file
+
+FRAMING = {"crc", "counter"}
+DATABASE = cantools.database.load_file(native_file("lever.dbc"))
+assert isinstance(DATABASE, Database)
+MESSAGES = {message.name: message for message in DATABASE.messages}
+
+
+def crc(data: bytes) -> int:
+    """CRC-8H2F by its definition: polynomial 0x2F, initial value and final xor 0xFF."""
+    register = 0xFF
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register = (register << 1 ^ 0x2F) & 0xFF if register & 0x80 else register << 1
+    return register ^ 0xFF
+
+
+def contents(message: Message) -> dict[str, float]:
+    """A value inside the range of every field but the framing."""
+    return {signal.name: 1 if signal.choices is None else 0 for signal in message.signals if signal.name not in FRAMING}
+
+
+def fields() -> Iterator[tuple[Message, Signal]]:
+    """Every field that carries a physical value: neither framing, nor flag, nor code."""
+    for message in MESSAGES.values():
+        for signal in message.signals:
+            if float(signal.scale) != 1.0:
+                yield message, signal
+
+
+FIELDS = list(fields())
+FIELD_NAMES = [f"{message.name}.{signal.name}" for message, signal in FIELDS]
+
+
+def by_cantools(message: Message, values: dict[str, float], counter: int) -> bytes:
+    """The payload without its CRC byte."""
+    return message.encode({**values, "crc": 0, "counter": counter}, strict=False)[1:]
+
+
+def test_catalogue_has_the_fields() -> None:
+    assert len(MESSAGES) == 9
+    assert len(FIELDS) == 21
+
+
+def test_crc_of_the_design() -> None:
+    assert crc(b"123456789") == 0xDF
+    lever = codec.encoder("LEVER_SAMPLE")  # data IDs 1 to 16
+    assert lever(0, None, None, None) == bytes([0x0E, 0, 0, 0, 0, 0, 0, 0])
+    assert lever(1, None, None, None) == bytes([0x1B, 1, 0, 0, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+@pytest.mark.parametrize("counter", range(16))
+def test_protection(name: str, counter: int) -> None:
+    message = MESSAGES[name]
+    assert message.dbc is not None
+    base = int(message.dbc.attributes["E2EDataIdBase"].value)
+    frame = codec.encode(name, counter, contents(message))
+    assert frame[1] & 15 == counter
+    assert frame[0] == crc(frame[1:] + bytes([base + counter]))
+    assert e2e_p02_check(frame, bytes(range(base, base + 16)))
+    assert codec.check(message.frame_id, frame)
+    assert codec.encode(name, counter + 16, contents(message)) == frame
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_every_flipped_bit_is_found(name: str) -> None:
+    message = MESSAGES[name]
+    frame = int.from_bytes(codec.encode(name, 5, contents(message)), "big")
+    for bit in range(64):
+        assert not codec.check(message.frame_id, (frame ^ 1 << bit).to_bytes(8, "big"))
+    identifier = codec.data_ids(name)[5:6]
+    for length in (2, 7, 9):  # with a CRC that is right for what there is
+        content = frame.to_bytes(8, "big")[1:length].ljust(length - 1, b"\0")
+        assert not codec.check(message.frame_id, bytes([crc(content + identifier)]) + content)
+    assert not codec.check(message.frame_id, b"")
+
+
+@pytest.mark.parametrize(("message", "signal"), FIELDS, ids=FIELD_NAMES)
+def test_field_against_cantools(message: Message, signal: Signal) -> None:
+    assert signal.minimum is not None
+    assert signal.maximum is not None
+    low, high, step = float(signal.minimum), float(signal.maximum), float(signal.scale)
+    span = high - low
+    inside = [low + span * part for part in (0.0, 0.1, 0.333333, 0.5, 0.77, 1.0)]
+    inside += [low + 1.4 * step, low + 1.6 * step, high - 1.4 * step, high - 0.4 * step, low + 0.4 * step]
+    beyond = [low - 0.4 * step, low - step, low - span, -1e30, -math.inf]
+    beyond += [high + 0.4 * step, high + step, high + span, 1e30, math.inf]
+    for value in inside + beyond:
+        values = {**contents(message), signal.name: value}
+        expected = {**values, signal.name: min(max(value, low), high)}
+        frame = codec.encode(message.name, 3, values)
+        assert frame[1:] == by_cantools(message, expected, 3), value
+        _, decoded = codec.decode(message.frame_id, frame)
+        assert decoded[signal.name] == pytest.approx(expected[signal.name], abs=0.5001 * step)
+
+
+@pytest.mark.parametrize(("message", "signal"), FIELDS, ids=FIELD_NAMES)
+@pytest.mark.parametrize("value", [math.nan, None])
+def test_not_a_number(message: Message, signal: Signal, value: float | None) -> None:
+    values = {**contents(message), signal.name: value}
+    flag = f"{signal.name}_valid"
+    if flag not in contents(message):
+        with pytest.raises(CodecError, match=f"{message.name}.{signal.name} cannot be"):
+            codec.encode(message.name, 0, values)
+        return
+    frame = codec.encode(message.name, 0, values)
+    assert frame[1:] == by_cantools(message, {**contents(message), signal.name: 0.0, flag: 0}, 0)
+
+
+def test_flag_of_an_invalid_value() -> None:
+    values = {"theta": 0.5, "theta_dot": 0.5, "tau_m": 0.5}
+    frame = codec.encode("LEVER_SAMPLE", 0, {**values, "theta_dot_valid": False})
+    flags = {"theta_valid": 1, "theta_dot_valid": 0, "tau_m_valid": 1}
+    assert frame[1:] == by_cantools(MESSAGES["LEVER_SAMPLE"], {**values, **flags, "theta_dot": 0.0}, 0)
+
+
+def test_counts_and_time_wrap_but_codes_do_not() -> None:
+    sample = MESSAGES["BASE_SAMPLE"]
+    for time_us in (0, 1, 2**32 - 1):
+        expected = by_cantools(sample, {"z_ddot": 1.0, "z_ddot_valid": 1, "time_us": time_us}, 0)
+        for turns in (0, 1, 5):
+            assert codec.encode("BASE_SAMPLE", 0, {"z_ddot": 1.0, "time_us": time_us + turns * 2**32})[1:] == expected
+    health = contents(MESSAGES["HEALTH"])
+    assert codec.encode("HEALTH", 0, {**health, "lost": 258}) == codec.encode("HEALTH", 0, {**health, "lost": 2})
+    for key, value in (("faults", 4096), ("faults", -1), ("mode", 6), ("mode", math.nan), ("lost", math.nan)):
+        with pytest.raises(CodecError, match=f"HEALTH.{key} cannot be"):
+            codec.encode("HEALTH", 0, {**health, key: value})
+
+
+def test_choices_by_name() -> None:
+    by_name = {"request": "freeze", "model": "keep", "preload": "trim", "estimator": "keep", "adaptation": "annealing"}
+    by_number = {"request": 2, "model": 15, "preload": 1, "estimator": 15, "adaptation": 1}
+    frame = codec.encode("COMMAND", 9, {**by_name, "dither_rms": 0.3})
+    assert frame == codec.encode("COMMAND", 9, {**by_number, "dither_rms": 0.3})
+    assert frame[1:] == by_cantools(MESSAGES["COMMAND"], {**by_number, "dither_rms": 0.3}, 9)
+    with pytest.raises(CodecError, match=r"COMMAND.request cannot be 'stop'; allowed: none, run, freeze, reset"):
+        codec.encode("COMMAND", 0, {**by_name, "request": "stop", "dither_rms": 0.0})
+    with pytest.raises(CodecError, match="dither_rms"):
+        codec.encode("COMMAND", 0, {**by_name, "dither_rms": math.nan})
+
+
+def test_command_choices_are_those_of_the_firmware() -> None:
+    for key in ("model", "preload", "estimator", "adaptation"):
+        signal = MESSAGES["COMMAND"].get_signal_by_name(key)
+        names = {raw: str(name) for raw, name in (signal.choices or {}).items()}
+        assert names == {**native.enum_names(f"lever_{key}"), native.lib.LEVER_KEEP: "keep"}
+    modes = MESSAGES["HEALTH"].get_signal_by_name("mode").choices
+    assert modes is not None
+    assert {raw: str(name) for raw, name in modes.items()} == native.enum_names("lever_mode")
+
+
+@pytest.mark.parametrize("change", [{"theta": None}, {"speed": 1.0}])
+def test_missing_and_unknown_names(change: dict[str, float | None]) -> None:
+    values = {"theta": 0.1, "theta_dot": 0.1, "tau_m": 0.1, **change}
+    if values["theta"] is None:
+        del values["theta"]
+    with pytest.raises(CodecError, match=r"LEVER_SAMPLE holds theta, theta_dot, tau_m; given: "):
+        codec.encode("LEVER_SAMPLE", 0, values)
+
+
+def test_multiplexed_message() -> None:
+    values = {"m_p": 2.5, "c_p": 42.0, "k_p": 1500.0}
+    frame = codec.encode("PILOT_PARAMETERS", 0, {"model": "lever", **values})
+    assert frame == codec.encode("PILOT_PARAMETERS", 0, {"model": 0, **values})
+    assert frame[1:] == by_cantools(MESSAGES["PILOT_PARAMETERS"], {"model": 0, **values}, 0)
+    with pytest.raises(CodecError, match="multiplexed"):
+        codec.encoder("PILOT_PARAMETERS")
+
+
+def test_fast_encoders_against_cantools() -> None:
+    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    valid = {"theta_valid": 1, "theta_dot_valid": 1, "tau_m_valid": 1}
+    random = np.random.default_rng(1)
+    for counter in range(16):
+        theta, theta_dot, tau_m, z_ddot = (float(value) for value in random.normal(size=4) * [1.0, 5.0, 10.0, 10.0])
+        values = {"theta": theta, "theta_dot": theta_dot, "tau_m": tau_m, **valid}
+        frame = lever(counter, theta, theta_dot, tau_m)
+        assert frame[1:] == by_cantools(MESSAGES["LEVER_SAMPLE"], values, counter)
+        assert codec.check(0x110, frame)
+        values = {"z_ddot": z_ddot, "z_ddot_valid": 1, "time_us": 1000 * counter}
+        frame = base(counter, z_ddot, 1000 * counter)
+        assert frame[1:] == by_cantools(MESSAGES["BASE_SAMPLE"], values, counter)
+        assert codec.check(0x111, frame)
+    with pytest.raises(ValueError, match="zip"):
+        lever(0, 1.0)
+
+
+def test_the_firmware_takes_what_is_encoded() -> None:
+    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    estimator = native.Estimator()
+    for k in range(40):
+        assert estimator.on_frame(0x110, lever(k, 0.3, 0.0, None)) == native.lib.LEVER_FRAME_TAKEN
+        assert estimator.on_frame(0x111, base(k, 0.0, 1000 * k)) == native.FRAME_SAMPLE
+        estimator.step()
+    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
+    command = codec.encode("COMMAND", 0, {"request": "freeze", "dither_rms": 0.0, **keep})
+    assert estimator.on_frame(0x120, command) == native.lib.LEVER_FRAME_TAKEN
+    assert estimator.health().corrupt == 0
+    for identifier, frame in ((0x110, lever(0, 0.3, 0.0, None)), (0x111, base(0, 0.0, 0)), (0x120, command)):
+        for bit in range(64):
+            flipped = (int.from_bytes(frame, "big") ^ 1 << bit).to_bytes(8, "big")
+            assert native.Estimator().on_frame(identifier, flipped) == native.lib.LEVER_FRAME_REFUSED
+
+
+def test_decoding_what_the_firmware_says() -> None:
+    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    estimator = native.Estimator()
+    seen = set()
+    for k in range(500):
+        theta = 0.35 + 0.02 * math.sin(0.02 * k)
+        estimator.on_frame(0x110, lever(k, theta, 0.4 * math.cos(0.02 * k), 0.0))
+        estimator.on_frame(0x111, base(k, 0.5 * math.sin(0.02 * k), 1000 * k))
+        estimator.step()
+        said = {}
+        while (frame := estimator.next_frame()) is not None:
+            name, said[name] = codec.decode(*frame)
+            seen.add(name)
+        estimate, health = estimator.estimate(), estimator.health()
+        state = said["STATE_ESTIMATE"]
+        assert state["theta"] == pytest.approx(estimate.theta, abs=0.501e-4)
+        assert state["theta_dot"] == pytest.approx(estimate.theta_dot, abs=2.501e-4)
+        if "PILOT_PARAMETERS" in said:
+            assert said["PILOT_PARAMETERS"]["k_p"] == pytest.approx(estimate.parameter[2], abs=0.0502)
+        if "HEALTH" in said:
+            assert native.enum_names("lever_mode")[int(said["HEALTH"]["mode"])] == health.mode
+    assert {"STATE_ESTIMATE", "PILOT_PARAMETERS", "HEALTH"} <= seen
+
+
+def test_decoding_refuses() -> None:
+    frame = codec.encoder("BASE_SAMPLE")(0, 1.0, 0)
+    assert codec.decode(0x111, frame) == (
+        "BASE_SAMPLE",
+        {"crc": frame[0], "counter": 0, "z_ddot_valid": 1, "z_ddot": 1.0, "time_us": 0},
+    )
+    with pytest.raises(CodecError, match=r"0x7ff is not a message of lever.dbc: LEVER_SAMPLE, "):
+        codec.decode(0x7FF, frame)
+    with pytest.raises(CodecError, match=r"BASE_SAMPLE \(0x111\) .* is corrupt"):
+        codec.decode(0x111, frame[:7])
+    with pytest.raises(CodecError, match=r"LEVER_SAMPLE \(0x110\) .* is corrupt"):  # a frame of another message
+        codec.decode(0x110, frame)
+    other_model = bytearray(codec.encode("PILOT_SIGMA", 0, contents(MESSAGES["PILOT_SIGMA"])))
+    other_model[1] |= 7 << 4
+    other_model[0] = crc(bytes(other_model[1:]) + codec.data_ids("PILOT_SIGMA")[:1])
+    with pytest.raises(CodecError, match=r"PILOT_SIGMA \(0x212\)"):
+        codec.decode(0x212, other_model)
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_columns_against_cantools(name: str) -> None:
+    message = MESSAGES[name]
+    data = np.random.default_rng(2).integers(0, 256, (400, 8), dtype=np.uint8)
+    data[:4] = [[0] * 8, [255] * 8, [0, 0x0F, 0, 0x80, 0, 0x80, 0, 0x80], [0, 0x0F, 255, 0x7F, 255, 0x7F, 255, 0x7F]]
+    if message.is_multiplexed():
+        data[::2, 1] &= 0x0F  # the model that there is
+    columns = codec.decode_columns(name, data)
+    assert set(columns) == {signal.name for signal in message.signals}
+    for row, frame in enumerate(data):
+        try:
+            expected = message.decode_simple(frame.tobytes(), decode_choices=False)
+        except cantools.database.DecodeError:
+            expected = {}  # of a model that there is not
+            assert message.is_multiplexed()
+        for signal in message.signals:
+            value = columns[signal.name][row]
+            if signal.name in expected:
+                assert value == expected[signal.name]
+            elif signal.multiplexer_ids is not None:
+                assert math.isnan(value)
+
+
+def test_columns_of_other_layouts() -> None:
+    assert codec.decode_columns("HEALTH", np.empty((0, 8), np.uint8))["mode"].shape == (0,)
+    wide = np.random.default_rng(3).integers(0, 256, (20, 16), dtype=np.uint8)
+    expected = codec.decode_columns("HEALTH", wide[::2, 4:12].copy())
+    for key, column in codec.decode_columns("HEALTH", wide[::2, 4:12]).items():
+        np.testing.assert_array_equal(column, expected[key])
+    wrongs: list[Any] = [np.zeros((3, 7), np.uint8), np.zeros(8, np.uint8), np.zeros((3, 8), np.int64)]
+    for wrong in wrongs:
+        with pytest.raises(CodecError, match=r"HEALTH: data is .* not uint8 of shape \(N, 8\)"):
+            codec.decode_columns("HEALTH", wrong)
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_raw_fields_against_cantools(name: str) -> None:
+    message = MESSAGES[name]
+    for frame in np.random.default_rng(4).integers(0, 256, (20, 8), dtype=np.uint8):
+        frame[1] &= 0x0F
+        raw = message.decode_simple(frame.tobytes(), decode_choices=False, scaling=False)
+        for signal in message.signals:
+            value = codec.raw_field(name, signal.name)(frame.tobytes())
+            assert value == int(raw[signal.name]) % (1 << signal.length)  # type: ignore[arg-type]

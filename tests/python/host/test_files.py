@@ -1,0 +1,83 @@
+"""Writing files whole or not at all, and tables to the screen and as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools import files
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.tables import Tables, print_tables
+
+TABLES: Tables = {
+    "pilots": [
+        {"name": "arm [left]", "mass kg": 2.5, "count": 3, "valid": True},
+        {"name": "", "mass kg": math.nan, "count": None, "valid": False},
+    ],
+    "empty": [],
+}
+
+
+def test_write_replaces(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    for text in ("old", "θ̇ new\n"):
+        files.write_text(path, text)
+        assert path.read_text(encoding="utf-8") == text
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_failed_write_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+
+    def full(_source: object, _target: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(LeverError, match=r"cannot write .*a\.txt: No space left on device"):
+        files.write_text(path, "new")
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_places_that_cannot_be_written(tmp_path: Path) -> None:
+    with pytest.raises(LeverError, match=r"cannot write .*: Is a directory"):
+        files.write_text(tmp_path, "new")
+    with pytest.raises(LeverError, match=r"cannot write .*: No such file or directory"):
+        files.write_text(tmp_path / "none" / "a.txt", "new")
+    assert os.listdir(tmp_path) == []
+
+
+def test_links_and_devices_stay(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "a.txt")
+    files.write_text(tmp_path / "link", "text")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "a.txt").read_text() == "text"
+    files.write_text("/dev/null", "text")
+    assert not Path("/dev/null").is_file()
+
+
+def test_printed_table(capsys: pytest.CaptureFixture[str]) -> None:
+    print_tables(TABLES)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["pilots"] in lines
+    assert ["name", "mass", "kg", "count", "valid"] in lines
+    assert ["arm", "[left]", "2.5", "3", "True"] in lines
+    assert ["nan", "False"] in lines
+    assert ["empty:", "none"] in lines
+
+
+def test_table_is_not_folded_in_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
+    print_tables({"wide": [{f"column {index}": "x" * 30 for index in range(20)}]})
+    assert any(line.count("x" * 30) == 20 for line in capsys.readouterr().out.splitlines())
+
+
+def test_json_has_the_same_rows(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    print_tables(TABLES, str(path))
+    rows = [dict(row) for row in TABLES["pilots"]]
+    rows[1]["mass kg"] = None  # JSON has no NaN
+    assert json.loads(path.read_text(encoding="utf-8")) == {"pilots": rows, "empty": []}
