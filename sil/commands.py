@@ -1,0 +1,228 @@
+"""`lever sim` and `lever demo`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
+
+if TYPE_CHECKING:
+    import can
+
+    from .runner import Result
+    from .scenario import Scenario
+
+_DESCRIPTION = """\
+Simulates a pilot's arm on the lever and lets the firmware estimate it over CAN, in lock-step: every sample is answered
+before the next one is sent. Prints how good the estimates were; with --out also writes into DIR
+
+  bus.log       every frame both ways, in the format of candump, with simulated time
+  trace.csv     truth, measured, estimated, standard deviations and health, a row for each sample
+  summary.json  errors, coverage, times to converge, innovations, counts, and a verdict
+  report.html   all of it as one page for a browser
+
+With --interface lever (the default) the firmware runs inside this process. With socketcan or slcan it has to be running
+at the other end of the channel, with the settings that --settings prints; bus.log is the same to the byte but for the
+channel's name.
+"""
+_EPILOG = """\
+examples:
+  lever sim --list
+  lever sim steady --out out/steady
+  lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
+  lever sim my_own.toml
+  lever sim steady --settings > steady.settings; lever_can --can vcan0 --settings steady.settings &
+  lever sim steady --interface socketcan --channel vcan0
+
+Exit status: 0 when every sample was answered, the estimator never was in fault, and the limits of the scenario were
+kept; 1 when not, with one line on standard error.
+"""
+_CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
+_PATIENCE = 2.0  # [s] before a progress bar appears
+_DEMO = "demo"
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    sim = subparsers.add_parser(
+        "sim", help="simulate a scenario and judge the estimates", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    what = sim.add_mutually_exclusive_group(required=True)
+    what.add_argument("scenario", nargs="?", metavar="SCENARIO", help="a name of --list, or the path of a .toml file")
+    what.add_argument("--list", action="store_true", help="print the scenarios that come with the package")
+    sim.add_argument(
+        "--interface", choices=("lever", "socketcan", "slcan"), default="lever", help="default: %(default)s"
+    )
+    sim.add_argument(
+        "--channel", help="vcan0 for socketcan, a serial device for slcan (default: vcan0; slcan has none)"
+    )
+    sim.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    sim.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
+    )
+    sim.add_argument("--seed", type=int, help="set the seed of all random numbers")
+    sim.add_argument("--realtime", action="store_true", help="pace the samples by the clock")
+    sim.add_argument(
+        "--settings", action="store_true", help="print the settings file that the firmware needs, and stop"
+    )
+    add_json_option(sim)
+    sim.set_defaults(run=run)
+    demo = subparsers.add_parser(
+        "demo",
+        help="simulate a tiring, then startled pilot and write a report",
+        description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled.",
+    )
+    demo.add_argument("--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
+    add_json_option(demo)
+    demo.set_defaults(run=run_demo)
+
+
+def run(args: argparse.Namespace) -> int:
+    """`lever sim`."""
+    from .scenario import load
+
+    if args.list:
+        return _list(args.json)
+    overrides = args.set + ([] if args.seed is None else [f"seed={args.seed}"])
+    scenario = load(args.scenario, overrides)
+    if args.settings:
+        from lever_cdkf.host_tools.settings_file import format_config
+
+        sys.stdout.write(format_config(scenario.config))
+        return 0
+    channel = args.channel or _CHANNELS.get(args.interface)
+    if channel is None:
+        raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
+    return _simulate(scenario, args.interface, channel, args.out, args.json, args.realtime)
+
+
+def run_demo(args: argparse.Namespace) -> int:
+    """`lever demo`."""
+    from .scenario import load
+
+    return _simulate(load(_DEMO), "lever", "lever", args.out, args.json, realtime=False)
+
+
+def _list(json_file: str | None) -> int:
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from .scenario import load, names
+
+    scenarios = [load(name) for name in names()]
+    rows: list[Row] = [
+        {"name": scenario.name, "duration [s]": scenario.duration, "title": scenario.title} for scenario in scenarios
+    ]
+    print_tables({"scenarios": rows}, json_file)
+    return 0
+
+
+def _simulate(
+    scenario: Scenario, interface: str, channel: str, out: Path | None, json_file: str | None, realtime: bool
+) -> int:
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from .runner import simulate
+
+    with open_bus(scenario, interface, channel) as bus, _Progress(scenario.name) as progress:
+        result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
+    print_tables(_tables(result), json_file)
+    print(result.summary["verdict"])
+    if out is not None:
+        print(f"Written to {out}: report.html, summary.json, trace.csv, bus.log")
+    if result.summary["passed"]:
+        return 0
+    print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)
+    return 1
+
+
+def open_bus(scenario: Scenario, interface: str, channel: str) -> can.BusABC:
+    """The bus to the estimator. Raises LeverError."""
+    import can
+
+    if interface == "lever":
+        from lever_cdkf.host_tools.bus import LeverBus
+
+        return LeverBus(channel, config=scenario.config)
+    options = {"sleep_after_open": 0.0} if interface == "slcan" else {}
+    try:
+        return can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
+    except (can.CanError, OSError, ValueError) as error:
+        raise LeverError(f"cannot open {interface} channel {channel}: {error}; is it there and up?") from None
+
+
+class _Progress:
+    """A progress bar on standard error, once a run takes longer than a moment and somebody is looking."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._start = time.monotonic()
+        self._bar: Any = None
+        self._task: Any = None
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def show(self, done: int, total: int) -> None:
+        if self._bar is None and time.monotonic() - self._start > _PATIENCE and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self._bar = Progress(console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._task = self._bar.add_task(self._name, total=total)
+        if self._bar is not None:
+            self._bar.update(self._task, completed=done)
+
+
+def _tables(result: Result) -> Tables:
+    """What is printed at the end."""
+    from .summary import QUANTITIES
+
+    summary, trace = result.summary, result.trace
+    rows: list[Row] = []
+    for name, entry in summary["parameters"].items():
+        ending, unit = QUANTITIES[name]
+        rows.append(
+            {
+                "quantity": name,
+                "unit": unit,
+                "truth at end": float(trace[f"{name}_true{ending}"][-1]),
+                "estimate": float(trace[f"{name}_estimate{ending}"][-1]),
+                "sigma": float(trace[f"{name}_sigma{ending}"][-1]),
+                "rms error [%]": entry["rms_percent"],
+                "bias [%]": entry["bias_percent"],
+                "truth within 2 sigma [1]": entry["coverage_2sigma"],
+                "time to 10 % [s]": _times(entry["time_to_10_percent_s"]),
+                "time to 5 % [s]": _times(entry["time_to_5_percent_s"]),
+            }
+        )
+    run_row: Row = {
+        "samples": summary["samples"],
+        **{count: summary[count] for count in ("unanswered", "lost", "corrupt", "late")},
+        "mean NIS [1]": summary["nis"]["mean"],
+        "expected NIS [1]": summary["nis"]["expected"],
+        "simulated time [s]": summary["simulated_time_s"],
+        "wall time [s]": summary["wall_time_s"],
+    }
+    return {summary["scenario"]["title"]: rows, "run": [run_row]}
+
+
+def _times(times: list[float | None]) -> str:
+    """Times after each change; a dash where the estimate never got there for good."""
+    return ", ".join("-" if seconds is None else f"{seconds:.1f}" for seconds in times)
+
+
+def _reason(result: Result) -> str:
+    """Why a run did not pass, in a line."""
+    summary = result.summary
+    reasons = [f"{summary['unanswered']} samples without an answer"] if summary["unanswered"] else []
+    reasons += ["the estimator was in fault"] if "fault" in summary["modes_s"] else []
+    return "; ".join(reasons + summary["missed"])

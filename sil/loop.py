@@ -1,0 +1,291 @@
+"""A run in lock-step over any python-can bus: one sample out, one estimate back, whatever time that takes.
+
+Everything that does not depend on the estimator (excitation, noise, dropouts, truth) is made beforehand, everything
+that is not needed to go on (decoding, statistics, files) is done afterwards, both in whole columns; the loop in between
+advances the plant, encodes two frames and waits for STATE_ESTIMATE. Time is the time in the frames, so that a run gives
+the same bytes at any speed and on any bus.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from array import array
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import can
+import numpy as np
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.errors import LeverError
+from numpy.typing import NDArray
+
+from . import excitation, plant, sensors
+from .buslog import Frames
+from .scenario import FloatArray, Scenario
+
+Progress = Callable[[int, int], None]
+"""Called now and then with the samples done and the samples in all."""
+
+ANSWER_TIMEOUT = 5.0
+"""Longest wait for a STATE_ESTIMATE [s]; a sample that gets none in that time is counted as unanswered."""
+FIRST_TIMEOUT = 2.0
+"""Longest wait for the first one: the other process may still be starting."""
+MOST_UNANSWERED = 20
+"""Samples without an answer in a row, after which nobody is taken to be there."""
+
+_PROGRESS_EVERY = 500
+
+
+class NoAnswerError(LeverError):
+    """No estimator answers on the bus."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What is known of a run before it starts: one value a sample."""
+
+    time: FloatArray
+    truth: plant.Truth
+    z_ddot: FloatArray
+    """True base acceleration [m/s^2]."""
+    z_ddot_measured: FloatArray
+    torque: FloatArray
+    """Commanded by the scenario itself [N m]."""
+    missing: dict[str, NDArray[np.bool_]]
+    """For each of sensors.VALUES and sensors.FRAMES."""
+
+
+@dataclass
+class Recording:
+    """What a run left behind, in the order in which it happened."""
+
+    scenario: Scenario
+    inputs: Inputs
+    identifier: array[int] = field(default_factory=lambda: array("H"))
+    sample: array[int] = field(default_factory=lambda: array("L"))
+    data: bytearray = field(default_factory=bytearray)
+    theta: list[float] = field(default_factory=list)
+    theta_dot: list[float] = field(default_factory=list)
+    tau_m: list[float] = field(default_factory=list)
+    unanswered: int = 0
+
+    def frames(self) -> Frames:
+        """All frames, with the time of their sample."""
+        identifier = np.array(self.identifier, dtype=np.uint16)
+        outgoing = [codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")]
+        period_us = round(self.scenario.period * 1e6)
+        return Frames(
+            np.array(self.sample, dtype=np.int64) * period_us,
+            identifier,
+            np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8),
+            ~np.isin(identifier, outgoing),
+        )
+
+
+def prepare(scenario: Scenario) -> Inputs:
+    """The parts of a run that do not depend on the estimator."""
+    time, period = scenario.time(), scenario.period
+    base = excitation.total(scenario.base, time, scenario.streams("base", scenario.base))
+    dropouts = scenario.sensors.dropout
+    gone = {}
+    for what in (*sensors.VALUES, *sensors.FRAMES):
+        gone[what] = sensors.missing(dropouts, what, time, period, scenario.streams("dropout", dropouts))
+    return Inputs(
+        time=time,
+        truth=scenario.truth(time),
+        z_ddot=base,
+        z_ddot_measured=scenario.sensors.z_ddot.measure(base, period, scenario.stream("z_ddot")),
+        torque=excitation.total(scenario.torque, time, scenario.streams("torque", scenario.torque)),
+        missing=gone,
+    )
+
+
+def run(scenario: Scenario, bus: can.BusABC, *, realtime: bool = False, progress: Progress | None = None) -> Recording:
+    """Runs `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock.
+
+    Raises NoAnswerError when nobody answers.
+    """
+    recording = Recording(scenario, prepare(scenario))
+    _loop(recording, _Link(bus, recording), realtime, progress)
+    return recording
+
+
+class _Link:
+    """The estimator at the other end of the bus; records every frame both ways."""
+
+    def __init__(self, bus: can.BusABC, recording: Recording) -> None:
+        self._bus = bus
+        self._recording = recording
+        self._estimate = codec.message("STATE_ESTIMATE").frame_id
+        self._motor = codec.message("MOTOR_COMMAND").frame_id
+        self._torque = _signed_field("MOTOR_COMMAND", "torque")
+        self._unanswered_in_a_row = 0
+        self._counter = 0  # of the next COMMAND
+        incoming = [message for message in codec.database().messages if message.senders == ["ESTIMATOR"]]
+        self._incoming = frozenset(message.frame_id for message in incoming)
+
+    def sender(self, name: str) -> Callable[[int, bytes], None]:
+        """A function that sends a frame of the message `name`: called with the sample and the 8 bytes."""
+        identifier = codec.message(name).frame_id
+        message = can.Message(arbitration_id=identifier, is_extended_id=False, data=bytes(8))
+        send, recording = self._bus.send, self._recording
+
+        def send_frame(sample: int, data: bytes) -> None:
+            message.data = bytearray(data)
+            send(message)
+            recording.identifier.append(identifier)
+            recording.sample.append(sample)
+            recording.data += data
+
+        return send_frame
+
+    def command(self, sample: int, request: str, dither_rms: float) -> None:
+        """Sends a COMMAND: a reset makes the scenario's choices, all else keeps them."""
+        send = self.sender("COMMAND")
+        keep = dict.fromkeys(self._recording.scenario.config.choices, "keep")
+        choices = self._recording.scenario.config.choices if request == "reset" else keep
+        send(sample, codec.encode("COMMAND", self._counter, {"request": request, "dither_rms": dither_rms, **choices}))
+        self._counter += 1
+
+    def answer(self, sample: int) -> float:
+        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for."""
+        recording, recv, motor, estimate = self._recording, self._bus.recv, self._motor, self._estimate
+        timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
+        torque = 0.0
+        while True:
+            message = recv(timeout)
+            if message is None:
+                self._miss(sample)
+                return torque
+            identifier, data = message.arbitration_id, message.data
+            if identifier not in self._incoming or len(data) != 8:
+                continue  # somebody else's
+            recording.identifier.append(identifier)
+            recording.sample.append(sample)
+            recording.data += data
+            if identifier == motor:
+                torque = self._torque(data)
+            elif identifier == estimate:
+                self._unanswered_in_a_row = 0
+                return torque
+
+    def discard_late(self) -> None:
+        """Takes late answers off the bus, so that none is mistaken for the next sample's; needed after a miss only."""
+        while self._recording.unanswered and self._bus.recv(0.0) is not None:
+            pass
+
+    def _miss(self, sample: int) -> None:
+        self._recording.unanswered += 1
+        self._unanswered_in_a_row += 1
+        if self._unanswered_in_a_row >= MOST_UNANSWERED or not sample:
+            raise NoAnswerError(
+                f"no STATE_ESTIMATE on {self._bus.channel_info} at sample {sample}: is the firmware running there?"
+            )
+
+
+def _signed_field(name: str, signal: str) -> Callable[[bytes | bytearray], float]:
+    """A fast reader of one signed, scaled field of an 8-byte frame."""
+    layout = codec.message(name).get_signal_by_name(signal)
+    raw, scale, half = codec.raw_field(name, signal), float(layout.scale), 1 << (layout.length - 1)
+    return lambda data: ((raw(data) ^ half) - half) * scale
+
+
+def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress | None) -> None:
+    """The samples, one after the other."""
+    scenario, inputs = recording.scenario, recording.inputs
+    count = len(inputs.time)
+    body = _plant(scenario, inputs)
+    commands = _commands(scenario, inputs.time)
+    pace = _pace(scenario.period) if realtime else None
+    send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
+    encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    thetas, theta_dots, torques = recording.theta, recording.theta_dot, recording.tau_m
+    measure = _lever_sensors(recording)
+    no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
+    base = np.where(inputs.missing["z_ddot"], np.nan, inputs.z_ddot_measured).tolist()
+    period_us = round(scenario.period * 1e6)
+    command, own_torque, last = 0.0, inputs.torque.tolist(), count - 1
+
+    for sample in range(count):
+        thetas.append(body.theta)
+        theta_dots.append(body.theta_dot)
+        torques.append(body.tau_m)
+        link.discard_late()
+        if sample in commands:
+            link.command(sample, *commands[sample])
+        theta, theta_dot, torque = measure(sample)
+        if not no_lever[sample]:
+            send_lever(sample, encode_lever(sample, theta, theta_dot, torque))
+        if not no_base[sample]:
+            send_base(sample, encode_base(sample, base[sample], sample * period_us))
+            command = link.answer(sample)
+        if sample != last:
+            body.advance(command + own_torque[sample])
+        if pace is not None:
+            next(pace)
+        if progress is not None and sample % _PROGRESS_EVERY == 0:
+            progress(sample, count)
+    if progress is not None:
+        progress(count, count)
+
+
+def _plant(scenario: Scenario, inputs: Inputs) -> plant.Plant:
+    return plant.Plant(
+        scenario.true_lever,
+        inputs.truth,
+        scenario.pilot.preload,
+        inputs.z_ddot,
+        scenario.period,
+        scenario.pilot.process_noise,
+        scenario.motor.lag,
+        scenario.stream("process"),
+    )
+
+
+def _commands(scenario: Scenario, time: FloatArray) -> dict[int, tuple[str, float]]:
+    """(request, dither rms) at the samples before which a COMMAND goes out: a reset at the start, then the dither."""
+    commands = {0: ("reset", 0.0)}
+    for when, rms in scenario.dithers():
+        sample = int(np.searchsorted(time, when - 1e-9))
+        commands[sample] = ("none" if sample else "reset", rms)
+    return commands
+
+
+def _lever_sensors(recording: Recording) -> Callable[[int], tuple[float, float, float]]:
+    """The readings of theta, theta_dot and tau_m at a sample, from the history up to it; NaN when invalid."""
+    scenario, inputs = recording.scenario, recording.inputs
+    readers = []
+    for name in ("theta", "theta_dot", "tau_m"):
+        sensor: sensors.Sensor = getattr(scenario.sensors, name)
+        offsets = sensor.offsets(len(inputs.time), scenario.stream(name))
+        offsets[inputs.missing[name]] = np.nan
+        readers.append(_reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period))
+    theta, theta_dot, tau_m = readers
+    return lambda sample: (theta(sample), theta_dot(sample), tau_m(sample))
+
+
+def _reader(
+    sensor: sensors.Sensor, history: list[float], offsets: list[float], period: float
+) -> Callable[[int], float]:
+    """A sensor of a signal that is known only up to now; as Sensor.measure() otherwise."""
+    gain = 1.0 + sensor.gain_error
+    whole, part = sensor.lag(period)
+    if whole == 0 and part == 0.0:
+        return lambda sample: gain * history[sample] + offsets[sample]
+
+    def delayed(sample: int) -> float:
+        newer, older = history[max(sample - whole, 0)], history[max(sample - whole - 1, 0)]
+        return gain * (newer + part * (older - newer)) + offsets[sample]
+
+    return delayed
+
+
+def _pace(period: float) -> Iterator[None]:
+    """Waits, each time it is advanced, until that many periods have gone by on the wall clock."""
+    due = clock.perf_counter()
+    while True:
+        due += period
+        remaining = due - clock.perf_counter()
+        if remaining > 0.0:
+            clock.sleep(remaining)
+        yield

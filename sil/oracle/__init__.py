@@ -1,0 +1,15 @@
+"""A float64 oracle for the firmware's estimator, written from the equations and not from the C.
+
+It repeats what the firmware does (DESIGN sections 3 and 4) the plain way: full sigma-point sets, every matrix a numpy
+array, LAPACK's QR for every factor. It shares no code and no shortcut with the firmware, so where both agree both are
+probably right. It is also the readable version of the estimator:
+
+- `cdkf`   the square-root Central Difference Kalman Filter for any model: draw, predict, measure, update;
+- `lever`  the lever and arm: the step of the motion, natural frequency and damping ratio;
+- `dual`   state filter and parameter filter in step, adaptation of the parameter noise, trim, alignment.
+"""
+
+from .dual import DualFilter, Start, align, run
+from .lever import Lever
+
+__all__ = ["DualFilter", "Lever", "Start", "align", "run"]

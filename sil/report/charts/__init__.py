@@ -1,0 +1,1 @@
+"""The charts of the report: functions that take a Run and return a Figure, or None when the run lacks what it shows."""

@@ -1,0 +1,210 @@
+"""Puts the page together: sections of words and figures, the style, plotly.js and the script that draws."""
+
+import html
+import json
+from importlib.resources import files
+from string import Template
+
+import plotly.offline
+
+from . import words
+from .charts import health, signals, tracking, transfer
+from .figure import Figure
+from .run import Run
+
+
+class Page:
+    """Sections in the order they are added."""
+
+    def __init__(self) -> None:
+        self.sections: list[str] = []
+        self.contents: list[tuple[str, str]] = []
+        self.figures: dict[str, Figure] = {}
+
+    def section(self, key: str, short: str, title: str, *parts: str) -> None:
+        """Adds a section of HTML parts, unless all are empty; `short` is its title in the table of contents."""
+        if any(parts):
+            self.contents.append((key, short))
+            self.sections.append(f'<section id="{key}"><h2>{title}</h2>{"".join(parts)}</section>')
+
+    def figure(self, key: str, figure: Figure | None, caption: str) -> str:
+        """The place of a figure with its caption; nothing without a figure."""
+        if figure is None:
+            return ""
+        self.figures[key] = figure
+        place = f'<div class="chart" id="{key}" style="height:{figure.height}px"></div>'
+        return f"<figure>{place}<figcaption>{caption}</figcaption></figure>"
+
+
+def build(run: Run) -> str:
+    """The whole page."""
+    page = Page()
+    _explained(page, run)
+    _estimates(page, run)
+    _transfer(page, run)
+    _signals(page, run)
+    _health(page, run)
+    _numbers(page, run)
+    scenario = run.summary.get("scenario", {})
+    title = scenario.get("title") or scenario.get("name") or "recorded run"
+    links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
+    body = (
+        f'<header><h1>Lever CDKF: {html.escape(title)}</h1><p class="subtitle">{_subtitle(run)}</p></header>'
+        f"{words.verdict(run)}{words.cards(run)}<nav>{links}</nav>{''.join(page.sections)}"
+        "<footer>Made by <code>lever</code>. Nothing on this page is loaded from elsewhere.</footer>"
+    )
+    specs = {key: figure.spec() for key, figure in page.figures.items()}
+    figures = json.dumps(specs, separators=(",", ":"), allow_nan=False)
+    here = files(__package__)
+    return Template((here / "page.html").read_text(encoding="utf-8")).substitute(
+        title=f"Lever CDKF: {html.escape(title)}",
+        css=(here / "page.css").read_text(encoding="utf-8"),
+        body=body,
+        figures=figures.replace("</", "<\\/"),
+        plotly=plotly.offline.get_plotlyjs(),
+        script=(here / "page.js").read_text(encoding="utf-8"),
+    )
+
+
+def _subtitle(run: Run) -> str:
+    description = html.escape(run.summary.get("scenario", {}).get("description") or "")
+    length = f"{len(run.time):,} samples in {run.end:.0f} s.".replace(",", "\u2009")
+    return f"{description} {length}".strip()
+
+
+def _explained(page: Page, run: Run) -> None:
+    checked = " The truth is known in a simulation: this page holds the claims against it." if run.has_truth else ""
+    svg = (files(__package__) / "schematic.svg").read_text(encoding="utf-8")
+    page.section(
+        "explained",
+        "About",
+        "What you are looking at",
+        '<div class="explained"><div>'
+        "<p>A helicopter pilot's left arm rests on the collective lever. The cabin shakes, the arm moves the lever, "
+        "the lever moves the rotor, and the rotor shakes the cabin: a loop that can grow by itself. How close it is "
+        "to that depends on the arm, which acts like a mass m<sub>p</sub> on a spring k<sub>p</sub> with a damper "
+        "c<sub>p</sub>, and which changes as the pilot grips, relaxes or tires.</p><p>Nobody can measure these three. "
+        "The estimator works them out on line, many times a second, from the lever's angle θ and rate, the "
+        "acceleration of the floor z̈ and the torque τ<sub>m</sub> of the lever's own motor, and says how sure it is: "
+        f"the shaded bands are ±2 standard deviations (σ).{checked}</p></div>{svg}</div>",
+    )
+
+
+def _estimates(page: Page, run: Run) -> None:
+    told = "."
+    if run.has_truth:
+        told = ": the blue line should follow the dashed one, and the band hold it about 95 % of the time."
+    marks = " Dotted lines mark sudden changes of the pilot." if run.changes else ""
+    page.section(
+        "parameters",
+        "Pilot's arm",
+        "The pilot's arm",
+        page.figure(
+            "figure-parameters",
+            tracking.parameters(run),
+            f"Mass, damping and stiffness of the pilot's arm, with a band of ±2σ{told}{marks}",
+        ),
+    )
+    page.section(
+        "dynamics",
+        "Frequency and damping",
+        "Natural frequency and damping",
+        page.figure(
+            "figure-dynamics",
+            tracking.dynamics(run),
+            "What decides about collective bounce: how fast arm and lever swing by themselves, and how quickly that "
+            "dies out (a damping ratio of 1 is no swing at all). Both are usually known better than the three "
+            "parameters, whose common scale cancels in them.",
+        ),
+    )
+
+
+def _transfer(page: Page, run: Run) -> None:
+    maps = transfer.maps(run)
+    captions = {
+        "truth": "<strong>Truth.</strong> Brightness is how many degrees the lever moves for 1 m/s² of floor motion, "
+        "over time and frequency. The white line is the natural frequency.",
+        "estimate": "<strong>Estimate.</strong> The same of the estimated parameters, same colours: the closer it "
+        "looks to the truth, the better.",
+    }
+    pair = "".join(page.figure(f"figure-map-{name}", figure, captions[name]) for name, figure in maps.items())
+    page.section(
+        "bode",
+        "Bode diagram",
+        "How the floor moves the lever: the Bode diagram in time",
+        f'<div class="pair">{pair}</div>' if pair else "",
+        page.figure(
+            "figure-slices",
+            transfer.slices(run),
+            "The same at one time, as a Bode diagram: magnitude above, phase below. Drag the slider through the run.",
+        ),
+    )
+
+
+def _signals(page: Page, run: Run) -> None:
+    page.section(
+        "states",
+        "States",
+        "States and innovations",
+        page.figure(
+            "figure-detail",
+            signals.detail(run),
+            "A close look at angle and rate of the lever: grey dots are what the sensors said, the blue line what the "
+            "estimator makes of it. The buttons choose the moment.",
+        ),
+        page.figure(
+            "figure-motion",
+            signals.motion(run),
+            "The whole run: the range that angle and rate covered in each short stretch of time. Estimate and truth "
+            "lie on each other unless something is wrong.",
+        ),
+        page.figure(
+            "figure-innovations",
+            signals.innovations(run),
+            "Innovations: how far each measurement was from what the estimator expected, squared, in units of what it "
+            "expected to be wrong by. Dots inside the band around 1 are what chance alone gives; above it the "
+            "estimator is over-confident, below it too cautious.",
+        ),
+    )
+    page.section(
+        "excitation",
+        "Excitation",
+        "Excitation",
+        page.figure(
+            "figure-excitation",
+            signals.excitation(run),
+            "What shakes the lever. Without motion there is nothing to learn from. Without motor torque only ratios of "
+            "the three parameters can be told, and the bands above must be wide.",
+        ),
+        page.figure(
+            "figure-spectra",
+            signals.spectra(run),
+            "At which frequencies the lever is shaken. They should cover its natural frequency (shaded).",
+        ),
+    )
+
+
+def _health(page: Page, run: Run) -> None:
+    page.section(
+        "health",
+        "Health",
+        "Health",
+        page.figure(
+            "figure-health",
+            health.timeline(run),
+            "What the estimator said of itself: its mode (blue) and the faults it noticed (orange). Below, how many "
+            "frames were lost, corrupt or late on the bus. What is not shown did not happen.",
+        ),
+    )
+
+
+def _numbers(page: Page, run: Run) -> None:
+    tables = (words.errors_table(run), words.run_table(run)) if run.summary else ()
+    page.section("numbers", "Numbers", "All numbers", *tables)
+    scenario = {key: value for key, value in run.summary.get("scenario", {}).items() if key != "description"}
+    rows = [(html.escape(key), html.escape(value)) for key, value in words.flat(scenario)]
+    estimator = {key: value for key, value in run.summary.get("estimator", {}).items() if key != "settings"}
+    rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in words.flat(estimator)]
+    made = f"<details><summary>Scenario</summary>{words.table(('', ''), rows)}</details>" if rows else ""
+    settings = f"<details><summary>Settings of the estimator</summary>{words.settings_table(run)}</details>"
+    page.section("made", "Settings", "How this run was made", made, settings)

@@ -1,0 +1,239 @@
+"""What a run comes to: summary.json, and the verdict in words.
+
+Errors are relative to the truth at the same sample and judged only from `converged_after` seconds after the start and
+after each jump of the truth on; how long the estimates need until then is what the times to 10 % and 5 % tell.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from lever_cdkf.host_tools.native import enum_names
+from numpy.typing import NDArray
+
+from .loop import Recording
+from .scenario import Scenario
+from .trace import Trace
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+QUANTITIES = {
+    "m_p": ("_kg", "kg"),
+    "c_p": ("_N_s_m", "N s/m"),
+    "k_p": ("_N_m", "N/m"),
+    "natural_frequency": ("_Hz", "Hz"),
+    "damping_ratio": ("", "1"),
+}
+"""What is judged: the ending of its columns, and its unit."""
+
+CHI_SQUARE_95 = {1: 3.841458820694124, 2: -2.0 * math.log(0.05)}
+"""Value that chi-square with so many degrees of freedom stays below with a probability of 95 %."""
+
+HONEST_COVERAGE = 0.9
+"""Share of the time for which +-2 sigma has to cover the truth to be called honest; 95.4 % if Gaussian and white."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How one quantity was estimated; null where there is nothing to judge."""
+
+    rms_percent: float | None
+    bias_percent: float | None
+    coverage_2sigma: float | None
+    """Share of the samples (0 to 1) at which estimate +- 2 sigma holds the truth."""
+    time_to_10_percent_s: list[float | None]
+    """After the start and each jump, until the error stays within 10 % up to the next jump; null: it never does."""
+    time_to_5_percent_s: list[float | None]
+
+
+def build(recording: Recording, trace: Trace) -> dict[str, Any]:
+    """The content of summary.json, but for the wall times; None stands for what there is nothing to say of."""
+    scenario = recording.scenario
+    quality = {name: _quality(name, scenario, trace) for name in QUANTITIES}
+    nis = _nis(scenario, trace)
+    count = len(recording.inputs.time)
+    modes = _modes(trace)
+    missed = _missed(scenario, quality)
+    summary: dict[str, Any] = {
+        "scenario": {
+            "name": scenario.name,
+            "title": scenario.title,
+            "description": scenario.description,
+            "seed": scenario.seed,
+            "sample_period_s": scenario.period,
+            "converged_after_s": scenario.converged_after,
+            "changes_s": list(scenario.changes()),
+            "limits": {name: limit for name, limit in asdict(scenario.limits).items() if limit is not None},
+        },
+        "estimator": {**scenario.config.choices, "settings": scenario.config.settings},
+        "parameters": {name: asdict(entry) for name, entry in quality.items()},
+        "nis": nis,
+        "samples": count,
+        **{name: _last(trace[name]) for name in ("lost", "corrupt", "late")},
+        "unanswered": recording.unanswered,
+        "modes_s": modes,
+        "missed": missed,
+        "simulated_time_s": count * scenario.period,
+    }
+    summary["passed"] = not missed and not recording.unanswered and "fault" not in modes
+    summary["verdict"] = _verdict(summary, quality)
+    return summary
+
+
+def _quality(name: str, scenario: Scenario, trace: Trace) -> Quality:
+    ending, _ = QUANTITIES[name]
+    truth = trace[f"{name}_true{ending}"]
+    error = trace[f"{name}_estimate{ending}"] - truth
+    relative, sigma = error / truth, trace[f"{name}_sigma{ending}"]
+    judged = judged_samples(scenario, trace["time_s"]) & np.isfinite(relative)
+    reached = [times_to(relative, trace["time_s"], scenario.changes(), within) for within in (0.1, 0.05)]
+    if not judged.any():
+        return Quality(None, None, None, *reached)
+    return Quality(
+        rms_percent=100.0 * float(np.sqrt(np.mean(np.square(relative[judged])))),
+        bias_percent=100.0 * float(np.mean(relative[judged])),
+        coverage_2sigma=float(np.mean(np.abs(error[judged]) <= 2.0 * sigma[judged])),
+        time_to_10_percent_s=reached[0],
+        time_to_5_percent_s=reached[1],
+    )
+
+
+def judged_samples(scenario: Scenario, time: FloatArray) -> BoolArray:
+    """True from `converged_after` seconds after each change on, until the next one."""
+    judged = np.ones(len(time), dtype=np.bool_)
+    for change in scenario.changes():
+        judged &= ~((time >= change) & (time < change + scenario.converged_after))
+    return judged
+
+
+def times_to(relative: FloatArray, time: FloatArray, changes: tuple[float, ...], within: float) -> list[float | None]:
+    """After each change, the time [s] until |relative| stays <= within up to the next change; None if it never does.
+
+    A sample without an estimate (NaN) counts as outside.
+    """
+    times: list[float | None] = []
+    for begin, end in zip(changes, (*changes[1:], math.inf), strict=True):
+        part = np.flatnonzero((time >= begin) & (time < end))
+        outside = np.flatnonzero(~(np.abs(relative[part]) <= within))
+        first = int(outside[-1]) + 1 if len(outside) else 0
+        times.append(round(float(time[part[first]]) - begin, 9) if first < len(part) else None)
+    return times
+
+
+def _nis(scenario: Scenario, trace: Trace) -> dict[str, Any]:
+    """Normalised innovation squared of the judged samples that had a measurement and an answer.
+
+    `inside_95_percent` is the share of samples below their chi-square's 95 % value: 0.95 for a consistent filter.
+    `mean_band_95` is where the mean would lie in 95 % of runs of a consistent filter.
+    """
+    outputs = np.isfinite(trace["theta_measured_rad"]).astype(int) + np.isfinite(trace["theta_dot_measured_rad_s"])
+    used = judged_samples(scenario, trace["time_s"]) & (outputs > 0) & np.isfinite(trace["nis"])
+    if not used.any():
+        return {"mean": None, "expected": None, "mean_band_95": None, "inside_95_percent": None}
+    nis, freedom = trace["nis"][used], outputs[used]
+    expected = float(np.mean(freedom))
+    spread = 1.96 * math.sqrt(2.0 * expected / len(nis))
+    limit = np.where(freedom == 2, CHI_SQUARE_95[2], CHI_SQUARE_95[1])
+    return {
+        "mean": float(np.mean(nis)),
+        "expected": expected,
+        "mean_band_95": [expected - spread, expected + spread],
+        "inside_95_percent": float(np.mean(nis <= limit)),
+    }
+
+
+def _last(column: FloatArray) -> int:
+    known = column[np.isfinite(column)]
+    return int(known[-1]) if len(known) else 0
+
+
+def _modes(trace: Trace) -> dict[str, float]:
+    """Seconds spent in each mode, by name, as far as HEALTH told."""
+    mode, step = trace["mode"], float(trace["time_s"][1] - trace["time_s"][0])
+    samples = {name: int(np.sum(mode == number)) for number, name in enum_names("lever_mode").items()}
+    return {name: round(count * step, 9) for name, count in samples.items() if count}
+
+
+def _missed(scenario: Scenario, quality: dict[str, Quality]) -> list[str]:
+    """The limits of the scenario that were not kept, in words."""
+    missed = []
+    for name, entry in quality.items():
+        limit = getattr(scenario.limits, name)
+        if limit is not None and entry.rms_percent is not None and entry.rms_percent > 100.0 * limit:
+            missed.append(f"rms error of {name} {entry.rms_percent:.1f} % (limit {100.0 * limit:g} %)")
+    least = scenario.limits.coverage
+    for name in ("m_p", "c_p", "k_p"):
+        coverage = quality[name].coverage_2sigma
+        if least is not None and coverage is not None and coverage < least:
+            missed.append(f"coverage of {name} {100.0 * coverage:.0f} % (limit {100.0 * least:g} %)")
+    return missed
+
+
+def add_wall_time(summary: dict[str, Any], seconds: float) -> None:
+    """Puts in how long the run took by the wall clock [s]; the only part of a summary that differs between runs."""
+    summary["wall_time_s"] = seconds
+    summary["wall_time_per_simulated_time"] = seconds / summary["simulated_time_s"]
+
+
+def _verdict(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
+    """The run in a few sentences, for somebody who has not seen a Kalman filter before."""
+    return " ".join(
+        sentence
+        for sentence in (
+            _verdict_run(summary),
+            _verdict_limits(summary, quality),
+            _verdict_sigma(quality),
+            _verdict_nis(summary["nis"]),
+        )
+        if sentence
+    )
+
+
+def _verdict_run(summary: dict[str, Any]) -> str:
+    troubles = []
+    if summary["unanswered"]:
+        troubles.append(f"{summary['unanswered']} samples got no answer")
+    if "fault" in summary["modes_s"]:
+        troubles.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
+    return f"Trouble: {' and '.join(troubles)}." if troubles else ""
+
+
+def _verdict_limits(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
+    errors = ", ".join(
+        f"{_words(name)} {entry.rms_percent:.1f} %" for name, entry in quality.items() if entry.rms_percent is not None
+    )
+    if not errors:
+        return "Too short to judge: the run ends before the estimates were to have converged."
+    if summary["missed"]:
+        return f"Limits missed: {'; '.join(summary['missed'])}. Rms errors after convergence: {errors}."
+    kept = "All limits kept. " if summary["scenario"]["limits"] else ""
+    return f"{kept}Rms errors after convergence: {errors}."
+
+
+def _verdict_sigma(quality: dict[str, Quality]) -> str:
+    covered = {name: entry.coverage_2sigma for name, entry in quality.items() if entry.coverage_2sigma is not None}
+    if not covered:
+        return ""
+    worst = min(covered, key=lambda name: covered[name])
+    percent = f"{100.0 * covered[worst]:.0f} % of the time"
+    if covered[worst] >= HONEST_COVERAGE:
+        return f"The stated uncertainties are honest: ±2σ covers the truth at least {percent}."
+    return f"The stated uncertainty of {_words(worst)} is too small: ±2σ covers the truth only {percent}."
+
+
+def _verdict_nis(nis: dict[str, Any]) -> str:
+    if nis["mean"] is None:
+        return ""
+    ratio = nis["mean"] / nis["expected"]
+    size = "larger than" if ratio > 1.1 else "smaller than" if ratio < 0.9 else "as large as"
+    numbers = f"mean NIS {nis['mean']:.2f}, expected {nis['expected']:.2f}"
+    return f"Innovations are {size} the filter expects ({numbers})."
+
+
+def _words(name: str) -> str:
+    """A quantity as it stands in a sentence; symbols stay."""
+    return name if len(name) == len("m_p") else name.replace("_", " ")

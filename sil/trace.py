@@ -1,0 +1,134 @@
+"""The trace of a run: truth, measured, estimated and health, one row a sample, the unit of each column in its name.
+
+Frames that come at a divided rate are held until the next one; before the first, where a value was invalid or a frame
+lost, and where a sample has no answer, there is NaN. Made from the frames as they were on the bus, in whole columns.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from lever_cdkf.host_tools import codec
+from numpy.typing import NDArray
+
+from . import plant
+from .buslog import Frames
+from .loop import Recording
+
+FloatArray = NDArray[np.float64]
+Trace = dict[str, FloatArray]
+
+WHOLE = ("mode", "faults", "lost", "corrupt", "late")
+"""Columns of whole numbers."""
+
+# column of the trace, its message and field
+_MEASURED = (
+    ("theta_measured_rad", "LEVER_SAMPLE", "theta"),
+    ("theta_dot_measured_rad_s", "LEVER_SAMPLE", "theta_dot"),
+    ("z_ddot_measured_m_s2", "BASE_SAMPLE", "z_ddot"),
+    ("tau_m_measured_N_m", "LEVER_SAMPLE", "tau_m"),
+)
+_ESTIMATED = (
+    ("theta_estimate_rad", "STATE_ESTIMATE", "theta"),
+    ("theta_dot_estimate_rad_s", "STATE_ESTIMATE", "theta_dot"),
+    ("nis", "STATE_ESTIMATE", "nis"),
+)
+_HELD = (
+    ("m_p_estimate_kg", "PILOT_PARAMETERS", "m_p"),
+    ("m_p_sigma_kg", "PILOT_SIGMA", "m_p_sigma"),
+    ("c_p_estimate_N_s_m", "PILOT_PARAMETERS", "c_p"),
+    ("c_p_sigma_N_s_m", "PILOT_SIGMA", "c_p_sigma"),
+    ("k_p_estimate_N_m", "PILOT_PARAMETERS", "k_p"),
+    ("k_p_sigma_N_m", "PILOT_SIGMA", "k_p_sigma"),
+    ("natural_frequency_estimate_Hz", "PILOT_DYNAMICS", "natural_frequency"),
+    ("natural_frequency_sigma_Hz", "PILOT_DYNAMICS", "natural_frequency_sigma"),
+    ("damping_ratio_estimate", "PILOT_DYNAMICS", "damping_ratio"),
+    ("damping_ratio_sigma", "PILOT_DYNAMICS", "damping_ratio_sigma"),
+    ("mode", "HEALTH", "mode"),
+    ("faults", "HEALTH", "faults"),
+    ("lost", "HEALTH", "lost"),
+    ("corrupt", "HEALTH", "corrupt"),
+    ("late", "HEALTH", "late"),
+    ("excitation_rad_s", "HEALTH", "excitation"),
+)
+_COUNTS = ("lost", "corrupt", "late")  # eight bits that wrap
+
+
+def build(recording: Recording, frames: Frames) -> Trace:
+    """The columns of trace.csv, in order."""
+    sample = np.array(recording.sample, dtype=np.int64)
+    count = len(recording.inputs.time)
+    decoded = _Decoded(frames, sample, count)
+    trace = _truth(recording)
+    for column, message, field in _MEASURED:
+        trace[column] = decoded.at_samples(message, field)
+    for column, message, field in _ESTIMATED:
+        trace[column] = decoded.at_samples(message, field)
+    for column, message, field in _HELD:
+        trace[column] = decoded.held(message, field)
+    trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
+    return trace
+
+
+def _truth(recording: Recording) -> Trace:
+    scenario, inputs = recording.scenario, recording.inputs
+    lever, truth, kind = scenario.true_lever, inputs.truth, scenario.pilot.preload
+    dynamics = plant.dynamics(lever, truth, kind)
+    return {
+        "time_s": inputs.time,
+        "theta_true_rad": np.array(recording.theta),
+        "theta_dot_true_rad_s": np.array(recording.theta_dot),
+        "z_ddot_true_m_s2": inputs.z_ddot,
+        "tau_m_true_N_m": np.array(recording.tau_m),
+        "trim_true_rad": plant.equilibrium(lever, truth, kind),
+        "m_p_true_kg": truth.m_p,
+        "c_p_true_N_s_m": truth.c_p,
+        "k_p_true_N_m": truth.k_p,
+        "natural_frequency_true_Hz": dynamics.natural_frequency,
+        "damping_ratio_true": dynamics.damping_ratio,
+    }
+
+
+class _Decoded:
+    """The fields of all frames, decoded a message at a time when first asked for."""
+
+    def __init__(self, frames: Frames, sample: NDArray[np.int64], count: int) -> None:
+        self._frames, self._sample, self._count = frames, sample, count
+        self._messages: dict[str, tuple[NDArray[np.int64], dict[str, FloatArray]]] = {}
+
+    def _message(self, name: str) -> tuple[NDArray[np.int64], dict[str, FloatArray]]:
+        if name not in self._messages:
+            where = self._frames.of(codec.message(name).frame_id)
+            self._messages[name] = self._sample[where], codec.decode_columns(name, self._frames.data[where])
+        return self._messages[name]
+
+    def at_samples(self, message: str, field: str) -> FloatArray:
+        """The field at each sample; NaN without a frame or with a cleared validity bit."""
+        sample, fields = self._message(message)
+        valid = fields.get(f"{field}_valid", np.ones(len(sample)))
+        column = np.full(self._count, np.nan)
+        column[sample] = np.where(valid == 0.0, np.nan, fields[field])
+        return column
+
+    def held(self, message: str, field: str) -> FloatArray:
+        """The last value of the field at or before each sample; NaN before the first.
+
+        Counts go on beyond their eight bits and start from 0, also if the firmware has counted in an earlier run.
+        """
+        sample, fields = self._message(message)
+        values = fields[field]
+        if field in _COUNTS and len(values):
+            values = np.unwrap(values, period=256.0) - values[0]
+        last = np.searchsorted(sample, np.arange(self._count), side="right")
+        return np.concatenate(((np.nan,), values))[last]
+
+
+def write_csv(trace: Trace, path: Path) -> None:
+    """trace.csv with six decimals; NaN stands as `NaN`, a whole number that is not known yet as nothing."""
+    import polars
+
+    columns = {name: polars.Series(values) for name, values in trace.items()}
+    for name in WHOLE:
+        columns[name] = columns[name].fill_nan(None).cast(polars.Int64)
+    polars.DataFrame(columns).write_csv(path, float_precision=6)

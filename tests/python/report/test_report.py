@@ -1,0 +1,328 @@
+"""The report: complete, self-contained, true to trace and summary, and without complaint in a browser."""
+
+from __future__ import annotations
+
+import re
+import struct
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.native import enum_names
+from lever_cdkf.sil.report import picture, write_report
+from lever_cdkf.sil.report.charts.health import FAULT_WORDS
+from lever_cdkf.sil.runner import Result
+
+from .reading import Reader, figures, first_number, read, unpack
+
+SECTIONS = ["explained", "parameters", "dynamics", "bode", "states", "excitation", "health", "numbers", "made"]
+_NAMES = "parameters dynamics map-truth map-estimate slices detail motion innovations excitation spectra health"
+FIGURES = [f"figure-{name}" for name in _NAMES.split()]
+ROWS = {"m_p": "mp mass", "c_p": "cp damping", "k_p": "kp stiffness"}
+ROWS |= {"natural_frequency": "fn natural frequency", "damping_ratio": "ζ damping ratio"}
+BROWSER = pytest.mark.requires("|".join(picture.BROWSERS))
+
+
+@pytest.fixture(scope="module")
+def page(report: Path) -> Reader:
+    return read(report)
+
+
+# --- structure -------------------------------------------------------------------------------------------------------
+
+
+def test_sections_and_figures_are_all_there_in_order(page: Reader) -> None:
+    assert page.ids("section") == SECTIONS
+    assert page.ids("div") == FIGURES
+    assert list(figures(page)) == FIGURES
+    assert page.open == []
+
+
+def test_nothing_is_loaded_from_elsewhere(page: Reader, report: Path) -> None:
+    for tag, attributes in page.tags:
+        assert tag not in ("link", "iframe", "img", "object", "embed"), tag
+        for name in ("src", "href", "xlink:href", "action", "data"):
+            assert (attributes.get(name) or "#").startswith("#"), (tag, attributes)
+    own = report.read_text(encoding="utf-8").replace(page.scripts[1], "")
+    assert not re.search(r"https?:|//\w+\.|@import|url\((?!#)", own)
+    policy = [attributes["content"] for _, attributes in page.tags if "http-equiv" in attributes]
+    assert policy == ["default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"]
+
+
+def test_no_button_sends_data_away(page: Reader) -> None:
+    assert "showSendToCloud: false" in page.scripts[2]
+
+
+def test_every_axis_has_a_unit_and_every_figure_a_caption(page: Reader) -> None:
+    for key, figure in figures(page).items():
+        for name, axis in figure["layout"].items():
+            if re.fullmatch(r"[xy]axis\d*", name) and axis.get("type") != "category":
+                title = axis["title"]["text"]
+                assert re.search(r"\[.+\]$", title) or title == "frames so far", (key, name, title)
+    assert len(page.captions) == len(FIGURES)
+    assert min(len(caption) for caption in page.captions) > 40
+
+
+def test_what_the_scenario_says_is_escaped(page: Reader, report: Path) -> None:
+    assert "<startled>" not in report.read_text(encoding="utf-8")
+    assert "A pilot <startled> after 8 s" in "".join(page.text)
+
+
+# --- numbers ---------------------------------------------------------------------------------------------------------
+
+
+def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
+    errors, run = page.tables[0], page.tables[1]
+    rows = {row[0]: row[1:] for row in errors[1:]}
+    assert list(rows) == list(ROWS.values())
+    for key, name in ROWS.items():
+        expected, row = result.summary["parameters"][key], rows[name]
+        assert float(row[0]) == pytest.approx(expected["rms_percent"], abs=0.005)
+        assert float(row[1]) == pytest.approx(expected["bias_percent"], abs=0.005)
+        assert float(row[2]) == pytest.approx(100.0 * expected["coverage_2sigma"], abs=0.05)
+        for cell, times in ((row[3], "time_to_10_percent_s"), (row[4], "time_to_5_percent_s")):
+            shown = [None if text == "never" else float(text) for text in cell.split(", ")]
+            assert shown == [None if time is None else pytest.approx(time, abs=0.005) for time in expected[times]]
+    values = {row[0]: row[1] for row in run[1:]}
+    assert first_number(values["samples"]) == result.summary["samples"]
+    assert first_number(values["lost"]) == result.summary["lost"] > 0
+    nis = result.summary["nis"]
+    assert float(values["mean normalised innovation squared"]) == pytest.approx(nis["mean"], rel=5e-3)
+    assert float(values["innovations inside their 95 % bound"]) == pytest.approx(
+        100 * nis["inside_95_percent"], rel=5e-3
+    )
+
+
+def test_cards_and_headline_say_what_the_summary_says(page: Reader, result: Result) -> None:
+    text = "".join(page.text)
+    for key, name in ROWS.items():
+        expected = result.summary["parameters"][key]
+        assert f"{expected['rms_percent']:.1f} % {name}" in text
+        assert f"{100 * expected['coverage_2sigma']:.0f} % {name}" in text
+    verdict = result.summary["verdict"]
+    assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
+    mood = "good" if result.summary["passed"] else "bad"
+    assert ("p", {"class": f"verdict {mood}"}) in page.tags
+
+
+def test_all_settings_are_shown(page: Reader, result: Result) -> None:
+    shown = {row[0]: row[1] for row in page.tables[-1][1:]}
+    settings = result.summary["estimator"]["settings"]
+    assert list(shown) == list(settings)
+    assert {name: float(value) for name, value in shown.items()} == pytest.approx(settings, rel=1e-5)
+
+
+# --- figures ---------------------------------------------------------------------------------------------------------
+
+
+def traces(page: Reader, figure: str, name: str) -> list[dict[str, Any]]:
+    return [trace for trace in figures(page)[figure]["data"] if trace["name"] == name]
+
+
+def at(result: Result, x: np.ndarray, column: str) -> np.ndarray:
+    """A column at the samples nearest to the times x."""
+    return result.trace[column][np.searchsorted(result.trace["time_s"], x - 5e-4)]
+
+
+def test_parameter_curves_are_those_of_the_trace(page: Reader, result: Result) -> None:
+    for row, (key, suffix) in enumerate((("m_p", "_kg"), ("c_p", "_N_s_m"), ("k_p", "_N_m"))):
+        for name, kind in (("truth", "true"), ("estimate", "estimate")):
+            trace = traces(page, "figure-parameters", name)[row]
+            x = unpack(trace["x"])
+            np.testing.assert_allclose(unpack(trace["y"]), at(result, x, f"{key}_{kind}{suffix}"), rtol=1e-6)
+            assert 1000 < len(x) < 2000
+        lower, upper = traces(page, "figure-parameters", "estimate ± 2σ")[2 * row : 2 * row + 2]
+        x = unpack(upper["x"])
+        width = 4.0 * at(result, x, f"{key}_sigma{suffix}")
+        inside = unpack(lower["y"]) > 0.0
+        np.testing.assert_allclose((unpack(upper["y"]) - unpack(lower["y"]))[inside], width[inside], rtol=1e-4)
+
+
+def test_a_jump_is_drawn_where_it_is_and_marked(page: Reader) -> None:
+    trace = traces(page, "figure-parameters", "truth")[2]
+    x, y = unpack(trace["x"]), unpack(trace["y"])
+    after = int(np.flatnonzero(np.diff(y) > 100.0)[0]) + 1
+    assert x[after] == pytest.approx(8.0, abs=1.1e-3)
+    assert x[after] - x[after - 1] == pytest.approx(1e-3, abs=1e-4)
+    shapes = figures(page)["figure-parameters"]["layout"]["shapes"]
+    assert [shape["x0"] for shape in shapes] == [pytest.approx(8.0, abs=1.1e-3)]
+
+
+def test_maps_and_slices_are_the_response_of_the_parameters(page: Reader, result: Result) -> None:
+    """Against the transfer function by scipy, from the columns of the trace and DESIGN section 3."""
+    signal = pytest.importorskip("scipy.signal")
+    s = result.summary["estimator"]["settings"]
+    heat = figures(page)["figure-map-truth"]["data"][0]
+    time, frequency, z = (unpack(heat[axis]) for axis in "xyz")
+    length, slice_of = s["lever_length"], figures(page)["figure-slices"]["layout"]["sliders"][0]["steps"]
+    for index in (0, len(time) // 2, len(time) - 1):
+        m_p, c_p, k_p, trim = (
+            float(at(result, time[index : index + 1], f"{name}")[0])
+            for name in ("m_p_true_kg", "c_p_true_N_s_m", "k_p_true_N_m", "trim_true_rad")
+        )
+        cosine = np.cos(trim)
+        inertia = length**2 * (s["lever_mass_position"] ** 2 * s["lever_mass"] + m_p) + s["lever_inertia"]
+        damping = c_p * length**2 * cosine**2 + s["lever_damping"]
+        stiffness = k_p * length**2 * cosine**2 + s["lever_stiffness"]
+        forcing = -length * (s["lever_mass_position"] * s["lever_mass"] + m_p) * cosine
+        _, expected = signal.freqs([forcing], [inertia, damping, stiffness], 2 * np.pi * frequency)
+        expected *= 180.0 / np.pi
+        np.testing.assert_allclose(z[:, index], np.abs(expected), rtol=1e-4)
+    magnitude, phase = (np.array(curve) for curve in slice_of[-1]["args"][0]["y"][:2])  # at the end, as the last above
+    np.testing.assert_allclose(magnitude, np.abs(expected), rtol=1e-3)
+    np.testing.assert_allclose(np.exp(1j * np.radians(phase)), expected / np.abs(expected), atol=2e-3)
+    assert phase[0] > -200.0
+    assert phase[-1] < -320.0
+
+
+def test_overview_of_the_motion_keeps_the_extremes(page: Reader, result: Result) -> None:
+    trace = traces(page, "figure-motion", "truth")[0]
+    theta = np.degrees(result.trace["theta_true_rad"])
+    y = unpack(trace["y"])
+    assert (y.min(), y.max()) == (pytest.approx(theta.min(), rel=1e-6), pytest.approx(theta.max(), rel=1e-6))
+
+
+def test_close_ups_show_one_stretch_at_a_time(page: Reader) -> None:
+    figure = figures(page)["figure-detail"]
+    buttons = figure["layout"]["updatemenus"][0]["buttons"]
+    assert [button["label"] for button in buttons] == ["at the start", "at the first change", "at the end"]
+    for button in buttons:
+        begin, end = button["args"][1]["xaxis.range"]
+        for visible, trace in zip(button["args"][0]["visible"], figure["data"], strict=True):
+            x = unpack(trace["x"])
+            assert visible == (begin - 1e-3 < x.min() and x.max() < end + 1e-3)
+
+
+def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Reader, result: Result) -> None:
+    trace = traces(page, "figure-innovations", "average over 0.25 s")[0]
+    nis, theta = result.trace["nis"][4000:4250], result.trace["theta_measured_rad"][4000:4250]
+    outputs = np.isfinite(theta).astype(int) + np.isfinite(result.trace["theta_dot_measured_rad_s"][4000:4250])
+    used = nis > 0.0
+    middle = np.flatnonzero(np.isclose(unpack(trace["x"]), 4.1245, atol=1e-3))[0]
+    assert unpack(trace["y"])[middle] == pytest.approx(nis[used].sum() / outputs[used].sum(), rel=1e-5)
+    upper = traces(page, "figure-innovations", "95 % of an honest filter")[1]
+    x, height = unpack(upper["x"]), unpack(upper["y"])
+    assert height[np.abs(x - 12.5) < 0.3].min() > height[np.abs(x - 5.0) < 0.3].max()  # one output: more scatter
+
+
+def test_health_names_what_happened_when_it_happened(page: Reader) -> None:
+    bars = {trace["name"]: trace for trace in figures(page)["figure-health"]["data"]}
+    assert {"mode: align", "mode: run", "angle missing", "rate missing", "lost"} <= set(bars)
+    assert "filter restarted" not in bars
+    x = unpack(bars["angle missing"]["x"]).reshape(-1, 3)
+    longest = x[np.argmax(x[:, 1] - x[:, 0])]
+    assert longest[0] == pytest.approx(12.0, abs=0.05)
+    assert longest[1] == pytest.approx(13.0, abs=0.05)
+
+
+def test_every_fault_has_a_word() -> None:
+    assert set(FAULT_WORDS) == set(enum_names("lever_fault").values())
+
+
+# --- less than everything --------------------------------------------------------------------------------------------
+
+
+def test_a_replay_without_truth_leaves_out_what_it_cannot_know(result: Result, tmp_path: Path) -> None:
+    trace = {name: column for name, column in result.trace.items() if "_true" not in name}
+    write_report(trace, {}, tmp_path / "replay.html")
+    page = read(tmp_path / "replay.html")
+    assert page.ids("section") == [name for name in SECTIONS if name != "numbers"]
+    assert "figure-map-truth" not in figures(page)
+    names = {trace["name"] for figure in figures(page).values() for trace in figure["data"]}
+    assert "truth" not in names
+    assert "estimate" in names
+    assert "Estimates at the end" in "".join(page.text)
+
+
+@pytest.mark.parametrize("missing", ["estimate", "sigma", "measured", "true", "theta", "nis", "mode", "excitation"])
+def test_any_missing_column_costs_only_its_figure(missing: str, result: Result, tmp_path: Path) -> None:
+    trace = {name: column for name, column in result.trace.items() if missing not in name}
+    write_report(trace, result.summary, tmp_path / "report.html")
+    page = read(tmp_path / "report.html")
+    assert "explained" in page.ids("section")
+    assert set(figures(page)) <= set(FIGURES)
+    assert page.ids("div") == list(figures(page))
+
+
+def test_a_run_that_got_no_answer_still_has_a_report(result: Result, tmp_path: Path) -> None:
+    silent = ("estimate", "sigma", "nis", "mode", "faults", "lost", "corrupt", "late", "excitation")
+    trace = {
+        name: np.full(len(column), np.nan) if any(word in name for word in silent) else column
+        for name, column in result.trace.items()
+    }
+    write_report(trace, result.summary, tmp_path / "report.html")
+    assert "figure-excitation" in figures(read(tmp_path / "report.html"))
+
+
+def test_two_samples_are_enough(result: Result, tmp_path: Path) -> None:
+    write_report({name: column[:2] for name, column in result.trace.items()}, {}, tmp_path / "report.html")
+    assert "excitation" in read(tmp_path / "report.html").ids("section")
+
+
+def test_a_path_that_cannot_be_written_is_one_line(result: Result, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(LeverError, match="cannot write"):
+        write_report(result.trace, result.summary, tmp_path / "file" / "report.html")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+
+
+# --- cost ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_longer_run_makes_no_larger_page(report: Path, result: Result, tmp_path: Path) -> None:
+    """Ten minutes at 1 kHz."""
+    count = len(result.trace["time_s"])
+    times = 600_000 // count + 1
+    trace = {name: np.tile(column, times) for name, column in result.trace.items()}
+    trace["time_s"] = np.arange(count * times, dtype=np.float64) / 1e3
+    write_report(trace, result.summary, tmp_path / "long.html")
+    assert (tmp_path / "long.html").stat().st_size < 6.3e6
+    assert report.stat().st_size < 6.2e6
+
+
+def test_nothing_slow_is_imported() -> None:
+    """Neither scipy nor plotly's Python classes: each takes longer than all the rest."""
+    code = """
+import sys, numpy as np, lever_cdkf.sil.report.page
+from lever_cdkf.sil.report import write_report
+slow = {"scipy", "pandas", "plotly.graph_objs", "plotly.io", "matplotlib", "cantools"} & set(sys.modules)
+sys.exit(f"imports {slow}" if slow else 0)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# --- in a browser ----------------------------------------------------------------------------------------------------
+
+
+@BROWSER
+@pytest.mark.parametrize("width", [1280, 500])
+def test_renders_without_complaint_and_without_sideways_scrolling(report: Path, tmp_path: Path, width: int) -> None:
+    probe = "<script>window.addEventListener('load', () => setTimeout(() => { document.title = 'width ' + "
+    probe += "document.documentElement.scrollWidth + ' of ' + document.documentElement.clientWidth; }, 3000));</script>"
+    copy = tmp_path / "probed.html"
+    copy.write_text(report.read_text(encoding="utf-8").replace("</body>", f"{probe}</body>"), encoding="utf-8")
+    size = f"--window-size={width},900"
+    result = picture.browse(copy.as_uri(), "--dump-dom", "--enable-logging=stderr", size)
+    assert [line for line in result.stderr.splitlines() if "CONSOLE" in line] == []
+    drawn = re.findall(r'class="chart[^"]*js-plotly-plot[^"]*"', result.stdout)
+    assert len(drawn) == len(FIGURES)
+    wanted, present = map(int, re.search(r"width (\d+) of (\d+)", result.stdout).groups())  # type: ignore[union-attr]
+    assert wanted <= present
+
+
+@BROWSER
+def test_the_picture_for_a_readme_is_a_png(report: Path, tmp_path: Path) -> None:
+    assert picture.main([str(report), str(tmp_path / "picture.png")]) == 0
+    head = (tmp_path / "picture.png").read_bytes()[:24]
+    assert head[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">II", head[16:]) == picture.SIZE
+    assert [entry.name for entry in tmp_path.iterdir()] == ["picture.png"]
+
+
+def test_no_picture_without_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert picture.main([str(tmp_path / "none.html"), str(tmp_path / "picture.png")]) == 2
+    assert "no such report" in capsys.readouterr().err

@@ -1,0 +1,250 @@
+"""The lock-step run: what goes onto the bus, what is made of the answers, the same bytes each time and on each bus."""
+
+from __future__ import annotations
+
+import math
+import os
+import pty
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import can
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.sil import buslog, commands, loop, runner, scenario
+from lever_cdkf.sil.scenario import Scenario
+
+from .conftest import PuppetBus, estimate
+
+MakeBus = Callable[[Scenario], LeverBus]
+
+
+def always(_: int) -> list[tuple[str, dict[str, Any]]]:
+    return [estimate()]
+
+
+def test_each_sample_is_a_pair_of_frames_with_equal_counters_and_its_time(short: Scenario) -> None:
+    bus = PuppetBus(always)
+    loop.run(short, bus)
+    frames = [(identifier, data) for identifier, data in bus.sent if identifier in (0x110, 0x111)]
+    assert [identifier for identifier, _ in frames] == [0x110, 0x111] * 500
+    assert all(codec.check(identifier, data) for identifier, data in frames)
+    assert [data[1] & 15 for _, data in frames] == [k // 2 % 16 for k in range(1000)]
+    assert [sample["time_us"] for sample in bus.decoded("BASE_SAMPLE")] == [1000 * k for k in range(500)]
+
+
+def test_samples_are_the_truth_but_for_the_sensors(short: Scenario) -> None:
+    bus = PuppetBus(always)
+    recording = loop.run(short, bus)
+    for field, truth, noise, step in (
+        ("theta", recording.theta, 1e-3, 1e-4),
+        ("theta_dot", recording.theta_dot, 1e-2, 5e-4),
+        ("tau_m", recording.tau_m, 2e-3, 1e-3),
+    ):
+        error = np.array([sample[field] for sample in bus.decoded("LEVER_SAMPLE")]) - truth
+        assert np.std(error) == pytest.approx(math.hypot(noise, step / math.sqrt(12)), rel=0.1)
+        assert abs(np.mean(error)) < 4 * noise / math.sqrt(500)
+    base = np.array([sample["z_ddot"] for sample in bus.decoded("BASE_SAMPLE")])
+    assert np.std(base - recording.inputs.z_ddot) == pytest.approx(0.01, rel=0.1)
+
+
+def test_the_motor_turns_as_the_firmware_commands(short: Scenario) -> None:
+    def push(sample: int) -> list[tuple[str, dict[str, Any]]]:
+        motor = ("MOTOR_COMMAND", {"torque": -0.75, "dither": 0.0})
+        return [motor, estimate()] if 100 <= sample < 300 else [estimate()]
+
+    torque = np.array(loop.run(short, PuppetBus(push)).tau_m)
+    assert np.all(torque[:101] == 0.0)
+    assert torque[101:110] == pytest.approx([-0.75 * (1 - math.exp(-k / 2)) for k in range(1, 10)])
+    assert torque[299] == pytest.approx(-0.75)
+    assert torque[301] == pytest.approx(-0.75 * math.exp(-0.5))
+
+
+def test_the_start_resets_and_chooses_and_the_dither_follows_the_scenario() -> None:
+    bus = PuppetBus(always)
+    loop.run(scenario.load("poor_excitation", ["duration=0.4 s", "torque.0.end=0.1 s", "torque.1.start=0.3 s"]), bus)
+    first = [identifier for identifier, _ in bus.sent].index(0x110)
+    assert [identifier for identifier, _ in bus.sent[:first]] == [0x120]
+    commands = [(command["request"], round(command["dither_rms"], 3)) for command in bus.decoded("COMMAND")]
+    assert commands == [(3, 0.3), (0, 0.0), (0, 0.3)]  # reset, none, none
+    assert [command["adaptation"] for command in bus.decoded("COMMAND")] == [2, 15, 15]
+    places = [sum(i == 0x111 for i, _ in bus.sent[:k]) for k, (i, _) in enumerate(bus.sent) if i == 0x120]
+    assert places == [0, 100, 300]
+
+
+def test_lost_frames_are_not_sent_and_invalid_values_are_marked() -> None:
+    lost = scenario.load("sensor_dropout", ["duration=4 s", "sensors.dropout.2.start=1 s", "sensors.dropout.2.end=2 s"])
+    inputs, bus = loop.prepare(lost), PuppetBus(always)
+    loop.run(lost, bus)
+    levers, bases = bus.decoded("LEVER_SAMPLE"), bus.decoded("BASE_SAMPLE")
+    assert 0 < inputs.missing["lever_frame"].sum() == 4000 - len(levers)
+    assert 0 < inputs.missing["base_frame"].sum() == 4000 - len(bases)
+    assert [sample["counter"] for sample in levers] == (np.flatnonzero(~inputs.missing["lever_frame"]) % 16).tolist()
+    there = ~inputs.missing["lever_frame"]
+    assert [sample["theta_valid"] == 0 for sample in levers] == inputs.missing["theta"][there].tolist()
+    assert inputs.missing["theta"][1000:2000].all()
+    assert all(sample["theta_dot_valid"] == 1 for sample in levers)
+    there = ~inputs.missing["base_frame"]
+    assert [sample["z_ddot_valid"] == 0 for sample in bases] == inputs.missing["z_ddot"][there].tolist()
+
+
+def test_a_delayed_sensor_lags_and_a_wrong_gain_scales(short: Scenario) -> None:
+    overrides = [
+        "duration=2 s",
+        "sensors.theta.delay=2.5 ms",
+        "sensors.theta.noise=0 rad",
+        "sensors.theta.gain_error=5 %",
+    ]
+    bus = PuppetBus(always)
+    recording = loop.run(scenario.load("steady", overrides), bus)
+    theta = np.array([sample["theta"] for sample in bus.decoded("LEVER_SAMPLE")])
+    at = np.maximum(np.arange(2000) - 2.5, 0.0)
+    assert theta == pytest.approx(1.05 * np.interp(at, np.arange(2000), recording.theta), abs=0.51e-4)
+
+
+def test_unanswered_samples_are_counted_and_silence_ends_the_run(short: Scenario) -> None:
+    recording = loop.run(short, PuppetBus(lambda sample: [] if sample % 100 == 50 else [estimate()]))
+    assert recording.unanswered == 5
+    with pytest.raises(loop.NoAnswerError, match="no STATE_ESTIMATE on puppet at sample 0: is the firmware running"):
+        loop.run(short, PuppetBus(lambda sample: []))
+    with pytest.raises(loop.NoAnswerError, match=f"at sample {100 + loop.MOST_UNANSWERED - 1}"):
+        loop.run(short, PuppetBus(lambda sample: [estimate()] if sample < 100 else []))
+
+
+def test_a_late_answer_is_not_taken_for_the_next_samples(short: Scenario) -> None:
+    def late(sample: int) -> list[tuple[str, dict[str, Any]]]:
+        return [] if sample == 100 else [estimate(sample * 1e-3)] + ([estimate(9.0)] if sample == 101 else [])
+
+    result = runner.simulate(short, PuppetBus(late))
+    theta = result.trace["theta_estimate_rad"]
+    assert math.isnan(theta[100])
+    assert theta[102:] == pytest.approx(np.arange(102, 500) * 1e-3)
+
+
+def test_other_nodes_frames_are_no_answers(short: Scenario) -> None:
+    def noisy(_: int) -> list[tuple[str, dict[str, Any]]]:
+        return [("LEVER_SAMPLE", {"theta": 0.0, "theta_dot": 0.0, "tau_m": 0.0}), estimate()]
+
+    frames = loop.run(short, PuppetBus(noisy)).frames()
+    assert len(frames.of(0x110)) == len(frames.of(0x210)) == 500
+
+
+def test_two_runs_give_the_same_bytes(lever_bus: MakeBus, tmp_path: Path) -> None:
+    wanted = scenario.load("sensor_dropout", ["duration=3 s", "converged_after=1 s"])
+    for name in ("one", "two"):
+        runner.simulate(wanted, lever_bus(wanted), tmp_path / name)
+    for file in ("bus.log", "trace.csv"):
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+    assert (tmp_path / "one" / "bus.log").read_bytes().count(b"\n") > 2 * 3000
+
+
+def test_another_seed_gives_other_bytes(lever_bus: MakeBus) -> None:
+    runs = [scenario.load("steady", ["duration=0.2 s", f"seed={seed}"]) for seed in (1, 2)]
+    one, two = (runner.simulate(wanted, lever_bus(wanted)).frames for wanted in runs)
+    assert not np.array_equal(one.data, two.data)
+
+
+def test_a_firmware_in_another_thread_on_another_bus_gives_the_same_frames(lever_bus: MakeBus, short: Scenario) -> None:
+    """python-can's virtual bus between runner and firmware, as a real bus would be: waiting, and not in step."""
+    there = can.Bus(interface="virtual", channel="sil")
+    here = can.Bus(interface="virtual", channel="sil")
+    stop = threading.Event()
+
+    def firmware() -> None:
+        inner = lever_bus(short)
+        while not stop.is_set():
+            message = there.recv(0.05)
+            if message is not None:
+                inner.send(message)
+                while (answer := inner.recv(0.0)) is not None:
+                    there.send(answer)
+
+    thread = threading.Thread(target=firmware)
+    thread.start()
+    try:
+        remote = runner.simulate(short, here)
+    finally:
+        stop.set()
+        thread.join()
+        there.shutdown()
+        here.shutdown()
+    inside = runner.simulate(short, lever_bus(short))
+    assert remote.summary["unanswered"] == 0
+    assert b"".join(buslog.lines(remote.frames, "x")) == b"".join(buslog.lines(inside.frames, "x"))
+
+
+def test_a_firmware_behind_a_serial_line_gives_the_same_frames(lever_bus: MakeBus, short: Scenario) -> None:
+    """python-can's slcan on one side of a pseudo-terminal, the ASCII protocol spoken by hand on the other."""
+    device, line = pty.openpty()
+    inner = lever_bus(short)
+
+    def adapter() -> None:
+        pending = b""
+        while True:
+            try:
+                pending += os.read(device, 4096)
+            except OSError:  # the line was closed
+                return
+            *complete, pending = pending.split(b"\r")
+            for command in complete:
+                if command[:1] != b"t":
+                    continue
+                identifier, data = int(command[1:4], 16), bytes.fromhex(command[5:].decode())
+                inner.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
+                while (answer := inner.recv(0.0)) is not None:
+                    os.write(device, f"t{answer.arbitration_id:03X}8{answer.data.hex().upper()}\r".encode())
+
+    thread = threading.Thread(target=adapter, daemon=True)
+    thread.start()
+    with commands.open_bus(short, "slcan", os.ttyname(line)) as bus:
+        os.close(line)
+        remote = runner.simulate(short, bus)
+    thread.join()
+    os.close(device)
+    inside = runner.simulate(short, lever_bus(short))
+    assert remote.summary["unanswered"] == 0
+    assert b"".join(buslog.lines(remote.frames, "x")) == b"".join(buslog.lines(inside.frames, "x"))
+
+
+def test_a_firmware_that_has_run_before_starts_over(lever_bus: MakeBus, short: Scenario) -> None:
+    bus = lever_bus(short)
+    first, second = (runner.simulate(short, bus) for _ in range(2))
+    assert (second.summary["unanswered"], second.summary["late"]) == (0, 0)
+    before = first.trace["m_p_estimate_kg"][0]
+    assert second.trace["m_p_estimate_kg"][0] == before
+    assert second.summary["modes_s"] == first.summary["modes_s"]
+
+
+def test_real_time_is_real_and_changes_nothing(lever_bus: MakeBus) -> None:
+    wanted = scenario.load("steady", ["duration=0.3 s"])
+    fast = runner.simulate(wanted, lever_bus(wanted))
+    begin = time.perf_counter()
+    paced = runner.simulate(wanted, lever_bus(wanted), realtime=True)
+    assert 0.3 <= time.perf_counter() - begin < 1.0
+    assert np.array_equal(paced.frames.data, fast.frames.data)
+
+
+def test_progress_is_told_from_start_to_end(short: Scenario) -> None:
+    told: list[tuple[int, int]] = []
+    loop.run(short, PuppetBus(always), progress=lambda done, total: told.append((done, total)))
+    assert told[0] == (0, 500)
+    assert told[-1] == (500, 500)
+
+
+def test_files_are_complete_or_not_there(short: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("lever_cdkf.sil.trace.write_csv", broken)
+    with pytest.raises(LeverError, match=r"cannot write .*trace.csv: No space left on device"):
+        runner.simulate(short, PuppetBus(always), tmp_path / "out")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["bus.log"]
+    (tmp_path / "file").touch()
+    with pytest.raises(LeverError, match="cannot make the folder"):
+        runner.simulate(short, PuppetBus(always), tmp_path / "file" / "out")

@@ -1,0 +1,173 @@
+"""Scenarios: those that come with the package keep what is promised of them; files that are wrong are refused well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.config import Config, settings_table
+from lever_cdkf.sil import excitation, loop, scenario
+from lever_cdkf.sil.reading import ScenarioError
+from lever_cdkf.sil.scenario import Scenario
+
+REQUIRED = {
+    "steady", "fatigue_drift", "sudden_grip", "base_only", "base_dither", "poor_excitation", "sensor_dropout",
+    "re_trim", "high_noise", "demo",
+}  # fmt: skip
+LEAST = """
+title = "t"
+duration = "1 s"
+[pilot]
+trim = "20 deg"
+m_p = "3 kg"
+c_p = "50 N s/m"
+k_p = "2000 N/m"
+"""
+
+Load = Callable[..., Scenario]
+
+
+def test_the_promised_scenarios_are_there() -> None:
+    assert set(scenario.names()) >= REQUIRED
+
+
+@pytest.mark.parametrize("name", scenario.names())
+def test_a_scenario_says_what_it_is_and_starts_from_a_wrong_guess(name: str) -> None:
+    loaded = scenario.load(name)
+    assert loaded.name == name
+    assert len(loaded.title) > 10
+    assert "first guess" in loaded.description.lower()
+    truth = loaded.truth(loaded.time())
+    for parameter in ("m_p", "c_p", "k_p"):
+        guess, true = loaded.config.settings[parameter], getattr(truth, parameter)[0]
+        assert abs(guess / true - 1.0) >= 0.2, parameter
+    assert loaded.limits.natural_frequency is not None
+
+
+@pytest.mark.parametrize("name", scenario.names())
+def test_the_standard_values_are_used(name: str) -> None:
+    loaded = scenario.load(name)
+    noise = loaded.base[0]
+    assert isinstance(noise, excitation.Noise)
+    assert (noise.rms, noise.low, noise.high) == pytest.approx((0.980665, 1.0, 10.0))
+    assert all(dither.rms == 0.3 for dither in loaded.torque if isinstance(dither, scenario.FirmwareDither))
+    assert loaded.pilot.process_noise == 0.05
+    times = 5 if name == "high_noise" else 1
+    assert (loaded.sensors.theta.noise, loaded.sensors.theta_dot.noise) == (times * 1e-3, times * 1e-2)
+
+
+def test_base_only_and_base_dither_are_the_same_pilot_in_the_same_air() -> None:
+    only, dither = scenario.load("base_only"), scenario.load("base_dither")
+    first, second = loop.prepare(only), loop.prepare(dither)
+    assert np.array_equal(first.z_ddot, second.z_ddot)
+    assert np.array_equal(first.z_ddot_measured, second.z_ddot_measured)
+    for name in ("m_p", "c_p", "k_p", "trim"):
+        assert np.array_equal(getattr(first.truth, name), getattr(second.truth, name))
+    assert only.dithers() == []
+    assert dither.dithers() == [(0.0, 0.3)]
+
+
+def test_settings_are_the_firmwares_but_for_overrides(load: Load) -> None:
+    assert load(LEAST).config.settings == Config().settings
+    changed = load(LEAST + '[settings]\ntheta_noise = "2 mrad"\nlever_length = "40 cm"\n')
+    assert {k for k, v in changed.config.settings.items() if v != Config().settings[k]} == {
+        "theta_noise",
+        "lever_length",
+    }
+    assert changed.config.settings["theta_noise"] == 0.002
+    assert changed.true_lever.lever_length == 0.4
+
+
+def test_the_true_lever_may_be_another_than_the_estimator_is_told(load: Load) -> None:
+    loaded = load(LEAST + '[lever]\nlever_mass = "1.5 kg"\n')
+    assert loaded.true_lever.lever_mass == 1.5
+    assert loaded.config.settings["lever_mass"] == 1.2
+
+
+def test_one_noise_does_not_shift_another(load: Load) -> None:
+    base = '[[base]]\nkind = "noise"\nrms = "0.1 g"\nlow = "1 Hz"\nhigh = "10 Hz"\n'
+    plain = load(LEAST + base)
+    more = load(LEAST + base + '[[base]]\nkind = "noise"\nrms = "1 mg"\nlow = "1 Hz"\nhigh = "10 Hz"\n'
+                + '[[sensors.dropout]]\nwhat = "theta"\nshare = "10 %"\n')  # fmt: skip
+    assert np.abs(loop.prepare(plain).z_ddot - loop.prepare(more).z_ddot).max() < 0.06
+    assert np.array_equal(plain.stream("process").random(5), more.stream("process").random(5))
+    numbers = [plain.stream(purpose, index).random() for purpose in scenario.STREAMS for index in range(3)]
+    assert len(set(numbers)) == len(numbers)
+    assert not np.array_equal(load(LEAST + base, "seed=2").stream("base").random(5), plain.stream("base").random(5))
+
+
+def test_changes_and_dithers_are_listed_in_order_of_time(load: Load) -> None:
+    loaded = load(
+        LEAST.replace(
+            '"3 kg"', '{ kind = "steps", first = "3 kg", at = ["0.7 s", "9 s"], to = ["4 kg", "5 kg"] }'
+        ).replace('"2000 N/m"', '{ kind = "steps", first = "2 N/m", at = ["0.5 s"], to = ["3 N/m"] }')
+        + '[[torque]]\nkind = "firmware"\nrms = "0.3 N m"\nend = "0.4 s"\n'
+        + '[[torque]]\nkind = "firmware"\nrms = "0.2 N m"\nstart = "0.6 s"\n'
+    )
+    assert loaded.changes() == (0.0, 0.5, 0.7)
+    assert loaded.dithers() == [(0.0, 0.3), (0.4, 0.0), (0.6, 0.2)]
+
+
+def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
+    base = '[[base]]\nkind = "sine"\nrms = "0.1 g"\nfrequency = "3 Hz"\n'
+    loaded = load(
+        LEAST + base, "duration=2 s", 'base.0.rms="1 m/s^2"', "settings.m_p=3 kg", "seed=9", "pilot.m_p='4 kg'"
+    )
+    assert (loaded.duration, loaded.seed, loaded.config.settings["m_p"]) == (2.0, 9, 3.0)
+    assert loaded.base[0].rms == 1.0  # type: ignore[attr-defined]
+    assert loaded.truth(loaded.time()).m_p[0] == 4.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (LEAST.replace("k_p", "k_q"), r"made.toml: pilot: unknown key 'k_q'; allowed: m_p, c_p, k_p, trim, preload"),
+        (LEAST.replace('m_p = "3 kg"', ""), "pilot: key 'm_p' is missing"),
+        (LEAST.replace('trim = "20 deg"', ""), "pilot: key 'trim' is missing"),
+        (LEAST.replace('"3 kg"', "3"), "pilot.m_p: 3 is not a quantity"),
+        (LEAST.replace('"3 kg"', '"3 g/s"'), "pilot.m_p: '3 g/s' has unit 'g/s'; allowed: kg, g"),
+        (LEAST.replace('"1 s"', '"2 h"'), "duration: '2 h' is out of range; it must be above 0 and at most 3600 s"),
+        (LEAST.replace('"3 kg"', '"-3 kg"'), "pilot.m_p: falls to -3; it must stay above 0"),
+        (LEAST + 'preload = "loose"', "pilot.preload: 'loose' is not known; allowed: trim, fixed"),
+        (LEAST + 'preload = "fixed"', "'trim' goes with preload trim"),
+        (LEAST + "[estimator]\nadaptation = 'magic'", "allowed: fixed, annealing, robbins_monro"),
+        (LEAST + "[settings]\ntheta_nose = '1 rad'", "settings: unknown key 'theta_nose'; allowed: sample_period"),
+        (LEAST + "[settings]\ntheta_noise = '9 rad'", "made.toml: settings: theta_noise = 9.0 is out of range"),
+        (LEAST + "[lever]\ntheta_noise = '9 rad'", "lever: unknown key 'theta_noise'; allowed: lever_length"),
+        (LEAST + "[[torque]]\nkind = 'sine'\nrms = '1 g'\nfrequency = '1 Hz'", r"torque\[0\].rms: '1 g' has unit 'g'"),
+        (LEAST + "[[sensors.dropout]]\nwhat = 'all'\nshare = '1 %'", r"sensors.dropout\[0\].what: 'all' is not known"),
+        (LEAST + "[sensors]\ntheta = { noise = '1 m' }", "sensors.theta.noise: '1 m' has unit 'm'; allowed: rad, mrad"),
+        (LEAST + "[base]\nkind = 'sine'", "base: must be a list"),
+        ("title =", "made.toml: not TOML"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_file_key_and_remedy(load: Load, text: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load(text)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("duration", "must be KEY=VALUE"),
+        ("pilot.m_p.first=3 kg", "the scenario has no 'pilot.m_p.first'"),
+        ("title.x=3", "the scenario has no 'title.x'"),
+        ("colour=red", "unknown key 'colour'"),
+    ],
+)
+def test_a_wrong_override_is_refused(load: Load, override: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load(LEAST, override)
+
+
+def test_an_unknown_scenario_or_file_is_refused_with_what_there_is() -> None:
+    with pytest.raises(ScenarioError, match="no scenario 'nope'; there are base_dither, base_only"):
+        scenario.load("nope")
+    with pytest.raises(ScenarioError, match=r"nope\.toml: no such file"):
+        scenario.load("nope.toml")
+
+
+def test_every_setting_can_be_overridden_in_its_unit(load: Load) -> None:
+    text = "".join(f'{row.name} = "{row.default!r} {row.unit}"\n' for row in settings_table())
+    assert load(LEAST + "[settings]\n" + text).config.settings == Config().settings

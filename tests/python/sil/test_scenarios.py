@@ -1,0 +1,93 @@
+"""Every scenario through the whole loop, against what it has to show (its [limits], issue 2's "Must show")."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.sil import runner, scenario
+
+
+@cache
+def result(name: str) -> runner.Result:
+    wanted = scenario.load(name)
+    with LeverBus("lever", config=wanted.config) as bus:
+        return runner.simulate(wanted, bus)
+
+
+def rms(name: str) -> dict[str, float]:
+    return {key: entry["rms_percent"] for key, entry in result(name).summary["parameters"].items()}
+
+
+@pytest.mark.parametrize("name", scenario.names())
+def test_a_scenario_keeps_its_limits(name: str) -> None:
+    summary: dict[str, Any] = result(name).summary
+    assert summary["passed"], summary["verdict"]
+    assert summary["unanswered"] == 0
+    assert (summary["corrupt"], summary["late"]) == (0, 0)
+
+
+@pytest.mark.parametrize("name", ["steady", "base_dither", "fixed_preload"])
+def test_with_dither_a_constant_pilot_is_known_within_5_percent(name: str) -> None:
+    errors = rms(name)
+    assert max(errors[key] for key in ("m_p", "c_p", "k_p")) <= 5.0
+    assert errors["natural_frequency"] <= 2.0
+
+
+@pytest.mark.parametrize("name", ["fatigue_drift", "sudden_grip", "demo"])
+def test_with_dither_a_changing_pilot_is_tracked_within_10_percent(name: str) -> None:
+    errors = rms(name)
+    assert max(errors[key] for key in ("m_p", "c_p", "k_p")) <= 10.0
+    assert errors["natural_frequency"] <= 2.0
+
+
+def test_without_dither_the_frequency_is_known_and_the_scale_honestly_not() -> None:
+    assert rms("base_only")["natural_frequency"] <= 3.0
+    parameters = result("base_only").summary["parameters"]
+    assert min(parameters[key]["coverage_2sigma"] for key in ("m_p", "c_p", "k_p")) >= 0.9
+
+
+def test_the_dither_makes_the_scale_more_certain() -> None:
+    for column in ("m_p_sigma_kg", "c_p_sigma_N_s_m", "k_p_sigma_N_m"):
+        assert result("base_dither").trace[column][-1] < 0.8 * result("base_only").trace[column][-1]
+
+
+def test_the_dither_on_the_bus_has_its_strength() -> None:
+    dither = result("steady").trace["dither_N_m"][2000:]
+    assert np.sqrt(np.mean(dither**2)) == pytest.approx(0.3, rel=0.05)
+    assert not result("base_only").trace["dither_N_m"].any()
+
+
+def test_poor_excitation_is_reported_and_does_not_make_anyone_certain() -> None:
+    trace = result("poor_excitation").trace
+    calm, rough = trace["time_s"] > 25, trace["time_s"] < 19
+    calm &= trace["time_s"] < 40
+    assert np.all(trace["excitation_rad_s"][calm] < trace["excitation_rad_s"][rough & (trace["time_s"] > 5)].min())
+    for column in ("m_p_sigma_kg", "c_p_sigma_N_s_m", "k_p_sigma_N_m"):
+        sigma = trace[column]
+        assert sigma[39_000] > sigma[20_000]
+        assert sigma[59_000] < sigma[39_000]
+
+
+def test_dropouts_are_counted_and_coasted_through() -> None:
+    lost = result("sensor_dropout")
+    assert lost.summary["lost"] > 1000
+    coasting = lost.summary["modes_s"].get("coast", 0.0)
+    assert coasting > 0.0
+    assert "fault" not in lost.summary["modes_s"]
+
+
+def test_the_filter_is_consistent_where_its_model_is_right() -> None:
+    for name in ("steady", "base_dither", "fixed_preload"):
+        nis = result(name).summary["nis"]
+        assert nis["mean"] == pytest.approx(nis["expected"], rel=0.05)
+        assert nis["inside_95_percent"] == pytest.approx(0.95, abs=0.01)
+
+
+def test_a_changed_grip_is_found_again_within_seconds() -> None:
+    for found in result("sudden_grip").summary["parameters"]["natural_frequency"]["time_to_10_percent_s"]:
+        assert found is not None
+        assert found < 3.0

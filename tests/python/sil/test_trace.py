@@ -1,0 +1,107 @@
+"""The trace: the contract's columns, made from the frames on the bus, and trace.csv holding the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.sil import loop, scenario, trace
+
+from .conftest import PuppetBus, estimate
+
+COLUMNS = """
+time_s theta_true_rad theta_dot_true_rad_s z_ddot_true_m_s2 tau_m_true_N_m
+trim_true_rad m_p_true_kg c_p_true_N_s_m k_p_true_N_m natural_frequency_true_Hz damping_ratio_true
+theta_measured_rad theta_dot_measured_rad_s z_ddot_measured_m_s2 tau_m_measured_N_m
+theta_estimate_rad theta_dot_estimate_rad_s nis m_p_estimate_kg m_p_sigma_kg c_p_estimate_N_s_m c_p_sigma_N_s_m
+k_p_estimate_N_m k_p_sigma_N_m natural_frequency_estimate_Hz natural_frequency_sigma_Hz damping_ratio_estimate
+damping_ratio_sigma mode faults lost corrupt late excitation_rad_s dither_N_m
+""".split()  # noqa: SIM905
+
+
+def answers(sample: int) -> list[tuple[str, dict[str, Any]]]:
+    """Parameters each 20th sample from 40 on, health each 100th, dither from 250 on, no answer at 333."""
+    if sample == 333:
+        return []
+    frames: list[tuple[str, dict[str, Any]]] = []
+    if sample >= 250:
+        frames.append(("MOTOR_COMMAND", {"torque": 0.2, "dither": 0.1 + sample * 1e-3}))
+    if sample >= 40 and sample % 20 == 0:
+        frames.append(("PILOT_PARAMETERS", {"m_p": sample * 0.01, "c_p": 42.0, "k_p": 1500.0}))
+        frames.append(("PILOT_SIGMA", {"m_p_sigma": 0.5, "c_p_sigma": 3.0, "k_p_sigma": 90.0}))
+    if sample % 100 == 0:
+        count = 3 + 70 * (sample // 100)  # of frames lost since power-on: 3, 73, 143, 213, 283, so it wraps
+        health = {"mode": "run", "faults": 128, "corrupt": 0, "late": 7, "excitation": 0.25}
+        frames.append(("HEALTH", {**health, "lost": count}))
+    return [*frames, estimate(theta=sample * 1e-3, nis=1.5)]
+
+
+def made(*overrides: str) -> tuple[loop.Recording, trace.Trace]:
+    wanted = scenario.load("sensor_dropout", ["duration=0.5 s", *overrides])
+    recording = loop.run(wanted, PuppetBus(answers))
+    return recording, trace.build(recording, recording.frames())
+
+
+def test_the_columns_are_those_of_the_contract_in_its_order() -> None:
+    _, columns = made()
+    assert list(columns) == COLUMNS
+    assert {len(column) for column in columns.values()} == {500}
+
+
+def test_measured_is_what_was_on_the_bus_and_nan_where_it_was_not() -> None:
+    recording, columns = made("sensors.dropout.2.start=0.1 s", "sensors.dropout.2.end=0.2 s")
+    missing = recording.inputs.missing
+    no_theta = missing["theta"] | missing["lever_frame"]
+    assert np.array_equal(np.isnan(columns["theta_measured_rad"]), no_theta)
+    assert np.array_equal(np.isnan(columns["z_ddot_measured_m_s2"]), missing["z_ddot"] | missing["base_frame"])
+    error = (columns["theta_measured_rad"] - columns["theta_true_rad"])[~no_theta]
+    assert 0.5e-3 < np.std(error) < 1.5e-3
+
+
+def test_estimates_stand_at_their_sample_and_slower_frames_are_held() -> None:
+    wanted = scenario.load("steady", ["duration=0.5 s"])
+    recording = loop.run(wanted, PuppetBus(answers))
+    columns = trace.build(recording, recording.frames())
+    sample = np.arange(500)
+    assert np.flatnonzero(np.isnan(columns["theta_estimate_rad"])).tolist() == [333]
+    assert np.delete(columns["theta_estimate_rad"], 333) == pytest.approx(np.delete(sample, 333) * 1e-3)
+    assert np.isnan(columns["m_p_estimate_kg"][:40]).all()
+    assert columns["m_p_estimate_kg"][40:] == pytest.approx(sample[40:] // 20 * 20 * 0.01)
+    assert columns["k_p_sigma_N_m"][499] == 90.0
+    expected = np.where((sample >= 250) & (sample != 333), 0.1 + sample * 1e-3, 0.0)
+    assert columns["dither_N_m"] == pytest.approx(expected, abs=1e-9)
+
+
+def test_counts_start_at_zero_and_go_on_beyond_their_eight_bits() -> None:
+    _, columns = made("sensors.dropout=[{what='theta', share='1 %'}]")
+    assert columns["lost"][[0, 150, 250, 350, 499]].tolist() == [0, 70, 140, 210, 280]
+    assert columns["late"].max() == 0
+    assert set(columns["mode"]) == {2.0}
+    assert set(columns["faults"]) == {128.0}
+
+
+def test_truth_is_linearised_where_the_lever_rests() -> None:
+    wanted = scenario.load("re_trim", ["duration=0.5 s", "pilot.trim.start=0.1 s", "pilot.trim.duration=0.2 s"])
+    recording = loop.run(wanted, PuppetBus(answers))
+    columns = trace.build(recording, recording.frames())
+    trim = np.radians(np.interp(np.arange(500), (100, 300), (20, 28)))
+    assert columns["trim_true_rad"] == pytest.approx(trim)
+    arm, mass = 0.45**2, 0.45**2 * (0.25 * 1.2 + 3.2) + 0.020
+    stiffness = arm * 2100 * np.cos(trim) ** 2 + 5.0
+    assert columns["natural_frequency_true_Hz"] == pytest.approx(np.sqrt(stiffness / mass) / (2 * np.pi))
+    damping = (arm * 60 * np.cos(trim) ** 2 + 0.5) / (2 * np.sqrt(stiffness * mass))
+    assert columns["damping_ratio_true"] == pytest.approx(damping)
+
+
+def test_csv_holds_the_trace(tmp_path: Path) -> None:
+    _, columns = made()
+    trace.write_csv(columns, tmp_path / "trace.csv")
+    lines = (tmp_path / "trace.csv").read_text().splitlines()
+    assert lines[0].split(",") == COLUMNS
+    table = np.genfromtxt(tmp_path / "trace.csv", delimiter=",", names=True)
+    for name, column in columns.items():
+        assert np.array_equal(np.isnan(table[name]), np.isnan(column))
+        assert np.nan_to_num(table[name]) == pytest.approx(np.nan_to_num(column), abs=0.51e-6)
+    assert lines[1].split(",")[COLUMNS.index("faults")] == "128"
