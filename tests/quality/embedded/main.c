@@ -1,0 +1,114 @@
+/* Feeds a lively series of samples to the estimator and prints every estimate as hexadecimal bits: two builds that
+ * compute alike print alike. The samples come from single-precision arithmetic under the same compiler flags.
+ *
+ *     embedded SAMPLES
+ *
+ * One run for each choice of preload and adaptation; a line is: run, sample, mode, then the bits of the estimate. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "lever_cdkf.h"
+
+#define PERIOD 1.0e-3f /* [s] */
+
+/* An arm and lever of 3.5 Hz and damping ratio 0.3 about a trim of 0.35 rad, shaken by the base and the motor. */
+typedef struct arm {
+    uint32_t random;
+    float base;   /* band-limited base acceleration [m/s^2] */
+    float torque; /* band-limited motor torque [N m] */
+    float angle;  /* about the trim [rad] */
+    float rate;   /* [rad/s] */
+} arm_t;
+
+/* Uniform in [-1, 1): a linear congruential generator. */
+static float noise(arm_t *arm)
+{
+    arm->random = (1664525u * arm->random) + 1013904223u;
+    return ((float)(int32_t)(arm->random >> 8) / 8388608.0f) - 1.0f;
+}
+
+static lever_sample_t next_sample(arm_t *arm, uint32_t index)
+{
+    arm->base += 0.05f * ((20.0f * noise(arm)) - arm->base);
+    arm->torque += 0.05f * ((4.0f * noise(arm)) - arm->torque);
+    const float forcing = (-2.0f * arm->base) + (1.6f * arm->torque);
+    arm->rate += PERIOD * (forcing - (483.6f * arm->angle) - (13.2f * arm->rate));
+    arm->angle += PERIOD * arm->rate;
+
+    lever_sample_t sample;
+    (void)memset(&sample, 0, sizeof sample);
+    sample.time_us = index * 1000u;
+    sample.theta = 0.35f + arm->angle + (1.0e-3f * noise(arm));
+    sample.theta_dot = arm->rate + (1.0e-2f * noise(arm));
+    sample.tau_m = arm->torque;
+    sample.z_ddot = arm->base;
+    sample.theta_valid = (index % 97u) != 0u;
+    sample.theta_dot_valid = (index % 89u) != 0u;
+    sample.tau_m_valid = (index % 83u) != 0u;
+    sample.z_ddot_valid = (index % 79u) != 0u;
+    return sample;
+}
+
+static void print_bits(float value)
+{
+    uint32_t bits = 0u;
+    (void)memcpy(&bits, &value, sizeof bits);
+    (void)printf(" %08" PRIx32, bits);
+}
+
+static void print_estimate(const lever_estimate_t *estimate)
+{
+    print_bits(estimate->theta);
+    print_bits(estimate->theta_sigma);
+    print_bits(estimate->theta_dot);
+    print_bits(estimate->theta_dot_sigma);
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+        print_bits(estimate->parameter[i]);
+        print_bits(estimate->parameter_sigma[i]);
+    }
+    print_bits(estimate->natural_frequency);
+    print_bits(estimate->natural_frequency_sigma);
+    print_bits(estimate->damping_ratio);
+    print_bits(estimate->damping_ratio_sigma);
+    print_bits(estimate->trim);
+    print_bits(estimate->nis);
+    (void)printf(" %u\n", estimate->nis_size);
+}
+
+static void run(const lever_config_t *config, uint32_t samples)
+{
+    static lever_memory_t memory;
+    arm_t arm = {1u, 0.0f, 0.0f, 0.0f, 0.0f};
+
+    lever_t *lever = lever_init(&memory, config);
+    if (lever == NULL) {
+        (void)fprintf(stderr, "embedded: refused: %s\n", lever_config_check(config));
+        exit(1);
+    }
+    for (uint32_t index = 0u; index < samples; index++) {
+        lever_estimate_t estimate;
+        const lever_sample_t sample = next_sample(&arm, index);
+        const enum lever_mode mode = lever_update(lever, &sample);
+        lever_estimate(lever, &estimate);
+        (void)printf("%u.%u %" PRIu32 " %u", config->preload, config->adaptation, index, (unsigned int)mode);
+        print_estimate(&estimate);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const uint32_t samples = (argc == 2) ? (uint32_t)strtoul(argv[1], NULL, 10) : 0u;
+    lever_config_t config;
+
+    lever_config_default(&config);
+    for (uint8_t preload = 0u; preload < (uint8_t)LEVER_PRELOAD_COUNT; preload++) {
+        for (uint8_t adaptation = 0u; adaptation < (uint8_t)LEVER_ADAPTATION_COUNT; adaptation++) {
+            config.preload = preload;
+            config.adaptation = adaptation;
+            run(&config, samples);
+        }
+    }
+    return 0;
+}

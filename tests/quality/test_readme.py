@@ -1,0 +1,79 @@
+"""What the README files tell people to type works: commands and Python run, C compiles.
+
+Each fenced block of language `sh`, `python` or `c` is a file that is run or compiled. It runs in a scratch folder that
+looks like the source tree, with the virtual environment active and a recording `session.log` at hand. Not run are lines
+that begin with cmake or ctest (they are what runs this) and sudo (not a test's to use).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools import codec
+from quality import tools
+
+FOLDERS = ("firmware", "host_tools", "sil", "tests")
+READMES = [tools.ROOT / "README.md", *(file for folder in FOLDERS for file in (tools.ROOT / folder).rglob("README.md"))]
+NOT_RUN = ("cmake", "ctest", "sudo")
+TIME_LIMIT = "120"
+"""For one block [s]."""
+
+
+VCAN = pytest.mark.requires("ip", "candump", "linux.uml")
+
+
+def blocks(language: str) -> list[object]:
+    fenced = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
+    return [
+        pytest.param(
+            match[1],
+            id=f"{readme.relative_to(tools.ROOT)}:{text.count(chr(10), 0, match.start()) + 1}",
+            marks=[VCAN] if "tests/vcan" in match[1] else [],
+        )
+        for readme in READMES
+        for text in [readme.read_text(encoding="utf-8")]
+        for match in fenced.finditer(text)
+    ]
+
+
+@pytest.fixture
+def scratch(tmp_path: Path, build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for entry in tools.ROOT.iterdir():
+        if entry.name != "build" and not entry.name.startswith("."):
+            (tmp_path / entry.name).symlink_to(entry)
+    (tmp_path / "build").symlink_to(build_dir)
+    write_recording(tmp_path / "session.log")
+    monkeypatch.setenv("PATH", f"{build_dir}/venv/bin:{os.environ['PATH']}")
+    return tmp_path
+
+
+def write_recording(file: Path) -> None:
+    """candump's format: 50 samples of a lever at rest."""
+    lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    with file.open("w", encoding="ascii") as log:
+        for k in range(50):
+            for identifier, data in ((0x110, lever_sample(k, 0.35, 0.0, 0.0)), (0x111, base_sample(k, 0.0, 1000 * k))):
+                log.write(f"({k / 1000:.6f}) vcan0 {identifier:03X}#{data.hex().upper()}\n")
+
+
+@pytest.mark.parametrize("script", blocks("sh"))
+def test_commands(script: str, scratch: Path) -> None:
+    lines = [line for line in script.splitlines() if not line.startswith(NOT_RUN)]
+    tools.assert_silent(["timeout", TIME_LIMIT, "bash", "-euo", "pipefail", "-c", "\n".join(lines)], cwd=scratch)
+
+
+@pytest.mark.parametrize("program", blocks("python"))
+def test_python(program: str, scratch: Path) -> None:
+    tools.assert_silent(["timeout", TIME_LIMIT, tools.python_tool("python"), "-W", "error", "-c", program], cwd=scratch)
+
+
+@pytest.mark.requires("cc|gcc|clang")
+@pytest.mark.parametrize("text", blocks("c"))
+def test_c(text: str, tmp_path: Path) -> None:
+    source = tmp_path / "example.c"
+    source.write_text(text, encoding="utf-8")
+    flags = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I", tools.FIRMWARE)
+    tools.assert_silent([tools.first_installed("cc|gcc|clang"), *flags, source])

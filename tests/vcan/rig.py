@@ -1,0 +1,183 @@
+"""What the tests on a vcan have in common: lever_can as a process, and a host that feeds it sample by sample."""
+
+from __future__ import annotations
+
+import errno
+import math
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.bus import LeverBus
+
+PATIENCE_S = 10.0
+"""How long to wait for what must happen; a loaded machine is slow."""
+
+INTERFACE = "vcan9"
+"""Of all tests, each of which makes its own."""
+
+Frame = tuple[int, bytes]
+"""Identifier and data."""
+
+SETTINGS = {"align_time": 0.05}
+"""Of the estimators in these tests: most of their samples are really estimated."""
+
+
+def ip(*arguments: str) -> None:
+    """iproute2's ip."""
+    subprocess.run(["ip", *arguments], check=True)
+
+
+@contextmanager
+def new_interface() -> Iterator[str]:
+    """A virtual CAN interface, up, without a past."""
+    ip("link", "add", "dev", INTERFACE, "type", "vcan")
+    try:
+        ip("link", "set", INTERFACE, "up")
+        yield INTERFACE
+    finally:
+        subprocess.run(["ip", "link", "delete", INTERFACE], check=False, capture_output=True)
+
+
+def wait_until(condition: Callable[[], bool], what: str) -> None:
+    """Waits, at most PATIENCE_S, for something to become true."""
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, f"not within {PATIENCE_S:g} s: {what}"
+        time.sleep(0.002)
+
+
+class LeverCan:
+    """The process lever_can, from when it is ready to the end of the context."""
+
+    def __init__(self, program: Path, interface: str, options: Sequence[str], folder: Path) -> None:
+        settings = [f"--set={name}={value}" for name, value in SETTINGS.items()]
+        command = [str(program), "--can", interface, *settings, *options]
+        self._stdout = folder / "stdout"
+        self._stderr = folder / "stderr"
+        with self._stdout.open("wb") as stdout, self._stderr.open("wb") as stderr:
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr)
+        wait_until(lambda: "ready" in self.stdout or self.process.poll() is not None, "lever_can is ready")
+        assert self.process.poll() is None, self.stderr
+
+    @property
+    def stdout(self) -> str:
+        """All that it has printed."""
+        return self._stdout.read_text()
+
+    @property
+    def stderr(self) -> str:
+        """All its complaints."""
+        return self._stderr.read_text()
+
+    def wait_for(self, complaint: str, times: int = 1) -> None:
+        """Waits until it has complained so often."""
+        wait_until(lambda: self.stderr.count(complaint) >= times, f"{complaint!r} in {self.stderr!r}")
+
+    def stop(self, with_signal: signal.Signals = signal.SIGTERM) -> dict[str, int]:
+        """Ends it as a user would; it must end well. Returns the totals of its last line by name, "frames in" etc."""
+        self.process.send_signal(with_signal)
+        status = self.process.wait(PATIENCE_S)
+        assert status == 0, f"exit status {status}: {self.stderr}"
+        last = self.stdout.splitlines()[-1]
+        assert re.fullmatch(r"lever_can: \w+: (\d+ [a-z ]+, )*\d+ [a-z ]+", last), last
+        return {name: int(number) for number, name in re.findall(r"(\d+) ([a-z ]+)", last.split(": ", 2)[2])}
+
+    def __enter__(self) -> LeverCan:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+
+
+Starter = Callable[..., LeverCan]
+
+
+def samples(first: int, count: int) -> Iterator[tuple[Frame, Frame]]:
+    """The frames of samples number first, first + 1, ... at 1 kHz, of a lever that swings on a bouncing base."""
+    for k in range(first, first + count):
+        phase = 2.0 * math.pi * 3.0 * k * 1e-3
+        lever = {"theta": 0.35 + 0.02 * math.sin(phase), "theta_dot": 0.377 * math.cos(phase), "tau_m": 0.0}
+        base = {"z_ddot": 1.5 * math.sin(phase + 0.4), "time_us": 1000 * k}
+        yield (
+            (0x110, bytes(codec.encode("LEVER_SAMPLE", k, lever))),
+            (0x111, bytes(codec.encode("BASE_SAMPLE", k, base))),
+        )
+
+
+class Host:
+    """Somebody who sends samples on a python-can bus and waits for the answer to each (lock-step)."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self.bus = bus
+        self.samples_sent = 0
+
+    @classmethod
+    def on(cls, interface: str) -> Host:
+        """On a SocketCAN interface; hears the estimator only."""
+        return cls(
+            can.Bus(interface="socketcan", channel=interface, can_filters=[{"can_id": 0x200, "can_mask": 0x700}])
+        )
+
+    def reopen(self, interface: str) -> None:
+        """Goes on with the next sample on an interface that was down or away."""
+        self.bus.shutdown()
+        self.bus = Host.on(interface).bus
+
+    def send(self, frame: Frame) -> None:
+        """Sends, again and again while there is no room."""
+        message = can.Message(arbitration_id=frame[0], data=frame[1], is_extended_id=False)
+        wait_until(lambda: self._has_sent(message), "room to send")
+
+    def _has_sent(self, message: can.Message) -> bool:
+        try:
+            self.bus.send(message)
+        except can.CanOperationError as error:
+            if error.error_code != errno.ENOBUFS:
+                raise
+            return False
+        return True
+
+    def run(self, count: int) -> list[Frame]:
+        """Sends the next `count` samples and returns all answers; each must end with its STATE_ESTIMATE."""
+        answers: list[Frame] = []
+        for lever, base in samples(self.samples_sent, count):
+            self.send(lever)
+            self.send(base)
+            self.samples_sent += 1
+            answers += self.answer()
+        return answers
+
+    def is_answered(self) -> bool:
+        """Sends the next sample and returns whether that is answered within 0.1 s."""
+        for frame in next(samples(self.samples_sent, 1)):
+            self.send(frame)
+        self.samples_sent += 1
+        return not self.nothing_more()
+
+    def answer(self) -> list[Frame]:
+        """What comes up to and including the next STATE_ESTIMATE."""
+        frames: list[Frame] = []
+        while not frames or frames[-1][0] != 0x210:
+            message = self.bus.recv(PATIENCE_S)
+            assert message is not None, f"no STATE_ESTIMATE within {PATIENCE_S:g} s after {frames}"
+            frames.append((message.arbitration_id, bytes(message.data)))
+        return frames
+
+    def nothing_more(self) -> bool:
+        """Whether no further frame comes."""
+        return self.bus.recv(0.1) is None
+
+
+def in_process(count: int, **settings: float) -> list[Frame]:
+    """The answers to the first `count` samples of a firmware instance in this process."""
+    with LeverBus(settings={**SETTINGS, **settings}) as bus:
+        return Host(bus).run(count)

@@ -1,0 +1,81 @@
+"""The places themselves: a command in User-Mode Linux behaves as one that is run here, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from vcan import place, uml
+
+pytestmark = pytest.mark.outside
+
+
+@pytest.fixture(autouse=True)
+def _machine() -> None:
+    try:
+        uml.find_machine()
+    except uml.UmlError as error:
+        pytest.skip(str(error))
+
+
+def processes() -> int:
+    """Processes of User-Mode Linux machines that were started from this process."""
+    listed = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
+    return listed.count(f"/lever-uml-{os.getpid()}-")
+
+
+def test_output_and_exit_status_are_those_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("LEVER_TEST_WORD", "a 'quoted' $word")
+    script = 'cat in; echo "$LEVER_TEST_WORD" >&2; ip -brief link show vcan0 >out; sleep 1000 & exit 7'
+    (tmp_path / "in").write_bytes(b"one\r\n\ntwo")
+    stdout, stderr = io.BytesIO(), io.BytesIO()
+    status = uml.run(["sh", "-c", script], stdout=stdout, stderr=stderr, time_limit_s=60.0)
+    assert status == 7
+    assert stdout.getvalue() == b"one\r\n\ntwo"
+    assert stderr.getvalue() == b"a 'quoted' $word\n"
+    assert "UP" in (tmp_path / "out").read_text()
+    assert processes() == 0
+
+
+def test_much_output_arrives_whole() -> None:
+    stdout = io.BytesIO()
+    assert uml.run(["seq", "100000"], stdout=stdout, time_limit_s=60.0) == 0
+    assert stdout.getvalue() == "".join(f"{i}\n" for i in range(1, 100001)).encode()
+
+
+def test_the_time_limit_ends_it() -> None:
+    began = time.monotonic()
+    with pytest.raises(TimeoutError, match="no end within 4 s: sleep 1000"):
+        uml.run(["sleep", "1000"], time_limit_s=4.0)
+    assert time.monotonic() - began < 10.0
+    assert processes() == 0
+
+
+def test_without_user_mode_linux_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("LEVER_SYSROOT", raising=False)
+    with pytest.raises(
+        uml.UmlError, match=r"no linux\.uml here, .*: apt install user-mode-linux busybox-static iproute2"
+    ):
+        uml.find_machine()
+
+
+def test_a_kernel_with_vcan_is_used_directly() -> None:
+    """Seen from inside User-Mode Linux, whose kernel has vcan: a network namespace with a vcan0 that is new."""
+    inner = f"{sys.executable} {Path(place.__file__).parent} -- sh -c 'ip -brief link show vcan0; exit 3'"
+    script = f"ip link delete vcan0; {inner}"
+    stdout = io.BytesIO()
+    assert uml.run(["sh", "-c", script], stdout=stdout, time_limit_s=60.0) == 3
+    assert b"UP" in stdout.getvalue()
+
+
+def test_command_line_reports_time_limit_and_status() -> None:
+    command = [sys.executable, str(Path(place.__file__).parent)]
+    limited = subprocess.run([*command, "--uml", "--time-limit=0.5", "--", "true"], capture_output=True, text=True)
+    assert (limited.returncode, limited.stderr) == (124, "vcan: no end within 0.5 s: true\n")

@@ -1,0 +1,222 @@
+"""lever_can as a process on a virtual CAN interface: what goes wrong around it must not show in its answers.
+
+The answers are compared, byte for byte, with those of the firmware in this process.
+"""
+
+from __future__ import annotations
+
+import signal
+import socket
+import struct
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from vcan import rig
+
+SAMPLES = 250
+
+
+def refusal(program: Path, interface: str) -> str:
+    """The one line with which lever_can says that it cannot use the interface."""
+    result = subprocess.run([program, "--can", interface], capture_output=True, text=True, timeout=rig.PATIENCE_S)
+    assert result.returncode == 1
+    assert result.stdout == ""
+    assert result.stderr.count("\n") == 1
+    return result.stderr.removeprefix(f"lever_can: {interface}: ")
+
+
+def test_an_interface_that_is_missing(build_dir: Path) -> None:
+    expected = "no such interface; a virtual one is made by: ip link add dev no0 type vcan && ip link set no0 up\n"
+    assert refusal(build_dir / "lever_can", "no0") == expected
+
+
+def test_an_interface_that_is_down_at_the_start(build_dir: Path, interface: str) -> None:
+    rig.ip("link", "set", interface, "down")
+    expected = f"the interface is down; bring it up by: ip link set {interface} up\n"
+    assert refusal(build_dir / "lever_can", interface) == expected
+
+
+def test_an_interface_that_is_not_can(build_dir: Path) -> None:
+    assert refusal(build_dir / "lever_can", "lo") == "not a CAN interface\n"
+
+
+def test_its_answers_are_those_of_the_firmware_in_this_process(start: rig.Starter, interface: str) -> None:
+    process = start()
+    host = rig.Host.on(interface)
+    began = time.perf_counter()
+    answers = host.run(4 * SAMPLES)
+    rate = 4 * SAMPLES / (time.perf_counter() - began)
+    print(f"{rate:.0f} lock-step round trips a second")
+    assert answers == rig.in_process(4 * SAMPLES)
+    totals = process.stop()
+    assert totals["samples"] == 4 * SAMPLES
+    assert totals["frames in"] == 8 * SAMPLES
+    assert totals["frames out"] == len(answers)
+    assert {name for name, count in totals.items() if count} == {"samples", "frames in", "frames out"}
+    host.bus.shutdown()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_well(start: rig.Starter, interface: str, number: signal.Signals) -> None:
+    process = start()
+    host = rig.Host.on(interface)
+    host.run(10)
+    assert process.stop(number)["samples"] == 10
+    assert process.stderr == ""
+    host.bus.shutdown()
+
+
+def test_a_signal_ends_it_while_the_interface_is_down(start: rig.Starter, interface: str) -> None:
+    process = start()
+    rig.ip("link", "set", interface, "down")
+    process.wait_for("link lost")
+    assert process.stop()["outages"] == 1
+
+
+def test_a_signal_ends_it_under_full_load(start: rig.Starter, interface: str) -> None:
+    process = start()
+    flood = subprocess.Popen(["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "8"])
+    try:
+        rig.wait_until(lambda: flood.poll() is None, "cangen runs")
+        time.sleep(0.5)
+        assert process.stop()["frames in"] > 100
+    finally:
+        flood.kill()
+        flood.wait()
+
+
+def test_it_goes_on_after_the_interface_was_down(start: rig.Starter, interface: str) -> None:
+    process = start()
+    host = rig.Host.on(interface)
+    answers = host.run(SAMPLES)
+    rig.ip("link", "set", interface, "down")
+    process.wait_for("link lost (Network is down); waiting for it with the estimate kept")
+    rig.ip("link", "set", interface, "up")
+    process.wait_for("link restored")
+    host.reopen(interface)
+    answers += host.run(SAMPLES)
+    assert answers == rig.in_process(2 * SAMPLES)
+    assert process.stderr.count("\n") == 2
+    assert process.stop()["outages"] == 1
+    host.bus.shutdown()
+
+
+def test_it_goes_on_after_the_interface_was_deleted_and_made_again(start: rig.Starter, interface: str) -> None:
+    process = start()
+    host = rig.Host.on(interface)
+    answers = host.run(SAMPLES)
+    rig.ip("link", "delete", interface)
+    process.wait_for("link lost")
+    time.sleep(0.1)
+    rig.ip("link", "add", "dev", interface, "type", "vcan")
+    time.sleep(0.1)  # it exists, but is down: not yet
+    assert "restored" not in process.stderr
+    rig.ip("link", "set", interface, "up")
+    process.wait_for("link restored")
+    host.reopen(interface)
+    answers += host.run(SAMPLES)
+    assert answers == rig.in_process(2 * SAMPLES)
+    assert process.stderr.count("\n") == 2
+    process.stop()
+    host.bus.shutdown()
+
+
+def test_many_outages_in_a_row(start: rig.Starter, interface: str) -> None:
+    process = start()
+    host = rig.Host.on(interface)
+    answers = []
+    for outage in range(1, 6):
+        answers += host.run(20)
+        rig.ip("link", "set", interface, "down")
+        rig.ip("link", "set", interface, "up")
+        process.wait_for("link restored", times=outage)
+        host.reopen(interface)
+    assert answers == rig.in_process(100)
+    assert process.stop()["outages"] == 5
+    host.bus.shutdown()
+
+
+@pytest.mark.requires("tc")
+def test_no_frame_is_dropped_when_the_interface_has_no_room(start: rig.Starter, interface: str) -> None:
+    """A queue of two frames, emptied at about 500 frames a second: ENOBUFS all the time."""
+    slow = ["tc", "qdisc", "add", "dev", interface, "root", "tbf", "rate", "64kbit", "burst", "80", "limit", "40"]
+    subprocess.run(slow, check=True)
+    process = start("--set", "publish_period=0.002")
+    host = rig.Host.on(interface)
+    answers = host.run(SAMPLES)
+    assert host.nothing_more()
+    totals = process.stop()
+    assert totals["send retries"] > 0
+    assert totals["frames out"] == len(answers)
+    assert totals["unsent"] == 0
+    assert answers == rig.in_process(SAMPLES, publish_period=0.002)
+    host.bus.shutdown()
+
+
+@pytest.mark.requires("cansend")
+def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, interface: str) -> None:
+    foreign = ["7FF#1122334455667788", "00000110#0102030405060708", "110#R", "111#R8", "000#"]
+    broken = [
+        "110#",
+        "110#11",
+        "111#11223344556677",
+        "110#0000000000000000",
+        "111#FFFFFFFFFFFFFFFF",
+        "120#0011223344556677",
+    ]
+    process = start()
+    host = rig.Host.on(interface)
+    answers = []
+    for frame in (*foreign, *broken):
+        answers += host.run(20)
+        subprocess.run(["cansend", interface, frame], check=True)
+    answers += host.run(20)
+    samples = 20 * (len(foreign) + len(broken) + 1)
+    health = 0x214  # tells of the broken ones
+    assert [frame for frame in answers if frame[0] != health] == [f for f in rig.in_process(samples) if f[0] != health]
+    totals = process.stop()
+    assert totals["samples"] == samples
+    assert totals["corrupt"] == len(broken)
+    assert totals["frames in"] == 2 * samples + len(broken)
+    host.bus.shutdown()
+
+
+@pytest.mark.requires("cangen")
+def test_a_full_receive_buffer_is_counted(start: rig.Starter, interface: str) -> None:
+    """While the process is stopped more frames come than the kernel keeps for it."""
+    process = start()
+    process.process.send_signal(signal.SIGSTOP)
+    flood = 20000
+    subprocess.run(["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "8", "-n", str(flood)], check=True)
+    process.process.send_signal(signal.SIGCONT)
+    host = rig.Host.on(interface)
+    rig.wait_until(host.is_answered, "an answer, which needs room for a sample")
+    totals = process.stop()
+    assert totals["overflowed"] > 0
+    assert totals["frames in"] + totals["overflowed"] == flood + 2 * host.samples_sent
+    host.bus.shutdown()
+
+
+def test_a_change_of_the_bus_condition_is_told_once(start: rig.Starter, interface: str) -> None:
+    err_flag, bus_off, controller, restarted = 0x20000000, 0x40, 0x04, 0x100
+    process = start()
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as injector:
+        injector.bind((interface,))
+        for identifier, data in [
+            (controller, b"\0\x20" + bytes(6)),
+            (bus_off, bytes(8)),
+            (bus_off, bytes(8)),
+            (restarted, bytes(8)),
+            (bus_off, bytes(8)),
+        ]:
+            injector.send(struct.pack("=IB3x8s", err_flag | identifier, 8, data))
+    process.wait_for("bus-off", times=2)
+    told = [line.split(": ", 2)[2] for line in process.stderr.splitlines()]
+    words = ["error-passive", "bus-off", "the controller has restarted", "bus-off"]
+    assert [line.split(":")[0] for line in told] == words
+    host = rig.Host.on(interface)
+    assert host.run(20) == rig.in_process(20)
+    process.stop()
+    host.bus.shutdown()

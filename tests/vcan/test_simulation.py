@@ -1,0 +1,126 @@
+"""The whole loop over a virtual CAN interface: plant and firmware in two processes, candump recording beside them.
+
+Everything is compared with a run in one process (`--interface lever`), and must be the same to the bit.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from vcan import rig
+
+SHORTENED = {
+    "steady": {"duration": "6 s"},
+    "fixed_preload": {"duration": "1 s"},
+    "sensor_dropout": {
+        "duration": "4 s",
+        "sensors.dropout.2.start": "1 s",  # theta
+        "sensors.dropout.2.end": "1.5 s",
+        "sensors.dropout.3.start": "2 s",  # theta_dot
+        "sensors.dropout.3.end": "2.5 s",
+        "sensors.dropout.4.start": "3 s",  # LEVER_SAMPLE
+        "sensors.dropout.4.end": "3.1 s",
+    },
+}
+MARKER = "7FF#"
+ROOM_BYTES = 1 << 26
+"""For all frames of a run: seen on one busy processor, candump had no turn for seconds, and lost frames."""
+
+
+def lever_sim(scenario: str, *options: str) -> str:
+    """What `lever sim` prints about a short version of the scenario."""
+    changes = [f"--set={key}={value}" for key, value in SHORTENED[scenario].items()]
+    command = [str(Path(sys.executable).with_name("lever")), "sim", scenario, *changes, *options]
+    result: subprocess.CompletedProcess[str] = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def settings_file(scenario: str, folder: Path) -> str:
+    """A file with the settings of the scenario, for lever_can."""
+    path = folder / "settings"
+    path.write_text(lever_sim(scenario, "--settings"))
+    return str(path)
+
+
+@contextmanager
+def candump(interface: str, log: Path) -> Iterator[None]:
+    """Records the interface in `log`, from the marker that it starts with to the marker that it ends with."""
+
+    def sees_marker(markers: int) -> bool:
+        subprocess.run(["cansend", interface, MARKER], check=True)
+        return log.read_text().count(MARKER) >= markers
+
+    with log.open("wb") as file:
+        recorder = subprocess.Popen(["candump", "-L", "-r", str(ROOM_BYTES), interface], stdout=file)
+    try:
+        rig.wait_until(lambda: sees_marker(1), "candump records")
+        before = log.read_text().count(MARKER)
+        yield
+        rig.wait_until(lambda: sees_marker(before + 1), "candump has recorded everything")
+    finally:
+        recorder.send_signal(signal.SIGTERM)
+        recorder.wait(rig.PATIENCE_S)
+
+
+def frames(log: Path) -> list[str]:
+    """Identifiers and data of a log in candump's format, in order, without the markers."""
+    written = [line.split()[2] for line in log.read_text().splitlines()]
+    return [frame for frame in written if frame != MARKER]
+
+
+@dataclass(frozen=True)
+class Runs:
+    """A scenario, run once over the interface and once in one process."""
+
+    over_can: Path
+    in_process: Path
+    """The folders that the two have written."""
+    candump: Path
+    totals: dict[str, int]
+    """The last line of lever_can."""
+
+
+@pytest.fixture(scope="module", params=["steady", "sensor_dropout"])
+def runs(request: pytest.FixtureRequest, build_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Runs:
+    scenario: str = request.param
+    folder = tmp_path_factory.mktemp(scenario)
+    over_can, in_process, recorded = folder / "over_can", folder / "in_process", folder / "candump.log"
+    options = ["--settings", settings_file(scenario, folder)]
+    with rig.new_interface() as interface, rig.LeverCan(build_dir / "lever_can", interface, options, folder) as process:
+        with candump(interface, recorded):
+            lever_sim(scenario, "--interface=socketcan", f"--channel={interface}", f"--out={over_can}")
+        totals = process.stop()
+    lever_sim(scenario, f"--out={in_process}")
+    return Runs(over_can, in_process, recorded, totals)
+
+
+@pytest.mark.requires("candump", "cansend")
+def test_candump_records_the_frames_of_the_run(runs: Runs) -> None:
+    recorded = frames(runs.candump)
+    assert recorded == frames(runs.over_can / "bus.log")
+    assert len(recorded) == runs.totals["frames in"] + runs.totals["frames out"]
+    assert not [name for name in ("overflowed", "unsent", "outages", "corrupt") if runs.totals[name]]
+
+
+def test_the_frames_are_those_of_a_run_in_one_process(runs: Runs) -> None:
+    log = (runs.over_can / "bus.log").read_text()
+    assert log.replace(f" {rig.INTERFACE} ", " lever ") == (runs.in_process / "bus.log").read_text()
+
+
+def test_the_estimates_are_those_of_a_run_in_one_process(runs: Runs) -> None:
+    assert (runs.over_can / "trace.csv").read_bytes() == (runs.in_process / "trace.csv").read_bytes()
+
+
+def test_a_process_that_has_run_before_serves_the_next_run(start: rig.Starter, interface: str, tmp_path: Path) -> None:
+    process = start("--settings", settings_file("fixed_preload", tmp_path))
+    for _ in range(2):
+        lever_sim("fixed_preload", "--interface=socketcan", f"--channel={interface}")
+    assert process.stop()["samples"] == 2 * 1000
