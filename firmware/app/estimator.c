@@ -404,6 +404,7 @@ static void correct(estimator_t *estimator, const measurement_t *measurement, fl
 
     if (estimator->followed.restart_debt > RESTARTS_TOLERATED) {
         estimator->mode = LEVER_MODE_FAULT;
+        dither_set(&estimator->dither, 0.0f);
     } else if (estimator->frozen) {
         estimator->mode = LEVER_MODE_FROZEN;
     } else {
@@ -442,20 +443,42 @@ static void take_and_step(estimator_t *estimator, const lever_sample_t *sample, 
     }
 }
 
+/* Counts a sample that is not newer than the last. Returns true when such samples have advanced for gap_limit: then they
+ * are not late, but their sender has started its clock anew. */
+static bool is_new_clock(estimator_t *estimator, uint32_t time_us)
+{
+    const uint32_t advanced_us = time_us - estimator->late_time_us;
+    const float limit_us = estimator->config.settings.gap_limit * 1.0e6f;
+    const bool goes_on = (estimator->late_series_us != 0u) && (advanced_us != 0u) && ((float)advanced_us <= limit_us);
+    estimator->late++;
+    estimator->late_time_us = time_us;
+    estimator->late_series_us = goes_on ? (estimator->late_series_us + advanced_us) : 1u;
+    return (float)estimator->late_series_us > limit_us;
+}
+
 enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample)
 {
     const uint32_t elapsed_us = sample->time_us - estimator->time_us;
+    const bool late = (elapsed_us == 0u) || (elapsed_us >= HALF_TURN_OF_TIME);
+    if (late && (estimator->mode != LEVER_MODE_INIT)) {
+        const bool new_clock = is_new_clock(estimator, sample->time_us);
+        if (new_clock && (estimator->mode != LEVER_MODE_FAULT)) {
+            estimator->mode = LEVER_MODE_INIT;
+        }
+    }
     if (estimator->mode == LEVER_MODE_INIT) {
         const taken_t taken = take_sample(estimator, sample); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
         estimator->samples++;
         begin_alignment(estimator, &taken);
-    } else if ((elapsed_us == 0u) || (elapsed_us >= HALF_TURN_OF_TIME)) {
-        estimator->late++;
-    } else {
+        estimator->late_series_us = 0u;
+    } else if (!late) {
         const float elapsed = (float)elapsed_us * 1.0e-6f;
+        estimator->late_series_us = 0u;
         estimator->samples++;
         take_and_step(estimator, sample, elapsed);
         dither_step(&estimator->dither, elapsed);
+    } else {
+        /* late: counted above, otherwise ignored */
     }
     return estimator->mode;
 }

@@ -40,7 +40,9 @@ typedef struct estimator {
     alignment_t alignment;
     enum lever_mode mode;
     bool frozen;
-    uint32_t time_us;  /* of the last sample */
+    uint32_t time_us;      /* of the last sample */
+    uint32_t late_time_us; /* of the last late one, and how long such a series has advanced */
+    uint32_t late_series_us;
     float last_z_ddot; /* inputs as they came [m/s^2], [N m] */
     float last_tau_m;
     float z_ddot; /* inputs of the last sample, deviations in preload trim, as the state is: */

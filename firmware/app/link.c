@@ -92,6 +92,7 @@ static enum lever_frame_result on_command(link_t *link, estimator_t *estimator, 
 {
     lever_command_t command;
     const bool done = message_command_decode(&command, frame) && estimator_command(estimator, &command);
+    estimator->corrupt += done ? 0u : 1u;
     if (done && (command.request == (uint8_t)LEVER_REQUEST_RESET)) {
         start_session(link);
     }
@@ -149,7 +150,7 @@ enum lever_mode link_step(link_t *link, estimator_t *estimator)
         if (was_on || dither_is_on(&estimator->dither)) {
             due |= BIT(OUTPUT_MOTOR_COMMAND);
         }
-        link->due = (uint8_t)due;
+        link->due = (uint8_t)(link->due | due);
     }
     return estimator->mode;
 }

@@ -104,7 +104,6 @@ static void test_what_is_wrong_is_said(void)
     assert_refused("--can vcan0 vcan1", "no argument is expected outside the options: vcan1");
     assert_refused("--can vcan0 --preload loose", "preload: \"loose\" is not known; it can be fixed, trim");
     assert_refused("--can vcan0 --set m_p=0", "m_p: 0 is out of range, which is 0.3 to 10 kg");
-    assert_refused("--can vcan0 --set dither_high=0.5", "dither_low: does not fit the other settings");
     assert_refused("--can vcan0 --settings /no/such", "/no/such: No such file or directory");
 }
 
