@@ -13,7 +13,6 @@
 #define THETA_MOST 25.0f          /* plausible samples [rad], [rad/s], [N m], [m/s^2] */
 #define OTHER_MOST 1.0e4f
 #define TURN 6.28318531f
-#define OUTAGE 0.0205f /* an output missing for longer is out [s]; not a whole number of periods */
 #define HALF_TURN_OF_TIME 0x80000000u
 
 static const model_t *const models[LEVER_MODEL_COUNT] = {&model_lever};
@@ -83,8 +82,7 @@ static void start_over(estimator_t *estimator)
     estimator->frozen = false;
     estimator->last_z_ddot = 0.0f;
     estimator->last_tau_m = 0.0f;
-    estimator->origin[0] = 0.0f;
-    estimator->origin[1] = 0.0f;
+    (void)memset(&estimator->levels, 0, sizeof estimator->levels);
     estimator->nis = 0.0f;
     estimator->nis_size = 0u;
     estimator->faults = 0u;
@@ -206,44 +204,15 @@ static void note(estimator_t *estimator, bool present, enum lever_fault fault)
  * known is near the trim, a rate not known anything plausible. */
 static void start_state(estimator_t *estimator, const measurement_t *measurement)
 {
+    const levels_t *levels = &estimator->levels;
     state_filter_t *state = &estimator->dual.state;
-    state->x[0] = measurement->valid[0] ? measurement->y[0] : (estimator->followed.theta.level - estimator->origin[0]);
+    state->x[0] = measurement->valid[0] ? measurement->y[0] : (levels->output[0].level - levels->origin[0]);
     state->x[1] = measurement->valid[1] ? measurement->y[1] : 0.0f;
     state->s[0] = measurement->valid[0] ? state->output_noise[0] : 0.1f;
     state->s[1] = 0.0f;
     state->s[2] = 0.0f;
     state->s[3] = measurement->valid[1] ? state->output_noise[1] : 1.0f;
     parameter_filter_forget_state(&estimator->dual.parameters);
-}
-
-/* What the states count from: in preload trim the levels. */
-static void set_origin(estimator_t *estimator)
-{
-    const bool trim = estimator->constants.trim;
-    estimator->origin[0] = trim ? estimator->followed.theta.level : 0.0f;
-    estimator->origin[1] = trim ? estimator->followed.theta_dot.level : 0.0f;
-}
-
-/* In preload trim the first levels, and those after an outage, are guesses: nothing can be learnt until they have settled. */
-static void wait_for_levels(estimator_t *estimator)
-{
-    estimator->unsettled = estimator->constants.trim ? (1.0f / estimator->config.settings.trim_corner) : 0.0f;
-}
-
-/* Levels: the trim found so far, nothing moving. */
-static void start_levels(estimator_t *estimator, float trim, const taken_t *taken)
-{
-    followed_t *followed = &estimator->followed;
-    detrend_start(&followed->theta, trim);
-    detrend_start(&followed->theta_dot, 0.0f);
-    detrend_start(&followed->z_ddot, 0.0f);
-    detrend_start(&followed->tau_m, 0.0f);
-    set_origin(estimator);
-    estimator->z_ddot = taken->z_ddot;
-    estimator->tau_m = taken->tau_m;
-    estimator->missing[0] = 0.0f;
-    estimator->missing[1] = 0.0f;
-    wait_for_levels(estimator);
 }
 
 /* Averages angles until align_time has passed, then starts the state at a valid one. */
@@ -257,8 +226,11 @@ static void align(estimator_t *estimator, const taken_t *taken, float elapsed)
     if (measurement.valid[0]) {
         alignment->theta_sum += measurement.y[0];
         alignment->count += 1.0f;
-        start_levels(estimator, alignment->theta_sum / alignment->count, taken);
-        measurement.y[0] -= estimator->origin[0];
+        levels_start(&estimator->levels, alignment->theta_sum / alignment->count, settings->trim_corner,
+            estimator->constants.trim);
+        estimator->z_ddot = taken->z_ddot;
+        estimator->tau_m = taken->tau_m;
+        measurement.y[0] -= estimator->levels.origin[0];
         start_state(estimator, &measurement);
         if (alignment->time > (settings->align_time - (0.5f * settings->sample_period))) {
             estimator->mode = LEVER_MODE_RUN;
@@ -304,55 +276,23 @@ static void restart_if_invalid(estimator_t *estimator, const measurement_t *meas
     }
 }
 
-/* The deviation of a value; in preload fixed the value itself. */
-static float deviation(const estimator_t *estimator, detrend_t *detrend, float value, float period)
-{
-    const float result = detrend_step(detrend, value, estimator->config.settings.trim_corner, period);
-    return estimator->constants.trim ? result : value;
-}
-
 /* Predicts one period ahead, with the mean of the inputs at both ends. */
 static void predict(estimator_t *estimator, float z_ddot, float tau_m, float period)
 {
-    const float z_deviation = deviation(estimator, &estimator->followed.z_ddot, z_ddot, period);
-    const float tau_deviation = deviation(estimator, &estimator->followed.tau_m, tau_m, period);
-    set_origin(estimator);
+    levels_t *levels = &estimator->levels;
+    const float z_deviation = levels_input(levels, 0u, z_ddot, period);
+    const float tau_deviation = levels_input(levels, 1u, tau_m, period);
+    levels_set_origin(levels);
     model_step_t step;
     step.period = period;
     step.z_ddot = 0.5f * (estimator->z_ddot + z_deviation);
     step.tau_m = 0.5f * (estimator->tau_m + tau_deviation);
-    step.origin = estimator->origin[0];
-    step.trim = estimator->followed.theta.level;
+    step.origin = levels->origin[0];
+    step.trim = levels->output[0].level;
     step.trim_sine = sine_cosine(step.trim).sine;
     dual_predict(&estimator->dual, estimator->model, &estimator->constants, &step, !estimator->frozen);
     estimator->z_ddot = z_deviation;
     estimator->tau_m = tau_deviation;
-}
-
-/* The outputs as the state counts them. A level follows the prediction through a few missing samples, then it waits: to
- * follow itself for long would be to integrate twice. Returns true when an output comes back after that. */
-static bool refer(estimator_t *estimator, measurement_t *measurement, float period)
-{
-    detrend_t *const detrend[MODEL_STATES] = {&estimator->followed.theta, &estimator->followed.theta_dot};
-    bool back = false;
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
-        const float state = estimator->dual.state.x[i];
-        const float predicted = estimator->origin[i] + ((fabsf(state) <= THETA_MOST) ? state : 0.0f);
-        const bool waiting = estimator->missing[i] > OUTAGE;
-        if (measurement->valid[i]) {
-            measurement->y[i] = deviation(estimator, detrend[i], measurement->y[i], period);
-            back = back || waiting;
-            estimator->missing[i] = 0.0f;
-        } else {
-            estimator->missing[i] += period;
-            if (waiting) {
-                detrend[i]->slope = 0.0f;
-            } else {
-                (void)deviation(estimator, detrend[i], predicted, period);
-            }
-        }
-    }
-    return back;
 }
 
 /* After an outage the prediction is worth little, more so if the base was not known either: the state starts again where it
@@ -362,7 +302,7 @@ static void end_outage(estimator_t *estimator, const measurement_t *measurement)
     if (measurement->valid[0] && measurement->valid[1]) {
         start_state(estimator, measurement);
     }
-    wait_for_levels(estimator);
+    levels_unsettle(&estimator->levels);
 }
 
 /* Predicts to the sample in `substeps`, inputs in between on a straight line from the last ones. */
@@ -375,10 +315,10 @@ static void advance(
             last_tau_m + (share * (taken->tau_m - last_tau_m)), period);
         if (i < substeps) {
             measurement_t nothing = {.valid = {false, false}};
-            (void)refer(estimator, &nothing, period);
+            (void)levels_refer(&estimator->levels, estimator->dual.state.x, &nothing, period);
         }
     }
-    if (refer(estimator, &taken->measurement, period)) {
+    if (levels_refer(&estimator->levels, estimator->dual.state.x, &taken->measurement, period)) {
         end_outage(estimator, &taken->measurement);
     }
 }
@@ -388,7 +328,7 @@ static void correct(estimator_t *estimator, const measurement_t *measurement, fl
     const float least = estimator->config.settings.excitation_least;
     const bool measured = measurement->valid[0] || measurement->valid[1];
     const bool excited = (estimator->followed.excitation_square >= squared(least));
-    const bool settled = estimator->unsettled < (0.5f * estimator->config.settings.sample_period);
+    const bool settled = estimator->levels.unsettled < (0.5f * estimator->config.settings.sample_period);
     const bool learn = !estimator->frozen && settled;
     float correction[MODEL_PARAMETERS];
     estimator->nis = dual_update(&estimator->dual, measurement, learn, correction);
@@ -396,7 +336,7 @@ static void correct(estimator_t *estimator, const measurement_t *measurement, fl
         adaptation_step(&estimator->adaptation, elapsed, correction, excited, estimator->dual.parameters.walk);
         note(estimator, parameter_filter_bound(&estimator->dual.parameters), LEVER_FAULT_BOUND);
     }
-    estimator->unsettled -= elapsed;
+    estimator->levels.unsettled -= elapsed;
     restart_if_invalid(estimator, measurement);
     follow(estimator, measurement, elapsed);
     note(estimator, !excited, LEVER_FAULT_EXCITATION);
@@ -487,7 +427,7 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
 
 void estimator_dynamics(const estimator_t *estimator, model_dynamics_t *dynamics, model_dynamics_t *sigma)
 {
-    const model_step_t step = {.trim = estimator->followed.theta.level};
+    const model_step_t step = {.trim = estimator->levels.output[0].level};
     derived_dynamics(&estimator->dual.parameters, estimator->model, &estimator->constants, &step, dynamics, sigma);
 }
 
@@ -495,7 +435,7 @@ void estimator_dynamics(const estimator_t *estimator, model_dynamics_t *dynamics
  * quarter of the rms rate, in the state's unit by `scale`. */
 static float state_sigma(const estimator_t *estimator, uint32_t i, float scale)
 {
-    const bool waiting = estimator->constants.trim && (estimator->missing[i] > OUTAGE);
+    const bool waiting = estimator->constants.trim && levels_is_waiting(&estimator->levels, i);
     const float slow = waiting ? (0.25f * scale) : 0.0f;
     return sqrtf(
         squared(dual_state_sigma(&estimator->dual, i)) + (squared(slow) * estimator->followed.excitation_square));
@@ -505,11 +445,11 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
 {
     const dual_t *dual = &estimator->dual;
     estimate->time_us = estimator->time_us;
-    estimate->theta = estimator->origin[0] + dual->state.x[0];
-    estimate->theta_dot = estimator->origin[1] + dual->state.x[1];
+    estimate->theta = estimator->levels.origin[0] + dual->state.x[0];
+    estimate->theta_dot = estimator->levels.origin[1] + dual->state.x[1];
     estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->config.settings.trim_corner));
     estimate->theta_dot_sigma = state_sigma(estimator, 1u, 1.0f);
-    estimate->trim = estimator->followed.theta.level;
+    estimate->trim = estimator->levels.output[0].level;
     estimate->nis = estimator->nis;
     estimate->nis_size = estimator->nis_size;
     derived_parameters(&dual->parameters, estimate->parameter, estimate->parameter_sigma);

@@ -3,8 +3,8 @@
 #define APP_ESTIMATOR_H
 
 #include "app/dither.h"
+#include "app/levels.h"
 #include "filter/adaptation.h"
-#include "filter/detrend.h"
 #include "filter/dual.h"
 #include "lever_cdkf.h"
 #include "model/model.h"
@@ -21,10 +21,6 @@ typedef struct alignment {
 
 /* Slow companions of the estimate. */
 typedef struct followed {
-    detrend_t theta; /* its level is the trim angle [rad] */
-    detrend_t theta_dot;
-    detrend_t z_ddot;
-    detrend_t tau_m;
     float excitation_square; /* mean square of theta_dot [rad^2/s^2] */
     float innovation_mean;   /* mean of nis / nis_size */
     float restart_debt;      /* restarts, forgotten over RESTART_MEMORY */
@@ -36,6 +32,7 @@ typedef struct estimator {
     model_constants_t constants;
     adaptation_t adaptation;
     dual_t dual;
+    levels_t levels;
     followed_t followed;
     alignment_t alignment;
     enum lever_mode mode;
@@ -45,12 +42,9 @@ typedef struct estimator {
     uint32_t late_series_us;
     float last_z_ddot; /* inputs as they came [m/s^2], [N m] */
     float last_tau_m;
-    float z_ddot; /* inputs of the last sample, deviations in preload trim, as the state is: */
+    float z_ddot; /* the same as levels.h counts them */
     float tau_m;
-    float origin[MODEL_STATES];  /* what the state counts from: levels at the last sample, 0 in preload fixed */
-    float missing[MODEL_STATES]; /* time since the last sample of each output [s] */
-    float unsettled;             /* time still to wait before learning, after an outage [s] */
-    float nis;                   /* of the last sample */
+    float nis; /* of the last sample */
     uint8_t nis_size;
     uint16_t faults;
     bool communication_fault; /* reported by the CAN side for the next sample */

