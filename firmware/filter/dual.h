@@ -2,7 +2,9 @@
  *
  * After Wan & Nelson (2001), with the recurrent sensitivity of the state to the parameters (Nelson 2000) carried as
  * columns of the parameter filter's factor, and the state corrected for what the parameters have just learned (the
- * two-stage filter of Friedland 1969). Both filters share one set of sigma points and one call of the model.
+ * two-stage filter of Friedland 1969). Both filters share one set of sigma points and one call of the model. With constant
+ * parameters this equals the joint filter on [w; x]; when they walk, the part of the state's uncertainty that a walk sets
+ * free is left out.
  */
 #ifndef FILTER_DUAL_H
 #define FILTER_DUAL_H
