@@ -425,6 +425,11 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
 
 /* --- what is known --------------------------------------------------------------------------------------------- */
 
+float estimator_state(const estimator_t *estimator, uint32_t i)
+{
+    return estimator->levels.origin[i] + estimator->dual.state.x[i];
+}
+
 void estimator_dynamics(const estimator_t *estimator, model_dynamics_t *dynamics, model_dynamics_t *sigma)
 {
     const model_step_t step = {.trim = estimator->levels.output[0].level};
@@ -445,8 +450,8 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
 {
     const dual_t *dual = &estimator->dual;
     estimate->time_us = estimator->time_us;
-    estimate->theta = estimator->levels.origin[0] + dual->state.x[0];
-    estimate->theta_dot = estimator->levels.origin[1] + dual->state.x[1];
+    estimate->theta = estimator_state(estimator, 0u);
+    estimate->theta_dot = estimator_state(estimator, 1u);
     estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->config.settings.trim_corner));
     estimate->theta_dot_sigma = state_sigma(estimator, 1u, 1.0f);
     estimate->trim = estimator->levels.output[0].level;

@@ -64,6 +64,9 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
 bool estimator_command(estimator_t *estimator, const lever_command_t *command);
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate);
 
+/* State i of the estimate as the sensors see it: theta [rad], theta_dot [rad/s]. */
+float estimator_state(const estimator_t *estimator, uint32_t i);
+
 /* The part of the estimate that is derived from the parameters, and its standard deviations. */
 void estimator_dynamics(const estimator_t *estimator, model_dynamics_t *dynamics, model_dynamics_t *sigma);
 

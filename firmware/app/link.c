@@ -216,8 +216,8 @@ static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *f
 {
     message_state_estimate_t message;
     message.model = estimator->config.model;
-    message.theta = estimator->levels.origin[0] + estimator->dual.state.x[0];
-    message.theta_dot = estimator->levels.origin[1] + estimator->dual.state.x[1];
+    message.theta = estimator_state(estimator, 0u);
+    message.theta_dot = estimator_state(estimator, 1u);
     message.nis = estimator->nis;
     return message_state_estimate_encode(frame, &message);
 }

@@ -14,14 +14,14 @@ static float spread(float plus, float minus, float mean)
 void derived_dynamics(const parameter_filter_t *filter, const model_t *model, const model_constants_t *constants,
     const model_step_t *step, model_dynamics_t *dynamics, model_dynamics_t *sigma)
 {
-    model_points_t points = {.x = {{0.0f}}}; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
-    parameter_filter_points(filter, &points);
-    *dynamics = model->dynamics(constants, step, points.p[0]);
+    float p[MODEL_PARAMETER_POINTS][MODEL_PARAMETERS];
+    parameter_filter_parameter_points(filter, p);
+    *dynamics = model->dynamics(constants, step, p[0]);
     float frequency = 0.0f;
     float damping = 0.0f;
     for (uint32_t j = 0u; j < (uint32_t)MODEL_PARAMETERS; j++) {
-        const model_dynamics_t plus = model->dynamics(constants, step, points.p[1u + (2u * j)]);
-        const model_dynamics_t minus = model->dynamics(constants, step, points.p[2u + (2u * j)]);
+        const model_dynamics_t plus = model->dynamics(constants, step, p[1u + (2u * j)]);
+        const model_dynamics_t minus = model->dynamics(constants, step, p[2u + (2u * j)]);
         frequency += spread(plus.natural_frequency, minus.natural_frequency, dynamics->natural_frequency);
         damping += spread(plus.damping_ratio, minus.damping_ratio, dynamics->damping_ratio);
     }

@@ -56,21 +56,27 @@ void parameter_filter_physical(const parameter_filter_t *filter, float p[MODEL_P
 }
 
 /* exp(w +- h s) = exp(w) exp(h s)^(+-1): one exponential a pair, and none above the diagonal, where s is 0. */
-void parameter_filter_points(const parameter_filter_t *filter, model_points_t *points)
+void parameter_filter_parameter_points(
+    const parameter_filter_t *filter, float p[MODEL_PARAMETER_POINTS][MODEL_PARAMETERS])
 {
-    parameter_filter_physical(filter, points->p[0]);
+    parameter_filter_physical(filter, p[0]);
     for (uint32_t j = 0u; j < L; j++) {
-        const uint32_t plus = 1u + (2u * j);
-        const uint32_t minus = plus + 1u;
         for (uint32_t i = 0u; i < L; i++) {
             const float ratio = (i < j) ? 1.0f : exponential(SIGMA_SPREAD * filter->s[(i * L) + j]);
-            points->p[plus][i] = points->p[0][i] * ratio;
-            points->p[minus][i] = points->p[0][i] / ratio;
+            p[1u + (2u * j)][i] = p[0][i] * ratio;
+            p[2u + (2u * j)][i] = p[0][i] / ratio;
         }
+    }
+}
+
+void parameter_filter_points(const parameter_filter_t *filter, model_points_t *points)
+{
+    parameter_filter_parameter_points(filter, points->p);
+    for (uint32_t j = 0u; j < L; j++) {
         for (uint32_t i = 0u; i < N; i++) {
             const float offset = SIGMA_SPREAD * filter->s[((L + i) * L) + j];
-            points->x[plus][i] = points->x[0][i] + offset;
-            points->x[minus][i] = points->x[0][i] - offset;
+            points->x[1u + (2u * j)][i] = points->x[0][i] + offset;
+            points->x[2u + (2u * j)][i] = points->x[0][i] - offset;
         }
     }
 }

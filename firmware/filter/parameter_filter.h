@@ -44,6 +44,10 @@ void parameter_filter_forget_state(parameter_filter_t *filter);
 /* p = guess exp(w), in the units of the model. */
 void parameter_filter_physical(const parameter_filter_t *filter, float p[MODEL_PARAMETERS]);
 
+/* Sigma points of the parameters alone, in the units of the model: the estimate, then the pair of each column of S_w. */
+void parameter_filter_parameter_points(
+    const parameter_filter_t *filter, float p[MODEL_PARAMETER_POINTS][MODEL_PARAMETERS]);
+
 /* Draws the parameters of the points, and the states of the parameter pairs about the mean points->x[0]. */
 void parameter_filter_points(const parameter_filter_t *filter, model_points_t *points);
 

@@ -8,10 +8,10 @@ that begin with cmake or ctest (they are what runs this) and sudo (not a test's 
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 
 import pytest
+import readmes
 from lever_cdkf.host_tools import codec
 from quality import tools
 
@@ -26,16 +26,10 @@ VCAN = pytest.mark.requires("ip", "candump", "linux.uml")
 
 
 def blocks(language: str) -> list[object]:
-    fenced = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
     return [
-        pytest.param(
-            match[1],
-            id=f"{readme.relative_to(tools.ROOT)}:{text.count(chr(10), 0, match.start()) + 1}",
-            marks=[VCAN] if "tests/vcan" in match[1] else [],
-        )
+        pytest.param(content, id=f"{readme.relative_to(tools.ROOT)}:{line}")
         for readme in READMES
-        for text in [readme.read_text(encoding="utf-8")]
-        for match in fenced.finditer(text)
+        for line, content in readmes.blocks(readme, language).items()
     ]
 
 

@@ -10,14 +10,13 @@ from pathlib import Path
 
 import can
 import pytest
+import readmes
 
 pytestmark = pytest.mark.usefixtures("installed")
 
 
 def blocks(root: Path, language: str) -> list[str]:
-    """The code blocks of a language."""
-    text = (root / "host_tools/README.md").read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return list(readmes.blocks(root / "host_tools/README.md", language).values())
 
 
 def test_python(root: Path, tmp_path: Path) -> None:

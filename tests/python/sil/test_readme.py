@@ -9,14 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
+import readmes
 from lever_cdkf.host_tools import cli
 from lever_cdkf.sil import commands, excitation, scenario, trajectories
 
 
 def blocks(root: Path, language: str) -> list[str]:
-    """The code blocks of a language."""
-    text = (root / "sil/README.md").read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return list(readmes.blocks(root / "sil/README.md", language).values())
 
 
 def test_shell(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

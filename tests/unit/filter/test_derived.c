@@ -2,7 +2,7 @@
  * the plant linearised in double. */
 #include "filter/derived.h"
 
-#include "../model/plant.h"
+#include "../model/constants.h"
 #include "kalman.h"
 #include "unity.h"
 
@@ -39,16 +39,7 @@ static void set_factor(float scale)
 
 static void derive(model_dynamics_t *dynamics, model_dynamics_t *sigma)
 {
-    const double centre = plant.mass_position * plant.length;
-    const model_constants_t constants = {.length = (float)plant.length,
-        .length_squared = (float)(plant.length * plant.length),
-        .inertia = (float)((centre * centre * plant.mass) + plant.inertia),
-        .mass_moment = (float)(plant.mass_position * plant.mass),
-        .damping = (float)plant.damping,
-        .stiffness = (float)plant.stiffness,
-        .arm_preload_sine = (float)sin(plant.arm_preload_angle),
-        .lever_preload_angle = (float)plant.lever_preload_angle,
-        .trim = true};
+    const model_constants_t constants = constants_of(&plant);
     const model_step_t step = {.trim = (float)plant.trim, .trim_sine = (float)sin(plant.trim)};
     derived_dynamics(&filter, &model_lever, &constants, &step, dynamics, sigma);
 }

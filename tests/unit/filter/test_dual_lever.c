@@ -2,6 +2,7 @@
  * and keeps its invariant whatever comes. */
 #include "filter/dual.h"
 
+#include "../model/constants.h"
 #include "../model/simulation.h"
 #include "math/factor.h"
 #include "unity.h"
@@ -23,16 +24,7 @@ static void start(void)
     const float guess[L] = {2.5f, 42.0f, 1500.0f};
     const float sigma[L] = {0.4f, 0.6f, 0.6f};
     const plant_t *plant = &simulation.plant;
-    const double centre = plant->mass_position * plant->length;
-    constants = (model_constants_t){.length = (float)plant->length,
-        .length_squared = (float)(plant->length * plant->length),
-        .inertia = (float)((centre * centre * plant->mass) + plant->inertia),
-        .mass_moment = (float)(plant->mass_position * plant->mass),
-        .damping = (float)plant->damping,
-        .stiffness = (float)plant->stiffness,
-        .arm_preload_sine = (float)sin(plant->arm_preload_angle),
-        .lever_preload_angle = (float)plant->lever_preload_angle,
-        .trim = plant->follows_trim};
+    constants = constants_of(plant);
     (void)memset(&dual, 0, sizeof dual);
     parameter_filter_init(&dual.parameters, &model_lever, guess, sigma);
     dual.state.x[0] = (float)plant->theta;

@@ -1,8 +1,7 @@
 /* Increments of the lever model against the equation of motion integrated in double with a thousand steps of Runge and
  * Kutta to each step of the model. */
 #include "../math/dense.h"
-#include "model/model.h"
-#include "plant.h"
+#include "constants.h"
 #include "unity.h"
 
 enum { FINE = 1000, REPEATS = 200 };
@@ -16,21 +15,6 @@ void setUp(void)
 
 void tearDown(void)
 {
-}
-
-static model_constants_t constants_of(const plant_t *plant)
-{
-    const double centre = plant->mass_position * plant->length;
-    const model_constants_t constants = {.length = (float)plant->length,
-        .length_squared = (float)(plant->length * plant->length),
-        .inertia = (float)((centre * centre * plant->mass) + plant->inertia),
-        .mass_moment = (float)(plant->mass_position * plant->mass),
-        .damping = (float)plant->damping,
-        .stiffness = (float)plant->stiffness,
-        .arm_preload_sine = (float)sin(plant->arm_preload_angle),
-        .lever_preload_angle = (float)plant->lever_preload_angle,
-        .trim = plant->follows_trim};
-    return constants;
 }
 
 static model_step_t step_of(const plant_t *plant, double period, double z_ddot, double tau_m)

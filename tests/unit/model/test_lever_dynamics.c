@@ -1,7 +1,6 @@
 /* Natural frequency and damping ratio against the plant linearised numerically in double; what the descriptor says. */
 #include "../math/dense.h"
-#include "model/model.h"
-#include "plant.h"
+#include "constants.h"
 #include "unity.h"
 
 enum { REPEATS = 500 };
@@ -19,16 +18,7 @@ void tearDown(void)
 
 static model_dynamics_t dynamics_of(const plant_t *plant)
 {
-    const double centre = plant->mass_position * plant->length;
-    const model_constants_t constants = {.length = (float)plant->length,
-        .length_squared = (float)(plant->length * plant->length),
-        .inertia = (float)((centre * centre * plant->mass) + plant->inertia),
-        .mass_moment = (float)(plant->mass_position * plant->mass),
-        .damping = (float)plant->damping,
-        .stiffness = (float)plant->stiffness,
-        .arm_preload_sine = (float)sin(plant->arm_preload_angle),
-        .lever_preload_angle = (float)plant->lever_preload_angle,
-        .trim = plant->follows_trim};
+    const model_constants_t constants = constants_of(plant);
     const model_step_t step = {.trim = (float)plant->trim, .trim_sine = (float)sin(plant->trim)};
     const float p[MODEL_PARAMETERS] = {(float)plant->m_p, (float)plant->c_p, (float)plant->k_p};
     return model_lever.dynamics(&constants, &step, p);
