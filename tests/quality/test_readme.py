@@ -23,11 +23,16 @@ TIME_LIMIT = "120"
 
 
 VCAN = pytest.mark.requires("ip", "candump", "linux.uml")
+"""Of a block that goes to a place with a vcan0."""
 
 
 def blocks(language: str) -> list[object]:
     return [
-        pytest.param(content, id=f"{readme.relative_to(tools.ROOT)}:{line}")
+        pytest.param(
+            content,
+            id=f"{readme.relative_to(tools.ROOT)}:{line}",
+            marks=[VCAN] if "tests/vcan" in content else [],
+        )
         for readme in READMES
         for line, content in readmes.blocks(readme, language).items()
     ]
