@@ -3,7 +3,8 @@
  * This header is the whole outside of the firmware; no other header is needed, and nothing below it is promised.
  *
  * What it does. A square-root Central Difference Kalman Filter (single precision, fixed size) estimates the angle and
- * rate of the lever and, in step with them, the pilot's parameters [m_p, c_p, k_p], each with its standard deviation.
+ * rate of the lever and, in step with them, the pilot's parameters [m_p, c_p, k_p], each with its standard deviation; or those
+ * of a linear model, for an arm on another device.
  *
  * What it needs. A sample each sample_period: lever angle and rate, base vertical acceleration, motor torque. It uses no
  * heap, operating system, clock, thread, or mutable static; all memory is the caller's, time comes with the samples.
@@ -22,8 +23,8 @@
  *                                                   }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent.
- * Cost. Every call is bounded; lever_update() is the expensive one: 3,700 instructions on a Cortex-M4F (gcc -O3), and up to
- * 16 times that for the first sample after a gap.
+ * Cost. Every call is bounded; lever_update() is the expensive one: 3,300 instructions on a Cortex-M4F (gcc -O3), 5,200 when
+ * the parameters learn (each learn_period), and up to 16 times the former for the first sample after a gap.
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
 #ifndef LEVER_CDKF_H
@@ -39,20 +40,29 @@ extern "C" {
 /* --- configuration --------------------------------------------------------------------------------------------- */
 
 /* Model of arm and lever: see firmware/model. */
-enum lever_model { LEVER_MODEL_LEVER = 0, LEVER_MODEL_COUNT };
+enum lever_model {
+    LEVER_MODEL_LEVER = 0,            /* nonlinear lever and arm: m_p [kg], c_p [N s/m], k_p [N/m] */
+    LEVER_MODEL_LINEAR_PHYSICAL = 1,  /* mass, spring, damper on a base: m [kg], c [N s/m], k [N/m] */
+    LEVER_MODEL_LINEAR_BLACK_BOX = 2, /* second-order system: a21 [1/s^2], a22 [1/s], b21, of any sign */
+    LEVER_MODEL_COUNT
+};
 
 /* Where the springs rest. FIXED: at the two preload angles of the settings. TRIM: the pilot re-trims; gravity
  * cancels at a trim angle that follows theta slowly, and all signals count from their slow part (trim_corner). */
 enum lever_preload { LEVER_PRELOAD_FIXED = 0, LEVER_PRELOAD_TRIM = 1, LEVER_PRELOAD_COUNT };
 
-/* How state and parameters are estimated together: DUAL, two filters in step. */
-enum lever_estimator { LEVER_ESTIMATOR_DUAL = 0, LEVER_ESTIMATOR_COUNT };
+/* How state and parameters are estimated together. DUAL: two filters in step, of which the state's takes the parameters as
+ * they are. JOINT: one filter on both, for which what the parameters may have done since the last sample also is
+ * uncertainty of the state. */
+enum lever_estimator { LEVER_ESTIMATOR_DUAL = 0, LEVER_ESTIMATOR_JOINT = 1, LEVER_ESTIMATOR_COUNT };
 
-/* How the parameter noise is set: FIXED walk; ANNEALING from ceiling to floor; ROBBINS_MONRO between floor and ceiling. */
+/* How the parameter noise is set: FIXED walk; ANNEALING from ceiling to floor; ROBBINS_MONRO between floor and ceiling;
+ * FORGETTING, in proportion to the parameters' own covariance. */
 enum lever_adaptation {
     LEVER_ADAPTATION_FIXED = 0,
     LEVER_ADAPTATION_ANNEALING = 1,
     LEVER_ADAPTATION_ROBBINS_MONRO = 2,
+    LEVER_ADAPTATION_FORGETTING = 3,
     LEVER_ADAPTATION_COUNT
 };
 
@@ -173,9 +183,11 @@ typedef struct lever_estimate {
     float theta_sigma;
     float theta_dot; /* lever rate [rad/s] and its standard deviation */
     float theta_dot_sigma;
-    float parameter[LEVER_PARAMETERS];       /* [m_p kg, c_p N s/m, k_p N/m] for the lever model */
+    float parameter[LEVER_PARAMETERS];       /* of the model: [m_p kg, c_p N s/m, k_p N/m] for the lever */
     float parameter_sigma[LEVER_PARAMETERS]; /* their standard deviations, in the same units */
-    float natural_frequency;                 /* undamped, of arm and lever about the trim [Hz] */
+    float parameter_correlation
+        [LEVER_PARAMETERS];  /* of their errors: first and second, first and third, second and third */
+    float natural_frequency; /* undamped, of arm and lever about the trim [Hz] */
     float natural_frequency_sigma;
     float damping_ratio; /* [1] */
     float damping_ratio_sigma;
@@ -185,7 +197,7 @@ typedef struct lever_estimate {
     uint8_t nis_size; /* 0, 1 or 2 outputs used in the last update */
 } lever_estimate_t;
 
-/* The estimate after the last sample. Derived values are computed here, so this is not free (1,900 instructions). */
+/* The estimate after the last sample. Derived values are computed here, so this is not free (1,500 instructions). */
 void lever_estimate(const lever_t *lever, lever_estimate_t *estimate);
 
 /* Name ("m_p") and unit ("kg") of a parameter of a model; NULL for an index or model that does not exist. */
@@ -203,9 +215,10 @@ enum lever_fault {
     LEVER_FAULT_GAP = 16,           /* samples were missing before this one */
     LEVER_FAULT_COMMUNICATION = 32, /* a frame since the last sample was corrupt, repeated or out of sequence */
     LEVER_FAULT_INNOVATION = 64,    /* innovations persistently larger than their predicted covariance */
-    LEVER_FAULT_EXCITATION = 128,   /* too little motion to learn from; parameters held at their floor of noise */
+    LEVER_FAULT_EXCITATION = 128,   /* too little motion to learn from; the parameters stand, and grow uncertain */
     LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model */
-    LEVER_FAULT_RECOVERED = 512     /* an invalid factor or estimate was refused and restarted at this sample */
+    LEVER_FAULT_RECOVERED = 512,    /* an invalid factor or estimate was refused and restarted at this sample */
+    LEVER_FAULT_CHANGE = 1024       /* the pilot has changed suddenly within the last second; learning anew */
 };
 
 typedef struct lever_health {

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 from .errors import SettingsError
 from .library import enum_names, ffi, lib
@@ -83,12 +83,33 @@ def choice_value(enum: str, what: str, name: str) -> int:
     raise SettingsError(f"{what} = {name!r} is not known; allowed: {', '.join(enum_names(enum).values())}")
 
 
+class Parameter(NamedTuple):
+    """What a model estimates."""
+
+    name: str
+    unit: str
+
+
+@cache
+def model_parameters(model: str) -> tuple[Parameter, ...]:
+    """The parameters of a model, in the order of lever_estimate_t. Raises SettingsError for a model that is none."""
+    number = choice_value("lever_model", "model", model)
+    return tuple(
+        Parameter(
+            ffi.string(lib.lever_parameter_name(number, index)).decode(),
+            ffi.string(lib.lever_parameter_unit(number, index)).decode(),
+        )
+        for index in range(lib.LEVER_PARAMETERS)
+    )
+
+
 class Config:
     """A configuration that the firmware accepts.
 
-    What is not given is as in the firmware's defaults: model "lever", preload "trim" (or "fixed"), estimator "dual",
-    adaptation "robbins_monro" (or "fixed", "annealing"), and `settings` by name, in the units of settings_table().
-    Raises SettingsError: one line that names key, unit and range.
+    The choices are names of enum_names("lever_model"), "lever_preload", "lever_estimator" and "lever_adaptation";
+    `settings` go by name, in the units of settings_table(). What is not given is as in the firmware's defaults: model
+    "lever", preload "trim", estimator "dual", adaptation "robbins_monro". Raises SettingsError: one line that names
+    key, unit and range.
     """
 
     def __init__(

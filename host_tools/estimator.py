@@ -31,8 +31,10 @@ class Estimate(NamedTuple):
     """Lever rate [rad/s]."""
     theta_dot_sigma: float
     parameter: tuple[float, float, float]
-    """m_p [kg], c_p [N s/m], k_p [N/m]."""
+    """Of the model: name and unit of each are in model_parameters(model)."""
     parameter_sigma: tuple[float, float, float]
+    parameter_correlation: tuple[float, float, float]
+    """Of their errors [1]: first and second, first and third, second and third."""
     natural_frequency: float
     """Undamped, of arm and lever about the trim [Hz]."""
     natural_frequency_sigma: float
@@ -130,7 +132,7 @@ class Estimator:
         """The estimate after the last sample."""
         lib.lever_estimate(self._lever, self._estimate)
         values = {name: getattr(self._estimate, name) for name in Estimate._fields}
-        for name in ("parameter", "parameter_sigma"):
+        for name in ("parameter", "parameter_sigma", "parameter_correlation"):
             values[name] = tuple(values[name])
         return Estimate(**values)
 
@@ -183,13 +185,16 @@ def _dtype(ctype: str) -> np.dtype[Any]:
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": ffi.sizeof(struct)})
 
 
-def run_samples(config: Config | None, samples: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Feeds N samples to a fresh estimator and returns what it says after each.
+def run_samples(
+    config: Config | None, samples: Mapping[str, NDArray[Any]], at: NDArray[np.int64] | None = None
+) -> dict[str, NDArray[Any]]:
+    """Feeds N samples to a fresh estimator and returns what it says after each, or after those with the indices `at`.
 
     samples: arrays of N: time_us (whole numbers, wrapped here), theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot
     [m/s²]; bool arrays theta_valid … may say what is valid, without them what is not NaN is. One that is missing is
-    never valid. Returned: each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma),
-    and mode and faults as the numbers of the façade's enums.
+    never valid. Returned: each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma,
+    parameter_correlation), mode and faults as the numbers of the façade's enums, and how
+    often the filter was restarted so far (recoveries).
     """
     import numpy as np
 
@@ -204,15 +209,21 @@ def run_samples(config: Config | None, samples: Mapping[str, NDArray[Any]]) -> d
     unknown = set(samples) - set(taken.dtype.names or ())
     if unknown:
         raise LeverError(f"unknown columns of samples: {', '.join(sorted(unknown))}")
-    estimates = np.zeros(count, _dtype("lever_estimate_t"))
-    healths = np.zeros(count, _dtype("lever_health_t"))
+    asked = np.arange(count) if at is None else np.asarray(at)
+    if (len(asked) and not 0 <= asked[0] <= asked[-1] < count) or (np.diff(asked) <= 0).any():
+        raise LeverError(f"at: the indices must rise from 0 to at most {count - 1}")
+    estimates = np.zeros(len(asked), _dtype("lever_estimate_t"))
+    healths = np.zeros(len(asked), _dtype("lever_health_t"))
     lever = estimator._lever
     sample = ffi.from_buffer("lever_sample_t[]", taken)
     estimate = ffi.from_buffer("lever_estimate_t[]", estimates)
     health = ffi.from_buffer("lever_health_t[]", healths)
-    for index in range(count):
-        lib.lever_update(lever, sample + index)
-        lib.lever_estimate(lever, estimate + index)
-        lib.lever_health(lever, health + index)
+    index = 0
+    for row, last in enumerate(asked.tolist()):
+        while index <= last:
+            lib.lever_update(lever, sample + index)
+            index += 1
+        lib.lever_estimate(lever, estimate + row)
+        lib.lever_health(lever, health + row)
     columns = {name: estimates[name].copy() for name in estimates.dtype.names or ()}
-    return columns | {"mode": healths["mode"].copy(), "faults": healths["faults"].copy()}
+    return columns | {name: healths[name].copy() for name in ("mode", "faults", "recoveries")}

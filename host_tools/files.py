@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -43,3 +44,23 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         if not in_place:
             with suppress(OSError):
                 target.unlink()
+
+
+def make_folder(folder: Path) -> None:
+    """Makes a folder and those above it, where they are not there yet. Raises LeverError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LeverError(f"cannot make the folder {folder}: {error.strerror}") from None
+
+
+def replace_file(path: Path, write: Callable[[Path], None]) -> None:
+    """Has `write` write a file so that `path` holds either all of it or what it held before. Raises LeverError."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        write(temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise LeverError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        temporary.unlink(missing_ok=True)

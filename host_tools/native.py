@@ -1,10 +1,10 @@
 """The firmware in Python, without CAN hardware: what other packages import.
 
 `ffi` and `lib` are the whole façade (firmware/lever_cdkf.h), `Config` a checked configuration, `Estimator` one
-instance, `run_samples` a whole recording at once.
+instance, `run_samples` a whole recording at once, `model_parameters` what a model estimates.
 """
 
-from .config import Config, Setting, settings_table
+from .config import Config, Parameter, Setting, model_parameters, settings_table
 from .estimator import FRAME_SAMPLE, Estimate, Estimator, Health, fault_names, run_samples
 from .library import enum_names, ffi, lib
 
@@ -14,11 +14,13 @@ __all__ = [
     "Estimate",
     "Estimator",
     "Health",
+    "Parameter",
     "Setting",
     "enum_names",
     "fault_names",
     "ffi",
     "lib",
+    "model_parameters",
     "run_samples",
     "settings_table",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +43,6 @@ Exit status: 0 when every sample was answered, the estimator never was in fault,
 kept; 1 when not, with one line on standard error.
 """
 _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
-_PATIENCE = 2.0  # [s] before a progress bar appears
 _DEMO = "demo"
 
 
@@ -123,11 +122,12 @@ def _list(json_file: str | None) -> int:
 def _simulate(
     scenario: Scenario, interface: str, channel: str, out: Path | None, json_file: str | None, realtime: bool
 ) -> int:
+    from lever_cdkf.host_tools.progress import Progress
     from lever_cdkf.host_tools.tables import print_tables
 
     from .runner import simulate
 
-    with open_bus(scenario, interface, channel) as bus, _Progress(scenario.name) as progress:
+    with open_bus(scenario, interface, channel) as bus, Progress(scenario.name) as progress:
         result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
     print_tables(_tables(result), json_file)
     print(result.summary["verdict"])
@@ -154,54 +154,26 @@ def open_bus(scenario: Scenario, interface: str, channel: str) -> can.BusABC:
         raise LeverError(f"cannot open {interface} channel {channel}: {error}; is it there and up?") from None
 
 
-class _Progress:
-    """A progress bar on standard error, once a run takes longer than a moment and somebody is looking."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._start = time.monotonic()
-        self._bar: Any = None
-        self._task: Any = None
-
-    def __enter__(self) -> _Progress:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def show(self, done: int, total: int) -> None:
-        if self._bar is None and time.monotonic() - self._start > _PATIENCE and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import Progress
-
-            self._bar = Progress(console=Console(stderr=True), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task(self._name, total=total)
-        if self._bar is not None:
-            self._bar.update(self._task, completed=done)
-
-
 def _tables(result: Result) -> Tables:
     """What is printed at the end."""
-    from .summary import QUANTITIES
+    from .quantities import quantities
 
     summary, trace = result.summary, result.trace
     rows: list[Row] = []
-    for name, entry in summary["parameters"].items():
-        ending, unit = QUANTITIES[name]
+    for quantity in quantities(summary["estimator"]["model"]):
+        entry, truth = summary["parameters"].get(quantity.key, {}), trace.get(quantity.column("true"))
         rows.append(
             {
-                "quantity": name,
-                "unit": unit,
-                "truth at end": float(trace[f"{name}_true{ending}"][-1]),
-                "estimate": float(trace[f"{name}_estimate{ending}"][-1]),
-                "sigma": float(trace[f"{name}_sigma{ending}"][-1]),
-                "rms error [%]": entry["rms_percent"],
-                "bias [%]": entry["bias_percent"],
-                "truth within 2 sigma [1]": entry["coverage_2sigma"],
-                "time to 10 % [s]": _times(entry["time_to_10_percent_s"]),
-                "time to 5 % [s]": _times(entry["time_to_5_percent_s"]),
+                "quantity": quantity.key,
+                "unit": quantity.unit,
+                "truth at end": None if truth is None else float(truth[-1]),
+                "estimate": float(trace[quantity.column("estimate")][-1]),
+                "sigma": float(trace[quantity.column("sigma")][-1]),
+                "rms error [%]": entry.get("rms_percent"),
+                "bias [%]": entry.get("bias_percent"),
+                "truth within 2 sigma [1]": entry.get("coverage_2sigma"),
+                "time to 10 % [s]": _times(entry.get("time_to_10_percent_s", ())),
+                "time to 5 % [s]": _times(entry.get("time_to_5_percent_s", ())),
             }
         )
     run_row: Row = {
@@ -209,13 +181,14 @@ def _tables(result: Result) -> Tables:
         **{count: summary[count] for count in ("unanswered", "lost", "corrupt", "late")},
         "mean NIS [1]": summary["nis"]["mean"],
         "expected NIS [1]": summary["nis"]["expected"],
+        "largest correlation [1]": (summary["whiteness"] or {}).get("largest"),
         "simulated time [s]": summary["simulated_time_s"],
         "wall time [s]": summary["wall_time_s"],
     }
     return {summary["scenario"]["title"]: rows, "run": [run_row]}
 
 
-def _times(times: list[float | None]) -> str:
+def _times(times: Sequence[float | None]) -> str:
     """Times after each change; a dash where the estimate never got there for good."""
     return ", ".join("-" if seconds is None else f"{seconds:.1f}" for seconds in times)
 

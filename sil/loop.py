@@ -19,9 +19,10 @@ from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.errors import LeverError
 from numpy.typing import NDArray
 
-from . import excitation, plant, sensors
+from . import excitation, sensors
 from .buslog import Frames
-from .scenario import FloatArray, Scenario
+from .scenario import Scenario
+from .truth import Body, Conditions, FloatArray, Truth
 
 Progress = Callable[[int, int], None]
 """Called now and then with the samples done and the samples in all."""
@@ -45,7 +46,7 @@ class Inputs:
     """What is known of a run before it starts: one value a sample."""
 
     time: FloatArray
-    truth: plant.Truth
+    truth: Truth
     z_ddot: FloatArray
     """True base acceleration [m/s^2]."""
     z_ddot_measured: FloatArray
@@ -194,7 +195,7 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
     """The samples, one after the other."""
     scenario, inputs = recording.scenario, recording.inputs
     count = len(inputs.time)
-    body = _plant(scenario, inputs)
+    body = _body(scenario, inputs)
     commands = _commands(scenario, inputs.time)
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
@@ -229,17 +230,9 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
         progress(count, count)
 
 
-def _plant(scenario: Scenario, inputs: Inputs) -> plant.Plant:
-    return plant.Plant(
-        scenario.true_lever,
-        inputs.truth,
-        scenario.pilot.preload,
-        inputs.z_ddot,
-        scenario.period,
-        scenario.pilot.process_noise,
-        scenario.motor.lag,
-        scenario.stream("process"),
-    )
+def _body(scenario: Scenario, inputs: Inputs) -> Body:
+    noise, lag = scenario.pilot.process_noise, scenario.motor.lag
+    return inputs.truth.body(Conditions(inputs.z_ddot, scenario.period, noise, lag, scenario.stream("process")))
 
 
 def _commands(scenario: Scenario, time: FloatArray) -> dict[int, tuple[str, float]]:

@@ -24,15 +24,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from . import truth as truths
+from .transfer import Transfer
+from .truth import Conditions, Dynamics, FloatArray
 from .units import GRAVITY
 
-FloatArray = NDArray[np.float64]
 Preload = Literal["fixed", "trim"]
-
-LONGEST_SUBSTEP = 0.25e-3
-"""Longest substep [s]; at 4 Hz the frequency is then right to 3e-6."""
-
-_BLOCK = 4096  # samples prepared at a time, so that an hour fits into memory
 
 
 @dataclass(frozen=True)
@@ -69,14 +66,6 @@ class Truth:
     trim: FloatArray
 
 
-@dataclass(frozen=True)
-class Dynamics:
-    """The lever with the pilot's arm, linearised about the trim, at every sample."""
-
-    natural_frequency: FloatArray
-    damping_ratio: FloatArray
-
-
 def inertia(lever: Lever, truth: Truth) -> FloatArray:
     """M of lever and arm [kg m^2]."""
     return lever.own_inertia + lever.lever_length**2 * truth.m_p
@@ -104,6 +93,12 @@ def stiffness(lever: Lever, truth: Truth, kind: Preload, angle: FloatArray) -> F
     return arm - GRAVITY * moment(lever, truth) * sine + lever.lever_stiffness
 
 
+def damping(lever: Lever, truth: Truth, angle: FloatArray) -> FloatArray:
+    """D: the resisting torque per rate at `angle` [N m s/rad]."""
+    damper: FloatArray = lever.lever_length**2 * truth.c_p * np.cos(angle) ** 2 + lever.lever_damping
+    return damper
+
+
 def equilibrium(lever: Lever, truth: Truth, kind: Preload) -> FloatArray:
     """The angle at which the lever rests [rad]: the trim, or with fixed preload where springs and weight balance."""
     if kind == "trim":
@@ -122,66 +117,70 @@ def dynamics(lever: Lever, truth: Truth, kind: Preload) -> Dynamics:
     """omega = sqrt(K / M) / 2 pi [Hz] and zeta = D / (2 sqrt(K M)) [1] at the equilibrium."""
     angle = equilibrium(lever, truth, kind)
     mass, spring = inertia(lever, truth), stiffness(lever, truth, kind, angle)
-    damper = lever.lever_length**2 * truth.c_p * np.cos(angle) ** 2 + lever.lever_damping
+    damper = damping(lever, truth, angle)
     return Dynamics(np.sqrt(spring / mass) / (2.0 * math.pi), damper / (2.0 * np.sqrt(spring * mass)))
+
+
+@dataclass(frozen=True)
+class LeverTruth(truths.Truth):
+    """This lever with its pilot, as a run needs them."""
+
+    model = "lever"
+    lever: Lever
+    pilot: Truth
+    preload: Preload
+
+    @property
+    def parameters(self) -> Mapping[str, FloatArray]:
+        return {"m_p": self.pilot.m_p, "c_p": self.pilot.c_p, "k_p": self.pilot.k_p}
+
+    @property
+    def rest(self) -> FloatArray:
+        return equilibrium(self.lever, self.pilot, self.preload)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        return dynamics(self.lever, self.pilot, self.preload)
+
+    def transfer(self, samples: NDArray[np.intp]) -> Transfer:
+        pilot = Truth(*(column[samples] for column in (*self.parameters.values(), self.pilot.trim)))
+        angle = equilibrium(self.lever, pilot, self.preload)
+        spring = stiffness(self.lever, pilot, self.preload, angle)
+        forcing = -moment(self.lever, pilot) * np.cos(angle)
+        resistance = (inertia(self.lever, pilot), damping(self.lever, pilot, angle), spring)
+        return Transfer(forcing[:, None], np.stack(resistance, axis=1))
+
+    def body(self, conditions: Conditions) -> Plant:
+        return Plant(self.lever, self.pilot, self.preload, conditions)
 
 
 # One sample period, prepared: M, l mu, l^2 c_p, l^2 k_p, sin theta_a, theta_l, [(z_ddot + g, M times noise), ...]
 _Row = tuple[float, float, float, float, float, float, list[list[float]]]
 
 
-def _rows(
-    lever: Lever,
-    truth: Truth,
-    kind: Preload,
-    z_ddot: FloatArray,
-    kick: float,
-    substeps: int,
-    rng: np.random.Generator,
-) -> Iterator[_Row]:
-    """The sample periods between the samples, in order; noise with standard deviation `kick` [rad/s] a substep."""
+def _rows(lever: Lever, truth: Truth, kind: Preload, conditions: Conditions) -> Iterator[_Row]:
+    """The sample periods between the samples, in order."""
     mass, arm = inertia(lever, truth), lever.lever_length**2
     arm_sine, lever_angle = preload(lever, truth, kind)
     columns = (mass, moment(lever, truth), arm * truth.c_p, arm * truth.k_p, arm_sine, lever_angle)
-    middles = (np.arange(substeps) + 0.5) / substeps
-    for begin in range(0, len(z_ddot) - 1, _BLOCK):
-        end = min(begin + _BLOCK, len(z_ddot) - 1)
-        base = z_ddot[begin:end, None] + np.diff(z_ddot[begin : end + 1])[:, None] * middles
-        noise = kick * mass[begin:end, None] * rng.standard_normal((end - begin, substeps))
+    for block, base, normal in conditions.blocks():
+        noise = conditions.kick * mass[block, None] * normal
         drive = np.stack((base + GRAVITY, noise), axis=2).tolist()
-        yield from zip(*(column[begin:end].tolist() for column in columns), drive, strict=True)
+        yield from zip(*(column[block].tolist() for column in columns), drive, strict=True)
 
 
 class Plant:
-    """Lever, arm and motor, advanced one sample period at a time; public state: theta, theta_dot, tau_m.
+    """Lever, arm and motor: a truth.Body, which starts at rest at the equilibrium."""
 
-    The state starts at rest at the equilibrium. `z_ddot` [m/s^2] are the samples of the base's acceleration without
-    gravity, `process_noise` is in rad/s/sqrt(s), `motor_lag` [s] the time constant with which torque follows command.
-    """
-
-    def __init__(
-        self,
-        lever: Lever,
-        truth: Truth,
-        kind: Preload,
-        z_ddot: FloatArray,
-        period: float,
-        process_noise: float,
-        motor_lag: float,
-        rng: np.random.Generator,
-        substeps: int | None = None,
-    ) -> None:
-        count = math.ceil(period / LONGEST_SUBSTEP - 1e-6) if substeps is None else substeps
-        step = period / count
+    def __init__(self, lever: Lever, truth: Truth, kind: Preload, conditions: Conditions) -> None:
         self.theta = float(equilibrium(lever, truth, kind)[0])
         self.theta_dot = 0.0
         self.tau_m = 0.0
-        self._step = step
-        self._lag_middle = math.exp(-0.5 * step / motor_lag) if motor_lag > 0.0 else 0.0
-        self._lag = math.exp(-step / motor_lag) if motor_lag > 0.0 else 0.0
+        self._step = conditions.step
+        self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
         self._damping = lever.lever_damping
         self._stiffness = lever.lever_stiffness
-        self._rows = _rows(lever, truth, kind, z_ddot, process_noise * math.sqrt(step), count, rng)
+        self._rows = _rows(lever, truth, kind, conditions)
 
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""

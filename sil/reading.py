@@ -157,14 +157,14 @@ def table(kind: type[T]) -> Any:
     return dataclasses.field(default_factory=lambda: kind(), metadata={"read": read_table(kind)})
 
 
-def read_kind(kinds: Mapping[str, type[Any]]) -> Reader:
-    """Reader of a table whose key `kind` says which of the dataclasses `kinds` it is."""
+def read_kind(kinds: Mapping[str, type[Any]], key: str = "kind", default: str | None = None) -> Reader:
+    """Reader of a table whose `key` says which of the dataclasses `kinds` it is."""
 
     def reader(value: Any, place: Place) -> Any:
-        if not isinstance(value, dict) or value.get("kind") not in kinds:
-            raise place.error(f"must be a table with kind = one of {', '.join(kinds)}")
-        rest = {key: entry for key, entry in value.items() if key != "kind"}
-        return read(kinds[value["kind"]], rest, place)
+        kind = value.get(key, default) if isinstance(value, dict) else None
+        if not isinstance(kind, str) or kind not in kinds:
+            raise place.error(f"must be a table with {key} = one of {', '.join(kinds)}")
+        return read(kinds[kind], {name: entry for name, entry in value.items() if name != key}, place)
 
     return reader
 

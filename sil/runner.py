@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import time as clock
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import can
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.files import make_folder, replace_file
 
 from . import buslog, loop, summary, trace
 from .buslog import Frames
@@ -46,7 +44,7 @@ def simulate(
     """
     start = clock.perf_counter()
     if out_dir is not None:
-        _make(out_dir)  # before a run that could then not be kept
+        make_folder(out_dir)  # before a run that could then not be kept
     recording = loop.run(scenario, bus, realtime=realtime, progress=progress)
     frames = recording.frames()
     columns = trace.build(recording, frames)
@@ -55,13 +53,6 @@ def simulate(
     if out_dir is not None:
         _write(result, out_dir, channel, start)
     return result
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LeverError(f"cannot make the folder {folder}: {error.strerror}") from None
 
 
 def _write(result: Result, folder: Path, channel: str, start: float) -> None:
@@ -76,21 +67,9 @@ def _write(result: Result, folder: Path, channel: str, start: float) -> None:
         text = json.dumps(result.summary, indent=2, ensure_ascii=False, allow_nan=False)
         path.write_text(text + "\n", encoding="utf-8")
 
-    _replace(folder / "bus.log", bus_log)
-    _replace(folder / "trace.csv", lambda path: trace.write_csv(result.trace, path))
+    replace_file(folder / "bus.log", bus_log)
+    replace_file(folder / "trace.csv", lambda path: trace.write_csv(result.trace, path))
     summary.add_wall_time(result.summary, clock.perf_counter() - start)
-    _replace(folder / "report.html", lambda path: write_report(result.trace, result.summary, path))
+    replace_file(folder / "report.html", lambda path: write_report(result.trace, result.summary, path))
     summary.add_wall_time(result.summary, clock.perf_counter() - start)
-    _replace(folder / "summary.json", summary_json)
-
-
-def _replace(path: Path, write: Callable[[Path], None]) -> None:
-    """Writes a file so that `path` holds either all of it or what it held before."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        write(temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise LeverError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    replace_file(folder / "summary.json", summary_json)

@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.native import Config, enum_names, settings_table
-from numpy.typing import NDArray
 
-from . import excitation, plant, sensors, trajectories
+from . import excitation, pilots, plant, quantities, sensors
 from .reading import (
     SIGNAL,
     Place,
@@ -33,26 +32,23 @@ from .reading import (
     read,
     read_kind,
     read_quantity,
-    read_table,
     table,
     tables,
     text,
     whole,
 )
+from .truth import FloatArray, Truth
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-FloatArray = NDArray[np.float64]
-
 STREAMS = (
     "process", "theta", "theta_dot", "tau_m", "z_ddot", "m_p", "c_p", "k_p", "trim", "base", "torque", "dropout",
+    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t",
 )  # fmt: skip
 """Purposes of random numbers; the order is part of what a seed means, so append only."""
-
-_TRIM_KINDS = {kind: trajectories.KINDS[kind] for kind in ("steps", "ramp", "sinusoid")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,24 +62,6 @@ class FirmwareDither(excitation.Excitation):
 
 
 _read_torque = read_kind({**excitation.KINDS, "firmware": FirmwareDither})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pilot:
-    """[pilot]: the truth that is to be estimated."""
-
-    m_p: trajectories.Trajectory = item(trajectories.read_trajectory(), "kg")
-    c_p: trajectories.Trajectory = item(trajectories.read_trajectory(), "N s/m")
-    k_p: trajectories.Trajectory = item(trajectories.read_trajectory(), "N/m")
-    trim: trajectories.Trajectory | None = item(trajectories.read_trajectory(_TRIM_KINDS), "rad", None)
-    preload: plant.Preload = choice("trim", "fixed", default="trim")
-    process_noise: float = quantity("rad/s/sqrt(s)", 0.05, least=0.0)
-
-    def __post_init__(self) -> None:
-        if self.preload == "trim" and self.trim is None:
-            raise ValueError("key 'trim' is missing, the angle at which the pilot lets the lever rest")
-        if self.preload == "fixed" and self.trim is not None:
-            raise ValueError("'trim' goes with preload trim; with fixed preload the lever rests where torques balance")
 
 
 @dataclass(frozen=True)
@@ -107,22 +85,8 @@ class Estimator:
     adaptation: str | None = _one_of("lever_adaptation")
 
 
-@dataclass(frozen=True)
-class Limits:
-    """[limits]: what a run must keep for its verdict to be good; relative rms errors and the coverage of +-2 sigma."""
-
-    m_p: float | None = quantity("1", None, above=0.0)
-    c_p: float | None = quantity("1", None, above=0.0)
-    k_p: float | None = quantity("1", None, above=0.0)
-    natural_frequency: float | None = quantity("1", None, above=0.0)
-    damping_ratio: float | None = quantity("1", None, above=0.0)
-    coverage: float | None = quantity("1", None, above=0.0, greatest=1.0)
-
-
-def _read_overrides(allowed: Iterable[str]) -> Reader:
-    """Reader of a table of settings by the names of lever_settings.def, each in a unit of its dimension."""
-    known = set(allowed)
-    readers = {row.name: read_quantity(row.unit) for row in settings_table() if row.name in known}
+def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
+    """Reader of a table of quantities by name."""
 
     def reader(values: Any, place: Place) -> dict[str, float]:
         if not isinstance(values, dict):
@@ -133,6 +97,19 @@ def _read_overrides(allowed: Iterable[str]) -> Reader:
         return {name: readers[name](value, place.at(name)) for name, value in values.items()}
 
     return reader
+
+
+def _read_settings(allowed: Iterable[str]) -> Reader:
+    """Reader of a table of settings by the names of lever_settings.def, each in a unit of its dimension."""
+    known = set(allowed)
+    return _read_numbers({row.name: read_quantity(row.unit) for row in settings_table() if row.name in known})
+
+
+def _read_limits() -> Reader:
+    """Reader of [limits]: greatest relative rms error of quantities, and the least coverage of +-2 sigma."""
+    parameters = (each for model in enum_names("lever_model").values() for each in quantities.parameters(model))
+    readers = {each.key: read_quantity("1", above=0.0) for each in (*parameters, *quantities.DYNAMICS)}
+    return _read_numbers({**readers, "coverage": read_quantity("1", above=0.0, greatest=1.0)})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,15 +123,15 @@ class Scenario:
     duration: float = quantity("s", above=0.0, greatest=3600.0)
     converged_after: float = quantity("s", 15.0, least=0.0)
     seed: int = whole(1)
-    pilot: Pilot = item(read_table(Pilot))
+    pilot: pilots.Pilot = item(pilots.read_pilot)
     base: tuple[excitation.Excitation, ...] = tables(excitation.read_excitation, "m/s^2")
     torque: tuple[excitation.Excitation, ...] = tables(_read_torque, "N m")
     motor: Motor = table(Motor)
     sensors: sensors.Sensors = table(sensors.Sensors)
     estimator: Estimator = table(Estimator)
-    settings: Mapping[str, float] | None = item(_read_overrides(row.name for row in settings_table()), default=None)
-    lever: Mapping[str, float] | None = item(_read_overrides(plant.Lever.__dataclass_fields__), default=None)
-    limits: Limits = table(Limits)
+    settings: Mapping[str, float] | None = item(_read_settings(row.name for row in settings_table()), default=None)
+    lever: Mapping[str, float] | None = item(_read_settings(plant.Lever.__dataclass_fields__), default=None)
+    limits: Mapping[str, float] | None = item(_read_limits(), default=None)
 
     @cached_property
     def config(self) -> Config:
@@ -186,25 +163,33 @@ class Scenario:
         """One stream for each of `items`."""
         return [self.stream(purpose, index) for index, _ in enumerate(items)]
 
-    def truth(self, time: FloatArray) -> plant.Truth:
-        """The pilot at the times `time` [s]. Raises ScenarioError when a parameter is not positive."""
-        values = {}
-        for name in ("m_p", "c_p", "k_p"):
-            values[name] = getattr(self.pilot, name).values(time, self.stream(name))
-            if not values[name].min() > 0.0:
-                raise ScenarioError(f"{self.file}: pilot.{name}: falls to {values[name].min():g}; it must stay above 0")
-        trim = self.pilot.trim
-        return plant.Truth(
-            **values, trim=np.zeros_like(time) if trim is None else trim.values(time, self.stream("trim"))
-        )
+    def truth(self, time: FloatArray) -> Truth:
+        """The pilot on his lever at the times `time` [s]. Raises ScenarioError when a parameter loses its sign."""
+        try:
+            return self.pilot.truth(time, self.stream, self.true_lever)
+        except ValueError as error:
+            raise ScenarioError(f"{self.file}: pilot.{error}") from None
+
+    def judged(self) -> tuple[quantities.Quantity, ...]:
+        """What there is a truth of: everything, or no parameters when the pilot is not of the estimator's model."""
+        model = self.config.choices["model"]
+        return quantities.quantities(model) if self.pilot.model == model else quantities.DYNAMICS
 
     def check(self) -> None:
         """Raises ScenarioError for what only shows when the parts are put together."""
-        self.truth(self.time())
+        truth = self.truth(self.time())
+        if self.torque and not truth.takes_torque:
+            raise ScenarioError(
+                f"{self.file}: torque: no motor torque acts on a pilot of model {truth.model}; remove it"
+            )
+        judged = {quantity.key for quantity in self.judged()} | {"coverage"}
+        for name in self.limits or ():
+            if name not in judged:
+                raise ScenarioError(f"{self.file}: limits.{name}: has no truth in this run to be judged by")
 
     def changes(self) -> tuple[float, ...]:
         """Times [s] after which the parameters have to be found anew: the start, and every jump of one of them."""
-        jumps = {time for name in ("m_p", "c_p", "k_p") for time in getattr(self.pilot, name).changes()}
+        jumps = {time for trajectory in self.pilot.trajectories().values() for time in trajectory.changes()}
         return (0.0, *sorted(time for time in jumps if time < self.duration))
 
     def dithers(self) -> list[tuple[float, float]]:

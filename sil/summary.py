@@ -14,24 +14,20 @@ import numpy as np
 from lever_cdkf.host_tools.native import enum_names
 from numpy.typing import NDArray
 
+from . import whiteness
 from .loop import Recording
+from .quantities import DYNAMICS, Quantity
 from .scenario import Scenario
 from .trace import Trace
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-QUANTITIES = {
-    "m_p": ("_kg", "kg"),
-    "c_p": ("_N_s_m", "N s/m"),
-    "k_p": ("_N_m", "N/m"),
-    "natural_frequency": ("_Hz", "Hz"),
-    "damping_ratio": ("", "1"),
-}
-"""What is judged: the ending of its columns, and its unit."""
-
 CHI_SQUARE_95 = {1: 3.841458820694124, 2: -2.0 * math.log(0.05)}
 """Value that chi-square with so many degrees of freedom stays below with a probability of 95 %."""
+
+MOST_TRANSFERS = 50
+"""How often, spread over the run, the transfer function of a truth is looked at for changes."""
 
 HONEST_COVERAGE = 0.9
 """Share of the time for which +-2 sigma has to cover the truth to be called honest; 95.4 % if Gaussian and white."""
@@ -53,7 +49,7 @@ class Quality:
 def build(recording: Recording, trace: Trace) -> dict[str, Any]:
     """The content of summary.json, but for the wall times; None stands for what there is nothing to say of."""
     scenario = recording.scenario
-    quality = {name: _quality(name, scenario, trace) for name in QUANTITIES}
+    quality = {quantity.key: _quality(quantity, scenario, trace) for quantity in scenario.judged()}
     nis = _nis(scenario, trace)
     count = len(recording.inputs.time)
     modes = _modes(trace)
@@ -67,11 +63,13 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
             "sample_period_s": scenario.period,
             "converged_after_s": scenario.converged_after,
             "changes_s": list(scenario.changes()),
-            "limits": {name: limit for name, limit in asdict(scenario.limits).items() if limit is not None},
+            "limits": dict(scenario.limits or {}),
         },
+        "truth": _truth(recording),
         "estimator": {**scenario.config.choices, "settings": scenario.config.settings},
         "parameters": {name: asdict(entry) for name, entry in quality.items()},
         "nis": nis,
+        "whiteness": _whiteness(scenario, trace),
         "samples": count,
         **{name: _last(trace[name]) for name in ("lost", "corrupt", "late")},
         "unanswered": recording.unanswered,
@@ -84,11 +82,24 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
     return summary
 
 
-def _quality(name: str, scenario: Scenario, trace: Trace) -> Quality:
-    ending, _ = QUANTITIES[name]
-    truth = trace[f"{name}_true{ending}"]
-    error = trace[f"{name}_estimate{ending}"] - truth
-    relative, sigma = error / truth, trace[f"{name}_sigma{ending}"]
+def _truth(recording: Recording) -> dict[str, Any]:
+    """The pilot's model, and where that is not the estimator's, theta/z_ddot of it: polynomials of s, highest power
+    first, from each of `time_s` on."""
+    scenario, inputs = recording.scenario, recording.inputs
+    if scenario.pilot.model == scenario.config.choices["model"]:
+        return {"model": scenario.pilot.model}
+    at = np.linspace(0, len(inputs.time) - 1, MOST_TRANSFERS).astype(np.intp)
+    transfer = inputs.truth.transfer(at)
+    rows = np.hstack((transfer.numerator, transfer.denominator))
+    new = np.flatnonzero(np.append(True, np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
+    told = {"numerator": transfer.numerator[new].tolist(), "denominator": transfer.denominator[new].tolist()}
+    return {"model": scenario.pilot.model, "transfer": {"time_s": inputs.time[at[new]].tolist(), **told}}
+
+
+def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
+    truth = trace[quantity.column("true")]
+    error = trace[quantity.column("estimate")] - truth
+    relative, sigma = error / truth, trace[quantity.column("sigma")]
     judged = judged_samples(scenario, trace["time_s"]) & np.isfinite(relative)
     reached = [times_to(relative, trace["time_s"], scenario.changes(), within) for within in (0.1, 0.05)]
     if not judged.any():
@@ -146,6 +157,16 @@ def _nis(scenario: Scenario, trace: Trace) -> dict[str, Any]:
     }
 
 
+def _whiteness(scenario: Scenario, trace: Trace) -> dict[str, Any] | None:
+    """Of the judged samples; null where there are too few."""
+    residual = whiteness.residual(trace)
+    if residual is None:
+        return None
+    judged = np.where(judged_samples(scenario, trace["time_s"]), residual, np.nan)
+    measured = whiteness.measure(judged, scenario.period)
+    return None if measured is None else asdict(measured)
+
+
 def _last(column: FloatArray) -> int:
     known = column[np.isfinite(column)]
     return int(known[-1]) if len(known) else 0
@@ -161,13 +182,14 @@ def _modes(trace: Trace) -> dict[str, float]:
 def _missed(scenario: Scenario, quality: dict[str, Quality]) -> list[str]:
     """The limits of the scenario that were not kept, in words."""
     missed = []
+    limits = scenario.limits or {}
     for name, entry in quality.items():
-        limit = getattr(scenario.limits, name)
+        limit = limits.get(name)
         if limit is not None and entry.rms_percent is not None and entry.rms_percent > 100.0 * limit:
             missed.append(f"rms error of {name} {entry.rms_percent:.1f} % (limit {100.0 * limit:g} %)")
-    least = scenario.limits.coverage
-    for name in ("m_p", "c_p", "k_p"):
-        coverage = quality[name].coverage_2sigma
+    least = limits.get("coverage")
+    for name, entry in quality.items():
+        coverage = entry.coverage_2sigma
         if least is not None and coverage is not None and coverage < least:
             missed.append(f"coverage of {name} {100.0 * coverage:.0f} % (limit {100.0 * least:g} %)")
     return missed
@@ -185,9 +207,11 @@ def _verdict(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
         sentence
         for sentence in (
             _verdict_run(summary),
+            _verdict_truth(summary),
             _verdict_limits(summary, quality),
             _verdict_sigma(quality),
             _verdict_nis(summary["nis"]),
+            _verdict_whiteness(summary["whiteness"]),
         )
         if sentence
     )
@@ -200,6 +224,15 @@ def _verdict_run(summary: dict[str, Any]) -> str:
     if "fault" in summary["modes_s"]:
         troubles.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
     return f"Trouble: {' and '.join(troubles)}." if troubles else ""
+
+
+def _verdict_truth(summary: dict[str, Any]) -> str:
+    if summary["truth"]["model"] == summary["estimator"]["model"]:
+        return ""
+    return (
+        f"The pilot ({summary['truth']['model']}) is not of the estimator's kind ({summary['estimator']['model']}): "
+        "only natural frequency and damping ratio can be held against the truth."
+    )
 
 
 def _verdict_limits(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
@@ -234,6 +267,18 @@ def _verdict_nis(nis: dict[str, Any]) -> str:
     return f"Innovations are {size} the filter expects ({numbers})."
 
 
+def _verdict_whiteness(told: dict[str, Any] | None) -> str:
+    if told is None:
+        return ""
+    size = f"correlation {told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"
+    if told["white"]:
+        return f"They are white ({size}): nothing is left over that the model could explain."
+    return (
+        f"They are coloured ({size}; white noise stays within ±{told['band_95']:.2f}): the arm, or a sensor, is not "
+        "what the model assumes."
+    )
+
+
 def _words(name: str) -> str:
     """A quantity as it stands in a sentence; symbols stay."""
-    return name if len(name) == len("m_p") else name.replace("_", " ")
+    return {quantity.key: quantity.name for quantity in DYNAMICS}.get(name, name)

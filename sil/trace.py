@@ -2,19 +2,22 @@
 
 Frames that come at a divided rate are held until the next one; before the first, where a value was invalid or a frame
 lost, and where a sample has no answer, there is NaN. Made from the frames as they were on the bus, in whole columns.
+
+The columns of the parameters are those of the estimator's model; their truth is there when the pilot is of that model.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from lever_cdkf.host_tools import codec
 from numpy.typing import NDArray
 
-from . import plant
 from .buslog import Frames
 from .loop import Recording
+from .quantities import DYNAMICS, quantities
 
 FloatArray = NDArray[np.float64]
 Trace = dict[str, FloatArray]
@@ -34,17 +37,7 @@ _ESTIMATED = (
     ("theta_dot_estimate_rad_s", "STATE_ESTIMATE", "theta_dot"),
     ("nis", "STATE_ESTIMATE", "nis"),
 )
-_HELD = (
-    ("m_p_estimate_kg", "PILOT_PARAMETERS", "m_p"),
-    ("m_p_sigma_kg", "PILOT_SIGMA", "m_p_sigma"),
-    ("c_p_estimate_N_s_m", "PILOT_PARAMETERS", "c_p"),
-    ("c_p_sigma_N_s_m", "PILOT_SIGMA", "c_p_sigma"),
-    ("k_p_estimate_N_m", "PILOT_PARAMETERS", "k_p"),
-    ("k_p_sigma_N_m", "PILOT_SIGMA", "k_p_sigma"),
-    ("natural_frequency_estimate_Hz", "PILOT_DYNAMICS", "natural_frequency"),
-    ("natural_frequency_sigma_Hz", "PILOT_DYNAMICS", "natural_frequency_sigma"),
-    ("damping_ratio_estimate", "PILOT_DYNAMICS", "damping_ratio"),
-    ("damping_ratio_sigma", "PILOT_DYNAMICS", "damping_ratio_sigma"),
+_HEALTH = (
     ("mode", "HEALTH", "mode"),
     ("faults", "HEALTH", "faults"),
     ("lost", "HEALTH", "lost"),
@@ -65,28 +58,31 @@ def build(recording: Recording, frames: Frames) -> Trace:
         trace[column] = decoded.at_samples(message, field)
     for column, message, field in _ESTIMATED:
         trace[column] = decoded.at_samples(message, field)
-    for column, message, field in _HELD:
+    for column, message, field in (*_quantities(recording.scenario.config.choices["model"]), *_HEALTH):
         trace[column] = decoded.held(message, field)
     trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
     return trace
 
 
+def _quantities(model: str) -> Iterator[tuple[str, str, str]]:
+    """Column, message and field of all that the estimator says of the pilot."""
+    for quantity in quantities(model):
+        values, sigmas = ("PILOT_DYNAMICS",) * 2 if quantity in DYNAMICS else ("PILOT_PARAMETERS", "PILOT_SIGMA")
+        yield quantity.column("estimate"), values, quantity.key
+        yield quantity.column("sigma"), sigmas, f"{quantity.key}_sigma"
+
+
 def _truth(recording: Recording) -> Trace:
-    scenario, inputs = recording.scenario, recording.inputs
-    lever, truth, kind = scenario.true_lever, inputs.truth, scenario.pilot.preload
-    dynamics = plant.dynamics(lever, truth, kind)
+    inputs = recording.inputs
+    values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}
     return {
         "time_s": inputs.time,
         "theta_true_rad": np.array(recording.theta),
         "theta_dot_true_rad_s": np.array(recording.theta_dot),
         "z_ddot_true_m_s2": inputs.z_ddot,
         "tau_m_true_N_m": np.array(recording.tau_m),
-        "trim_true_rad": plant.equilibrium(lever, truth, kind),
-        "m_p_true_kg": truth.m_p,
-        "c_p_true_N_s_m": truth.c_p,
-        "k_p_true_N_m": truth.k_p,
-        "natural_frequency_true_Hz": dynamics.natural_frequency,
-        "damping_ratio_true": dynamics.damping_ratio,
+        "trim_true_rad": inputs.truth.rest,
+        **{quantity.column("true"): values[quantity.key] for quantity in recording.scenario.judged()},
     }
 
 

@@ -33,7 +33,11 @@ _SPELLINGS: dict[str, dict[str, float]] = {
     "N/m": {"N/m": 1.0, "N/mm": 1e3},
     "N m s/rad": {"N m s/rad": 1.0},
     "N m/rad": {"N m/rad": 1.0},
+    "1/s": {"1/s": 1.0},
+    "1/s^2": {"1/s^2": 1.0},
     "1/sqrt(s)": {"1/sqrt(s)": 1.0, "%/sqrt(s)": 0.01},
+    "1/s/sqrt(s)": {"1/s/sqrt(s)": 1.0},
+    "1/s^2/sqrt(s)": {"1/s^2/sqrt(s)": 1.0},
     "rad/sqrt(s)": {"rad/sqrt(s)": 1.0, "mrad/sqrt(s)": 1e-3},
     "rad/s/sqrt(s)": {"rad/s/sqrt(s)": 1.0, "mrad/s/sqrt(s)": 1e-3},
 }

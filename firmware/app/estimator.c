@@ -1,5 +1,6 @@
 #include "app/estimator.h"
 
+#include "app/prior.h"
 #include "filter/derived.h"
 #include "math/trigonometry.h"
 
@@ -15,7 +16,7 @@
 #define TURN 6.28318531f
 #define HALF_TURN_OF_TIME 0x80000000u
 
-static const model_t *const models[LEVER_MODEL_COUNT] = {&model_lever};
+static const model_t *const models[LEVER_MODEL_COUNT] = {&model_lever, &model_linear_physical, &model_linear_black_box};
 
 static float squared(float x)
 {
@@ -39,27 +40,12 @@ static void init_constants(model_constants_t *constants, const lever_config_t *c
     constants->trim = (config->preload == (uint8_t)LEVER_PRELOAD_TRIM);
 }
 
-static void init_adaptation(adaptation_t *adaptation, const lever_config_t *config)
-{
-    const lever_settings_t *s = &config->settings;
-    const float walk[MODEL_PARAMETERS] = {s->m_p_walk, s->c_p_walk, s->k_p_walk};
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
-        adaptation->floor[i] = squared(walk[i]);
-        adaptation->ceiling[i] = squared(walk[i] * s->walk_ceiling);
-    }
-    adaptation->kind = config->adaptation;
-    adaptation->annealing_time = s->annealing_time;
-    adaptation->averaging_time = s->robbins_monro_time;
-}
-
 static void init_dual(estimator_t *estimator)
 {
     (void)memset(&estimator->dual, 0, sizeof estimator->dual);
     const lever_settings_t *s = &estimator->config.settings;
-    const float guess[MODEL_PARAMETERS] = {s->m_p, s->c_p, s->k_p};
-    const float sigma[MODEL_PARAMETERS] = {s->m_p_sigma, s->c_p_sigma, s->k_p_sigma};
-    parameter_filter_init(&estimator->dual.parameters, estimator->model, guess, sigma);
-    adaptation_start(&estimator->adaptation, estimator->dual.parameters.walk);
+    const prior_t prior = prior_of(&estimator->config); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    parameter_filter_init(&estimator->dual.parameters, estimator->model, &prior);
 
     state_filter_t *state = &estimator->dual.state;
     state->process_noise[0] = s->theta_process_noise;
@@ -68,6 +54,7 @@ static void init_dual(estimator_t *estimator)
     state->output_noise[1] = s->theta_dot_noise;
     state->s[0] = s->theta_noise;
     state->s[3] = s->theta_dot_noise;
+    noise_begin(&estimator->dual.noise);
 }
 
 /* Back to before the first sample; dither and counts go on. */
@@ -75,8 +62,8 @@ static void start_over(estimator_t *estimator)
 {
     estimator->model = models[estimator->config.model];
     init_constants(&estimator->constants, &estimator->config);
-    init_adaptation(&estimator->adaptation, &estimator->config);
     init_dual(estimator);
+    learning_start(&estimator->learning, &estimator->config, &estimator->dual);
     (void)memset(&estimator->followed, 0, sizeof estimator->followed);
     estimator->mode = LEVER_MODE_INIT;
     estimator->frozen = false;
@@ -127,8 +114,7 @@ bool estimator_command(estimator_t *estimator, const lever_command_t *command)
         const bool preload = choose(&config->preload, command->preload);
         const bool kind = choose(&config->estimator, command->estimator);
         if (choose(&config->adaptation, command->adaptation)) {
-            estimator->adaptation.kind = config->adaptation;
-            adaptation_start(&estimator->adaptation, estimator->dual.parameters.walk);
+            learning_adapt(config, &estimator->dual);
         }
         if (model || preload || kind || (command->request == (uint8_t)LEVER_REQUEST_RESET)) {
             start_over(estimator);
@@ -212,6 +198,8 @@ static void start_state(estimator_t *estimator, const measurement_t *measurement
     state->s[1] = 0.0f;
     state->s[2] = 0.0f;
     state->s[3] = measurement->valid[1] ? state->output_noise[1] : 1.0f;
+    state->echo[0] = 0.0f;
+    state->echo[1] = 0.0f;
     parameter_filter_forget_state(&estimator->dual.parameters);
 }
 
@@ -248,14 +236,13 @@ static void begin_alignment(estimator_t *estimator, const taken_t *taken)
 }
 
 /* What follows the estimate: excitation, innovation level, memory of restarts. */
-static void follow(estimator_t *estimator, const measurement_t *measurement, float elapsed)
+static void follow(estimator_t *estimator, float elapsed)
 {
     const lever_settings_t *s = &estimator->config.settings;
     followed_t *followed = &estimator->followed;
     const float share = (elapsed < s->excitation_time) ? (elapsed / s->excitation_time) : 1.0f;
     followed->excitation_square += share * (squared(estimator->dual.state.x[1]) - followed->excitation_square);
     followed->restart_debt -= followed->restart_debt * (elapsed / RESTART_MEMORY);
-    estimator->nis_size = (uint8_t)((measurement->valid[0] ? 1u : 0u) + (measurement->valid[1] ? 1u : 0u));
     if (estimator->nis_size != 0u) {
         const float ratio = estimator->nis / (float)estimator->nis_size;
         followed->innovation_mean += share * (ratio - followed->innovation_mean);
@@ -267,6 +254,7 @@ static void restart_if_invalid(estimator_t *estimator, const measurement_t *meas
 {
     if (!dual_is_valid(&estimator->dual)) {
         init_dual(estimator);
+        learning_start(&estimator->learning, &estimator->config, &estimator->dual);
         start_state(estimator, measurement);
         estimator->followed.innovation_mean = 1.0f;
         estimator->nis = 0.0f;
@@ -290,7 +278,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     step.origin = levels->origin[0];
     step.trim = levels->output[0].level;
     step.trim_sine = sine_cosine(step.trim).sine;
-    dual_predict(&estimator->dual, estimator->model, &estimator->constants, &step, !estimator->frozen);
+    dual_predict(&estimator->dual, estimator->model, &estimator->constants, &step);
     estimator->z_ddot = z_deviation;
     estimator->tau_m = tau_deviation;
 }
@@ -323,6 +311,18 @@ static void advance(
     }
 }
 
+static enum lever_mode mode_of(const estimator_t *estimator, bool measured)
+{
+    enum lever_mode mode = measured ? LEVER_MODE_RUN : LEVER_MODE_COAST;
+    if (estimator->frozen) {
+        mode = LEVER_MODE_FROZEN;
+    }
+    if (estimator->followed.restart_debt > RESTARTS_TOLERATED) {
+        mode = LEVER_MODE_FAULT;
+    }
+    return mode;
+}
+
 static void correct(estimator_t *estimator, const measurement_t *measurement, float elapsed)
 {
     const float least = estimator->config.settings.excitation_least;
@@ -330,25 +330,20 @@ static void correct(estimator_t *estimator, const measurement_t *measurement, fl
     const bool excited = (estimator->followed.excitation_square >= squared(least));
     const bool settled = estimator->levels.unsettled < (0.5f * estimator->config.settings.sample_period);
     const bool learn = !estimator->frozen && settled;
-    float correction[MODEL_PARAMETERS];
-    estimator->nis = dual_update(&estimator->dual, measurement, learn, correction);
-    if (learn && measured) {
-        adaptation_step(&estimator->adaptation, elapsed, correction, excited, estimator->dual.parameters.walk);
-        note(estimator, parameter_filter_bound(&estimator->dual.parameters), LEVER_FAULT_BOUND);
-    }
+    const lesson_t lesson = {.walks = !estimator->frozen, .teaches = learn && measured, .excited = excited};
+    estimator->nis = dual_update(&estimator->dual, measurement, learn && excited);
+    estimator->nis_size = (uint8_t)((measurement->valid[0] ? 1u : 0u) + (measurement->valid[1] ? 1u : 0u));
+    learning_step(&estimator->learning, &estimator->config, &estimator->dual, &lesson, elapsed);
     estimator->levels.unsettled -= elapsed;
     restart_if_invalid(estimator, measurement);
-    follow(estimator, measurement, elapsed);
+    follow(estimator, elapsed);
     note(estimator, !excited, LEVER_FAULT_EXCITATION);
+    note(estimator, estimator->learning.bounded, LEVER_FAULT_BOUND);
+    note(estimator, learning_has_changed(&estimator->learning), LEVER_FAULT_CHANGE);
     note(estimator, estimator->followed.innovation_mean > INNOVATION_TOLERATED, LEVER_FAULT_INNOVATION);
-
-    if (estimator->followed.restart_debt > RESTARTS_TOLERATED) {
-        estimator->mode = LEVER_MODE_FAULT;
+    estimator->mode = mode_of(estimator, measured);
+    if (estimator->mode == LEVER_MODE_FAULT) {
         dither_set(&estimator->dither, 0.0f);
-    } else if (estimator->frozen) {
-        estimator->mode = LEVER_MODE_FROZEN;
-    } else {
-        estimator->mode = measured ? LEVER_MODE_RUN : LEVER_MODE_COAST;
     }
 }
 
@@ -372,7 +367,8 @@ static void take_and_step(estimator_t *estimator, const lever_sample_t *sample, 
     if (estimator->mode == LEVER_MODE_FAULT) {
         /* only a reset helps */
     } else if (elapsed > estimator->config.settings.gap_limit) {
-        parameter_filter_walk(&estimator->dual.parameters, elapsed);
+        float freed[PARAMETER_FILTER_FREED]; /* the state starts anew */
+        parameter_filter_walk(&estimator->dual.parameters, elapsed, freed);
         begin_alignment(estimator, &taken);
     } else if (estimator->mode == LEVER_MODE_ALIGN) {
         align(estimator, &taken, elapsed);
@@ -457,7 +453,9 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
     estimate->trim = estimator->levels.output[0].level;
     estimate->nis = estimator->nis;
     estimate->nis_size = estimator->nis_size;
-    derived_parameters(&dual->parameters, estimate->parameter, estimate->parameter_sigma);
+    parameter_filter_physical(&dual->parameters, estimate->parameter);
+    parameter_filter_sigma(&dual->parameters, estimate->parameter_sigma);
+    parameter_filter_correlation(&dual->parameters, estimate->parameter_correlation);
 
     model_dynamics_t dynamics;
     model_dynamics_t sigma;

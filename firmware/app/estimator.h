@@ -3,8 +3,8 @@
 #define APP_ESTIMATOR_H
 
 #include "app/dither.h"
+#include "app/learning.h"
 #include "app/levels.h"
-#include "filter/adaptation.h"
 #include "filter/dual.h"
 #include "lever_cdkf.h"
 #include "model/model.h"
@@ -30,8 +30,8 @@ typedef struct estimator {
     lever_config_t config;
     const model_t *model;
     model_constants_t constants;
-    adaptation_t adaptation;
     dual_t dual;
+    learning_t learning;
     levels_t levels;
     followed_t followed;
     alignment_t alignment;

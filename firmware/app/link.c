@@ -1,7 +1,5 @@
 #include "app/link.h"
 
-#include "filter/derived.h"
-
 #include <string.h>
 
 /* The order in which frames are fetched: the motor first, STATE_ESTIMATE last. */
@@ -177,9 +175,8 @@ static bool encode_parameters(const estimator_t *estimator, lever_frame_t *frame
 static bool encode_sigma(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_pilot_sigma_t message;
-    float parameter[MODEL_PARAMETERS];
     message.model = estimator->config.model;
-    derived_parameters(&estimator->dual.parameters, parameter, message.sigma);
+    parameter_filter_sigma(&estimator->dual.parameters, message.sigma);
     return message_pilot_sigma_encode(frame, &message);
 }
 

@@ -264,9 +264,13 @@ bool message_state_estimate_decode(message_state_estimate_t *message, const leve
 /* One row a model, in the order of enum lever_model. */
 static const quantity_t parameter_field[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
     {UNSIGNED(16u, 65535, 1000.0f), UNSIGNED(32u, 65535, 100.0f), UNSIGNED(48u, 65535, 10.0f)},
+    {UNSIGNED(16u, 65535, 1000.0f), UNSIGNED(32u, 65535, 100.0f), UNSIGNED(48u, 65535, 10.0f)},
+    {SIGNED_16(16u, 10.0f), SIGNED_16(32u, 100.0f), SIGNED_16(48u, 1000.0f)},
 };
 static const quantity_t sigma_field[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
     {UNSIGNED(16u, 65535, 10000.0f), UNSIGNED(32u, 65535, 500.0f), UNSIGNED(48u, 65535, 20.0f)},
+    {UNSIGNED(16u, 65535, 10000.0f), UNSIGNED(32u, 65535, 500.0f), UNSIGNED(48u, 65535, 20.0f)},
+    {UNSIGNED(16u, 65535, 50.0f), UNSIGNED(32u, 65535, 500.0f), UNSIGNED(48u, 65535, 5000.0f)},
 };
 
 static bool encode_by_model(lever_frame_t *frame, enum message_id id, uint8_t model,

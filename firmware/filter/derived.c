@@ -14,8 +14,7 @@ static float spread(float plus, float minus, float mean)
 void derived_dynamics(const parameter_filter_t *filter, const model_t *model, const model_constants_t *constants,
     const model_step_t *step, model_dynamics_t *dynamics, model_dynamics_t *sigma)
 {
-    float p[MODEL_PARAMETER_POINTS][MODEL_PARAMETERS];
-    parameter_filter_parameter_points(filter, p);
+    const float (*p)[MODEL_PARAMETERS] = filter->p;
     *dynamics = model->dynamics(constants, step, p[0]);
     float frequency = 0.0f;
     float damping = 0.0f;
@@ -27,12 +26,4 @@ void derived_dynamics(const parameter_filter_t *filter, const model_t *model, co
     }
     sigma->natural_frequency = sqrtf(frequency);
     sigma->damping_ratio = sqrtf(damping);
-}
-
-void derived_parameters(const parameter_filter_t *filter, float p[MODEL_PARAMETERS], float sigma[MODEL_PARAMETERS])
-{
-    parameter_filter_physical(filter, p);
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
-        sigma[i] = p[i] * factor_sigma(filter->s, (uint32_t)MODEL_PARAMETERS, i);
-    }
 }

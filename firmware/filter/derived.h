@@ -10,7 +10,4 @@
 void derived_dynamics(const parameter_filter_t *filter, const model_t *model, const model_constants_t *constants,
     const model_step_t *step, model_dynamics_t *dynamics, model_dynamics_t *sigma);
 
-/* Parameters in the units of the model and their standard deviations, to first order: sigma_p = p sigma_w. */
-void derived_parameters(const parameter_filter_t *filter, float p[MODEL_PARAMETERS], float sigma[MODEL_PARAMETERS]);
-
 #endif

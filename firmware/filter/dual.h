@@ -1,15 +1,22 @@
-/* Dual estimation: a state filter and a parameter filter in step on the same sample.
+/* Estimation of state and parameters together, on the same sample: the belief, and the two ways to advance it.
  *
- * After Wan & Nelson (2001), with the recurrent sensitivity of the state to the parameters (Nelson 2000) carried as
- * columns of the parameter filter's factor, and the state corrected for what the parameters have just learned (the
- * two-stage filter of Friedland 1969). Both filters share one set of sigma points and one call of the model. With constant
- * parameters this equals the joint filter on [w; x]; when they walk, the part of the state's uncertainty that a walk sets
- * free is left out.
+ * The belief on [w; x] is one covariance factor, lower block-triangular with the parameters first: [S_w 0; T S_x]. S_w and T
+ * are the parameter filter's, S_x, the uncertainty of the state when the parameters are given, is the state filter's. A
+ * prediction touches the rows of the state only.
+ *
+ * Dual: a state filter at the estimated parameters and a parameter filter in step (Wan & Nelson 2001), with the recurrent
+ * sensitivity of the state to the parameters (Nelson 2000), and the state corrected for what the parameters have just
+ * learned (the two-stage filter of Friedland 1969). Joint: the same, but what a walk of the parameters makes independent of
+ * them stays with the state as uncertainty of its own, so that the belief is that of one filter on [w; x] (van der Merwe
+ * 2004) exactly; the dual filter leaves it out. With constant parameters both are equal.
+ *
+ * Both share one set of sigma points and one call of the model a sample.
  */
 #ifndef FILTER_DUAL_H
 #define FILTER_DUAL_H
 
 #include "filter/measurement.h"
+#include "filter/noise.h"
 #include "filter/parameter_filter.h"
 #include "filter/state_filter.h"
 #include "model/model.h"
@@ -19,15 +26,28 @@
 typedef struct dual {
     state_filter_t state;
     parameter_filter_t parameters;
+    noise_estimator_t noise;
 } dual_t;
 
-/* Time update over one step of the model. `learn` false: the parameters do not walk. */
-void dual_predict(
-    dual_t *dual, const model_t *model, const model_constants_t *constants, const model_step_t *step, bool learn);
+/* Time update over one step of the model; the parameters stand still (dual_learn). */
+void dual_predict(dual_t *dual, const model_t *model, const model_constants_t *constants, const model_step_t *step);
 
-/* Measurement update. The change of w is left in `correction`; `learn` false holds w and its covariance. Returns the
- * normalised innovation squared. */
-float dual_update(dual_t *dual, const measurement_t *measurement, bool learn, float correction[MODEL_PARAMETERS]);
+/* Measurement update of the state. `learn`: what the sample says of the parameters is gathered. Returns the normalised
+ * innovation squared. */
+float dual_update(dual_t *dual, const measurement_t *measurement, bool learn);
+
+/* The parameters learn what was gathered (with `caution`, see parameter_filter_learn), then walk for `period` seconds, the time
+ * since they did so last. The change of w
+ * is left in `correction`, by how much its variances have become smaller in `learnt`. `joint`: the joint filter instead of the dual one. Returns true when a parameter rests on a bound
+ * of its model. */
+bool dual_learn(dual_t *dual, float period, float caution, bool joint, float correction[MODEL_PARAMETERS],
+    float learnt[MODEL_PARAMETERS]);
+
+/* Adds independent uncertainty to the parameters: variances of w. `joint` as above. */
+void dual_widen(dual_t *dual, const float variance[MODEL_PARAMETERS], bool joint);
+
+/* Opens the parameters' covariance to that of their prior. What they have made uncertain of the state stays with it. */
+void dual_open(dual_t *dual);
 
 /* Standard deviation of state i, that of the parameters included. */
 float dual_state_sigma(const dual_t *dual, uint32_t i);

@@ -3,12 +3,14 @@
 #include "filter/sigma_points.h"
 #include "math/factor.h"
 
+#include <string.h>
+
 #define N ((uint32_t)MODEL_STATES)
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define OUTPUTS ((uint32_t)MEASUREMENT_OUTPUTS)
 #define FIRST_PAIR ((uint32_t)MODEL_PARAMETER_POINTS) /* index of the first point of the state pairs */
 #define COLUMNS ((3u * N) + L)                        /* first order, second order of all pairs, process noise */
-#define SETS (1u + L)                                 /* innovations to update with: of x, and of each sensitivity */
+#define SETS (2u + L) /* innovations to update with: of x, of each sensitivity, of the echo */
 
 void state_filter_points(const state_filter_t *filter, model_points_t *points)
 {
@@ -40,9 +42,12 @@ static void process_noise_columns(const state_filter_t *filter, float period, fl
 void state_filter_predict(state_filter_t *filter, float increment[MODEL_POINTS][MODEL_STATES], float period)
 {
     float a[N * COLUMNS];
+    factor_solve(filter->s, N, filter->echo, 1u);
+    const float share[N] = {filter->echo[0], filter->echo[1]}; /* of each column of S: they move as the columns do */
     for (uint32_t i = 0u; i < N; i++) {
         float *row = &a[i * COLUMNS];
         const float mean = increment[0][i];
+        filter->echo[i] = 0.0f;
         float bend = 0.0f;
         for (uint32_t pair = 0u; pair < (L + N); pair++) {
             const float plus = increment[1u + (2u * pair)][i];
@@ -52,6 +57,7 @@ void state_filter_predict(state_filter_t *filter, float increment[MODEL_POINTS][
             row[pair] = SIGMA_SECOND * second;
             if (pair >= L) {
                 row[N + pair] = filter->s[(i * N) + (pair - L)] + (SIGMA_FIRST * (plus - minus));
+                filter->echo[i] += share[pair - L] * row[N + pair];
             }
         }
         filter->x[i] += mean + (SIGMA_MEAN * bend);
@@ -87,6 +93,7 @@ float state_filter_update(
         for (uint32_t j = 0u; j < L; j++) {
             innovation[(i * SETS) + 1u + j] = -weight * sensitivity[(i * L) + j];
         }
+        innovation[(i * SETS) + 1u + L] = -weight * filter->echo[i];
         for (uint32_t j = 0u; j < N; j++) {
             c[(i * N) + j] = weight * filter->s[(i * N) + j];
         }
@@ -96,6 +103,7 @@ float state_filter_update(
     const float nis = factor_update(filter->s, N, N, c, OUTPUTS, innovation, SETS, correction, work);
     for (uint32_t i = 0u; i < N; i++) {
         filter->x[i] += correction[i * SETS];
+        filter->echo[i] += correction[i * SETS] + correction[(i * SETS) + 1u + L];
         for (uint32_t j = 0u; j < L; j++) {
             sensitivity[(i * L) + j] += correction[(i * SETS) + 1u + j];
         }
@@ -103,7 +111,19 @@ float state_filter_update(
     return nis;
 }
 
+void state_filter_add(state_filter_t *filter, const float deviations[STATE_FILTER_ADDED])
+{
+    float a[N * (N + (2u * L))];
+    for (uint32_t i = 0u; i < N; i++) {
+        float *row = &a[i * (N + (2u * L))];
+        (void)memcpy(row, &filter->s[i * N], N * sizeof row[0]);
+        (void)memcpy(&row[N], &deviations[i * 2u * L], 2u * L * sizeof row[0]);
+    }
+    factor_tria(a, N, N + (2u * L), filter->s);
+}
+
 bool state_filter_is_valid(const state_filter_t *filter)
 {
-    return factor_is_valid(filter->s, N) && (fabsf(filter->x[0]) < 25.0f) && (fabsf(filter->x[1]) < 1.0e4f);
+    const bool echo = (fabsf(filter->echo[0]) < 1.0e6f) && (fabsf(filter->echo[1]) < 1.0e6f);
+    return echo && factor_is_valid(filter->s, N) && (fabsf(filter->x[0]) < 25.0f) && (fabsf(filter->x[1]) < 1.0e4f);
 }

@@ -11,11 +11,14 @@
 
 #include <stdbool.h>
 
+enum { STATE_FILTER_ADDED = 2 * MODEL_PARAMETERS * MODEL_STATES };
+
 typedef struct state_filter {
     float x[MODEL_STATES];                /* theta [rad], theta_dot [rad/s] */
     float s[MODEL_STATES * MODEL_STATES]; /* factor of their covariance, parameters given */
     float process_noise[MODEL_STATES];    /* random walk of each [unit / sqrt(s)] */
     float output_noise[MODEL_STATES];     /* standard deviation of each sample [unit] */
+    float echo[MODEL_STATES];             /* what past corrections have come to (noise.h) */
 } state_filter_t;
 
 /* Draws the points of the state pairs, and the mean, into `points`. */
@@ -34,6 +37,9 @@ void state_filter_innovation(const state_filter_t *filter, const measurement_t *
  * normalised innovation squared, parameters given. */
 float state_filter_update(
     state_filter_t *filter, const measurement_t *measurement, float sensitivity[MODEL_STATES * MODEL_PARAMETERS]);
+
+/* Adds independent deviations of the state, columns [MODEL_STATES x 2 MODEL_PARAMETERS], to its uncertainty. */
+void state_filter_add(state_filter_t *filter, const float deviations[STATE_FILTER_ADDED]);
 
 /* Finite estimate of a plausible angle (a few turns), valid factor. */
 bool state_filter_is_valid(const state_filter_t *filter);

@@ -122,10 +122,12 @@ static inline float factor_update(float *s, uint32_t rows, uint32_t n, float *c,
 
 /* Adds independent noise to a factor: P <- P + diag(noise^2), noise[n] standard deviations, by Givens rotations of each
  * noise column into the columns of the factor. s[rows x n] as in factor_update: rows below the first n keep their
- * covariance with the first n elements. column[rows] is scratch: the noise column, what is left of it. */
-static inline void factor_add_noise(float *s, uint32_t rows, uint32_t n, const float *noise, float *column)
+ * covariance with the first n elements. rest[n x rows] takes what is left of each noise column: zeros for the first n rows,
+ * and for the others deviations that are no longer correlated with the first n elements. */
+static inline void factor_add_noise(float *s, uint32_t rows, uint32_t n, const float *noise, float *rest)
 {
     for (uint32_t i = 0u; i < n; i++) {
+        float *column = &rest[i * rows];
         for (uint32_t r = 0u; r < rows; r++) {
             column[r] = (r == i) ? noise[i] : 0.0f;
         }
@@ -135,12 +137,66 @@ static inline void factor_add_noise(float *s, uint32_t rows, uint32_t n, const f
             const float cosine = (norm > 0.0f) ? (diagonal / norm) : 1.0f; /* exactly 1 where there is no noise */
             const float sine = (norm > 0.0f) ? (column[j] / norm) : 0.0f;
             s[(j * n) + j] = norm;
+            column[j] = 0.0f;
             for (uint32_t r = j + 1u; r < rows; r++) {
                 const float old = s[(r * n) + j];
                 s[(r * n) + j] = (cosine * old) + (sine * column[r]);
                 column[r] = (cosine * column[r]) - (sine * old);
             }
         }
+    }
+}
+
+#define FACTOR_ROUNDING 1.0e-6f /* of a difference of sums of a few products, relative to the sums */
+
+/* Conditions a factor on information gathered elsewhere: P <- S (I + information)^-1 S^T, by the reverse Cholesky factor
+ * U U^T = I + information (U upper triangular), S <- S U^-T. Every pivot of U is at least 1; it is kept from falling below
+ * that, or below the rounding of the information, so it cannot fail. Directions that have less than a millionth of the
+ * greatest information drown in that rounding.
+ *   s[rows x n]           as in factor_update; before and after
+ *   information[n x n]    sum of C^T C over outputs C = H S with noise covariance I; used up
+ *   score[n]              sum of C^T innovation; used up
+ *   correction[rows]      result: S (I + information)^-1 score
+ * Costs n square roots and n divisions, whatever the number of outputs. */
+static inline void factor_condition(
+    float *s, uint32_t rows, uint32_t n, float *information, float *score, float *correction)
+{
+    float *u = information; /* its upper triangle; the diagonal holds the inverse of U's */
+    for (uint32_t left = n; left > 0u; left--) {
+        const uint32_t j = left - 1u;
+        const float rounding = FACTOR_ROUNDING * u[(j * n) + j];
+        const float least = (rounding > 1.0f) ? rounding : 1.0f;
+        float pivot = 1.0f + u[(j * n) + j];
+        for (uint32_t k = left; k < n; k++) {
+            pivot -= u[(j * n) + k] * u[(j * n) + k];
+        }
+        const float inverse = 1.0f / sqrtf((pivot < least) ? least : pivot);
+        u[(j * n) + j] = inverse;
+        for (uint32_t i = 0u; i < j; i++) {
+            float sum = u[(i * n) + j];
+            for (uint32_t k = left; k < n; k++) {
+                sum -= u[(i * n) + k] * u[(j * n) + k];
+            }
+            u[(i * n) + j] = sum * inverse;
+        }
+    }
+    for (uint32_t r = 0u; r <= rows; r++) { /* the rows of S, and last the score: U z = row */
+        float *row = (r < rows) ? &s[r * n] : score;
+        for (uint32_t left = n; left > 0u; left--) {
+            const uint32_t j = left - 1u;
+            float sum = row[j];
+            for (uint32_t k = left; k < n; k++) {
+                sum -= u[(j * n) + k] * row[k];
+            }
+            row[j] = sum * u[(j * n) + j];
+        }
+    }
+    for (uint32_t r = 0u; r < rows; r++) {
+        float sum = 0.0f;
+        for (uint32_t j = 0u; j < n; j++) {
+            sum += s[(r * n) + j] * score[j];
+        }
+        correction[r] = sum;
     }
 }
 

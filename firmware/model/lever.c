@@ -19,8 +19,7 @@
 #include "math/trigonometry.h"
 #include "model/model.h"
 
-#define GRAVITY 9.80665f          /* [m/s^2] */
-#define INVERSE_TURN 0.159154943f /* 1 / (2 pi) */
+#define GRAVITY 9.80665f /* [m/s^2] */
 
 /* What depends on the angle only. */
 typedef struct geometry {
@@ -109,7 +108,7 @@ static model_dynamics_t dynamics(
     const float inertia = constants->inertia + (constants->length_squared * p[0]);
     model_dynamics_t result = {0.0f, 0.0f};
     if (stiffness > 0.0f) {
-        result.natural_frequency = sqrtf(stiffness / inertia) * INVERSE_TURN;
+        result.natural_frequency = sqrtf(stiffness / inertia) * MODEL_INVERSE_TURN;
         result.damping_ratio = damping / (2.0f * sqrtf(stiffness * inertia));
     }
     return result;
@@ -118,6 +117,7 @@ static model_dynamics_t dynamics(
 const model_t model_lever = {
     .name = "lever",
     .parameter = {{"m_p", "kg", 0.3f, 10.0f}, {"c_p", "N s/m", 2.0f, 400.0f}, {"k_p", "N/m", 50.0f, 6500.0f}},
+    .positive = true,
     .propagate = propagate,
     .dynamics = dynamics,
 };

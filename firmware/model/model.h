@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define MODEL_INVERSE_TURN 0.159154943f /* 1 / (2 pi) */
+
 enum {
     MODEL_STATES = 2,
     MODEL_PARAMETERS = 3,
@@ -63,6 +65,7 @@ typedef struct model_dynamics {
 typedef struct model {
     const char *name;
     model_parameter_t parameter[MODEL_PARAMETERS];
+    bool positive; /* all parameters are, and are estimated on a logarithmic scale; else on a linear one */
 
     /* Increments of the state over the step, for all points at once: what they share is computed once. */
     void (*propagate)(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
@@ -73,6 +76,8 @@ typedef struct model {
         const model_constants_t *constants, const model_step_t *step, const float p[MODEL_PARAMETERS]);
 } model_t;
 
-extern const model_t model_lever; /* nonlinear lever: m_p, c_p, k_p */
+extern const model_t model_lever;            /* nonlinear lever: m_p, c_p, k_p */
+extern const model_t model_linear_physical;  /* mass, spring and damper: m, c, k */
+extern const model_t model_linear_black_box; /* second-order system: a21, a22, b21 */
 
 #endif

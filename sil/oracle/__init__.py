@@ -4,9 +4,11 @@ It repeats what the firmware does (DESIGN sections 3 and 4) the plain way: full 
 array, LAPACK's QR for every factor. It shares no code and no shortcut with the firmware, so where both agree both are
 probably right. It is also the readable version of the estimator:
 
-- `cdkf`   the square-root Central Difference Kalman Filter for any model: draw, predict, measure, update;
-- `lever`  the lever and arm: the step of the motion, natural frequency and damping ratio;
-- `dual`   state filter and parameter filter in step, adaptation of the parameter noise, trim, alignment.
+- `cdkf`             the square-root Central Difference Kalman Filter for any model: draw, predict, measure, update;
+- `lever` `linear`   the models: the step of the motion, natural frequency and damping ratio;
+- `scale`            how a model's parameters are scaled, and what is known of them before the first sample;
+- `belief`           what is known of state and parameters, and how samples change it: dual, joint, joint in one piece;
+- `dual`             the whole estimator: when it learns, adaptation of the parameter noise, trim, gaps, alignment.
 """
 
 from .dual import DualFilter, Start, align, run

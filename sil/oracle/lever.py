@@ -80,11 +80,11 @@ class Lever:
         arm = cosine**2 - sine * (sine - np.sin(self.arm_preload_angle))
         return self.length**2 * k_p * arm + self.stiffness - GRAVITY * self.unbalance(m_p) * sine
 
-    def step(self, x: Array, p: Array, u: tuple[float, float], trim: float, dt: float) -> Array:
+    def step(self, x: Array, p: Array, u: tuple[float | Array, float | Array], trim: float | Array, dt: float) -> Array:
         """The states dt [s] later under constant inputs, by the linearly implicit midpoint rule.
 
-        `x` (2, N) or (2, 1) and `p` (3, N) or (3, 1) broadcast against each other. Second order in dt; the damping is
-        taken implicitly, so no damping is too large.
+        `x` (2, …), `p` (3, …), inputs and trim broadcast against each other. Second order in dt; the damping is taken
+        implicitly, so no damping is too large.
         """
         theta, rate = x
         m_p, c_p, k_p = p
@@ -94,8 +94,8 @@ class Lever:
         change = dt * (force - damping * rate) / (self.total_inertia(m_p) + 0.5 * dt * damping)
         return np.array((theta + dt * (rate + 0.5 * change), rate + change))
 
-    def dynamics(self, p: Array, trim: float) -> Array:
-        """Natural frequency [Hz] and damping ratio [1] about the trim of parameters (3, N), shape (2, N)."""
+    def dynamics(self, p: Array, trim: float | Array) -> Array:
+        """Natural frequency [Hz] and damping ratio [1] about the trim of parameters (3, …), shape (2, …)."""
         m_p, c_p, k_p = p
         angle = np.full_like(m_p, trim)
         inertia = self.total_inertia(m_p)

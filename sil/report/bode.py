@@ -1,29 +1,47 @@
-"""The answer of the lever to the base, θ/z̈, over frequency and time, from the parameters and the linearised lever."""
+"""The answer of the lever to the base, θ/z̈, over frequency and time, from the parameters of a model."""
+
+from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..oracle.detrend import Detrend
 from ..oracle.lever import Lever
+from ..transfer import Transfer
 from .series import Array
 
 LONGEST_STEP = 0.05  # [s] that the trim moves on by after a gap
 FREQUENCIES: Array = np.linspace(0.5, 12.0, 116)  # [Hz]
 
 
-def response(lever: Lever, parameters: Array, trim: Array, frequency: Array = FREQUENCIES) -> NDArray[np.complex128]:
-    """θ/z̈ [rad/(m/s²)], shape (times, frequencies), of parameters m_p, c_p, k_p (3, times) about the trim angles [rad].
+def transfer(model: str, lever: Lever, parameters: Array, trim: Array) -> Transfer:
+    """θ/z̈ of a model of the firmware with parameters (3, times) about the trim angles [rad]."""
+    return _TRANSFERS[model](lever, parameters, trim)
 
-    About the trim the lever of DESIGN section 3 is M θ̈ + D θ̇ + K θ = -l μ cos(trim) z̈.
-    """
+
+def _of_lever(lever: Lever, parameters: Array, trim: Array) -> Transfer:
+    """About the trim the lever of DESIGN section 3 is M θ̈ + D θ̇ + K θ = -l μ cos(trim) z̈."""
     m_p, c_p, k_p = parameters
-    inertia = lever.total_inertia(m_p)[:, np.newaxis]
-    damping = lever.rotational_damping(trim, c_p)[:, np.newaxis]
-    stiffness = lever.rotational_stiffness(trim, m_p, k_p, trim)[:, np.newaxis]
-    forcing = (-lever.unbalance(m_p) * np.cos(trim))[:, np.newaxis]
-    s = (2j * np.pi * frequency).astype(np.complex128)
-    answer: NDArray[np.complex128] = forcing / (inertia * s**2 + damping * s + stiffness)
-    return answer
+    stiffness = lever.rotational_stiffness(trim, m_p, k_p, trim)
+    resistance = (lever.total_inertia(m_p), lever.rotational_damping(trim, c_p), stiffness)
+    return Transfer((-lever.unbalance(m_p) * np.cos(trim))[:, np.newaxis], np.column_stack(resistance))
+
+
+def _of_linear_physical(_: Lever, parameters: Array, __: Array) -> Transfer:
+    """m θ̈ + c θ̇ + k θ = m z̈."""
+    return Transfer(parameters[0][:, np.newaxis], parameters.T)
+
+
+def _of_linear_black_box(_: Lever, parameters: Array, __: Array) -> Transfer:
+    """θ̈ - a22 θ̇ - a21 θ = b21 z̈."""
+    a21, a22, b21 = parameters
+    return Transfer(b21[:, np.newaxis], np.column_stack((np.ones_like(a21), -a22, -a21)))
+
+
+_TRANSFERS: Mapping[str, Callable[[Lever, Array, Array], Transfer]] = {
+    "lever": _of_lever,
+    "linear_physical": _of_linear_physical,
+    "linear_black_box": _of_linear_black_box,
+}
 
 
 def slow_trim(time: Array, theta: Array, corner: float) -> Array:

@@ -1,14 +1,11 @@
 """Puts the page together: sections of words and figures, the style, plotly.js and the script that draws."""
 
 import html
-import json
 from importlib.resources import files
-from string import Template
 
-import plotly.offline
-
-from . import words
+from . import models, words
 from .charts import health, signals, tracking, transfer
+from .document import document
 from .figure import Figure
 from .run import Run
 
@@ -53,17 +50,7 @@ def build(run: Run) -> str:
         f"{words.verdict(run)}{words.cards(run)}<nav>{links}</nav>{''.join(page.sections)}"
         "<footer>Made by <code>lever</code>. Nothing on this page is loaded from elsewhere.</footer>"
     )
-    specs = {key: figure.spec() for key, figure in page.figures.items()}
-    figures = json.dumps(specs, separators=(",", ":"), allow_nan=False)
-    here = files(__package__)
-    return Template((here / "page.html").read_text(encoding="utf-8")).substitute(
-        title=f"Lever CDKF: {html.escape(title)}",
-        css=(here / "page.css").read_text(encoding="utf-8"),
-        body=body,
-        figures=figures.replace("</", "<\\/"),
-        plotly=plotly.offline.get_plotlyjs(),
-        script=(here / "page.js").read_text(encoding="utf-8"),
-    )
+    return document(f"Lever CDKF: {title}", body, {key: figure.spec() for key, figure in page.figures.items()})
 
 
 def _subtitle(run: Run) -> str:
@@ -74,6 +61,7 @@ def _subtitle(run: Run) -> str:
 
 def _explained(page: Page, run: Run) -> None:
     checked = " The truth is known in a simulation: this page holds the claims against it." if run.has_truth else ""
+    about = "".join(f"<p>{paragraph}</p>" for paragraph in models.about(run))
     svg = (files(__package__) / "schematic.svg").read_text(encoding="utf-8")
     page.section(
         "explained",
@@ -86,14 +74,11 @@ def _explained(page: Page, run: Run) -> None:
         "c<sub>p</sub>, and which changes as the pilot grips, relaxes or tires.</p><p>Nobody can measure these three. "
         "The estimator works them out on line, many times a second, from the lever's angle θ and rate, the "
         "acceleration of the floor z̈ and the torque τ<sub>m</sub> of the lever's own motor, and says how sure it is: "
-        f"the shaded bands are ±2 standard deviations (σ).{checked}</p></div>{svg}</div>",
+        f"the shaded bands are ±2 standard deviations (σ).{checked}</p>{about}</div>{svg}</div>",
     )
 
 
 def _estimates(page: Page, run: Run) -> None:
-    told = "."
-    if run.has_truth:
-        told = ": the blue line should follow the dashed one, and the band hold it about 95 % of the time."
     marks = " Dotted lines mark sudden changes of the pilot." if run.changes else ""
     page.section(
         "parameters",
@@ -102,7 +87,7 @@ def _estimates(page: Page, run: Run) -> None:
         page.figure(
             "figure-parameters",
             tracking.parameters(run),
-            f"Mass, damping and stiffness of the pilot's arm, with a band of ±2σ{told}{marks}",
+            f"{models.parameters_caption(run)}{marks}",
         ),
     )
     page.section(
@@ -112,9 +97,7 @@ def _estimates(page: Page, run: Run) -> None:
         page.figure(
             "figure-dynamics",
             tracking.dynamics(run),
-            "What decides about collective bounce: how fast arm and lever swing by themselves, and how quickly that "
-            "dies out (a damping ratio of 1 is no swing at all). Both are usually known better than the three "
-            "parameters, whose common scale cancels in them.",
+            models.dynamics_caption(run),
         ),
     )
 
@@ -165,6 +148,7 @@ def _signals(page: Page, run: Run) -> None:
             "expected to be wrong by. Dots inside the band around 1 are what chance alone gives; above it the "
             "estimator is over-confident, below it too cautious.",
         ),
+        page.figure("figure-whiteness", signals.whiteness(run), models.whiteness_caption(run)),
     )
     page.section(
         "excitation",
@@ -173,8 +157,7 @@ def _signals(page: Page, run: Run) -> None:
         page.figure(
             "figure-excitation",
             signals.excitation(run),
-            "What shakes the lever. Without motion there is nothing to learn from. Without motor torque only ratios of "
-            "the three parameters can be told, and the bands above must be wide.",
+            models.excitation_caption(run),
         ),
         page.figure(
             "figure-spectra",

@@ -1,7 +1,7 @@
 """What a run left behind, as the charts read it: columns that may be absent, and what follows from several of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict
 from functools import cached_property
 from typing import Any
 
@@ -9,35 +9,11 @@ import numpy as np
 from lever_cdkf.host_tools import native
 from numpy.typing import NDArray
 
+from .. import quantities, whiteness
 from ..oracle.lever import Lever
+from ..quantities import Quantity
+from ..transfer import Transfer
 from .series import Array, jumps
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Something that is estimated: its columns are {key}_true…, {key}_estimate… and {key}_sigma… + suffix."""
-
-    key: str
-    symbol: str
-    name: str
-    unit: str
-    suffix: str
-
-    @property
-    def label(self) -> str:
-        return f"{self.symbol} [{self.unit or '1'}]"
-
-
-PARAMETERS = (
-    Quantity("m_p", "m<sub>p</sub>", "mass", "kg", "_kg"),
-    Quantity("c_p", "c<sub>p</sub>", "damping", "N s/m", "_N_s_m"),
-    Quantity("k_p", "k<sub>p</sub>", "stiffness", "N/m", "_N_m"),
-)
-DYNAMICS = (
-    Quantity("natural_frequency", "f<sub>n</sub>", "natural frequency", "Hz", "_Hz"),
-    Quantity("damping_ratio", "ζ", "damping ratio", "", ""),
-)
-QUANTITIES = PARAMETERS + DYNAMICS
 
 
 class Run:
@@ -60,13 +36,54 @@ class Run:
         return next((values for name in names if (values := self.column(name)) is not None), None)
 
     def truth(self, quantity: Quantity) -> Array | None:
-        return self.column(f"{quantity.key}_true{quantity.suffix}")
+        return self.column(quantity.column("true"))
 
     def estimate(self, quantity: Quantity) -> Array | None:
-        return self.column(f"{quantity.key}_estimate{quantity.suffix}")
+        return self.column(quantity.column("estimate"))
 
     def sigma(self, quantity: Quantity) -> Array | None:
-        return self.column(f"{quantity.key}_sigma{quantity.suffix}")
+        return self.column(quantity.column("sigma"))
+
+    @cached_property
+    def model(self) -> str:
+        """The estimator's model: as the summary tells, or without one as the columns do."""
+        models = native.enum_names("lever_model").values()
+        seen = (model for model in models if quantities.parameters(model)[0].column("estimate") in self.trace)
+        told: str | None = self.summary.get("estimator", {}).get("model")
+        return told or next(seen, native.Config().choices["model"])
+
+    @property
+    def parameters(self) -> tuple[Quantity, ...]:
+        """What the estimator's model has to be estimated."""
+        return quantities.parameters(self.model)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        return quantities.quantities(self.model)
+
+    @cached_property
+    def mismatch(self) -> str | None:
+        """The truth's model where it is another than the estimator's."""
+        told: str | None = self.summary.get("truth", {}).get("model")
+        return told if told != self.model else None
+
+    @cached_property
+    def whiteness(self) -> Mapping[str, Any] | None:
+        """As the summary tells, or without one of the whole trace; None where there is nothing to tell from."""
+        if "whiteness" in self.summary:
+            told: Mapping[str, Any] | None = self.summary["whiteness"]
+            return told
+        residual = whiteness.residual(self.trace)
+        measured = None if residual is None else whiteness.measure(residual, self.sample_period)
+        return None if measured is None else asdict(measured)
+
+    def true_transfer(self, time: Array) -> Transfer | None:
+        """θ/z̈ of a truth that is not of the estimator's model, at the times [s]; None where the summary has none."""
+        told = self.summary.get("truth", {}).get("transfer")
+        if told is None:
+            return None
+        at = np.maximum(np.searchsorted(told["time_s"], time, side="right") - 1, 0)
+        return Transfer(np.array(told["numerator"])[at], np.array(told["denominator"])[at])
 
     @property
     def end(self) -> float:
@@ -74,7 +91,8 @@ class Run:
 
     @cached_property
     def has_truth(self) -> bool:
-        return all(self.truth(quantity) is not None for quantity in PARAMETERS)
+        """Of anything that is estimated."""
+        return any(self.truth(quantity) is not None for quantity in self.quantities)
 
     @cached_property
     def sample_period(self) -> float:
@@ -89,7 +107,7 @@ class Run:
     @cached_property
     def changes(self) -> list[float]:
         """Times [s] at which the pilot or the trim jumped."""
-        columns = [values for quantity in PARAMETERS if (values := self.truth(quantity)) is not None]
+        columns = [values for quantity in self.quantities if (values := self.truth(quantity)) is not None]
         trim = self.column("trim_true_rad")
         return jumps(self.time, columns + ([trim] if trim is not None else []))
 

@@ -1,12 +1,14 @@
 """The run in words and figures: the verdict, the cards below it, and the tables. All figures come from the summary."""
 
 import html
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from lever_cdkf.host_tools import native
 
-from .run import PARAMETERS, QUANTITIES, Quantity, Run
+from ..quantities import Quantity
+from .run import Run
 
 NOTHING = "–"
 
@@ -51,14 +53,14 @@ def verdict(run: Run) -> str:
     text = run.summary.get("verdict") or "A recorded run, with no truth to compare with: what the estimator made of it."
     mood = {True: "good", False: "bad", None: ""}[run.summary.get("passed")]
     escaped = html.escape(text)
-    for quantity in PARAMETERS:
-        escaped = escaped.replace(quantity.key, quantity.symbol)
+    for quantity in run.parameters:
+        escaped = re.sub(rf"\b{quantity.key}\b", quantity.symbol, escaped)
     return f'<p class="verdict {mood}">{escaped}</p>'
 
 
 def cards(run: Run) -> str:
     """The figures behind the verdict."""
-    judged = [quantity for quantity in QUANTITIES if figures_of(run, quantity)]
+    judged = [quantity for quantity in run.quantities if figures_of(run, quantity)]
     shown = _judgement_cards(run, judged) if judged else [_last_estimates(run)]
     return f'<div class="cards">{"".join(shown)}</div>'
 
@@ -95,10 +97,11 @@ def _judgement_cards(run: Run, judged: list[Quantity]) -> list[str]:
 
 def _last_estimates(run: Run) -> str:
     rows = []
-    for quantity in QUANTITIES:
+    for quantity in run.quantities:
         estimate, sigma = run.estimate(quantity), run.sigma(quantity)
         if estimate is not None and sigma is not None:
-            value = f"{number(float(estimate[-1]))} ± {number(float(sigma[-1]), 2)} {quantity.unit}"
+            value = f"{number(float(estimate[-1]))} ± {number(float(sigma[-1]), 2)}"
+            value += "" if quantity.unit == "1" else f" {quantity.shown_unit}"
             rows.append((f"{quantity.symbol} {quantity.name}", value))
     return _card("Estimates at the end", rows, "With their standard deviation.")
 
@@ -119,7 +122,7 @@ def errors_table(run: Run) -> str:
     titles = (("rms error", "%"), ("bias", "%"), ("within ±2σ", "%"), ("to within 10 %", "s"), ("to within 5 %", "s"))
     header = ("", *(f"{name}<br>[{unit}]" for name, unit in titles))
     rows = []
-    for quantity in QUANTITIES:
+    for quantity in run.quantities:
         if found := figures_of(run, quantity):
             coverage = found.get("coverage_2sigma")
             rows.append(
@@ -159,6 +162,7 @@ def run_table(run: Run) -> str:
         ("mean normalised innovation squared", number(nis.get("mean")), "1"),
         ("the same of an honest filter", number(nis.get("expected")), "1"),
         ("innovations inside their 95 % bound", number(None if inside is None else 100.0 * inside), "%"),
+        ("largest correlation of residuals (white noise: 0)", number((run.whiteness or {}).get("largest")), "1"),
     ]
     rows += [(label, number(run.summary.get(key)), unit) for key, label, unit in RUN_FIGURES]
     return table(("", "value", "unit"), [row for row in rows if row[1] != NOTHING])

@@ -19,13 +19,19 @@ typedef struct choice {
 } choice_t;
 
 static const choice_t choices[] = {
-    {"model", {[LEVER_MODEL_LEVER] = "lever"}, offsetof(lever_config_t, model)},
+    {"model",
+        {[LEVER_MODEL_LEVER] = "lever",
+            [LEVER_MODEL_LINEAR_PHYSICAL] = "linear_physical",
+            [LEVER_MODEL_LINEAR_BLACK_BOX] = "linear_black_box"},
+        offsetof(lever_config_t, model)},
     {"preload", {[LEVER_PRELOAD_FIXED] = "fixed", [LEVER_PRELOAD_TRIM] = "trim"}, offsetof(lever_config_t, preload)},
-    {"estimator", {[LEVER_ESTIMATOR_DUAL] = "dual"}, offsetof(lever_config_t, estimator)},
+    {"estimator", {[LEVER_ESTIMATOR_DUAL] = "dual", [LEVER_ESTIMATOR_JOINT] = "joint"},
+        offsetof(lever_config_t, estimator)},
     {"adaptation",
         {[LEVER_ADAPTATION_FIXED] = "fixed",
             [LEVER_ADAPTATION_ANNEALING] = "annealing",
-            [LEVER_ADAPTATION_ROBBINS_MONRO] = "robbins_monro"},
+            [LEVER_ADAPTATION_ROBBINS_MONRO] = "robbins_monro",
+            [LEVER_ADAPTATION_FORGETTING] = "forgetting"},
         offsetof(lever_config_t, adaptation)},
 };
 enum { CHOICES = sizeof choices / sizeof choices[0] };

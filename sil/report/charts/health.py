@@ -24,6 +24,7 @@ FAULT_WORDS = {
     "excitation": "too little motion",
     "bound": "parameter at its bound",
     "recovered": "filter restarted",
+    "change": "sudden change noticed",
 }
 
 

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from ...quantities import DYNAMICS
 from ..figure import Figure, Spec, axis, axis_range, band, dots, frequency_axis, line, time_axis
-from ..run import DYNAMICS, Run
-from ..series import Array, chi_square_band, envelope, spread_indices, welch
+from ..run import Run
+from ..series import Array, chi_square_band, envelope, packed, spread_indices, welch
 
 DEGREES = 180.0 / np.pi
 STATES = (("theta", "_rad", "angle θ [deg]"), ("theta_dot", "_rad_s", "rate θ̇ [deg/s]"))
@@ -106,6 +107,29 @@ def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
     figure.add(*band(time, low, high, "95 % of an honest filter", "chance-band"))
     figure.add(dots(time, ratio, f"average over {seconds:g} s", "estimate"))
     figure.mark(run.changes)
+    return figure
+
+
+def whiteness(run: Run) -> Figure | None:
+    """Autocorrelation of the residual of the rate, and the band in which white noise stays."""
+    told = run.whiteness
+    if told is None:
+        return None
+    lag = 1000.0 * told["average_s"] * np.arange(1, len(told["autocorrelation"]) + 1)
+    correlation = np.array(told["autocorrelation"])
+    end = float(lag[-1] + lag[0])
+    limits = axis_range([np.append(correlation, (-0.25, 0.25))], slice(None))
+    figure = Figure([axis("correlation [1]", range=limits)], axis("lag [ms]", range=[0.0, end]), 260, over_time=False)
+    edges = np.full(2, told["band_95"])
+    figure.add(*band(np.array([0.0, end]), -edges, edges, "95 % of white noise", "chance-band"))
+    bar: Spec = {
+        "type": "bar",
+        "x": packed(lag),
+        "y": packed(correlation),
+        "name": "residual of the rate",
+        "yaxis": "y",
+    }
+    figure.add(bar | {"width": 0.3 * float(lag[0]), "marker": {"color": "@estimate"}})
     return figure
 
 

@@ -2,16 +2,17 @@
 
 import numpy as np
 
+from ...quantities import DYNAMICS, Quantity
 from ..figure import Figure, Spec, axis, axis_range, band, line, time_axis
-from ..run import DYNAMICS, PARAMETERS, Quantity, Run
+from ..run import Run
 from ..series import spread_indices
 
 POINTS = 1500
 
 
 def parameters(run: Run) -> Figure | None:
-    """m_p, c_p and k_p over time."""
-    return _tracked(run, PARAMETERS, height=620)
+    """Those of the estimator's model over time."""
+    return _tracked(run, run.parameters, height=620)
 
 
 def dynamics(run: Run) -> Figure | None:
@@ -35,18 +36,20 @@ def _bounds(run: Run, quantity: Quantity) -> tuple[np.ndarray, np.ndarray] | Non
     estimate, sigma = run.estimate(quantity), run.sigma(quantity)
     if estimate is None or sigma is None:
         return None
-    return np.maximum(estimate - 2.0 * sigma, 0.0), estimate + 2.0 * sigma
+    lower = estimate - 2.0 * sigma
+    return lower if quantity.signed else np.maximum(lower, 0.0), estimate + 2.0 * sigma
 
 
 def _row(run: Run, quantity: Quantity) -> Spec:
     shown = [values for values in (run.truth(quantity), run.estimate(quantity)) if values is not None]
-    return axis(quantity.label, range=axis_range([*shown, *(_bounds(run, quantity) or ())], run.settled))
+    limits = axis_range([*shown, *(_bounds(run, quantity) or ())], run.settled)
+    return axis(f"{quantity.symbol} [{quantity.shown_unit}]", range=limits)
 
 
 def _traces(run: Run, quantity: Quantity, row: int, chosen: np.ndarray) -> list[Spec]:
     time = run.time[chosen]
     traces: list[Spec] = []
-    unit = f" {quantity.unit}" if quantity.unit else ""
+    unit = "" if quantity.unit == "1" else f" {quantity.shown_unit}"
     if bounds := _bounds(run, quantity):
         traces += band(time, bounds[0][chosen], bounds[1][chosen], "estimate ± 2σ", "estimate-band", row)
     if (truth := run.truth(quantity)) is not None:

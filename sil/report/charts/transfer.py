@@ -4,15 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from ..bode import FREQUENCIES, response, slow_trim
-from ..figure import TICKS, Figure, Spec, axis, frequency_axis, line, time_axis
-from ..run import DYNAMICS, PARAMETERS, Run
+from ...quantities import DYNAMICS
+from .. import bode
+from ..bode import FREQUENCIES, slow_trim
+from ..figure import TICKS, Figure, Spec, axis, axis_range, frequency_axis, line, time_axis
+from ..run import Run
 from ..series import Array, packed, spread_indices
 
 TIMES = 200
 SLICES = 25
 DEGREES = 180.0 / np.pi
-FIRST_ESTIMATES = tuple(f"{quantity.key}_estimate{quantity.suffix}" for quantity in PARAMETERS)
 
 
 def _responses(run: Run, count: int) -> tuple[Array, dict[str, np.ndarray]]:
@@ -20,7 +21,7 @@ def _responses(run: Run, count: int) -> tuple[Array, dict[str, np.ndarray]]:
 
     Times before the first estimate are left out.
     """
-    known = run.first_of(*FIRST_ESTIMATES)
+    known = run.first_of(*(quantity.column("estimate") for quantity in run.parameters))
     started = np.flatnonzero(np.isfinite(run.time if known is None else known))
     chosen = started[spread_indices(len(started), count)]
     theta = run.first_of("theta_estimate_rad", "theta_measured_rad")
@@ -29,13 +30,16 @@ def _responses(run: Run, count: int) -> tuple[Array, dict[str, np.ndarray]]:
         return run.time[chosen], found
     followed = slow_trim(run.time, theta, run.settings["trim_corner"])
     true_trim = run.column("trim_true_rad")
+    if (other := run.true_transfer(run.time[chosen])) is not None:
+        found["truth"] = DEGREES * other.response(FREQUENCIES)
     for name, columns, trim in (
-        ("truth", [run.truth(q) for q in PARAMETERS], followed if true_trim is None else true_trim),
-        ("estimate", [run.estimate(q) for q in PARAMETERS], followed),
+        ("truth", [run.truth(q) for q in run.parameters], followed if true_trim is None else true_trim),
+        ("estimate", [run.estimate(q) for q in run.parameters], followed),
     ):
         present = [column[chosen] for column in columns if column is not None]
-        if len(present) == len(PARAMETERS):
-            found[name] = DEGREES * response(run.lever, np.array(present), trim[chosen])
+        if len(present) == len(run.parameters):
+            transfer = bode.transfer(run.model, run.lever, np.array(present), trim[chosen])
+            found[name] = DEGREES * transfer.response(FREQUENCIES)
     return run.time[chosen], found
 
 
@@ -79,10 +83,11 @@ def slices(run: Run) -> Figure | None:
     if not responses:
         return None
     magnitudes = [np.abs(values) for values in responses.values()]
+    phases = [_curves(curve)[1] for values in responses.values() for curve in values]
     decades = [np.log10(0.8 * np.nanmin(magnitudes)), np.log10(1.25 * np.nanmax(magnitudes))]
     rows = [
         axis("θ/z̈ [deg per m/s²]", type="log", range=[float(decade) for decade in decades], tickvals=TICKS),
-        axis("phase [deg]", range=[-370.0, -170.0], dtick=45),
+        axis("phase [deg]", range=axis_range(phases, slice(None)), dtick=45),
     ]
     figure = Figure(rows, frequency_axis(FREQUENCIES[0], FREQUENCIES[-1]), 520, over_time=False)
     shown = len(time) * 4 // 5
@@ -99,8 +104,11 @@ def slices(run: Run) -> Figure | None:
 
 
 def _curves(values: np.ndarray) -> tuple[Array, Array]:
-    """Magnitude, and phase [deg] that goes on downwards from -180: the arm's weight opposes the floor."""
-    return np.abs(values), np.degrees(np.unwrap(np.angle(-values))) - 180.0
+    """Magnitude, and phase [deg] that goes on downwards from -180 where the lever moves against the floor at first (the
+    arm's weight does so), from 0 where it moves along."""
+    start = -180.0 if values[0].real < 0.0 else 0.0
+    along = values if start == 0.0 else -values
+    return np.abs(values), np.degrees(np.unwrap(np.angle(along))) + start
 
 
 def _short(number: float) -> float | None:

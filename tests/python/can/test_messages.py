@@ -205,6 +205,19 @@ def test_ties_differ_from_cantools(codec: Codec, value: float, ours: int, theirs
     assert int.from_bytes(expected[2:4], "little", signed=True) == theirs
 
 
+def test_signed_parameters_are_in_two_s_complement(codec: Codec) -> None:
+    """Counts worked out by hand: -465 / 0.1, -13.7 / 0.01, -2.2 / 0.001; sigma 180 / 0.02, 6 / 0.002, 0.8 / 0.0002."""
+    for name, array, values, counts in (
+        ("PILOT_PARAMETERS", "parameter", [-465.0, -13.7, -2.2], [-4650, -1370, -2200]),
+        ("PILOT_SIGMA", "sigma", [180.0, 6.0, 0.8], [9000, 3000, 4000]),
+    ):
+        data = codec.encode(name, {"model": 2, array: values})
+        assert data == bytes([0, 2 << 4]) + b"".join(count.to_bytes(2, "little", signed=True) for count in counts)
+        decoded = codec.decode(name, data or b"")
+        assert decoded is not None
+        assert decoded[array] == pytest.approx(values, rel=1e-6)
+
+
 def test_values_without_flag_are_not_read(codec: Codec) -> None:
     assert codec.encode("LEVER_SAMPLE", {"theta": math.nan, "theta_dot": 1.0, "tau_m": -math.inf}) == bytes(8)
     assert codec.encode("BASE_SAMPLE", {"z_ddot": math.nan}) == bytes(8)

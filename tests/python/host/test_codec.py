@@ -31,9 +31,17 @@ def crc(data: bytes) -> int:
     return register ^ 0xFF
 
 
-def contents(message: Message) -> dict[str, float]:
-    """A value inside the range of every field but the framing."""
-    return {signal.name: 1 if signal.choices is None else 0 for signal in message.signals if signal.name not in FRAMING}
+MODELS = {0: ("m_p", "c_p", "k_p"), 1: ("m", "c", "k"), 2: ("a21", "a22", "b21")}
+
+
+def contents(message: Message, field: Signal | None = None) -> dict[str, float]:
+    """A value inside the range of every field but the framing, of the model that has `field` if the message has all."""
+    ids = (field.multiplexer_ids if field is not None else None) or [0]
+    present = [signal for signal in message.signals if signal.multiplexer_ids in (None, ids)]
+    values: dict[str, float] = {
+        signal.name: 1 if signal.choices is None else 0 for signal in present if signal.name not in FRAMING
+    }
+    return values | {signal.name: ids[0] for signal in present if signal.is_multiplexer}
 
 
 def fields() -> Iterator[tuple[Message, Signal]]:
@@ -55,7 +63,7 @@ def by_cantools(message: Message, values: dict[str, float], counter: int) -> byt
 
 def test_catalogue_has_the_fields() -> None:
     assert len(MESSAGES) == 9
-    assert len(FIELDS) == 21
+    assert len(FIELDS) == 15 + 2 * 3 * len(MODELS)
 
 
 def test_crc_of_the_design() -> None:
@@ -103,7 +111,7 @@ def test_field_against_cantools(message: Message, signal: Signal) -> None:
     beyond = [low - 0.4 * step, low - step, low - span, -1e30, -math.inf]
     beyond += [high + 0.4 * step, high + step, high + span, 1e30, math.inf]
     for value in inside + beyond:
-        values = {**contents(message), signal.name: value}
+        values = {**contents(message, signal), signal.name: value}
         expected = {**values, signal.name: min(max(value, low), high)}
         frame = codec.encode(message.name, 3, values)
         assert frame[1:] == by_cantools(message, expected, 3), value
@@ -114,14 +122,14 @@ def test_field_against_cantools(message: Message, signal: Signal) -> None:
 @pytest.mark.parametrize(("message", "signal"), FIELDS, ids=FIELD_NAMES)
 @pytest.mark.parametrize("value", [math.nan, None])
 def test_not_a_number(message: Message, signal: Signal, value: float | None) -> None:
-    values = {**contents(message), signal.name: value}
+    values: dict[str, float | None] = {**contents(message, signal), signal.name: value}
     flag = f"{signal.name}_valid"
-    if flag not in contents(message):
+    if flag not in values:
         with pytest.raises(CodecError, match=f"{message.name}.{signal.name} cannot be"):
             codec.encode(message.name, 0, values)
         return
     frame = codec.encode(message.name, 0, values)
-    assert frame[1:] == by_cantools(message, {**contents(message), signal.name: 0.0, flag: 0}, 0)
+    assert frame[1:] == by_cantools(message, {**contents(message, signal), signal.name: 0.0, flag: 0}, 0)
 
 
 def test_flag_of_an_invalid_value() -> None:
@@ -182,6 +190,12 @@ def test_multiplexed_message() -> None:
     assert frame[1:] == by_cantools(MESSAGES["PILOT_PARAMETERS"], {"model": 0, **values}, 0)
     with pytest.raises(CodecError, match="multiplexed"):
         codec.encoder("PILOT_PARAMETERS")
+    signed = {"a21": -465.0, "a22": -13.7, "b21": -2.2}
+    frame = codec.encode("PILOT_PARAMETERS", 0, {"model": "linear_black_box", **signed})
+    counts = [int.from_bytes(frame[start : start + 2], "little", signed=True) for start in (2, 4, 6)]
+    assert counts == [-4650, -1370, -2200]
+    with pytest.raises(CodecError, match="PILOT_PARAMETERS holds model, a21, a22, b21; given: model, m_p"):
+        codec.encode("PILOT_PARAMETERS", 0, {"model": "linear_black_box", **values})
 
 
 def test_fast_encoders_against_cantools() -> None:
@@ -219,9 +233,10 @@ def test_the_firmware_takes_what_is_encoded() -> None:
             assert native.Estimator().on_frame(identifier, flipped) == native.lib.LEVER_FRAME_REFUSED
 
 
-def test_decoding_what_the_firmware_says() -> None:
+@pytest.mark.parametrize("model", MODELS)
+def test_decoding_what_the_firmware_says(model: int) -> None:
     lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    estimator = native.Estimator()
+    estimator = native.Estimator(native.Config(model=native.enum_names("lever_model")[model]))
     seen = set()
     for k in range(500):
         theta = 0.35 + 0.02 * math.sin(0.02 * k)
@@ -236,8 +251,12 @@ def test_decoding_what_the_firmware_says() -> None:
         state = said["STATE_ESTIMATE"]
         assert state["theta"] == pytest.approx(estimate.theta, abs=0.501e-4)
         assert state["theta_dot"] == pytest.approx(estimate.theta_dot, abs=2.501e-4)
-        if "PILOT_PARAMETERS" in said:
-            assert said["PILOT_PARAMETERS"]["k_p"] == pytest.approx(estimate.parameter[2], abs=0.0502)
+        for index, name in enumerate(MODELS[model]) if "PILOT_PARAMETERS" in said else ():
+            step = 0.501 * float(MESSAGES["PILOT_PARAMETERS"].get_signal_by_name(name).scale)
+            assert said["PILOT_PARAMETERS"][name] == pytest.approx(estimate.parameter[index], abs=step)
+            sigma = MESSAGES["PILOT_SIGMA"].get_signal_by_name(f"{name}_sigma")
+            expected = min(estimate.parameter_sigma[index], sigma.maximum or 0.0)
+            assert said["PILOT_SIGMA"][f"{name}_sigma"] == pytest.approx(expected, abs=0.501 * float(sigma.scale))
         if "HEALTH" in said:
             assert native.enum_names("lever_mode")[int(said["HEALTH"]["mode"])] == health.mode
     assert {"STATE_ESTIMATE", "PILOT_PARAMETERS", "HEALTH"} <= seen
@@ -268,7 +287,8 @@ def test_columns_against_cantools(name: str) -> None:
     data = np.random.default_rng(2).integers(0, 256, (400, 8), dtype=np.uint8)
     data[:4] = [[0] * 8, [255] * 8, [0, 0x0F, 0, 0x80, 0, 0x80, 0, 0x80], [0, 0x0F, 255, 0x7F, 255, 0x7F, 255, 0x7F]]
     if message.is_multiplexed():
-        data[::2, 1] &= 0x0F  # the model that there is
+        model = np.arange(200, dtype=np.uint8) % len(MODELS)  # those that there are
+        data[::2, 1] = data[::2, 1] & 0x0F | model << 4
     columns = codec.decode_columns(name, data)
     assert set(columns) == {signal.name for signal in message.signals}
     for row, frame in enumerate(data):
@@ -300,9 +320,9 @@ def test_columns_of_other_layouts() -> None:
 @pytest.mark.parametrize("name", MESSAGES)
 def test_raw_fields_against_cantools(name: str) -> None:
     message = MESSAGES[name]
-    for frame in np.random.default_rng(4).integers(0, 256, (20, 8), dtype=np.uint8):
-        frame[1] &= 0x0F
+    for row, frame in enumerate(np.random.default_rng(4).integers(0, 256, (21, 8), dtype=np.uint8)):
+        frame[1] = frame[1] & 0x0F | row % len(MODELS) << 4
         raw = message.decode_simple(frame.tobytes(), decode_choices=False, scaling=False)
-        for signal in message.signals:
+        for signal in filter(lambda signal: signal.name in raw, message.signals):
             value = codec.raw_field(name, signal.name)(frame.tobytes())
             assert value == int(raw[signal.name]) % (1 << signal.length)  # type: ignore[arg-type]

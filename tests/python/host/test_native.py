@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import native
+from lever_cdkf.host_tools import codec, native
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from lever_cdkf.host_tools.files import LIBRARY_DIR, native_file
 from lever_cdkf.host_tools.native import Config, Estimate, Estimator, Health, ffi, lib
@@ -67,6 +67,16 @@ def test_enum_names() -> None:
     assert native.enum_names("lever_mode")[lib.LEVER_MODE_COAST] == "coast"
     assert native.fault_names(lib.LEVER_FAULT_THETA | lib.LEVER_FAULT_RECOVERED) == ("theta", "recovered")
     assert native.fault_names(0) == ()
+
+
+def test_parameters_of_every_model_are_those_on_the_bus() -> None:
+    """Against lever.dbc; names and units are the firmware's."""
+    message = codec.message("PILOT_PARAMETERS")
+    for number, model in native.enum_names("lever_model").items():
+        on_bus = [(signal.name, signal.unit) for signal in message.signals if signal.multiplexer_ids == [number]]
+        assert [tuple(parameter) for parameter in native.model_parameters(model)] == on_bus
+    with pytest.raises(SettingsError, match="model = 'arm' is not known; allowed: lever, linear_physical, linear_b"):
+        native.model_parameters("arm")
 
 
 @pytest.mark.parametrize(("python", "c"), [(Estimate, "lever_estimate_t"), (Health, "lever_health_t")])
@@ -231,18 +241,34 @@ def test_hundreds_of_instances_are_independent() -> None:
         assert alone.health() == together[index].health()
 
 
-def test_run_samples_is_the_loop() -> None:
-    config, samples = Config(settings={"k_p": 1200.0}), recording(400)
+@pytest.mark.parametrize("estimator", native.enum_names("lever_estimator").values())
+@pytest.mark.parametrize("model", native.enum_names("lever_model").values())
+def test_run_samples_is_the_loop(model: str, estimator: str) -> None:
+    config, samples = Config(model=model, estimator=estimator, settings={"align_time": 0.1}), recording(300)
     columns = native.run_samples(config, samples)
-    estimator = Estimator(config)
-    for index in range(400):
-        mode = feed(estimator, samples, index)
-        for name, value in estimator.estimate()._asdict().items():
+    instance = Estimator(config)
+    for index in range(300):
+        mode = feed(instance, samples, index)
+        for name, value in instance.estimate()._asdict().items():
             np.testing.assert_array_equal(columns[name][index], np.asarray(value, columns[name].dtype))
         assert native.enum_names("lever_mode")[columns["mode"][index]] == mode
-        assert native.fault_names(columns["faults"][index]) == estimator.health().faults
-    assert columns["parameter"].shape == (400, 3)
+        assert native.fault_names(columns["faults"][index]) == instance.health().faults
+    assert columns["parameter"].shape == columns["parameter_correlation"].shape == (300, 3)
     assert columns["theta"].dtype == np.float32
+
+
+def test_the_correlation_of_the_parameters_explains_the_sigma_of_the_frequency() -> None:
+    """The linear physical model's frequency is sqrt(k/m) / 2 pi: its sigma by the law of error propagation."""
+    columns = native.run_samples(Config(model="linear_physical"), recording(4000))
+    m, _, k = columns["parameter"][-1].astype(float)
+    sigma_m, _, sigma_k = columns["parameter_sigma"][-1].astype(float)
+    _, m_with_k, _ = columns["parameter_correlation"][-1].astype(float)
+    assert np.abs(columns["parameter_correlation"]).max() <= 1.0
+    relative = 0.5 * np.sqrt((sigma_m / m) ** 2 + (sigma_k / k) ** 2 - 2.0 * m_with_k * sigma_m * sigma_k / (m * k))
+    frequency = np.sqrt(k / m) / (2.0 * np.pi)
+    assert columns["natural_frequency"][-1] == pytest.approx(frequency, rel=1e-5)
+    assert columns["natural_frequency_sigma"][-1] == pytest.approx(relative * frequency, rel=0.05)
+    assert m_with_k > 0.5  # without a torque only their ratio is known
 
 
 def test_run_samples_wraps_time() -> None:

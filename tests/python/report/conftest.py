@@ -43,13 +43,18 @@ share = "1 %"
 """
 
 
+def run(name: str, *overrides: str) -> Result:
+    """A scenario through the firmware in this process."""
+    made = scenario.load(name, overrides)
+    with LeverBus("lever", config=made.config) as bus:
+        return simulate(made, bus)
+
+
 @pytest.fixture(scope="session")
 def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
     file = tmp_path_factory.mktemp("scenario") / "short.toml"
     file.write_text(SCENARIO)
-    made = scenario.load(str(file))
-    with LeverBus("lever", config=made.config) as bus:
-        return simulate(made, bus)
+    return run(str(file))
 
 
 @pytest.fixture(scope="session")

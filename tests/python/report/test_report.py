@@ -20,8 +20,8 @@ from lever_cdkf.sil.runner import Result
 from .reading import Reader, figures, first_number, read, unpack
 
 SECTIONS = ["explained", "parameters", "dynamics", "bode", "states", "excitation", "health", "numbers", "made"]
-_NAMES = "parameters dynamics map-truth map-estimate slices detail motion innovations excitation spectra health"
-FIGURES = [f"figure-{name}" for name in _NAMES.split()]
+_NAMES = "parameters dynamics map-truth map-estimate slices detail motion innovations whiteness excitation spectra"
+FIGURES = [*(f"figure-{name}" for name in _NAMES.split()), "figure-health"]
 ROWS = {"m_p": "mp mass", "c_p": "cp damping", "k_p": "kp stiffness"}
 ROWS |= {"natural_frequency": "fn natural frequency", "damping_ratio": "ζ damping ratio"}
 BROWSER = pytest.mark.requires("|".join(picture.BROWSERS))
@@ -209,6 +209,20 @@ def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Re
     assert height[np.abs(x - 12.5) < 0.3].min() > height[np.abs(x - 5.0) < 0.3].max()  # one output: more scatter
 
 
+def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, result: Result) -> None:
+    told = result.summary["whiteness"]
+    bars = traces(page, "figure-whiteness", "residual of the rate")[0]
+    np.testing.assert_allclose(unpack(bars["y"]), told["autocorrelation"], rtol=1e-6)
+    assert unpack(bars["x"]) == pytest.approx(20.0 * np.arange(1, 26))
+    lower, upper = (unpack(trace["y"]) for trace in traces(page, "figure-whiteness", "95 % of white noise"))
+    assert (lower[0], upper[0]) == pytest.approx((-told["band_95"], told["band_95"]))
+    values = {row[0]: row[1] for row in page.tables[1][1:]}
+    assert float(values["largest correlation of residuals (white noise: 0)"]) == pytest.approx(
+        told["largest"], rel=5e-3
+    )
+    assert "Here it is noise." in "".join(page.text)
+
+
 def test_health_names_what_happened_when_it_happened(page: Reader) -> None:
     bars = {trace["name"]: trace for trace in figures(page)["figure-health"]["data"]}
     assert {"mode: align", "mode: run", "angle missing", "rate missing", "lost"} <= set(bars)
@@ -236,6 +250,7 @@ def test_a_replay_without_truth_leaves_out_what_it_cannot_know(result: Result, t
     assert "truth" not in names
     assert "estimate" in names
     assert "Estimates at the end" in "".join(page.text)
+    assert "figure-whiteness" in figures(page)
 
 
 @pytest.mark.parametrize("missing", ["estimate", "sigma", "measured", "true", "theta", "nis", "mode", "excitation"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from lever_cdkf.sil.oracle import Lever
 from lever_cdkf.sil.report import series
-from lever_cdkf.sil.report.bode import FREQUENCIES, response, slow_trim
+from lever_cdkf.sil.report.bode import FREQUENCIES, slow_trim, transfer
 from scipy import signal, stats
 
 LEVER = Lever(0.45, 1.2, 0.5, 0.02, 0.5, 5.0, 0.35, 0.35, "trim")
@@ -39,7 +39,7 @@ def test_chi_square_band_is_that_of_scipy(freedom: float) -> None:
 
 def test_response_is_that_of_scipy_and_peaks_near_the_natural_frequency() -> None:
     parameters, trim = np.array([[2.5, 3.0], [5.0, 8.0], [1500.0, 2500.0]]), np.array([0.35, 0.2])
-    answer = response(LEVER, parameters, trim)
+    answer = transfer("lever", LEVER, parameters, trim).response(FREQUENCIES)
     for index, (m_p, c_p, k_p) in enumerate(parameters.T):
         cosine = np.cos(trim[index])
         inertia = 0.45**2 * (0.3 + m_p) + 0.02

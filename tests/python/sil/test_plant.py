@@ -8,6 +8,7 @@ import pytest
 import sympy
 from lever_cdkf.sil import plant
 from lever_cdkf.sil.plant import Lever, Plant, Preload, Truth
+from lever_cdkf.sil.truth import Conditions
 from lever_cdkf.sil.units import GRAVITY
 from scipy import integrate, linalg, optimize, signal
 
@@ -28,7 +29,7 @@ def body(
     substeps: int | None = None,
 ) -> Plant:
     base = np.full(len(truth.m_p), z_ddot)
-    return Plant(LEVER, truth, kind, base, PERIOD, noise, lag, np.random.default_rng(1), substeps)
+    return Plant(LEVER, truth, kind, Conditions(base, PERIOD, noise, lag, np.random.default_rng(1), substeps))
 
 
 def from_energies() -> sympy.Expr:
@@ -103,7 +104,7 @@ def test_large_motion_is_that_of_solve_ivp() -> None:
     truth = held(1.5, 15.0, 900.0, 0.35, count=2001)
     time = np.arange(2001) * PERIOD
     base = 3.0 * np.sin(2 * math.pi * 5.0 * time)
-    lever = Plant(LEVER, truth, "trim", base, PERIOD, 0.0, 0.0, np.random.default_rng(0))
+    lever = Plant(LEVER, truth, "trim", Conditions(base, PERIOD, 0.0, 0.0, np.random.default_rng(0)))
     lever.theta += 0.2
     arm, own = preload_angles(truth, "trim")
 
@@ -197,9 +198,8 @@ def test_one_step_of_noise_has_the_strength_of_a_millisecond_whatever_the_subste
 def test_the_response_to_the_base_is_the_linear_transfer_function() -> None:
     truth = held(3.2, 60.0, 2100.0, count=20_000)
     time = np.arange(20_000) * PERIOD
-    lever = Plant(
-        LEVER, truth, "trim", 0.01 * np.sin(2 * math.pi * 3.0 * time), PERIOD, 0.0, 0.0, np.random.default_rng(0)
-    )
+    base = 0.01 * np.sin(2 * math.pi * 3.0 * time)
+    lever = Plant(LEVER, truth, "trim", Conditions(base, PERIOD, 0.0, 0.0, np.random.default_rng(0)))
     path = np.empty(20_000)
     for k in range(20_000):
         path[k] = lever.theta

@@ -7,13 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.config import Config, settings_table
+from lever_cdkf.host_tools.native import Estimator
 from lever_cdkf.sil import excitation, loop, scenario
 from lever_cdkf.sil.reading import ScenarioError
 from lever_cdkf.sil.scenario import Scenario
 
 REQUIRED = {
     "steady", "fatigue_drift", "sudden_grip", "base_only", "base_dither", "poor_excitation", "sensor_dropout",
-    "re_trim", "high_noise", "demo",
+    "re_trim", "high_noise", "demo", "linear_physical", "linear_black_box", "two_dof", "mayo_ectomorphic",
+    "mayo_mesomorphic",
 }  # fmt: skip
 LEAST = """
 title = "t"
@@ -24,6 +26,26 @@ m_p = "3 kg"
 c_p = "50 N s/m"
 k_p = "2000 N/m"
 """
+BLACK_BOX = """
+title = "t"
+duration = "1 s"
+[pilot]
+model = "linear_black_box"
+trim = "20 deg"
+a21 = "-500 1/s^2"
+a22 = "-9 1/s"
+b21 = "2 1"
+"""
+MAYO = """
+title = "t"
+duration = "1 s"
+[pilot]
+model = "mayo"
+somatotype = "ectomorphic"
+trim = '20 deg'
+"""
+FIRMWARE_TORQUE = "[[torque]]\nkind = 'firmware'\nrms = '1 N m'\n"
+SINE_TORQUE = "[[torque]]\nkind = 'sine'\nrms = '1 N m'\nfrequency = '1 Hz'\n"
 
 Load = Callable[..., Scenario]
 
@@ -39,10 +61,14 @@ def test_a_scenario_says_what_it_is_and_starts_from_a_wrong_guess(name: str) -> 
     assert len(loaded.title) > 10
     assert "first guess" in loaded.description.lower()
     truth = loaded.truth(loaded.time())
-    for parameter in ("m_p", "c_p", "k_p"):
-        guess, true = loaded.config.settings[parameter], getattr(truth, parameter)[0]
-        assert abs(guess / true - 1.0) >= 0.2, parameter
-    assert loaded.limits.natural_frequency is not None
+    if loaded.pilot.model == loaded.config.choices["model"]:
+        guesses = {name: (loaded.config.settings[name], true[0]) for name, true in truth.parameters.items()}
+    else:
+        guess = Estimator(loaded.config).estimate().natural_frequency
+        guesses = {"natural_frequency": (guess, truth.dynamics.natural_frequency[0])}
+    for name, (guess, true) in guesses.items():
+        assert abs(guess / true - 1.0) >= 0.2, name
+    assert "natural_frequency" in (loaded.limits or {})
 
 
 @pytest.mark.parametrize("name", scenario.names())
@@ -51,7 +77,8 @@ def test_the_standard_values_are_used(name: str) -> None:
     noise = loaded.base[0]
     assert isinstance(noise, excitation.Noise)
     assert (noise.rms, noise.low, noise.high) == pytest.approx((0.980665, 1.0, 10.0))
-    assert all(dither.rms == 0.3 for dither in loaded.torque if isinstance(dither, scenario.FirmwareDither))
+    strength = 1.0 if name == "linear_physical" else 0.3
+    assert all(dither.rms == strength for dither in loaded.torque if isinstance(dither, scenario.FirmwareDither))
     assert loaded.pilot.process_noise == 0.05
     times = 5 if name == "high_noise" else 1
     assert (loaded.sensors.theta.noise, loaded.sensors.theta_dot.noise) == (times * 1e-3, times * 1e-2)
@@ -62,8 +89,9 @@ def test_base_only_and_base_dither_are_the_same_pilot_in_the_same_air() -> None:
     first, second = loop.prepare(only), loop.prepare(dither)
     assert np.array_equal(first.z_ddot, second.z_ddot)
     assert np.array_equal(first.z_ddot_measured, second.z_ddot_measured)
-    for name in ("m_p", "c_p", "k_p", "trim"):
-        assert np.array_equal(getattr(first.truth, name), getattr(second.truth, name))
+    assert np.array_equal(first.truth.rest, second.truth.rest)
+    for name, values in first.truth.parameters.items():
+        assert np.array_equal(values, second.truth.parameters[name])
     assert only.dithers() == []
     assert dither.dithers() == [(0.0, 0.3)]
 
@@ -116,22 +144,37 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
     )
     assert (loaded.duration, loaded.seed, loaded.config.settings["m_p"]) == (2.0, 9, 3.0)
     assert loaded.base[0].rms == 1.0  # type: ignore[attr-defined]
-    assert loaded.truth(loaded.time()).m_p[0] == 4.0
+    assert loaded.truth(loaded.time()).parameters["m_p"][0] == 4.0
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (LEAST.replace("k_p", "k_q"), r"made.toml: pilot: unknown key 'k_q'; allowed: m_p, c_p, k_p, trim, preload"),
+        (
+            LEAST.replace("k_p", "k_q"),
+            r"made.toml: pilot: unknown key 'k_q'; allowed: trim, preload, process_noise, m_p, c_p, k_p",
+        ),
         (LEAST.replace('m_p = "3 kg"', ""), "pilot: key 'm_p' is missing"),
         (LEAST.replace('trim = "20 deg"', ""), "pilot: key 'trim' is missing"),
         (LEAST.replace('"3 kg"', "3"), "pilot.m_p: 3 is not a quantity"),
         (LEAST.replace('"3 kg"', '"3 g/s"'), "pilot.m_p: '3 g/s' has unit 'g/s'; allowed: kg, g"),
         (LEAST.replace('"1 s"', '"2 h"'), "duration: '2 h' is out of range; it must be above 0 and at most 3600 s"),
         (LEAST.replace('"3 kg"', '"-3 kg"'), "pilot.m_p: falls to -3; it must stay above 0"),
+        (BLACK_BOX.replace("-9 1/s", "1 1/s"), "pilot.a22: rises to 1; it must stay below 0"),
+        (BLACK_BOX + SINE_TORQUE, "torque: no motor torque acts on a pilot of model linear_black_box; remove it"),
+        (MAYO + SINE_TORQUE, "torque: no motor torque acts on a pilot of model mayo; remove it"),
+        (MAYO + FIRMWARE_TORQUE, "torque: no motor torque acts on a pilot of model mayo"),
+        (
+            MAYO.replace("ecto", "endo"),
+            "pilot.somatotype: 'endomorphic' is not known; allowed: ectomorphic, mesomorphic",
+        ),
+        (MAYO.replace("trim = '20 deg'", "preload = 'fixed'"), "pilot.preload: 'fixed' is not known; allowed: trim"),
+        (LEAST + "model = 'two_dof'\nk_t = '-1 N/m'", "pilot.k_t: falls to -1; it must stay above 0"),
+        (BLACK_BOX + "[limits]\na21 = '5 %'", "limits.a21: has no truth in this run to be judged by"),
+        (LEAST + "[limits]\nm_q = '5 %'", "limits: unknown key 'm_q'; allowed: m_p, c_p, k_p, m, c, k, a21"),
         (LEAST + 'preload = "loose"', "pilot.preload: 'loose' is not known; allowed: trim, fixed"),
         (LEAST + 'preload = "fixed"', "'trim' goes with preload trim"),
-        (LEAST + "[estimator]\nadaptation = 'magic'", "allowed: fixed, annealing, robbins_monro"),
+        (LEAST + "[estimator]\nadaptation = 'magic'", "allowed: fixed, annealing, robbins_monro, forgetting"),
         (LEAST + "[settings]\ntheta_nose = '1 rad'", "settings: unknown key 'theta_nose'; allowed: sample_period"),
         (LEAST + "[settings]\ntheta_noise = '9 rad'", "made.toml: settings: theta_noise = 9.0 is out of range"),
         (LEAST + "[lever]\ntheta_noise = '9 rad'", "lever: unknown key 'theta_noise'; allowed: lever_length"),

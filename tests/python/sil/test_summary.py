@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from lever_cdkf.sil import loop, summary
+from lever_cdkf.sil.quantities import quantities
 from lever_cdkf.sil.scenario import Scenario
 from lever_cdkf.sil.trace import Trace
 from scipy import stats
@@ -40,16 +41,13 @@ def recording(load: Callable[..., Scenario]) -> loop.Recording:
 def perfect(recording: loop.Recording) -> Trace:
     """A trace in which every estimate is the truth, with 1 % of sigma."""
     random = np.random.default_rng(0)
-    truth = recording.inputs.truth
-    values = {
-        "m_p": truth.m_p, "c_p": truth.c_p, "k_p": truth.k_p, "natural_frequency": np.full(COUNT, 3.5),
-        "damping_ratio": np.full(COUNT, 0.3),
-    }  # fmt: skip
+    dynamics = {"natural_frequency": np.full(COUNT, 3.5), "damping_ratio": np.full(COUNT, 0.3)}
+    values = {**recording.inputs.truth.parameters, **dynamics}
     trace: Trace = {"time_s": TIME, "theta_measured_rad": np.zeros(COUNT), "theta_dot_measured_rad_s": np.zeros(COUNT)}
-    for name, (ending, _) in summary.QUANTITIES.items():
-        trace[f"{name}_true{ending}"] = values[name]
-        trace[f"{name}_estimate{ending}"] = values[name].copy()
-        trace[f"{name}_sigma{ending}"] = 0.01 * values[name]
+    for quantity in quantities("lever"):
+        trace[quantity.column("true")] = values[quantity.key]
+        trace[quantity.column("estimate")] = values[quantity.key].copy()
+        trace[quantity.column("sigma")] = 0.01 * values[quantity.key]
     trace["nis"] = random.chisquare(2, COUNT)
     trace["mode"] = np.where(TIME < 0.1, 1.0, 2.0)
     return trace | {name: np.zeros(COUNT) for name in ("lost", "corrupt", "late")}
@@ -152,6 +150,34 @@ def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., 
     assert read["parameters"]["m_p"]["rms_percent"] is None
     assert read["parameters"]["m_p"]["time_to_10_percent_s"] == [None, None]
     assert read["wall_time_per_simulated_time"] == pytest.approx(0.05)
+
+
+def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable[..., Scenario]) -> None:
+    scenario = load(TEXT, "estimator.model=linear_physical", "limits={natural_frequency='2 %', coverage='90 %'}")
+    recording = loop.Recording(scenario, loop.prepare(scenario))
+    trace = perfect(recording)
+    trace["damping_ratio_sigma"][:] = 0.0
+    trace["damping_ratio_estimate"] *= 1.01
+    made = summary.build(recording, trace)
+    assert list(made["parameters"]) == ["natural_frequency", "damping_ratio"]
+    assert made["missed"] == ["coverage of damping_ratio 0 % (limit 90 %)"]
+    assert "m_p" not in made["verdict"]
+
+
+def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(load: Callable[..., Scenario]) -> None:
+    """The pilot tightens his c_p at 4 s; against M, D, K and the forcing of DESIGN section 3 worked out here."""
+    scenario = load(TEXT, "estimator.model=linear_physical", "limits={}")
+    recording = loop.Recording(scenario, loop.prepare(scenario))
+    told = summary.build(recording, perfect(recording))["truth"]
+    assert told["model"] == "lever"
+    assert told["transfer"]["time_s"] == [0.0, pytest.approx(4.0, abs=10.0 / summary.MOST_TRANSFERS)]
+    cosine, arm = math.cos(math.radians(20.0)), 0.45**2
+    for c_p, numerator, denominator in zip(
+        (50.0, 40.0), told["transfer"]["numerator"], told["transfer"]["denominator"], strict=True
+    ):
+        assert numerator == pytest.approx([-0.45 * (0.6 + 2.0) * cosine])
+        expected = [arm * (0.3 + 2.0) + 0.02, arm * c_p * cosine**2 + 0.5, arm * 2000.0 * cosine**2 + 5.0]
+        assert denominator == pytest.approx(expected)
 
 
 def test_the_keys_are_those_of_the_contract(recording: loop.Recording) -> None:

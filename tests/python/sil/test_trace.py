@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.bus import LeverBus
 from lever_cdkf.sil import loop, scenario, trace
+from lever_cdkf.sil.scenario import Scenario
 
 from .conftest import PuppetBus, estimate
 
@@ -48,6 +52,41 @@ def test_the_columns_are_those_of_the_contract_in_its_order() -> None:
     _, columns = made()
     assert list(columns) == COLUMNS
     assert {len(column) for column in columns.values()} == {500}
+
+
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [
+        ("linear_physical", {"m": "_kg", "c": "_N_s_m", "k": "_N_m"}),
+        ("linear_black_box", {"a21": "_1_s2", "a22": "_1_s", "b21": ""}),
+    ],
+)
+def test_parameters_are_those_of_the_estimators_model(
+    lever_bus: Callable[[Scenario], LeverBus], model: str, parameters: dict[str, str]
+) -> None:
+    wanted = scenario.load(model, ["duration=1 s"])
+    recording = loop.run(wanted, lever_bus(wanted))
+    frames = recording.frames()
+    columns = trace.build(recording, frames)
+    expected = COLUMNS
+    for old, (new, ending) in zip(("m_p_", "c_p_", "k_p_"), parameters.items(), strict=True):
+        expected = [f"{new}_{name.split('_')[2]}{ending}" if name.startswith(old) else name for name in expected]
+    assert list(columns) == expected
+    last = codec.decode(0x211, frames.data[frames.of(0x211)[-1]].tobytes())[1]
+    for name, ending in parameters.items():
+        assert columns[f"{name}_estimate{ending}"][-1] == last[name]
+        assert columns[f"{name}_true{ending}"][0] == recording.inputs.truth.parameters[name][0]
+
+
+def test_a_pilot_of_another_model_has_no_true_parameters(lever_bus: Callable[[Scenario], LeverBus]) -> None:
+    wanted = scenario.load("steady", ["duration=1 s", "estimator.model=linear_black_box", "limits={}"])
+    recording = loop.run(wanted, lever_bus(wanted))
+    columns = trace.build(recording, recording.frames())
+    assert {name for name in columns if "_true" in name} == {
+        "theta_true_rad", "theta_dot_true_rad_s", "z_ddot_true_m_s2", "tau_m_true_N_m", "trim_true_rad",
+        "natural_frequency_true_Hz", "damping_ratio_true",
+    }  # fmt: skip
+    assert np.isfinite(columns["a21_estimate_1_s2"][-1])
 
 
 def test_measured_is_what_was_on_the_bus_and_nan_where_it_was_not() -> None:

@@ -21,6 +21,8 @@ from lever_cdkf.sil import units
         (" .5 % ", "1", 0.005),
         ("0.4 1", "1", 0.4),
         ("2.1 N/mm", "N/m", 2100.0),
+        ("-465 1/s^2", "1/s^2", -465.0),
+        ("-13.7 1/s", "1/s", -13.7),
     ],
 )
 def test_a_quantity_becomes_its_si_value(text: str, unit: str, value: float) -> None:

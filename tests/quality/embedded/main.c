@@ -3,7 +3,8 @@
  *
  *     embedded SAMPLES
  *
- * One run for each choice of preload and adaptation; a line is: run, sample, mode, then the bits of the estimate. */
+ * One run for each choice of preload and adaptation, and one for each model and estimator; a line is: run, sample, mode, then
+ * the bits of the estimate. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -92,7 +93,8 @@ static void run(const lever_config_t *config, uint32_t samples)
         const lever_sample_t sample = next_sample(&arm, index);
         const enum lever_mode mode = lever_update(lever, &sample);
         lever_estimate(lever, &estimate);
-        (void)printf("%u.%u %" PRIu32 " %u", config->preload, config->adaptation, index, (unsigned int)mode);
+        (void)printf("%u.%u.%u.%u %" PRIu32 " %u", config->model, config->estimator, config->preload,
+            config->adaptation, index, (unsigned int)mode);
         print_estimate(&estimate);
     }
 }
@@ -109,6 +111,13 @@ int main(int argc, char **argv)
             config.adaptation = adaptation;
             run(&config, samples);
         }
+    }
+    lever_config_default(&config);
+    const uint8_t estimators = (uint8_t)LEVER_ESTIMATOR_COUNT;
+    for (uint8_t choice = 1u; choice < (uint8_t)((uint8_t)LEVER_MODEL_COUNT * estimators); choice++) {
+        config.model = choice / estimators;
+        config.estimator = choice % estimators;
+        run(&config, samples);
     }
     return 0;
 }

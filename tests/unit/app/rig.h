@@ -6,9 +6,66 @@
 #include "lever_cdkf.h"
 #include "unity.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { RIG_PERIOD_US = 1000 };
+
+/* --- every model with every estimator, for programs that run their tests with all of them ---------------------------- */
+
+enum { RIG_COMBINATIONS = LEVER_MODEL_COUNT * LEVER_ESTIMATOR_COUNT };
+
+/* The default configuration but for model and estimator. */
+static inline lever_config_t rig_config(uint32_t combination)
+{
+    lever_config_t config;
+    lever_config_default(&config);
+    config.model = (uint8_t)(combination % (uint32_t)LEVER_MODEL_COUNT);
+    config.estimator = (uint8_t)(combination / (uint32_t)LEVER_MODEL_COUNT);
+    return config;
+}
+
+/* RUN_TEST(), with the combination in the name of the test. */
+#define RIG_RUN_TEST(test, combination) UnityDefaultTestRun((test), rig_test_name(#test, (combination)), __LINE__)
+
+static inline const char *rig_test_name(const char *test, uint32_t combination)
+{
+    static const char *const models[LEVER_MODEL_COUNT] = {"lever", "linear_physical", "linear_black_box"};
+    static const char *const estimators[LEVER_ESTIMATOR_COUNT] = {"dual", "joint"};
+    static char name[160];
+    const lever_config_t config = rig_config(combination);
+    (void)snprintf(name, sizeof name, "%s [%s, %s]", test, models[config.model], estimators[config.estimator]);
+    return name;
+}
+
+/* The setting of that name. */
+static inline float *rig_setting(lever_config_t *config, const char *name)
+{
+    uint32_t index = 0u;
+    while ((index < lever_setting_count()) && (strcmp(lever_setting(index)->name, name) != 0)) {
+        index++;
+    }
+    TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(lever_setting_count(), index, name);
+    return (float *)(void *)((uint8_t *)&config->settings + (index * sizeof(float)));
+}
+
+/* The setting of parameter i of the chosen model that is named like it with `suffix`: "" its first guess, "_sigma", "_walk". */
+static inline float *rig_parameter_setting(lever_config_t *config, uint32_t i, const char *suffix)
+{
+    char name[32];
+    (void)snprintf(name, sizeof name, "%s%s", lever_parameter_name(config->model, i), suffix);
+    return rig_setting(config, name);
+}
+
+/* Standard deviation of the first guess of parameter i, in its unit. */
+static inline float rig_first_sigma(lever_config_t *config, uint32_t i)
+{
+    const float sigma = *rig_parameter_setting(config, i, "_sigma");
+    const bool relative = (config->model != (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX);
+    return relative ? (sigma * *rig_parameter_setting(config, i, "")) : sigma;
+}
+
+/* --- samples --------------------------------------------------------------------------------------------------------- */
 
 typedef struct rig {
     simulation_t simulation;
@@ -18,6 +75,27 @@ typedef struct rig {
 static inline rig_t rig_typical(void)
 {
     const rig_t rig = {.simulation = simulation_typical()};
+    return rig;
+}
+
+/* The same samples, of a plant that is what `model` takes it for; its parameters, none the first guess, are left in `truth`. */
+static inline rig_t rig_of(uint8_t model, double truth[LEVER_PARAMETERS])
+{
+    static const double parameters[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {[LEVER_MODEL_LEVER] = {3.2, 60.0, 2100.0},
+        [LEVER_MODEL_LINEAR_PHYSICAL] = {3.2, 60.0, 2100.0},
+        [LEVER_MODEL_LINEAR_BLACK_BOX] = {-620.0, -19.0, -2.8}};
+    const double *p = parameters[model];
+    rig_t rig = rig_typical();
+    if (model == (uint8_t)LEVER_MODEL_LINEAR_PHYSICAL) {
+        rig.simulation.plant = plant_physical(p[0], p[1], p[2]);
+        rig.simulation.torque_rms = 1.6; /* [N], moves this mass as 0.3 N m move the lever and its arm */
+    } else if (model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX) {
+        rig.simulation.plant = plant_black_box(p[0], p[1], p[2]);
+        rig.simulation.torque_rms = 0.0;
+    } else {
+        /* a lever it is */
+    }
+    (void)memcpy(truth, p, LEVER_PARAMETERS * sizeof truth[0]);
     return rig;
 }
 

@@ -156,11 +156,14 @@ static void test_no_accepted_dither_band_is_empty(void)
 
 static void test_first_guesses_are_accepted_within_the_bounds_of_the_model_and_nowhere_else(void)
 {
-    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
-        const lever_setting_t *row = row_named(model_lever.parameter[i].name);
-        TEST_ASSERT_TRUE(row->least == model_lever.parameter[i].least);
-        TEST_ASSERT_TRUE(row->greatest == model_lever.parameter[i].greatest);
-        TEST_ASSERT_EQUAL_STRING(model_lever.parameter[i].unit, row->unit);
+    const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box};
+    for (uint32_t k = 0u; k < ((uint32_t)LEVER_MODEL_COUNT * (uint32_t)LEVER_PARAMETERS); k++) {
+        const model_parameter_t *parameter =
+            &models[k / (uint32_t)LEVER_PARAMETERS]->parameter[k % (uint32_t)LEVER_PARAMETERS];
+        const lever_setting_t *row = row_named(parameter->name);
+        TEST_ASSERT_TRUE(row->least == parameter->least);
+        TEST_ASSERT_TRUE(row->greatest == parameter->greatest);
+        TEST_ASSERT_EQUAL_STRING(parameter->unit, row->unit);
     }
 }
 
@@ -205,10 +208,16 @@ static void test_init_refuses_null(void)
 
 static void test_parameters_have_names_and_units_and_nothing_beyond(void)
 {
-    TEST_ASSERT_EQUAL_STRING("m_p", lever_parameter_name((uint8_t)LEVER_MODEL_LEVER, 0u));
-    TEST_ASSERT_EQUAL_STRING("kg", lever_parameter_unit((uint8_t)LEVER_MODEL_LEVER, 0u));
-    TEST_ASSERT_EQUAL_STRING("k_p", lever_parameter_name((uint8_t)LEVER_MODEL_LEVER, 2u));
-    TEST_ASSERT_EQUAL_STRING("N/m", lever_parameter_unit((uint8_t)LEVER_MODEL_LEVER, 2u));
+    static const char *const names[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
+        {"m_p", "c_p", "k_p"}, {"m", "c", "k"}, {"a21", "a22", "b21"}};
+    static const char *const units[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
+        {"kg", "N s/m", "N/m"}, {"kg", "N s/m", "N/m"}, {"1/s^2", "1/s", "1"}};
+    for (uint8_t model = 0u; model < (uint8_t)LEVER_MODEL_COUNT; model++) {
+        for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+            TEST_ASSERT_EQUAL_STRING(names[model][i], lever_parameter_name(model, i));
+            TEST_ASSERT_EQUAL_STRING(units[model][i], lever_parameter_unit(model, i));
+        }
+    }
     TEST_ASSERT_NULL(lever_parameter_name((uint8_t)LEVER_MODEL_LEVER, (uint32_t)LEVER_PARAMETERS));
     TEST_ASSERT_NULL(lever_parameter_unit((uint8_t)LEVER_MODEL_LEVER, (uint32_t)LEVER_PARAMETERS));
     TEST_ASSERT_NULL(lever_parameter_name((uint8_t)LEVER_MODEL_COUNT, 0u));

@@ -14,11 +14,10 @@ static plant_t plant;
 
 void setUp(void)
 {
-    const float guess[L] = {2.5f, 42.0f, 1500.0f};
-    const float sigma[L] = {0.4f, 0.6f, 0.6f};
+    const prior_t prior = {.guess = {2.5f, 42.0f, 1500.0f}, .sigma = {0.4f, 0.6f, 0.6f}};
     source.state = 31u;
     plant = plant_typical();
-    parameter_filter_init(&filter, &model_lever, guess, sigma);
+    parameter_filter_init(&filter, &model_lever, &prior);
     filter.w[0] = 0.2f;
     filter.w[1] = -0.1f;
     filter.w[2] = 0.3f;
@@ -39,6 +38,8 @@ static void set_factor(float scale)
 
 static void derive(model_dynamics_t *dynamics, model_dynamics_t *sigma)
 {
+    float freed[MODEL_STATES * 2 * L];
+    parameter_filter_walk(&filter, 0.0f, freed); /* draws the points */
     const model_constants_t constants = constants_of(&plant);
     const model_step_t step = {.trim = (float)plant.trim, .trim_sine = (float)sin(plant.trim)};
     derived_dynamics(&filter, &model_lever, &constants, &step, dynamics, sigma);
@@ -150,7 +151,8 @@ static void test_parameters_come_in_their_units_with_sigma_to_first_order(void)
     float p[L];
     float sigma[L];
     set_factor(0.1f);
-    derived_parameters(&filter, p, sigma);
+    parameter_filter_physical(&filter, p);
+    parameter_filter_sigma(&filter, sigma);
     const matrix_t covariance = matrix_gram(matrix_of(filter.s, (uint32_t)L, (uint32_t)L));
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
         const double wanted = guess[i] * exp((double)filter.w[i]);

@@ -21,12 +21,11 @@ static double last_tau_m;
 
 static void start(void)
 {
-    const float guess[L] = {2.5f, 42.0f, 1500.0f};
-    const float sigma[L] = {0.4f, 0.6f, 0.6f};
+    const prior_t prior = {.guess = {2.5f, 42.0f, 1500.0f}, .sigma = {0.4f, 0.6f, 0.6f}};
     const plant_t *plant = &simulation.plant;
     constants = constants_of(plant);
     (void)memset(&dual, 0, sizeof dual);
-    parameter_filter_init(&dual.parameters, &model_lever, guess, sigma);
+    parameter_filter_init(&dual.parameters, &model_lever, &prior);
     dual.state.x[0] = (float)plant->theta;
     dual.state.s[0] = (float)simulation.theta_noise;
     dual.state.s[3] = (float)simulation.theta_dot_noise;
@@ -60,12 +59,15 @@ static double sample(bool theta_valid, bool theta_dot_valid, bool learn)
         .y = {theta_valid ? (float)simulation.theta : NAN, theta_dot_valid ? (float)simulation.theta_dot : NAN},
         .valid = {theta_valid, theta_dot_valid}};
     float correction[L];
+    float learnt[L];
     last_z_ddot = simulation.z_ddot;
     last_tau_m = simulation.tau_m;
-    dual_predict(&dual, &model_lever, &constants, &step, learn);
+    dual_predict(&dual, &model_lever, &constants, &step);
     TEST_ASSERT_TRUE(dual_is_valid(&dual));
-    const double nis = (double)dual_update(&dual, &measurement, learn, correction);
-    (void)parameter_filter_bound(&dual.parameters);
+    const double nis = (double)dual_update(&dual, &measurement, learn);
+    if (learn) {
+        (void)dual_learn(&dual, (float)PERIOD, 0.0f, false, correction, learnt);
+    }
     TEST_ASSERT_TRUE(dual_is_valid(&dual));
     return nis;
 }
@@ -83,7 +85,7 @@ static void assert_parameters_found(double sigmas, double relative)
     const double truth[L] = {simulation.plant.m_p, simulation.plant.c_p, simulation.plant.k_p};
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
         const double found = (double)dual.parameters.w[i];
-        const double wanted = log(truth[i] / (double)dual.parameters.guess[i]);
+        const double wanted = log(truth[i] / (double)dual.parameters.prior.guess[i]);
         const double sigma = (double)factor_sigma(dual.parameters.s, (uint32_t)L, i);
         TEST_ASSERT_DOUBLE_WITHIN(relative, wanted, found);
         TEST_ASSERT_DOUBLE_WITHIN(sigmas * sigma, wanted, found);

@@ -1,5 +1,5 @@
-/* The parameter filter by itself: scaling, sigma points, random walk, cap, update and invariant, against closed forms and
- * the textbook Kalman update in double. */
+/* The parameter filter by itself, on both scales: sigma points, what is known, learning and invariant, against closed forms
+ * and the textbook Kalman update in double. */
 #include "filter/parameter_filter.h"
 
 #include "kalman.h"
@@ -9,8 +9,8 @@
 
 enum { L = MODEL_PARAMETERS, N = MODEL_STATES, ROWS = PARAMETER_FILTER_ROWS, REPEATS = 200 };
 
-static const float guess[L] = {2.5f, 42.0f, 1500.0f};
-static const float sigma[L] = {0.4f, 0.6f, 0.5f};
+static const prior_t prior = {.guess = {2.5f, 42.0f, 1500.0f}, .sigma = {0.4f, 0.6f, 0.5f}};
+static const prior_t signed_prior = {.guess = {-465.0f, 13.7f, -2.2f}, .sigma = {180.0f, 6.0f, 0.8f}};
 
 static random_source_t source;
 static parameter_filter_t filter;
@@ -18,7 +18,7 @@ static parameter_filter_t filter;
 void setUp(void)
 {
     source.state = 17u;
-    parameter_filter_init(&filter, &model_lever, guess, sigma);
+    parameter_filter_init(&filter, &model_lever, &prior);
 }
 
 void tearDown(void)
@@ -37,6 +37,13 @@ static void draw_factor(void)
     }
 }
 
+/* What becomes of the state is left to the tests of the walk. */
+static void walk_for(float period)
+{
+    float freed[N * 2 * L];
+    parameter_filter_walk(&filter, period, freed);
+}
+
 static matrix_t covariance_of_all(void)
 {
     return matrix_gram(matrix_of(filter.s, (uint32_t)ROWS, (uint32_t)L));
@@ -50,10 +57,10 @@ static void test_starts_at_the_guess_with_its_relative_standard_deviations_uncor
     parameter_filter_physical(&filter, p);
     const matrix_t covariance = covariance_of_all();
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        TEST_ASSERT_EQUAL_FLOAT(guess[i], p[i]);
+        TEST_ASSERT_EQUAL_FLOAT(prior.guess[i], p[i]);
         TEST_ASSERT_TRUE(filter.walk[i] == 0.0f);
         for (uint32_t j = 0u; j < (uint32_t)ROWS; j++) {
-            const double wanted = (i == j) ? ((double)sigma[i] * (double)sigma[i]) : 0.0;
+            const double wanted = (i == j) ? ((double)prior.sigma[i] * (double)prior.sigma[i]) : 0.0;
             TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, wanted, covariance.at[i][j]);
         }
     }
@@ -63,10 +70,47 @@ static void test_starts_at_the_guess_with_its_relative_standard_deviations_uncor
 static void test_bounds_of_w_are_those_of_the_model(void)
 {
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        const double least = (double)model_lever.parameter[i].least / (double)guess[i];
-        const double greatest = (double)model_lever.parameter[i].greatest / (double)guess[i];
+        const double least = (double)model_lever.parameter[i].least / (double)prior.guess[i];
+        const double greatest = (double)model_lever.parameter[i].greatest / (double)prior.guess[i];
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, log(least), (double)filter.least[i]);
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, log(greatest), (double)filter.greatest[i]);
+    }
+}
+
+static void start_signed(void)
+{
+    parameter_filter_init(&filter, &model_linear_black_box, &signed_prior);
+}
+
+static void test_signed_parameters_start_at_the_guess_one_sigma_being_one(void)
+{
+    float p[L];
+    float sigma[L];
+    start_signed();
+    parameter_filter_physical(&filter, p);
+    parameter_filter_sigma(&filter, sigma);
+    const matrix_t covariance = covariance_of_all();
+    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+        TEST_ASSERT_EQUAL_FLOAT(signed_prior.guess[i], p[i]);
+        TEST_ASSERT_EQUAL_FLOAT(signed_prior.sigma[i], sigma[i]);
+        TEST_ASSERT_TRUE(filter.w[i] == 0.0f);
+        for (uint32_t j = 0u; j < (uint32_t)ROWS; j++) {
+            TEST_ASSERT_TRUE(covariance.at[i][j] == ((i == j) ? 1.0 : 0.0));
+        }
+    }
+    TEST_ASSERT_TRUE(parameter_filter_is_valid(&filter));
+}
+
+static void test_bounds_of_signed_parameters_are_those_of_the_model_in_sigmas(void)
+{
+    start_signed();
+    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+        const model_parameter_t *parameter = &model_linear_black_box.parameter[i];
+        const double least = ((double)parameter->least - (double)signed_prior.guess[i]) / (double)signed_prior.sigma[i];
+        const double greatest =
+            ((double)parameter->greatest - (double)signed_prior.guess[i]) / (double)signed_prior.sigma[i];
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * fabs(least), least, (double)filter.least[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * fabs(greatest), greatest, (double)filter.greatest[i]);
     }
 }
 
@@ -77,7 +121,7 @@ static void test_opening_keeps_the_estimate_and_forgets_what_was_learnt(void)
     filter.walk[1] = 0.01f;
     parameter_filter_open(&filter);
     parameter_filter_t wanted;
-    parameter_filter_init(&wanted, &model_lever, guess, sigma);
+    parameter_filter_init(&wanted, &model_lever, &prior);
     TEST_ASSERT_EQUAL_MEMORY(wanted.s, filter.s, sizeof wanted.s);
     TEST_ASSERT_TRUE(filter.w[1] == 0.3f);
     TEST_ASSERT_TRUE(filter.walk[1] == 0.01f);
@@ -93,8 +137,64 @@ static void test_physical_parameters_are_the_guess_times_exp_w(void)
     float p[L];
     parameter_filter_physical(&filter, p);
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        const double wanted = (double)guess[i] * exp((double)filter.w[i]);
+        const double wanted = (double)prior.guess[i] * exp((double)filter.w[i]);
         TEST_ASSERT_DOUBLE_WITHIN(5.0e-7 * wanted, wanted, (double)p[i]);
+    }
+}
+
+static void test_signed_parameters_are_the_guess_plus_w_sigmas(void)
+{
+    start_signed();
+    filter.w[0] = -0.7f;
+    filter.w[1] = -2.5f; /* crosses zero */
+    filter.w[2] = 1.1f;
+    float p[L];
+    parameter_filter_physical(&filter, p);
+    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+        const double step = (double)signed_prior.sigma[i] * (double)filter.w[i];
+        const double size = fabs((double)signed_prior.guess[i]) + fabs(step);
+        TEST_ASSERT_DOUBLE_WITHIN(2.0e-7 * size, (double)signed_prior.guess[i] + step, (double)p[i]);
+    }
+    TEST_ASSERT_TRUE(p[1] < 0.0f);
+}
+
+/* d p / d w sqrt(P_ii), and P_ij / sqrt(P_ii P_jj), in double. */
+static void assert_sigma_and_correlation(const double slope[L])
+{
+    const uint32_t pairs[3][2] = {{0u, 1u}, {0u, 2u}, {1u, 2u}};
+    float sigma[L];
+    float correlation[L];
+    parameter_filter_sigma(&filter, sigma);
+    parameter_filter_correlation(&filter, correlation);
+    const matrix_t p = covariance_of_all();
+    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+        const double wanted = slope[i] * sqrt(p.at[i][i]);
+        const uint32_t a = pairs[i][0];
+        const uint32_t b = pairs[i][1];
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * wanted, wanted, (double)sigma[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, p.at[a][b] / sqrt(p.at[a][a] * p.at[b][b]), (double)correlation[i]);
+    }
+}
+
+static void test_sigma_and_correlation_are_those_of_the_covariance(void)
+{
+    for (uint32_t repeat = 0u; repeat < (uint32_t)REPEATS; repeat++) {
+        double slope[L];
+        setUp();
+        source.state += repeat;
+        draw_factor();
+        random_floats(&source, filter.w, (uint32_t)L, 0.5);
+        for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+            slope[i] = (double)prior.guess[i] * exp((double)filter.w[i]);
+        }
+        assert_sigma_and_correlation(slope);
+        start_signed();
+        draw_factor();
+        random_floats(&source, filter.w, (uint32_t)L, 5.0);
+        for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+            slope[i] = (double)signed_prior.sigma[i];
+        }
+        assert_sigma_and_correlation(slope);
     }
 }
 
@@ -103,9 +203,10 @@ static void assert_point(const model_points_t *points, uint32_t index, double si
 {
     const double h = sqrt(3.0);
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        const double offset = sign * h * (double)filter.s[(i * L) + j];
-        const double wanted = (double)guess[i] * exp((double)filter.w[i] + offset);
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * wanted, wanted, (double)points->p[index][i]);
+        const double w = (double)filter.w[i] + (sign * h * (double)filter.s[(i * L) + j]);
+        const double guess = (double)filter.prior.guess[i];
+        const double wanted = filter.positive ? (guess * exp(w)) : (guess + ((double)filter.prior.sigma[i] * w));
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * (fabs(guess) + fabs(wanted)), wanted, (double)points->p[index][i]);
     }
     for (uint32_t i = 0u; i < (uint32_t)N; i++) {
         const double offset = sign * h * (double)filter.s[((L + i) * L) + j];
@@ -113,11 +214,12 @@ static void assert_point(const model_points_t *points, uint32_t index, double si
     }
 }
 
-static void test_points_are_a_pair_for_each_column_with_the_state_moving_along(void)
+static void assert_points(void)
 {
     model_points_t points = {.x = {{0.35f, -0.2f}}};
     draw_factor();
     random_floats(&source, filter.w, (uint32_t)L, 0.5);
+    walk_for(0.0f); /* draws the points */
     parameter_filter_points(&filter, &points);
     for (uint32_t j = 0u; j < (uint32_t)L; j++) {
         assert_point(&points, 1u + (2u * j), 1.0, j);
@@ -126,6 +228,13 @@ static void test_points_are_a_pair_for_each_column_with_the_state_moving_along(v
     float mean[L];
     parameter_filter_physical(&filter, mean);
     TEST_ASSERT_EQUAL_MEMORY(mean, points.p[0], sizeof mean);
+}
+
+static void test_points_are_a_pair_for_each_column_with_the_state_moving_along(void)
+{
+    assert_points();
+    start_signed();
+    assert_points();
 }
 
 /* --- prediction ---------------------------------------------------------------------------------------------------- */
@@ -147,7 +256,7 @@ static void test_prediction_moves_the_state_deviations_by_the_model(void)
             increment[2u + (2u * j)][i] = (float)(5.0 - change);
         }
     }
-    parameter_filter_predict(&filter, increment, 1.0e-3f); /* no walk has been set */
+    parameter_filter_predict(&filter, increment);
     for (uint32_t j = 0u; j < (uint32_t)L; j++) {
         for (uint32_t i = 0u; i < (uint32_t)N; i++) {
             double wanted = (double)before.s[((L + i) * L) + j];
@@ -159,97 +268,200 @@ static void test_prediction_moves_the_state_deviations_by_the_model(void)
     }
 }
 
-static void test_walk_adds_its_variance_and_keeps_the_covariance_with_the_state(void)
+/* --- learning ------------------------------------------------------------------------------------------------------ */
+
+/* [w; x] in the textbook, where the outputs C of the columns are C S^-1 of w; and everything there is to compare. */
+typedef struct textbook {
+    kalman_t w;
+    matrix_t inverse; /* S_w^-1 */
+    matrix_t states;  /* T S_w^-1: how x follows w */
+} textbook_t;
+
+static textbook_t textbook_of_filter(void)
 {
-    draw_factor();
-    matrix_t wanted = covariance_of_all();
-    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        filter.walk[i] = 0.01f * (float)(i + 1u);
-        wanted.at[i][i] += 0.5 * (double)filter.walk[i];
-    }
-    parameter_filter_walk(&filter, 0.5f);
-    const matrix_t found = covariance_of_all();
-    for (uint32_t i = 0u; i < (uint32_t)ROWS; i++) {
-        for (uint32_t j = 0u; j < (uint32_t)L; j++) {
-            TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, wanted.at[i][j], found.at[i][j]);
-        }
-    }
+    const matrix_t all = matrix_of(filter.s, (uint32_t)ROWS, (uint32_t)L);
+    const matrix_t s = matrix_block(&all, 0u, (uint32_t)L, 0u, (uint32_t)L);
+    const matrix_t t = matrix_block(&all, (uint32_t)L, (uint32_t)N, 0u, (uint32_t)L);
+    textbook_t textbook = {.w = {.x = matrix_of(filter.w, (uint32_t)L, 1u), .p = matrix_gram(s)}};
+    textbook.inverse = matrix_inverse(s);
+    textbook.states = matrix_product(t, textbook.inverse);
+    return textbook;
 }
 
-static void test_standard_deviations_never_outgrow_the_first_guess(void)
+/* A sample with a random output and innovation, of which the filter knows the state's part of the noise; the textbook learns
+ * from it at once. The innovation is that from the w the block began with, `start`. */
+static void gather(textbook_t *textbook, matrix_t start)
 {
-    draw_factor();
-    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        filter.walk[i] = 10.0f;
-    }
-    for (uint32_t k = 0u; k < 1000u; k++) {
-        parameter_filter_walk(&filter, 1.0e-3f);
-        const matrix_t covariance = covariance_of_all();
-        for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-            TEST_ASSERT_TRUE(sqrt(covariance.at[i][i]) <= (double)sigma[i] * 1.000001);
-        }
-        TEST_ASSERT_TRUE(parameter_filter_is_valid(&filter));
-    }
-    const matrix_t covariance = covariance_of_all();
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, (double)sigma[2], sqrt(covariance.at[2][2]));
-}
-
-static void test_cap_keeps_correlations(void)
-{
-    draw_factor();
-    for (uint32_t k = 0u; k < (uint32_t)(L * L); k++) {
-        filter.s[k] *= 100.0f;
-    }
-    const matrix_t before = covariance_of_all();
-    parameter_filter_walk(&filter, 0.0f);
-    const matrix_t after = covariance_of_all();
-    for (uint32_t i = 1u; i < (uint32_t)L; i++) {
-        for (uint32_t j = 0u; j < i; j++) {
-            const double wanted = before.at[i][j] / sqrt(before.at[i][i] * before.at[j][j]);
-            TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, wanted, after.at[i][j] / sqrt(after.at[i][i] * after.at[j][j]));
-        }
-    }
-}
-
-/* --- update -------------------------------------------------------------------------------------------------------- */
-
-/* The same update of [w; x] in the textbook: outputs that see w through `output`, with a full noise covariance. */
-static void assert_update_is_the_textbook_one(void)
-{
+    const float noise[4] = {0.05f, 0.0f, (float)random_between(&source, -0.05, 0.05), 0.08f};
     float output[2 * L];
-    const float noise[4] = {0.05f, 0.0f, 0.03f, 0.08f};
     float innovation[2];
-    float correction[ROWS];
-    draw_factor();
     random_floats(&source, output, (uint32_t)(2 * L), 0.1);
     random_floats(&source, innovation, 2u, 0.2);
-    random_floats(&source, filter.w, (uint32_t)L, 0.5);
-    const matrix_t s = matrix_of(filter.s, (uint32_t)ROWS, (uint32_t)L);
+    const matrix_t r = matrix_gram(matrix_of(noise, 2u, 2u));
     const matrix_t c = matrix_of(output, 2u, (uint32_t)L);
     const matrix_t y = matrix_of(innovation, 2u, 1u);
-    const matrix_t covariance = matrix_sum(matrix_gram(c), 1.0, matrix_gram(matrix_of(noise, 2u, 2u)));
-    const matrix_t gain = matrix_product(matrix_product(s, matrix_transposed(c)), matrix_inverse(covariance));
-    const matrix_t change = matrix_product(gain, y);
-    const matrix_t posterior = matrix_sum(matrix_gram(s), -1.0, matrix_congruence(gain, covariance));
-    const double nis = matrix_congruence(matrix_transposed(y), matrix_inverse(covariance)).at[0][0];
-    const parameter_filter_t before = filter;
+    const matrix_t h = matrix_product(c, textbook->inverse);
+    const matrix_t covariance = matrix_sum(matrix_gram(c), 1.0, r);
+    const double wanted = matrix_congruence(matrix_transposed(y), matrix_inverse(covariance)).at[0][0];
+    const double nis = (double)parameter_filter_gather(&filter, output, innovation, noise);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-5 * (1.0 + wanted), wanted, nis);
+    (void)kalman_update(&textbook->w, h, r, matrix_sum(y, 1.0, matrix_product(h, start)));
+}
 
-    const double found_nis = (double)parameter_filter_update(&filter, output, innovation, noise, correction);
+static void assert_learns_as_the_textbook(uint32_t samples)
+{
+    draw_factor();
+    random_floats(&source, filter.w, (uint32_t)L, 0.5);
+    textbook_t textbook = textbook_of_filter();
+    const matrix_t start = textbook.w.x;
+    for (uint32_t k = 0u; k < samples; k++) {
+        gather(&textbook, start);
+    }
+    float correction[ROWS];
+    float learnt[L];
+    TEST_ASSERT_FALSE(parameter_filter_learn(&filter, 1.0e-2f, 0.0f, correction, learnt));
+
+    matrix_t everything = matrix_zero((uint32_t)ROWS, (uint32_t)L); /* [w; x] from w */
+    for (uint32_t i = 0u; i < (uint32_t)ROWS; i++) {
+        for (uint32_t j = 0u; j < (uint32_t)L; j++) {
+            everything.at[i][j] = (i >= (uint32_t)L) ? textbook.states.at[i - (uint32_t)L][j] : ((i == j) ? 1.0 : 0.0);
+        }
+    }
+    const matrix_t posterior = matrix_congruence(everything, textbook.w.p);
+    const matrix_t change = matrix_product(everything, matrix_sum(textbook.w.x, -1.0, start));
     const matrix_t found = covariance_of_all();
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-5 * (1.0 + nis), nis, found_nis);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, 0.0, covariance_difference(&found, &posterior, &posterior));
-    for (uint32_t r = 0u; r < (uint32_t)ROWS; r++) {
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, change.at[r][0], (double)correction[r]);
+    for (uint32_t i = 0u; i < (uint32_t)ROWS; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, change.at[i][0], (double)correction[i]);
     }
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, (double)before.w[i] + change.at[i][0], (double)filter.w[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, textbook.w.x.at[i][0], (double)filter.w[i]);
     }
 }
 
-static void test_update_is_the_textbook_one(void)
+static void test_a_sample_teaches_what_the_textbook_update_does(void)
 {
-    for (uint32_t repeat = 0u; repeat < REPEATS; repeat++) {
-        assert_update_is_the_textbook_one();
+    for (uint32_t repeat = 0u; repeat < (uint32_t)REPEATS; repeat++) {
+        setUp();
+        source.state += repeat;
+        assert_learns_as_the_textbook(1u);
+    }
+}
+
+static void test_a_block_teaches_what_its_samples_do_one_by_one(void)
+{
+    const uint32_t samples[] = {2u, 4u, 7u, 50u};
+    for (uint32_t k = 0u; k < 4u; k++) {
+        for (uint32_t repeat = 0u; repeat < (uint32_t)REPEATS; repeat++) {
+            setUp();
+            source.state += repeat;
+            assert_learns_as_the_textbook(samples[k]);
+        }
+    }
+}
+
+static void test_signed_parameters_learn_alike(void)
+{
+    for (uint32_t repeat = 0u; repeat < (uint32_t)REPEATS; repeat++) {
+        start_signed();
+        source.state += repeat;
+        assert_learns_as_the_textbook(4u);
+    }
+}
+
+/* With caution, the k-th block of ten counts by k tenths: in the textbook, its outputs are that much noisier. */
+static void test_at_first_what_was_gathered_counts_in_part(void)
+{
+    draw_factor();
+    for (uint32_t block = 1u; block <= 12u; block++) {
+        const float noise[4] = {0.05f, 0.0f, 0.02f, 0.08f};
+        const double trust = fmin(0.1 * (double)block, 1.0);
+        textbook_t textbook = textbook_of_filter();
+        float output[2 * L];
+        float innovation[2];
+        random_floats(&source, output, (uint32_t)(2 * L), 0.1);
+        random_floats(&source, innovation, 2u, 0.2);
+        const matrix_t h = matrix_product(matrix_of(output, 2u, (uint32_t)L), textbook.inverse);
+        const matrix_t y = matrix_sum(matrix_of(innovation, 2u, 1u), 1.0, matrix_product(h, textbook.w.x));
+        const matrix_t given = matrix_gram(matrix_of(noise, 2u, 2u));
+        (void)kalman_update(&textbook.w, h, matrix_sum(matrix_zero(2u, 2u), 1.0 / trust, given), y);
+
+        float correction[ROWS];
+        float learnt[L];
+        (void)parameter_filter_gather(&filter, output, innovation, noise);
+        (void)parameter_filter_learn(&filter, 0.01f, 0.1f, correction, learnt);
+        const matrix_t all = covariance_of_all();
+        const matrix_t found = matrix_block(&all, 0u, (uint32_t)L, 0u, (uint32_t)L);
+        TEST_ASSERT_DOUBLE_WITHIN(2.0e-5, 0.0, covariance_difference(&found, &textbook.w.p, &textbook.w.p));
+        for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, textbook.w.x.at[i][0], (double)filter.w[i]);
+        }
+    }
+}
+
+static void test_time_in_which_nothing_was_gathered_is_no_reason_to_trust(void)
+{
+    float correction[ROWS];
+    float learnt[L];
+    draw_factor();
+    const parameter_filter_t before = filter;
+    for (uint32_t k = 0u; k < 100u; k++) {
+        (void)parameter_filter_learn(&filter, 0.01f, 0.1f, correction, learnt);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
+}
+
+static void test_what_was_learnt_is_what_the_variances_have_lost(void)
+{
+    for (uint32_t repeat = 0u; repeat < (uint32_t)REPEATS; repeat++) {
+        setUp();
+        source.state += repeat;
+        draw_factor();
+        textbook_t textbook = textbook_of_filter();
+        const matrix_t before = covariance_of_all();
+        gather(&textbook, textbook.w.x);
+        float correction[ROWS];
+        float learnt[L];
+        (void)parameter_filter_learn(&filter, 0.01f, 0.0f, correction, learnt);
+        const matrix_t after = covariance_of_all();
+        for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+            const double wanted = before.at[i][i] - after.at[i][i];
+            TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * before.at[i][i], wanted, (double)learnt[i]);
+        }
+    }
+}
+
+/* Nothing gathered is learnt twice. */
+static void test_learning_again_changes_nothing(void)
+{
+    draw_factor();
+    textbook_t textbook = textbook_of_filter();
+    gather(&textbook, textbook.w.x);
+    float correction[ROWS];
+    float learnt[L];
+    (void)parameter_filter_learn(&filter, 1.0e-2f, 0.0f, correction, learnt);
+    const parameter_filter_t before = filter;
+    TEST_ASSERT_FALSE(parameter_filter_learn(&filter, 1.0e-2f, 0.0f, correction, learnt));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &filter, sizeof filter);
+    for (uint32_t i = 0u; i < (uint32_t)ROWS; i++) {
+        TEST_ASSERT_TRUE(correction[i] == 0.0f);
+    }
+}
+
+static void test_a_state_that_starts_anew_drops_what_was_gathered(void)
+{
+    draw_factor();
+    textbook_t textbook = textbook_of_filter();
+    gather(&textbook, textbook.w.x);
+    parameter_filter_forget_state(&filter);
+    const parameter_filter_t before = filter;
+    float correction[ROWS];
+    float learnt[L];
+    (void)parameter_filter_learn(&filter, 1.0e-2f, 0.0f, correction, learnt);
+    TEST_ASSERT_EQUAL_MEMORY(before.s, filter.s, sizeof filter.s);
+    TEST_ASSERT_EQUAL_MEMORY(before.w, filter.w, sizeof filter.w);
+    for (uint32_t k = 0u; k < (uint32_t)(N * L); k++) {
+        TEST_ASSERT_TRUE(parameter_filter_sensitivity(&filter)[k] == 0.0f);
     }
 }
 
@@ -257,14 +469,16 @@ static void test_update_is_the_textbook_one(void)
 
 static void test_estimate_is_held_at_its_bounds_and_said_to_rest_there(void)
 {
-    TEST_ASSERT_FALSE(parameter_filter_bound(&filter));
+    float correction[ROWS];
+    float learnt[L];
+    TEST_ASSERT_FALSE(parameter_filter_learn(&filter, 1.0e-2f, 0.0f, correction, learnt));
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
         setUp();
         filter.w[i] = filter.least[i] - 0.01f;
-        TEST_ASSERT_TRUE(parameter_filter_bound(&filter));
+        TEST_ASSERT_TRUE(parameter_filter_learn(&filter, 1.0e-2f, 0.0f, correction, learnt));
         TEST_ASSERT_TRUE(filter.w[i] == filter.least[i]);
         filter.w[i] = filter.greatest[i] + 0.01f;
-        TEST_ASSERT_TRUE(parameter_filter_bound(&filter));
+        TEST_ASSERT_TRUE(parameter_filter_learn(&filter, 1.0e-2f, 0.0f, correction, learnt));
         TEST_ASSERT_TRUE(filter.w[i] == filter.greatest[i]);
         TEST_ASSERT_TRUE(parameter_filter_is_valid(&filter));
     }
@@ -300,14 +514,22 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_starts_at_the_guess_with_its_relative_standard_deviations_uncorrelated);
     RUN_TEST(test_bounds_of_w_are_those_of_the_model);
+    RUN_TEST(test_signed_parameters_start_at_the_guess_one_sigma_being_one);
+    RUN_TEST(test_bounds_of_signed_parameters_are_those_of_the_model_in_sigmas);
     RUN_TEST(test_opening_keeps_the_estimate_and_forgets_what_was_learnt);
     RUN_TEST(test_physical_parameters_are_the_guess_times_exp_w);
+    RUN_TEST(test_signed_parameters_are_the_guess_plus_w_sigmas);
+    RUN_TEST(test_sigma_and_correlation_are_those_of_the_covariance);
     RUN_TEST(test_points_are_a_pair_for_each_column_with_the_state_moving_along);
     RUN_TEST(test_prediction_moves_the_state_deviations_by_the_model);
-    RUN_TEST(test_walk_adds_its_variance_and_keeps_the_covariance_with_the_state);
-    RUN_TEST(test_standard_deviations_never_outgrow_the_first_guess);
-    RUN_TEST(test_cap_keeps_correlations);
-    RUN_TEST(test_update_is_the_textbook_one);
+    RUN_TEST(test_a_sample_teaches_what_the_textbook_update_does);
+    RUN_TEST(test_a_block_teaches_what_its_samples_do_one_by_one);
+    RUN_TEST(test_signed_parameters_learn_alike);
+    RUN_TEST(test_at_first_what_was_gathered_counts_in_part);
+    RUN_TEST(test_time_in_which_nothing_was_gathered_is_no_reason_to_trust);
+    RUN_TEST(test_what_was_learnt_is_what_the_variances_have_lost);
+    RUN_TEST(test_learning_again_changes_nothing);
+    RUN_TEST(test_a_state_that_starts_anew_drops_what_was_gathered);
     RUN_TEST(test_estimate_is_held_at_its_bounds_and_said_to_rest_there);
     RUN_TEST(test_valid_means_within_bounds_finite_and_a_valid_factor);
     return UNITY_END();

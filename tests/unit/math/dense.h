@@ -139,6 +139,18 @@ static inline matrix_t matrix_block(
     return result;
 }
 
+/* The matrix in the upper left corner of zeros, n x n. */
+static inline matrix_t matrix_padded(matrix_t a, uint32_t n)
+{
+    matrix_t result = matrix_zero(n, n);
+    for (uint32_t i = 0u; i < a.rows; i++) {
+        for (uint32_t j = 0u; j < a.columns; j++) {
+            result.at[i][j] = a.at[i][j];
+        }
+    }
+    return result;
+}
+
 /* Inverse of a regular matrix by Gauss and Jordan, with row pivots. */
 static inline matrix_t matrix_inverse(matrix_t a)
 {

@@ -1,5 +1,5 @@
 /* The lever and the pilot's arm in double precision: the truth of the tests. The equation of DESIGN section 3 as it stands,
- * gravity and preload spelt out, integrated by Runge and Kutta's fourth-order rule. */
+ * gravity and preload spelt out, integrated by Runge and Kutta's fourth-order rule; or a linear system instead. */
 #ifndef UNIT_MODEL_PLANT_H
 #define UNIT_MODEL_PLANT_H
 
@@ -9,7 +9,17 @@
 
 #define PLANT_GRAVITY 9.80665
 
+/* theta_ddot = -stiffness (theta - trim) - damping theta_dot + base z_ddot + torque tau_m */
+typedef struct plant_linear {
+    double stiffness; /* [1/s^2] */
+    double damping;   /* [1/s] */
+    double base;
+    double torque;
+} plant_linear_t;
+
 typedef struct plant {
+    bool is_linear; /* what is moved is `linear`, and the lever's own values do not matter */
+    plant_linear_t linear;
     double length;              /* [m] */
     double mass;                /* of the lever [kg] */
     double mass_position;       /* [1] */
@@ -47,6 +57,23 @@ static inline plant_t plant_typical(void)
     return plant;
 }
 
+/* Mass, damper and spring on a base, and a second-order system, at rest at 20 degrees. */
+static inline plant_t plant_physical(double m, double c, double k)
+{
+    plant_t plant = plant_typical();
+    plant.is_linear = true;
+    plant.linear = (plant_linear_t){k / m, c / m, 1.0, 1.0 / m};
+    return plant;
+}
+
+static inline plant_t plant_black_box(double a21, double a22, double b21)
+{
+    plant_t plant = plant_typical();
+    plant.is_linear = true;
+    plant.linear = (plant_linear_t){-a21, -a22, b21, 0.0};
+    return plant;
+}
+
 /* M [kg m^2] */
 static inline double plant_inertia(const plant_t *plant)
 {
@@ -54,8 +81,8 @@ static inline double plant_inertia(const plant_t *plant)
     return plant->inertia + (centre * centre * plant->mass) + (plant->length * plant->length * plant->m_p);
 }
 
-/* theta_ddot [rad/s^2] */
-static inline double plant_acceleration(
+/* theta_ddot of the lever [rad/s^2] */
+static inline double plant_lever_acceleration(
     const plant_t *plant, double theta, double theta_dot, double z_ddot, double tau_m)
 {
     const double l = plant->length;
@@ -72,6 +99,16 @@ static inline double plant_acceleration(
     const double lever_spring = plant->stiffness * (theta - lever_rest);
     const double base = l * mu * cos(theta) * z_ddot;
     return (tau_m - base - damper - gravity - arm_spring - lever_spring) / plant_inertia(plant);
+}
+
+/* theta_ddot [rad/s^2] */
+static inline double plant_acceleration(
+    const plant_t *plant, double theta, double theta_dot, double z_ddot, double tau_m)
+{
+    const plant_linear_t *linear = &plant->linear;
+    const double own = -(linear->stiffness * (theta - plant->trim)) - (linear->damping * theta_dot);
+    return plant->is_linear ? (own + (linear->base * z_ddot) + (linear->torque * tau_m))
+                            : plant_lever_acceleration(plant, theta, theta_dot, z_ddot, tau_m);
 }
 
 /* One Runge-Kutta step of `h` seconds with constant inputs. */

@@ -92,8 +92,10 @@ static void test_the_choices_go_by_name(void)
     TEST_ASSERT_EQUAL_UINT8(LEVER_PRELOAD_FIXED, config.preload);
     TEST_ASSERT_TRUE(settings_assign(&config, " adaptation = annealing ", &error));
     TEST_ASSERT_EQUAL_UINT8(LEVER_ADAPTATION_ANNEALING, config.adaptation);
-    TEST_ASSERT_TRUE(settings_assign(&config, "model = lever", &error));
-    TEST_ASSERT_TRUE(settings_assign(&config, "estimator = dual", &error));
+    TEST_ASSERT_TRUE(settings_assign(&config, "model = linear_black_box", &error));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_MODEL_LINEAR_BLACK_BOX, config.model);
+    TEST_ASSERT_TRUE(settings_assign(&config, "estimator = joint", &error));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_ESTIMATOR_JOINT, config.estimator);
     TEST_ASSERT_NULL(lever_config_check(&config));
 }
 

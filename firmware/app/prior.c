@@ -1,0 +1,47 @@
+#include "app/prior.h"
+
+/* The rows of lever_settings.def that a model uses. */
+typedef struct rows {
+    prior_t prior;
+    float walk[MODEL_PARAMETERS];
+} rows_t;
+
+static rows_t rows_of(const lever_config_t *config)
+{
+    const lever_settings_t *s = &config->settings;
+    rows_t rows;
+    if (config->model == (uint8_t)LEVER_MODEL_LINEAR_PHYSICAL) {
+        rows = (rows_t){{{s->m, s->c, s->k}, {s->m_sigma, s->c_sigma, s->k_sigma}}, {s->m_walk, s->c_walk, s->k_walk}};
+    } else if (config->model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX) {
+        rows = (rows_t){{{s->a21, s->a22, s->b21}, {s->a21_sigma, s->a22_sigma, s->b21_sigma}},
+            {s->a21_walk, s->a22_walk, s->b21_walk}};
+    } else {
+        rows = (rows_t){{{s->m_p, s->c_p, s->k_p}, {s->m_p_sigma, s->c_p_sigma, s->k_p_sigma}},
+            {s->m_p_walk, s->c_p_walk, s->k_p_walk}};
+    }
+    return rows;
+}
+
+prior_t prior_of(const lever_config_t *config)
+{
+    return rows_of(config).prior;
+}
+
+adaptation_t adaptation_of(const lever_config_t *config)
+{
+    const lever_settings_t *s = &config->settings;
+    const rows_t rows = rows_of(config); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    const bool is_signed = (config->model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX);
+    adaptation_t adaptation;
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        /* of the scaled parameter w, see parameter_filter.h */
+        const float walk = is_signed ? (rows.walk[i] / rows.prior.sigma[i]) : rows.walk[i];
+        adaptation.floor[i] = walk * walk;
+    }
+    adaptation.ceiling = s->walk_ceiling * s->walk_ceiling;
+    adaptation.kind = config->adaptation;
+    adaptation.annealing_time = s->annealing_time;
+    adaptation.averaging_time = s->robbins_monro_time;
+    adaptation.forgetting_time = s->forgetting_time;
+    return adaptation;
+}

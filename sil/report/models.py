@@ -1,0 +1,96 @@
+"""What a reader is told of the estimator's model, and of a truth that is of another kind."""
+
+from .run import Run
+
+ABOUT_MODEL = {
+    "linear_physical": "In this run the estimator knows nothing of the lever's geometry. It takes arm and lever "
+    "together for a mass m on a spring k with a damper c, shaken by the floor, the angle for a distance and the torque "
+    "for a force: θ̈ = −(k/m) θ − (c/m) θ̇ + z̈ + τ<sub>m</sub>/m.",
+    "linear_black_box": "In this run the estimator asks for no mass, damping or stiffness, but for the three numbers "
+    "of any second-order system, θ̈ = a<sub>21</sub> θ + a<sub>22</sub> θ̇ + b<sub>21</sub> z̈. Natural frequency and "
+    "damping ratio follow from the first two.",
+}
+PARAMETERS = {
+    "lever": "Mass, damping and stiffness of the pilot's arm",
+    "linear_physical": "Mass, damping and stiffness that the linear model needs to move as the lever does",
+    "linear_black_box": "The three coefficients of a second-order system that moves as the lever does",
+}
+ABOUT_TRUTH = {
+    "lever": "a rigid lever with the arm as mass, damper and spring at its end",
+    "linear_physical": "a mass on a spring and a damper",
+    "linear_black_box": "a linear second-order system",
+    "two_dof": "the arm hangs on a trunk that gives way on its seat, so that two masses swing",
+    "mayo": "a hand that follows the cabin as Mayo (1989) measured it on people, by a transfer function",
+}
+"""Every model of [pilot]."""
+DYNAMICS = {
+    "two_dof": "The truth is the one of its two modes that answers more between 2 and 8 Hz.",
+    "mayo": "The truth is that of the poles of the hand's transfer function.",
+}
+"""What the true natural frequency is, where the truth has more than one mode or none of its own."""
+
+
+def about(run: Run) -> list[str]:
+    """Sentences, as HTML, on what is special in this run's model and truth; none for the lever."""
+    told = [ABOUT_MODEL[run.model]] if run.model in ABOUT_MODEL else []
+    if run.mismatch is not None:
+        told.append(
+            f"<strong>The truth of this run is of another kind:</strong> {ABOUT_TRUTH[run.mismatch]}. The "
+            "parameters of the estimator's model have no true values then; what can be compared are natural frequency "
+            "and damping ratio, the answer to the floor, and whether the innovations are still noise."
+        )
+    return told
+
+
+def parameters_caption(run: Run) -> str:
+    """What the chart of the parameters shows."""
+    shown = f"{PARAMETERS[run.model]}, with a band of ±2σ"
+    if run.mismatch is not None:
+        return (
+            f"{shown}. There is no truth to hold them against: the pilot of this run is not of this kind, and these "
+            "are the values with which the model imitates him."
+        )
+    if not run.has_truth:
+        return f"{shown}."
+    return f"{shown}: the blue line should follow the dashed one, and the band hold it about 95 % of the time."
+
+
+def dynamics_caption(run: Run) -> str:
+    """What the chart of natural frequency and damping ratio shows."""
+    told = [
+        "What decides about collective bounce: how fast arm and lever swing by themselves, and how quickly that dies "
+        "out (a damping ratio of 1 is no swing at all)."
+    ]
+    if _has_scale(run):
+        told.append("Both are usually known better than the three parameters, whose common scale cancels in them.")
+    if run.mismatch in DYNAMICS:
+        told.append(DYNAMICS[run.mismatch])
+    return " ".join(told)
+
+
+def excitation_caption(run: Run) -> str:
+    """What the chart of the excitation shows."""
+    told = ["What shakes the lever. Without motion there is nothing to learn from."]
+    if _has_scale(run):
+        told.append(
+            "Without motor torque only ratios of the three parameters can be told, and the bands above must be wide."
+        )
+    return " ".join(told)
+
+
+def _has_scale(run: Run) -> bool:
+    """Whether the parameters have a common scale that base motion alone does not tell."""
+    return run.model != "linear_black_box"
+
+
+def whiteness_caption(run: Run) -> str:
+    """What the chart of the autocorrelation shows."""
+    told = run.whiteness
+    found = ""
+    if told is not None:
+        found = " Here it is noise." if told["white"] else " Here it is not: the arm, or a sensor, is not as assumed."
+    return (
+        "Is what is left over only noise? Measured minus estimated rate, averaged over 20 ms, and how alike it is to "
+        "itself so much later. Noise stays about the band; bars beyond 0.2 mean that something moves the lever in a "
+        f"way that the model does not know.{found}"
+    )
