@@ -1,0 +1,205 @@
+"""The scores against scipy's distributions, Monte Carlo, and curves drawn by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.sil.study import scores
+from lever_cdkf.sil.study.data import Estimates
+from lever_cdkf.sil.study.matched import Condition, matched
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[Any]  # of floats
+
+
+def random_covariance(rng: np.random.Generator) -> Array:
+    root = np.tril(rng.standard_normal((3, 3))) + 2.0 * np.eye(3)
+    covariance: Array = 1e-3 * root @ root.T
+    return covariance
+
+
+def correlated(rng: np.random.Generator, runs: int, times: int, memory: float) -> Array:
+    """(runs, times) standard normal values, each correlated by `memory` with the one before."""
+    white = rng.standard_normal((runs, times))
+    for k in range(1, times):
+        white[:, k] = memory * white[:, k - 1] + np.sqrt(1.0 - memory**2) * white[:, k]
+    return white
+
+
+# --- errors and the bound --------------------------------------------------------------------------------------------
+
+
+def test_errors_are_those_of_w_and_relative_ones_of_the_dynamics() -> None:
+    """Of an arm without a lever, whose frequency goes with √(k/m) and whose damping ratio with c/√(k m)."""
+    settings = {"lever_mass": 0.01, "lever_inertia": 0.0, "lever_damping": 0.0, "lever_stiffness": 0.0}
+    batch = matched(Condition(settings=settings), 3, 0.5, 1)
+    assert batch.truth.p is not None
+    at = np.array([10, 400])
+    w = np.log(batch.truth.p[:, at] / batch.knowledge.guess)
+    wrong = np.array([0.0, 0.2, np.log(1.1)])
+    found = scores.errors(batch, Estimates(at, w + wrong, None))
+    np.testing.assert_allclose(found[..., :3], np.broadcast_to(wrong, (3, 2, 3)), atol=1e-12)
+    np.testing.assert_allclose(found[..., 3], np.sqrt(1.1) - 1.0, rtol=1e-9)
+    np.testing.assert_allclose(found[..., 4], np.exp(0.2) / np.sqrt(1.1) - 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("preload", ["fixed", "trim"])
+def test_the_truth_has_no_errors(preload: str) -> None:
+    batch = matched(Condition(preload=preload), 2, 0.5, 1)
+    assert batch.truth.p is not None
+    at = np.arange(0, 500, 50)
+    w = batch.knowledge.scaled(batch.truth.p[:, at])
+    np.testing.assert_allclose(scores.errors(batch, Estimates(at, w, None)), 0.0, atol=1e-12)
+
+
+def test_of_a_truth_outside_the_model_only_the_dynamics_are_judged() -> None:
+    batch = matched(Condition(), 2, 0.5, 1)
+    batch = dataclasses.replace(batch, truth=dataclasses.replace(batch.truth, p=None))
+    found = scores.errors(batch, Estimates(np.array([3]), np.zeros((2, 1, 3)), None))
+    assert np.isnan(found[..., :3]).all()
+    assert np.isfinite(found[..., 3:]).all()
+
+
+def test_rms_and_ratio_of_numbers_made_by_hand() -> None:
+    deviations = np.array([[[3.0, 1.0], [-4.0, 1.0]], [[0.0, -1.0], [5.0, 1.0]]])  # mean squares 12.5, 1
+    variances = np.array([[[2.0, 4.0], [4.0, 4.0]], [[1.0, 4.0], [5.5, 4.0]]])  # means 3.125, 4
+    np.testing.assert_allclose(scores.rms(deviations), [np.sqrt(12.5), 1.0])
+    np.testing.assert_allclose(scores.ratio(deviations, variances), [2.0, 0.5])
+    np.testing.assert_allclose(scores.honesty(deviations, variances), [0.5, 2.0])
+
+
+def test_two_estimators_are_told_apart_more_finely_than_one_from_the_bound() -> None:
+    rng = np.random.default_rng(4)
+    good, other = (correlated(rng, 40, 100, 0.9)[..., None] for _ in range(2))
+    worse = good + 0.3 * other
+    pair = scores.ratio_spread(worse, np.square(good), seed=1)[0]
+    assert scores.ratio(worse, np.square(good))[0] == pytest.approx(np.sqrt(1.09), abs=3.3 * pair)
+    assert pair < 0.6 * scores.ratio_spread(worse, np.ones_like(good), seed=1)[0]
+
+
+def test_an_error_that_is_not_a_number_is_not_hidden() -> None:
+    deviations = np.ones((4, 5, 2))
+    deviations[1, 3:, 0] = np.nan
+    found = scores.ratio(deviations, np.ones((4, 5, 2)))
+    assert np.isnan(found[0])
+    assert found[1] == 1.0
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.98])
+def test_spread_of_the_ratio_is_that_of_many_experiments(memory: float) -> None:
+    """40 runs whose errors are correlated in time, and of unlike size: 400 experiments against one's own opinion."""
+    rng = np.random.default_rng(3)
+    size = np.linspace(0.5, 1.5, 40)[:, None]
+    ratios, opinions = [], []
+    for experiment in range(400):
+        deviations = (size * correlated(rng, 40, 100, memory))[..., None]
+        variances = np.broadcast_to(size**2, (40, 100))[..., None]
+        ratios.append(scores.ratio(deviations, variances)[0])
+        opinions.append(scores.ratio_spread(deviations, variances, seed=experiment, draws=300)[0])
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.02)
+    assert np.mean(opinions) == pytest.approx(np.std(ratios), rel=0.15)
+
+
+# --- honesty ---------------------------------------------------------------------------------------------------------
+
+
+def test_normalised_squares_of_honest_errors_are_chi_square() -> None:
+    rng = np.random.default_rng(5)
+    covariance = np.stack([[random_covariance(rng) for _ in range(50)] for _ in range(40)])
+    deviations = np.einsum("btij,btj->bti", np.linalg.cholesky(covariance), rng.standard_normal((40, 50, 3)))
+    squares = scores.normalised_squares(deviations, covariance)
+    assert squares.shape == (40, 50)
+    assert stats.kstest(squares.ravel(), stats.chi2(3).cdf).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 4, 40, 60, 61, 120, 300, 2001])
+def test_chi_square_band_is_scipys(freedom: int) -> None:
+    expected = stats.chi2.ppf((0.025, 0.975), freedom)
+    np.testing.assert_allclose(scores.chi_square_band(freedom), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("freedom", [3, 4, 7, 19, 39, 200])
+def test_students_t_is_scipys(freedom: int) -> None:
+    assert scores.student_95(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=2e-3)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.95])
+@pytest.mark.parametrize("freedom", [2, 3])
+def test_an_honest_filter_is_found_consistent_in_95_of_100_batches(freedom: int, memory: float) -> None:
+    """Exact chi-square, white or correlated over a tenth of the run: 600 batches of 20 runs."""
+    rng = np.random.default_rng(7)
+    normal = np.stack([correlated(rng, 600 * 20, 200, memory) for _ in range(freedom)])
+    batches = np.sum(np.square(normal), axis=0).reshape(600, 20, 200)
+    found = [scores.consistency(squares, freedom) for squares in batches]
+    assert all(one.expected == freedom for one in found)
+    share = np.mean([one.consistent for one in found])
+    assert share == pytest.approx(
+        0.95, abs=3.3 * np.sqrt(0.95 * 0.05 / 600) + 0.01
+    )  # 0.01: their means are no Gaussians
+    inside = np.mean([one.inside for one in found])
+    spread = np.std([one.inside for one in found]) / np.sqrt(600)
+    assert inside == pytest.approx(0.95, abs=3.3 * spread)
+    assert np.mean([one.mean for one in found]) == pytest.approx(freedom, rel=0.01)
+
+
+@pytest.mark.parametrize("runs", [4, 20])
+def test_the_band_of_the_mean_is_students(runs: int) -> None:
+    """Rejection of `freedom` as the mean of the runs' means: scipy's t test."""
+    squares = np.random.default_rng(runs).chisquare(3, (runs, 10))
+    found = scores.consistency(squares, 3)
+    interval = stats.ttest_1samp(squares.mean(axis=1), 3.0).confidence_interval(0.95)
+    np.testing.assert_allclose(np.diff(found.mean_band), interval.high - interval.low, rtol=2e-3)
+    assert sum(found.mean_band) / 2.0 == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("claim", [0.8, 1.25])
+def test_a_filter_that_lies_about_its_sigma_is_found_out(claim: float) -> None:
+    rng = np.random.default_rng(9)
+    normal = np.stack([correlated(rng, 40, 400, 0.95) for _ in range(3)], axis=-1)
+    covariance = np.broadcast_to(claim**2 * np.eye(3), (40, 400, 3, 3))
+    found = scores.consistency(scores.normalised_squares(normal, covariance), 3)
+    assert not found.consistent
+    assert found.inside < 0.8
+    assert found.mean == pytest.approx(3.0 / claim**2, rel=0.1)
+    honesty = scores.honesty(normal, np.diagonal(covariance, axis1=-2, axis2=-1))
+    np.testing.assert_allclose(honesty, claim, rtol=0.1)
+
+
+# --- convergence -----------------------------------------------------------------------------------------------------
+
+ELAPSED = np.arange(-2.0, 8.0)  # the change is at index 2
+
+
+@pytest.mark.parametrize(
+    ("relative", "settled"),
+    [
+        ([0, 0, 0.30, 0.20, 0.05, 0.04, 0.03, 0.02, 0.01, 0.01], 2.0),  # the limit itself is inside
+        ([0, 0, 0.30, -0.04, 0.04, 0.06, 0.03, 0.02, 0.01, 0.01], 4.0),  # out once more
+        ([0, 0, 0.30, -0.20, -0.06, -0.05, 0, 0, 0, 0], 3.0),  # from below
+        ([9, 9, 0.01, 0.01, 0.02, 0.01, 0.00, 0.01, 0.01, 0.01], 0.0),  # at once; what was before does not count
+        ([0, 0, 0.30, 0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.06], np.nan),  # out at the end
+        ([0, 0, 0.30, 0.04, 0.04, np.nan, 0.04, 0.04, 0.04, 0.01], 4.0),  # a time without an estimate
+        ([0, 0, 0.30, 0.04, 0.04, 0.04, 0.04, np.nan, np.nan, np.nan], np.nan),  # broken down
+    ],
+)
+def test_settling_time(relative: list[float], settled: float) -> None:
+    both = np.array([relative, np.full(10, 0.5)])
+    np.testing.assert_array_equal(scores.settling_times(both, ELAPSED), [settled, np.nan])
+
+
+def test_settling_time_within_another_limit() -> None:
+    decay = np.exp(-np.arange(0.0, 5.0, 1e-3))[None]
+    found = scores.settling_times(decay, np.arange(0.0, 5.0, 1e-3), within=0.1)
+    assert found[0] == pytest.approx(np.log(10.0), abs=1e-3)
+
+
+def test_median_and_worst() -> None:
+    assert scores.median_and_worst(np.array([1.0, 4.0, 2.0])) == (2.0, 4.0)
+    median, worst = scores.median_and_worst(np.array([1.0, np.nan, 2.0]))
+    assert median == 2.0
+    assert np.isnan(worst)
+    assert np.isnan(scores.median_and_worst(np.array([1.0, np.nan, np.nan]))[0])
