@@ -1,0 +1,71 @@
+"""What the firmware's filter is compared with: other people's estimators, each as published and fairly tuned.
+
+All are `data.Estimator`: they get a batch of runs and report at samples. A new one is a module with its source at the
+top and a line in BASELINES; nothing else knows them by name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..data import Estimator, Model
+from .algorithm1 import Algorithm1
+from .balance import MODELS as LINEAR_IN_COEFFICIENTS
+from .dual_ekf import dual_ekf
+from .filterpy_ukf import FilterPyUkf
+from .joint_ekf import joint_ekf
+from .lms import Nlms
+from .rls import Rls
+
+__all__ = ["BASELINES", "Baseline"]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """An estimator with what a table says of it."""
+
+    name: str
+    title: str
+    source: str
+    run: Estimator
+    models: tuple[type, ...] = (object,)
+    """The classes of models that it can be used with; by default any."""
+
+    def handles(self, model: Model) -> bool:
+        """Whether it can be used with a model."""
+        return isinstance(model, self.models)
+
+
+BASELINES = {
+    baseline.name: baseline
+    for baseline in (
+        Baseline(
+            "algorithm1",
+            "sigma-point parameter filter from the measured state, full covariance, one sample ahead",
+            "van der Merwe 2004",
+            Algorithm1(),
+        ),
+        Baseline(
+            "algorithm1_ahead",
+            "the same, 30 ms ahead",
+            "van der Merwe 2004",
+            Algorithm1(ahead=0.03),
+        ),
+        Baseline(
+            "dual_ekf",
+            "dual extended Kalman filter with recurrent derivatives",
+            "Wan and Nelson 2001, Nelson 2000",
+            dual_ekf,
+        ),
+        Baseline("joint_ekf", "joint extended Kalman filter", "Kopp and Orford 1963, Jazwinski 1970", joint_ekf),
+        Baseline(
+            "rls",
+            "recursive least squares with exponential forgetting",
+            "Ljung and Söderström 1983",
+            Rls(),
+            LINEAR_IN_COEFFICIENTS,
+        ),
+        Baseline("lms", "normalised least mean squares", "Elliott 2001", Nlms(), LINEAR_IN_COEFFICIENTS),
+        Baseline("filterpy_ukf", "joint unscented Kalman filter, off the shelf", "FilterPy (Labbe)", FilterPyUkf()),
+    )
+}

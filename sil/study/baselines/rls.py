@@ -1,0 +1,50 @@
+"""Recursive least squares with exponential forgetting, on the model as a linear regression (regression.py).
+
+Source: L. Ljung, T. Söderström, "Theory and practice of recursive identification", MIT Press (1983), ch. 2;
+K. J. Åström, B. Wittenmark, "Adaptive control", Addison-Wesley (1995), ch. 2. With t = φᵀ q for each window:
+
+    K = P φ / (λ r + φᵀ P φ);  q = q + K (t - φᵀ q);  P = (P - K φᵀ P) / λ,  λ = exp(-window / forgetting)
+
+P / r is what is usually called P; so scaled it is the covariance of q as far as least squares knows: it takes the
+noise for white and the parameters for constant. As its users would: started with what is known of the parameters, no
+remedy against wind-up, and the defaults the best (within 5 %, error of m_p, c_p, k_p) of windows of 5 to 60 ms,
+forgetting of 0.5 to 20 s and corners of 0 to 1 Hz, for both preloads, on 20 runs of 30 s of a lever whose parameters
+walk by 1, 2, 2 % per √s, shaken by 0.1 g and 0.3 N m.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import PARAMETERS, Batch, Estimates
+from .recursion import repeated
+from .regression import equations
+
+
+@dataclass(frozen=True)
+class Rls:
+    """Learns once in `window` [s] from what is faster than `corner` [Hz]; what is `forgetting` [s] old counts 1/e."""
+
+    window: float = 0.02
+    forgetting: float = 8.0
+    corner: float = 1.0
+
+    def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
+        data = equations(batch, self.window, self.corner)
+        forget = math.exp(-data.period / self.forgetting)
+        shape = (batch.runs, len(data.ends) + 1)
+        q, covariance = np.empty((*shape, PARAMETERS)), np.empty((*shape, PARAMETERS, PARAMETERS))
+        q[:, 0], covariance[:, 0] = (repeated(known, batch.runs) for known in data.first_guess(batch.knowledge))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for j in range(len(data.ends)):
+                phi, p = data.regressors[:, j], covariance[:, j]
+                cross = (p @ phi[:, :, np.newaxis])[:, :, 0]
+                error = data.target[:, j] - (phi * q[:, j]).sum(axis=1)
+                k = cross / (forget * data.variance + (phi * cross).sum(axis=1))[:, np.newaxis]
+                q[:, j + 1] = q[:, j] + k * error[:, np.newaxis]
+                covariance[:, j + 1] = (p - k[:, :, np.newaxis] * cross[:, np.newaxis]) / forget
+        return data.estimates(at, batch.knowledge, q, covariance)
