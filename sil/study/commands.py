@@ -1,0 +1,152 @@
+"""`lever compare`."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.files import make_folder
+from lever_cdkf.host_tools.progress import Progress
+from lever_cdkf.host_tools.tables import Row, add_json_option
+
+_DESCRIPTION = """\
+Runs the firmware's estimators and other people's on the same data and says who is best where: errors, errors against
+the least that is possible (posterior Cramér-Rao bound), honesty of the stated uncertainty (NEES, NIS), time to follow a
+step, time a step takes. Cases are matched random walks, sudden changes of the pilot's grip, wrong settings of the
+noise, and the scenarios of `lever sim`. With --out also writes into DIR
+
+  compare.csv   every figure of every estimator in every case
+  compare.html  verdicts, figures and tables as one page for a browser
+"""
+_EPILOG = """\
+examples:
+  lever compare --list
+  lever compare --quick --out out/quick
+  lever compare --scenarios step_up step_down --seeds 20
+  lever compare --models lever --estimators dual joint joint_ekf --seeds 20 --out out/lever
+  lever compare --out out/compare                the whole campaign, half an hour on two cores
+
+Times of steps are processor times, batched over runs for the baselines: compare them as ratios, and with care.
+"""
+_QUICK_CASES = ("lever_fixed_dither_rough", "linear_black_box_trim_base_rough", "step_up", "steady")
+_QUICK_SEEDS, _QUICK_DURATION, _SEEDS = 4, 12.0, 40
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    compare = subparsers.add_parser(
+        "compare", help="compare all estimators on the same data", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    compare.add_argument("--list", action="store_true", help="print cases and estimators, and stop")
+    compare.add_argument("--scenarios", nargs="+", metavar="NAME", help="cases of --list (default: all)")
+    compare.add_argument("--models", nargs="+", metavar="MODEL", help="only cases of these models (default: all)")
+    compare.add_argument("--estimators", nargs="+", metavar="NAME", help="estimators of --list (default: all)")
+    compare.add_argument("--seeds", type=int, metavar="N", help=f"runs of each case (default: {_SEEDS})")
+    compare.add_argument("--seed", type=int, default=1, help="seed of the first (default: %(default)s)")
+    compare.add_argument("--duration", type=float, metavar="SECONDS", help="of each run (default: each case's own)")
+    compare.add_argument(
+        "--quick", action="store_true", help=f"a few cases, {_QUICK_SEEDS} runs of {_QUICK_DURATION:g} s: a taste"
+    )
+    compare.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one a core)")
+    compare.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    add_json_option(compare)
+    compare.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """`lever compare`."""
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from .compare import campaign, judgement, table, words
+    from .compare.cases import Plan
+
+    if args.list:
+        print_tables(_listed(), args.json)
+        return 0
+    names, estimators = _cases(args), _estimators(args)
+    seeds = args.seeds if args.seeds is not None else (_QUICK_SEEDS if args.quick else _SEEDS)
+    duration = args.duration if args.duration is not None else (_QUICK_DURATION if args.quick else None)
+    _check(seeds, duration, args.jobs)
+    todo = campaign.tasks(names, estimators, Plan(seeds, duration, args.seed))
+    if not todo:
+        raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
+    if args.out is not None:
+        make_folder(args.out)  # before a campaign that could then not be kept
+    with Progress("compare") as progress:
+        results = campaign.run(todo, args.jobs, progress.show)
+    rows = judgement.judge(results)
+    claims, verdicts = words.claims(rows) if results.plan.is_whole else [], words.verdicts(rows)
+    tables = table.tables(rows, claims)
+    print_tables(tables, args.json)
+    for case, verdict in verdicts.items():
+        print(f"{case}: {verdict}")
+    if args.out is not None:
+        from lever_cdkf.host_tools.files import write_text
+
+        from .compare import page
+
+        write_text(args.out / "compare.csv", table.csv_text(rows))
+        write_text(args.out / "compare.html", page.build(results, rows, verdicts, claims, tables))
+        print(f"Written to {args.out}: compare.html, compare.csv")
+    return 0
+
+
+def _listed() -> dict[str, list[Row]]:
+    from .compare.cases import cases
+    from .compare.entrants import entrants
+
+    found = {entrant.name: entrant for case in cases().values() for entrant in entrants(case).values()}
+    return {
+        "cases": [{"name": case.name, "duration [s]": case.duration, "title": case.title} for case in cases().values()],
+        "estimators": [{"name": entrant.name, "title": entrant.title} for entrant in found.values()],
+    }
+
+
+def _cases(args: argparse.Namespace) -> list[str]:
+    from .compare.cases import cases
+
+    chosen = args.scenarios or (_QUICK_CASES if args.quick else cases())
+    _known("scenario", chosen, cases())
+    models = {case.model for case in cases().values()}
+    _known("model", args.models or (), models)
+    return [name for name in chosen if not args.models or cases()[name].model in args.models]
+
+
+def _estimators(args: argparse.Namespace) -> list[str]:
+    from .compare.cases import cases
+    from .compare.entrants import FEW, entrants, without_package
+
+    names = list(dict.fromkeys(name for case in cases().values() for name in entrants(case)))
+    _known("estimator", args.estimators or (), names)
+    if args.estimators:
+        return list(args.estimators)
+    left_out = set(FEW) if args.quick else set()
+    for name, package in without_package().items():
+        if name not in left_out:
+            print(f"lever: compare: without {name}; for that: pip install {package}", file=sys.stderr)
+        left_out.add(name)
+    return [name for name in names if name not in left_out]
+
+
+def _known(what: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raises LeverError for the first name that is not known."""
+    there: Sequence[str] = list(known)
+    for name in names:
+        if name not in there:
+            near = difflib.get_close_matches(name, there, n=1)
+            hint = f"did you mean {near[0]}?" if near else "`lever compare --list` lists them all"
+            raise LeverError(f"no {what} {name!r}; {hint}")
+
+
+def _check(seeds: int, duration: float | None, jobs: int) -> None:
+    if seeds < 1:
+        raise LeverError(f"--seeds {seeds}: must be at least 1")
+    if jobs < 1:
+        raise LeverError(f"--jobs {jobs}: must be at least 1")
+    if duration is not None and not 1.0 <= duration <= 3600.0:
+        raise LeverError(f"--duration {duration:g}: must be from 1 to 3600 s")

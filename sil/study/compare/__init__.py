@@ -1,0 +1,9 @@
+"""`lever compare`: every estimator on the same data, judged alike.
+
+cases.py      what is run: matched walks, steps, wrong noise, recorded scenarios, in one registry
+entrants.py   who runs: the firmware in several configurations, and the baselines
+campaign.py   runs them, in processes, and brings back errors
+judgement.py  makes one row of figures of each
+words.py      says who wins where, and whether what was promised is kept
+table.py      rows as tables and as CSV;  page.py, charts.py: as a page for a browser
+"""

@@ -1,0 +1,158 @@
+"""Runs entrants on cases, in processes, and brings back their errors. Nothing is kept on disk.
+
+A task is a case with an entrant, or with nobody: that is the bound. Tasks go case by case, so each process makes the
+batch of a case once and keeps it until the next.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import time as clock
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...oracle.cdkf import Array
+from ..bound import dynamics_variances
+from ..data import PARAMETERS, Batch, Estimates
+from ..scores import errors, normalised_squares
+from .cases import Case, Matched, Plan, cases
+from .entrants import entrants
+
+Progress = Callable[[int, int, str], None]
+"""Called after each task: how many are done, of how many, and what the last one was."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an entrant did in a case: B runs, T times."""
+
+    time: Array
+    """(T,) [s]"""
+    errors: Array
+    """(B, T, 5) as scores.errors."""
+    relative: Array
+    """(B, T, 5) the same relative to the truth, also for signed parameters."""
+    stated: Array | None
+    """(B, T, 5) variances that the estimator states of the errors."""
+    nees: Array | None
+    """(B, T) of the parameters."""
+    nis: Array | None
+    """(B, T)"""
+    seconds: float
+    """Processor time of all runs."""
+    steps: int
+    """Samples of all runs."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """All there is of a campaign."""
+
+    plan: Plan
+    outcomes: dict[tuple[str, str], Outcome]
+    """By names of case and entrant."""
+    least: dict[str, Array]
+    """Bounds by name of case, (B, T, 5), where there is one."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a process is asked for."""
+
+    case: str
+    entrant: str | None
+    """None: the bound."""
+    plan: Plan
+
+    def __str__(self) -> str:
+        return f"{self.case}: {self.entrant or 'bound'}"
+
+
+def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> list[Task]:
+    """Those of the cases `chosen`, for the entrants `names` (None: all there are)."""
+    wanted = None if names is None else set(names)
+    found = []
+    for name in chosen:
+        case = cases()[name]
+        taking = [entrant for entrant in entrants(case) if wanted is None or entrant in wanted]
+        bound = [None] if taking and isinstance(case, Matched) else []
+        found += [Task(name, entrant, plan) for entrant in (*bound, *taking)]
+    return found
+
+
+def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Results:
+    """Does all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
+    results = Results(todo[0].plan, {}, {})
+    for done, (task, result) in enumerate(_results(todo, jobs), 1):
+        if isinstance(result, Outcome):
+            results.outcomes[task.case, task.entrant or ""] = result
+        elif result is not None:
+            results.least[task.case] = result
+        if progress is not None:
+            progress(done, len(todo), str(task))
+    return results
+
+
+def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, Outcome | Array | None]]:
+    if jobs == 1 or len(todo) == 1:
+        yield from map(do, todo)
+        return
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(min(jobs, len(todo)), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        yield from pool.imap_unordered(do, todo)
+
+
+def do(task: Task) -> tuple[Task, Outcome | Array | None]:
+    """One task."""
+    case = cases()[task.case]
+    batch = _batch(task.case, task.plan)
+    at = samples(case, batch)
+    if task.entrant is None:
+        return task, case.least(batch, at, task.plan)
+    entrant = entrants(case)[task.entrant]
+    share, estimator = entrant.share(batch), entrant.make(case)
+    start = clock.process_time()
+    estimates = estimator(share, at)
+    return task, outcome(share, estimates, clock.process_time() - start)
+
+
+@lru_cache(maxsize=1)
+def _batch(case: str, plan: Plan) -> Batch:
+    return cases()[case].batch(plan)
+
+
+def samples(case: Case, batch: Batch) -> NDArray[np.int64]:
+    """Indices of the samples at which estimates are looked at."""
+    step = max(1, round(case.every / batch.period))
+    return np.arange(step, batch.samples, step, dtype=np.int64)
+
+
+def outcome(batch: Batch, estimates: Estimates, seconds: float) -> Outcome:
+    """Of what an estimator made of a batch."""
+    at = estimates.at
+    with np.errstate(all="ignore"):  # of runs that broke down
+        deviations = errors(batch, estimates)
+        relative = deviations.copy()
+        if not batch.knowledge.positive and batch.truth.p is not None:
+            relative[..., :PARAMETERS] *= batch.knowledge.sigma / np.abs(batch.truth.p[:, at])
+        stated, nees = _stated(batch, estimates, deviations)
+    steps = batch.runs * batch.samples
+    return Outcome(at * batch.period, deviations, relative, stated, nees, estimates.nis, seconds, steps)
+
+
+def _stated(batch: Batch, estimates: Estimates, deviations: Array) -> tuple[Array | None, Array | None]:
+    """Variances (B, T, 5) and NEES of the parameters (B, T), where the estimator and the truth tell them."""
+    if estimates.covariance is None or batch.truth.p is None:
+        return None, None
+    own = np.diagonal(estimates.covariance, axis1=-2, axis2=-1)
+    dynamics = dynamics_variances(batch, estimates.at, estimates.w, estimates.covariance)
+    stated = np.concatenate((own, dynamics), axis=-1)
+    intact = np.isfinite(own).all(axis=-1) & (own > 0.0).all(axis=-1)
+    covariance = np.where(intact[..., None, None], estimates.covariance, np.eye(PARAMETERS))
+    squares = normalised_squares(deviations[..., :PARAMETERS], covariance)
+    return stated, np.where(intact, squares, np.nan)

@@ -1,0 +1,147 @@
+"""Who is compared: the firmware's estimators as they can be set up, and the baselines.
+
+The firmware's are `ours`. Names: dual and joint are told the true noise and adapt nothing; *_shipped have every default
+but what is known beforehand (the first guess, the lever); *_no_change are the same without change detection; *_r…_q…
+are shipped, too, and told a measurement noise (r) and a process noise (q) wrong by a factor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+
+from lever_cdkf.host_tools.config import settings_table
+
+from ..baselines import BASELINES
+from ..data import Batch, Estimator, Truth
+from ..firmware import Firmware
+from ..matched import KINDS
+from .cases import Case
+
+OURS = ("dual", "joint")
+_FACTORS = {"0.1": 0.1, "1": 1.0, "10": 10.0}
+FEW = {"filterpy_ukf": 2}
+"""Most runs of estimators that take a minute for each; they take part in a few cases only (Case.slow_too)."""
+_PACKAGES = {"filterpy_ukf": "filterpy"}
+
+
+def without_package() -> dict[str, str]:
+    """Estimators of a package that is not installed, with its name."""
+    return {name: package for name, package in _PACKAGES.items() if find_spec(package) is None}
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """An estimator in the setting of a case."""
+
+    name: str
+    title: str
+    ours: bool
+    make: Callable[[Case], Estimator]
+    few: int | None = None
+    """Most runs it gets; None: all."""
+    reference: str = ""
+    """The entrant against which errors are told besides."""
+
+    def share(self, batch: Batch) -> Batch:
+        """The part of the batch that it gets."""
+        return batch if self.few is None else first_runs(batch, self.few)
+
+
+def first_runs(batch: Batch, runs: int) -> Batch:
+    """The batch of the first runs of another."""
+    part, truth = slice(runs), batch.truth
+    return replace(
+        batch,
+        y=batch.y[part],
+        u=batch.u[part],
+        trim=batch.trim[part],
+        raw_y=batch.raw_y[part],
+        raw_u=batch.raw_u[part],
+        truth=Truth(truth.x[part], None if truth.p is None else truth.p[part], truth.dynamics[part]),
+    )
+
+
+def entrants(case: Case) -> dict[str, Entrant]:
+    """Those of a case, by name, ours first."""
+    if case.kind == "wrong noise":
+        chosen = _told() + _wrong()
+    elif case.kind == "matched":
+        chosen = _told() + _shipped() + _baselines(case)
+    else:
+        chosen = _shipped() + _no_change() + _baselines(case)
+    return {entrant.name: entrant for entrant in chosen}
+
+
+def _told() -> list[Entrant]:
+    def maker(estimator: str) -> Callable[[Case], Estimator]:
+        def make(case: Case) -> Estimator:
+            align = {"align_time": 0.0} if case.preload == "fixed" else {}
+            still = {"change_threshold": 0.0, "noise_window": 0.0, **align}
+            return Firmware(case.model, case.preload, estimator, "fixed", {**case.known, **case.noise, **still})
+
+        return make
+
+    return [Entrant(name, f"firmware, {name}, told the noise", True, maker(name)) for name in OURS]
+
+
+def _with(estimator: str, settings: Mapping[str, float]) -> Callable[[Case], Estimator]:
+    """The shipped firmware but for `settings`."""
+    return lambda case: Firmware(case.model, case.preload, estimator, settings={**case.known, **settings})
+
+
+def _shipped() -> list[Entrant]:
+    return [
+        Entrant(
+            f"{name}_shipped",
+            f"firmware, {name}, as shipped",
+            True,
+            _with(name, {}),
+            reference=f"{name}_no_change",
+        )
+        for name in OURS
+    ]
+
+
+def _no_change() -> list[Entrant]:
+    still = {"change_threshold": 0.0}
+    return [
+        Entrant(f"{name}_no_change", f"firmware, {name}, without change detection", True, _with(name, still))
+        for name in OURS
+    ]
+
+
+def _wrong() -> list[Entrant]:
+    defaults = {row.name: row.default for row in settings_table()}
+
+    def told(r: float, q: float) -> dict[str, float]:
+        factors = {"theta_noise": r, "theta_dot_noise": r, "theta_dot_process_noise": q}
+        return {name: factor * defaults[name] for name, factor in factors.items()}
+
+    return [
+        Entrant(
+            f"{name}_r{r}_q{q}",
+            f"firmware, {name}, as shipped, R × {r}, Q × {q}",
+            True,
+            _with(name, told(r_factor, q_factor)),
+            reference=name,
+        )
+        for name in OURS
+        for r, r_factor in _FACTORS.items()
+        for q, q_factor in _FACTORS.items()
+    ]
+
+
+def _baselines(case: Case) -> list[Entrant]:
+    settings = {row.name: row.default for row in settings_table()}
+    model = KINDS[case.model].make(settings, case.preload)
+    return [
+        Entrant(name, f"{baseline.title} ({baseline.source})", False, _always(baseline.run), FEW.get(name))
+        for name, baseline in BASELINES.items()
+        if baseline.handles(model) and (name not in FEW or case.slow_too)
+    ]
+
+
+def _always(estimator: Estimator) -> Callable[[Case], Estimator]:
+    return lambda _case: estimator

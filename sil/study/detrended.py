@@ -1,0 +1,41 @@
+"""What is left of measured signals without their slow part, for estimators that do not detrend by themselves.
+
+oracle/detrend.py for all runs at once, started as the firmware does (firmware/app/levels.c): theta from its mean over
+the first moments, everything else from 0. All signals alike: so the deviations obey the same dynamics.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ..oracle.cdkf import Array
+from .data import OUTPUTS, Batch
+
+
+def detrended(batch: Batch, corner: float, align_time: float) -> Batch:
+    """The batch with y, u and trim made of raw_y and raw_u; corner [Hz], theta at first a mean of align_time [s]."""
+    signals = np.concatenate((batch.raw_y, batch.raw_u), axis=2)
+    start = np.zeros((batch.runs, signals.shape[2]))
+    start[:, 0] = batch.raw_y[:, : max(1, round(align_time / batch.period)), 0].mean(axis=1)
+    deviation, level = deviations(signals, start, corner, batch.period)
+    return replace(batch, y=deviation[..., :OUTPUTS], u=deviation[..., OUTPUTS:], trim=level[..., 0])
+
+
+def deviations(signals: Array, start: Array, corner: float, dt: float) -> tuple[Array, Array]:
+    """Deviations of signals (B, K, n) from the levels before each sample, and those levels, both (B, K, n).
+
+    The levels start at `start` (B, n), at rest; corner [Hz], dt [s].
+    """
+    w = 2.0 * math.pi * corner
+    level, slope = start.copy(), np.zeros_like(start)
+    levels = np.empty((signals.shape[1], *start.shape))
+    for k, values in enumerate(np.ascontiguousarray(signals.swapaxes(0, 1))):
+        levels[k] = level
+        deviation = values - level
+        slope += dt * w**2 * deviation
+        level += dt * (slope + math.sqrt(2.0) * w * deviation)
+    levels = np.ascontiguousarray(levels.swapaxes(0, 1))
+    return signals - levels, levels

@@ -1,0 +1,319 @@
+"""`lever compare`: who takes part in what, what is made of it, and how it is said."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import importlib.metadata
+import io
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.native import enum_names
+from lever_cdkf.sil.study import compare
+from lever_cdkf.sil.study.baselines import BASELINES
+from lever_cdkf.sil.study.compare import campaign, judgement, table, words
+from lever_cdkf.sil.study.compare.campaign import Outcome, Results
+from lever_cdkf.sil.study.compare.cases import Plan, cases
+from lever_cdkf.sil.study.compare.entrants import entrants
+from lever_cdkf.sil.study.compare.judgement import Row
+from lever_cdkf.sil.study.data import Batch, Estimates
+from numpy.typing import NDArray
+
+Lever = Callable[..., int]
+
+
+@pytest.fixture
+def lever(monkeypatch: pytest.MonkeyPatch) -> Lever:
+    """lever("compare", …): the exit status. What is installed may be older than this tree and not know the command."""
+    entry = importlib.metadata.EntryPoint("study", "lever_cdkf.sil.study.commands", cli.COMMANDS)
+    others = importlib.metadata.entry_points
+
+    def entry_points(group: str) -> Any:
+        return [entry] if group == cli.COMMANDS else others(group=group)
+
+    monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
+    return lambda *arguments: cli.main(arguments)
+
+
+# --- who takes part ---------------------------------------------------------------------------------------------------
+
+
+def test_every_model_and_estimator_of_the_firmware_is_compared() -> None:
+    walks = [case for case in cases().values() if case.kind == "matched"]
+    for model in enum_names("lever_model").values():
+        for preload in enum_names("lever_preload").values():
+            own = [case for case in walks if (case.model, case.preload) == (model, preload)]
+            assert len({case.noise["theta_dot_process_noise"] for case in own}) >= 2, (model, preload)
+            for case in own:
+                assert entrants(case).keys() >= set(enum_names("lever_estimator").values())
+
+
+def test_every_baseline_takes_part_with_every_model_that_it_handles() -> None:
+    for model in enum_names("lever_model").values():
+        own = [case for case in cases().values() if case.model == model and case.kind == "matched"]
+        there = {name for case in own for name in entrants(case)}
+        known = cases()[own[0].name].batch(Plan(1, 1.0)).model
+        assert there >= {name for name, baseline in BASELINES.items() if baseline.handles(known)}, model
+
+
+def test_told_the_wrong_noise_in_all_combinations() -> None:
+    made = entrants(cases()["wrong_noise_fixed"])
+    combinations = {(r, q) for r in ("0.1", "1", "10") for q in ("0.1", "1", "10")}
+    for name in ("dual", "joint"):
+        assert {f"{name}_r{r}_q{q}" for r, q in combinations} <= made.keys()
+        assert made[f"{name}_r10_q0.1"].reference == name
+
+
+@pytest.mark.parametrize("name", ["lever_fixed_dither_quiet", "lever_trim_base_rough", "wrong_noise_trim", "step_up"])
+def test_the_firmware_takes_the_settings_of_each_entrant(name: str) -> None:
+    case, plan = cases()[name], Plan(1, 1.0)
+    batch = case.batch(plan)
+    at = campaign.samples(case, batch)
+    for entrant in entrants(case).values():
+        if entrant.ours:
+            assert np.isfinite(entrant.make(case)(batch, at).w).all(), entrant.name
+
+
+def test_moments_move_with_the_duration() -> None:
+    case = cases()["step_up"]
+    assert case.change(Plan()) == 25.0
+    assert case.change(Plan(duration=9.0)) == pytest.approx(5.0)
+    time = np.arange(0.5, 45.0, 1.0)
+    assert time[case.judged(time, Plan())].tolist() == [15.5 + i for i in range(10)]
+    grip = cases()["sudden_grip"]
+    judged = grip.judged(np.arange(0.0, 60.0, 0.5), Plan())
+    assert 0 < judged.sum() < len(judged)
+
+
+# --- what is made of it ----------------------------------------------------------------------------------------------
+
+
+def made_up(errors: NDArray[Any], time: NDArray[Any], stated: float = 1.0) -> Outcome:
+    """An outcome with these errors (B, T, 5) and stated variances."""
+    nees = np.sum(np.square(errors[..., :3]), axis=-1) / stated
+    return Outcome(time, errors, errors, np.full_like(errors, stated), nees, None, 2e-3, 1000)
+
+
+def one_row(outcome: Outcome, case: str = "lever_fixed_dither_quiet", least: NDArray[Any] | None = None) -> Row:
+    plan = Plan(len(outcome.errors))
+    results = Results(plan, {(case, "joint"): outcome}, {} if least is None else {case: least})
+    (row,) = judgement.judge(results)
+    return row
+
+
+def test_a_row_of_known_errors() -> None:
+    """Errors twice the bound, drawn with the stated variance: the window of judgement is from 15 s on."""
+    time = np.arange(1.0, 61.0)
+    errors = 0.2 * np.random.default_rng(3).standard_normal((200, 60, 5))
+    errors[:, time < 15.0] = 7.0
+    row = one_row(made_up(errors, time, 0.04), least=np.full_like(errors, 0.01))
+    assert row.rms == pytest.approx([0.2] * 5, rel=0.03)
+    assert row.bound == pytest.approx([2.0] * 5, rel=0.03)
+    assert row.bound_error == pytest.approx([2.0 / math.sqrt(2 * 200 * 46)] * 5, rel=0.3)
+    assert row.honesty == pytest.approx([1.0] * 5, rel=0.03)
+    assert row.nees == pytest.approx(3.0, rel=0.03)
+    assert row.nees_low < 3.0 < row.nees_high
+    assert row.nees_inside > 0.8
+    assert row.score == pytest.approx(0.2, rel=0.03)
+    assert (row.runs, row.failures, row.ranked) == (200, 0, True)
+    assert row.microseconds == pytest.approx(2.0)
+
+
+def test_runs_that_break_down_are_counted_and_left_out() -> None:
+    time = np.arange(1.0, 61.0)
+    errors = np.full((4, 60, 5), 0.1)
+    errors[2, 30:] = np.nan
+    row = one_row(made_up(errors, time))
+    assert (row.runs, row.failures, row.ranked) == (4, 1, False)
+    assert row.rms == pytest.approx([0.1] * 5)
+    row = one_row(made_up(np.full_like(errors, np.nan), time))
+    assert row.failures == 4
+    assert math.isnan(row.score)
+
+
+def test_settling_of_known_errors() -> None:
+    time = np.arange(0.02, 45.0, 0.02)
+    errors = np.zeros((3, len(time), 5))
+    for run, seconds in enumerate((0.5, 1.0, 3.0)):
+        errors[run, (time > 25.0) & (time < 25.0 + seconds), 3] = -0.1
+    errors[:, time < 24.0] = 0.3  # before the step: nothing to do with it
+    outcome = made_up(errors, time)
+    row = judgement.judge(Results(Plan(3), {("step_up", "dual_shipped"): outcome}, {}))[0]
+    assert (row.settled_median, row.settled_worst) == pytest.approx((1.0, 3.0), abs=0.021)
+    errors[1, -1, 3] = 0.1
+    row = judgement.judge(Results(Plan(3), {("step_up", "dual_shipped"): made_up(errors, time)}, {}))[0]
+    assert row.settled_worst == math.inf
+
+
+def test_errors_of_signed_parameters_are_relative_to_the_truth() -> None:
+    batch: Batch = cases()["linear_black_box_fixed_base_quiet"].batch(Plan(2, 1.0))
+    at = np.array([500, 900])
+    assert batch.truth.p is not None
+    w = batch.knowledge.scaled(1.1 * batch.truth.p[:, at])
+    outcome = campaign.outcome(batch, Estimates(at, w, None), 1.0)
+    np.testing.assert_allclose(np.abs(outcome.relative[..., :3]), 0.1, rtol=1e-9)
+
+
+# --- how it is said --------------------------------------------------------------------------------------------------
+
+CASE = "lever_fixed_dither_quiet"
+
+
+def row(estimator: str, score: float, **more: Any) -> Row:
+    five = (score,) * 5
+    known: dict[str, Any] = {"ours": estimator in ("dual", "joint"), "asked": 20, "runs": 20, "failures": 0}
+    known |= {"rms": five, "score": score, "bound": tuple(value / 0.1 for value in five)}
+    return Row(**{"case": CASE, "estimator": estimator} | known | more)
+
+
+def test_winner_and_who_is_as_good() -> None:
+    said = words.verdict([row("dual", 0.108), row("joint", 0.104), row("joint_ekf", 0.1065), row("rls", 0.3)])
+    assert said == "Smallest errors: joint (1.04 × the bound on average); within 3 %: joint_ekf (baseline)."
+
+
+def test_says_so_when_ours_is_not_best() -> None:
+    near = words.verdict([row("joint", 0.102), row("joint_ekf", 0.1)])
+    assert "joint_ekf (baseline) (1.00 × the bound" in near
+    assert near.endswith("Ours is not best, but joint is within 3 %.")
+    far = words.verdict([row("joint", 0.12), row("joint_ekf", 0.1)])
+    assert far.endswith("nobody is within 3 %. Ours is not best: joint has 20 % larger errors.")
+
+
+def test_who_broke_down_or_did_little_is_not_ranked() -> None:
+    said = words.verdict([row("joint", 0.12), row("lms", 0.01, failures=2), row("filterpy_ukf", 0.02, runs=2)])
+    assert said.startswith("Smallest errors: joint")
+    assert "Broke down: lms in 2 of 20 runs." in said
+    assert "not ranked: filterpy_ukf (2 of 20 runs)." in said
+    assert words.verdict([row("lms", 0.1, failures=20)]).startswith("Nobody did all runs.")
+
+
+def test_fastest_after_a_step() -> None:
+    at = {"case": "step_up", "bound": (math.nan,) * 5}
+    said = words.verdict(
+        [
+            row("dual_shipped", 0.02, ours=True, settled_median=0.4, settled_worst=0.9, **at),
+            row("joint_ekf", 0.01, settled_median=1.5, settled_worst=math.inf, **at),
+        ]
+    )
+    assert "joint_ekf (baseline) (natural frequency 1 % rms)" in said
+    fastest = "dual_shipped (median 0.40 s, worst 0.90 s); the fastest baseline, joint_ekf: 1.50 s."
+    assert said.endswith(f"Fastest after the step: {fastest}")
+
+
+def test_claims_take_the_worst_and_say_where() -> None:
+    rows = [row("joint", 0.1), row("joint_ekf", 0.1)]
+    rows[0] = dataclasses.replace(rows[0], bound=(1.0, 1.0, 1.2, 1.0, 1.0), nees=3.2, nees_low=2.5, nees_high=3.5)
+    found = {claim.text: claim for claim in words.claims(rows)}
+    bound = found["joint: error ÷ bound"]
+    assert (bound.measured, bound.where, bound.kept) == (1.2, f"{CASE}, joint, k_p", False)
+    assert bound.kept_in_words == "no"
+    rows[0] = dataclasses.replace(rows[0], bound_error=(0.01, 0.01, 0.06, 0.01, 0.01))
+    assert words.claims(rows)[0].kept_in_words == "no, but within chance"
+    assert found["joint: NEES ÷ its 95 % limit"].kept
+    assert found["joint: error ÷ best baseline's, preload fixed"].measured == 1.0
+    assert found["firmware: runs with NaN or a refused factor"].kept
+    assert found["dual: step followed in, median [s]"].kept is None
+
+
+def test_csv_has_every_figure_with_all_digits() -> None:
+    rows = [row("joint", 1.0 / 3.0, nees=3.1), row("joint_ekf", 0.1, failures=1)]
+    lines = list(csv.DictReader(io.StringIO(table.csv_text(rows))))
+    assert list(lines[0]) == table.columns()
+    for line, original in zip(lines, rows, strict=True):
+        assert (line["case"], line["estimator"]) == (original.case, original.estimator)
+        for field in dataclasses.fields(Row):
+            value = getattr(original, field.name)
+            parts = [cell for name, cell in line.items() if name.startswith(f"{field.name}_") and field.name == "rms"]
+            if field.name == "rms":
+                assert tuple(map(float, parts)) == value
+            elif isinstance(value, float) and not math.isnan(value):
+                assert float(line[field.name]) == value
+    assert lines[0]["model"] == "lever"
+    assert lines[0]["parameters"] == "m_p c_p k_p"
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--scenarios", "step_upp"), "no scenario 'step_upp'; did you mean step_up?"),
+        (("--estimators", "kalman"), "no estimator 'kalman'"),
+        (("--models", "quadratic"), "no model 'quadratic'"),
+        (("--seeds", "0"), "--seeds 0: must be at least 1"),
+        (("--jobs", "0"), "--jobs 0: must be at least 1"),
+        (("--duration", "0.1"), "--duration 0.1: must be from 1 to 3600 s"),
+        (("--scenarios", "steady", "--estimators", "dual_r10_q10"), "none of these estimators takes part"),
+    ],
+)
+def test_what_is_wrong_is_one_line(
+    lever: Lever, arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert lever("compare", *arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert said in captured.err
+    assert captured.err.count("\n") == 1
+
+
+def test_list(lever: Lever, capsys: pytest.CaptureFixture[str]) -> None:
+    assert lever("compare", "--list") == 0
+    out = capsys.readouterr().out
+    assert all(name in out for name in (*cases(), *BASELINES))
+
+
+def test_a_small_campaign(lever: Lever, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two cases in two processes; the same figures as in one process."""
+    chosen = ("--scenarios", "lever_fixed_dither_rough", "step_up", "--estimators", "joint", "dual_shipped", "rls")
+    brief = ("--seeds", "2", "--duration", "3")
+    out, tables = tmp_path / "deep" / "out", tmp_path / "tables.json"
+    assert lever("compare", *chosen, *brief, "--jobs", "2", "--out", str(out), "--json", str(tables)) == 0
+    printed = capsys.readouterr().out
+    assert "lever_fixed_dither_rough: Smallest errors: " in printed
+    assert sorted(path.name for path in out.iterdir()) == ["compare.csv", "compare.html"]
+    lines = list(csv.DictReader(io.StringIO((out / "compare.csv").read_text())))
+    assert len(lines) == 5
+    walk = next(line for line in lines if line["case"].startswith("lever") and line["estimator"] == "joint")
+    assert 0.1 < float(walk["bound_natural_frequency"]) < 10.0
+    page = (out / "compare.html").read_text()
+    figures = json.loads(page.split('<script type="application/json" id="figures">')[1].split("</script>")[0])
+    assert {"bound-lever", "settling-step_up", "following-step_up"} <= figures.keys()
+    assert all(f'id="{key}"' in page for key in figures)
+    assert len(json.loads(tables.read_text())) == 2
+    alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
+    (row,) = judgement.judge(alone)
+    assert float(walk["bound_natural_frequency"]) == row.bound[3]
+
+
+def test_without_filterpy_the_others_run(
+    lever: Lever, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taken: list[str | None] = []
+
+    def noted(todo: list[campaign.Task], *_: object) -> Results:
+        taken.extend(task.entrant for task in todo)
+        return Results(Plan(1), {}, {})
+
+    monkeypatch.setattr(campaign, "run", noted)
+    monkeypatch.setattr(compare.entrants, "find_spec", lambda _: None)
+    assert lever("compare", "--scenarios", "step_up") == 0
+    assert "filterpy_ukf" not in taken
+    assert "joint_ekf" in taken
+    assert "without filterpy_ukf; for that: pip install filterpy" in capsys.readouterr().err
+
+
+def test_interrupted_it_writes_nothing(lever: Lever, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaign, "run", interrupted)
+    assert lever("compare", "--quick", "--out", str(tmp_path)) == 130
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,61 @@
+"""Recorded scenarios: what the bus carried, and what was true, for every estimator alike."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import codec
+from lever_cdkf.sil import scenario
+from lever_cdkf.sil.reading import ScenarioError
+from lever_cdkf.sil.study.recorded import recorded, usable
+
+
+def test_measured_is_the_truth_with_the_noise_of_the_sensors() -> None:
+    batch = recorded("steady", 2, 1, 3.0)
+    assert batch.raw_y.shape == (2, 3000, 2)
+    sensors = scenario.load("steady").sensors
+    noise = batch.raw_y - batch.truth.x
+    for index, sigma in enumerate((sensors.theta.noise, sensors.theta_dot.noise)):
+        assert noise[..., index].std() == pytest.approx(sigma, rel=0.05)
+        assert abs(noise[..., index].mean()) < 5.0 * sigma / np.sqrt(noise[..., index].size)
+    assert not np.array_equal(batch.raw_u[0], batch.raw_u[1]), "each seed shakes the lever in its own way"
+
+
+def test_values_have_passed_the_frames() -> None:
+    batch = recorded("steady", 1, 1, 1.0)
+    scale = codec.message("LEVER_SAMPLE").get_signal_by_name("theta").scale
+    counts = batch.raw_y[..., 0] / float(scale)
+    np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
+
+
+def test_dither_of_the_firmware_is_in_what_was_measured() -> None:
+    dithered, plain = recorded("base_dither", 1, 1, 4.0), recorded("base_only", 1, 1, 4.0)
+    assert dithered.raw_u[0, 2000:, 1].std() > 0.2
+    assert plain.raw_u[0, 2000:, 1].std() < 0.01
+
+
+def test_truth_is_that_of_the_scenario() -> None:
+    batch, steady = recorded("steady", 1, 1, 1.0), scenario.load("steady")
+    assert batch.truth.p is not None
+    truth = steady.truth(steady.time())
+    np.testing.assert_array_equal(batch.truth.p[0, -1], [column[0] for column in truth.parameters.values()])
+
+
+def test_a_pilot_who_is_none_of_the_model_has_dynamics_and_no_parameters() -> None:
+    batch, pilot = recorded("mayo_ectomorphic", 1, 1, 1.0), scenario.load("mayo_ectomorphic")
+    assert batch.truth.p is None
+    np.testing.assert_array_equal(
+        batch.truth.dynamics[0, 0, 0], pilot.truth(pilot.time()).dynamics.natural_frequency[0]
+    )
+
+
+def test_fixed_preload_is_not_detrended() -> None:
+    batch = recorded("fixed_preload", 1, 1, 1.0)
+    np.testing.assert_array_equal(batch.y, batch.raw_y)
+    np.testing.assert_array_equal(batch.trim, 0.0)
+
+
+def test_dropouts_are_refused() -> None:
+    assert not usable(scenario.load("sensor_dropout"))
+    with pytest.raises(ScenarioError, match=r"sensor_dropout\.toml: has dropouts"):
+        recorded("sensor_dropout", 1, 1)
