@@ -1,0 +1,41 @@
+"""All figures by name, and how to get at those that somebody asks for."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+
+from lever_cdkf.host_tools.errors import LeverError
+
+from . import bode, consistency, grip, identification, linear
+from .description import Figure
+from .runs import Extent
+
+Make = Callable[[int, Extent], Figure]
+"""A figure of a seed; the same seed gives the same figure."""
+
+FIGURES: Mapping[str, Make] = {
+    "bode": bode.bode,
+    "excitation": linear.excitation,
+    "parameters": linear.parameters,
+    "states": linear.states,
+    "identification": identification.identification,
+    "grip": grip.grip,
+    "consistency": consistency.nees,
+}
+"""In the order of the page."""
+
+
+def chosen(names: Sequence[str]) -> list[str]:
+    """The names in the order of the page, all without any. Raises LeverError for one that does not exist."""
+    for name in names:
+        if name not in FIGURES:
+            near = difflib.get_close_matches(name, FIGURES, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(FIGURES)}"
+            raise LeverError(f"unknown figure {name!r}; {hint}")
+    return [name for name in FIGURES if name in names or not names]
+
+
+def summary(name: str) -> str:
+    """The figure in a line."""
+    return (FIGURES[name].__doc__ or "").splitlines()[0]

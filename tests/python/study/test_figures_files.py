@@ -1,0 +1,295 @@
+"""`lever figures` as a user calls it: the files that it writes, what they look like, and what it refuses."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib.metadata
+import io
+import itertools
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.sil.study.figures import catalogue, page, png, runs
+from lever_cdkf.sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
+from lever_cdkf.sil.study.figures.typesetting import colours, css, in_html, in_mathtext
+from PIL import Image
+from python.report.reading import figures, read, unpack
+from quality.tools import ROOT
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+Run = Callable[..., tuple[int, str, str]]
+LONG, SHORT = runs.Extent(), runs.Extent(duration=3.0, runs=4)
+NAMES = list(catalogue.FIGURES)
+every = pytest.mark.parametrize("name", NAMES)
+
+
+@functools.cache
+def made(name: str) -> Figure:
+    """Each figure once, however many tests and commands ask for it."""
+    return catalogue.FIGURES[name](1, SHORT)
+
+
+@functools.cache
+def sheet(name: str) -> Any:
+    """A figure in print, with a time axis as long as that of the real one."""
+    figure = made(name)
+    if figure.x_range[0] == 0.0:
+        figure = dataclasses.replace(figure, x_range=(0.0, figure.x_range[1] * LONG.duration / SHORT.duration))
+    return png.sheet(figure)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def commands() -> Iterator[None]:
+    """The sub-commands of pyproject.toml, installed or not, and figures of short runs."""
+    entries = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][cli.COMMANDS]
+    found = [importlib.metadata.EntryPoint(name, value, cli.COMMANDS) for name, value in entries.items()]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(importlib.metadata, "entry_points", lambda group: found)
+        patch.setattr(runs, "Extent", lambda: SHORT)
+        yield
+
+
+@pytest.fixture(scope="module")
+def folder(commands: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `lever figures` leaves behind."""
+    out = tmp_path_factory.mktemp("figures") / "deep" / "folder"
+    assert cli.main(["figures", "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture
+def lever(capsys: pytest.CaptureFixture[str]) -> Run:
+    """lever(*arguments): exit status, standard output, standard error."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        status = cli.main(arguments)
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return run
+
+
+# --- pictures --------------------------------------------------------------------------------------------------------
+
+
+def test_every_figure_is_there_in_both_forms_and_nothing_else(folder: Path) -> None:
+    wanted = {*(f"{name}.png" for name in NAMES), "figures.html", "captions.md"}
+    assert {path.name for path in folder.iterdir()} == wanted
+    assert read(folder / "figures.html").ids("section") == NAMES
+
+
+@every
+def test_a_picture_is_a_column_wide_on_white_with_nothing_cut_off(folder: Path, name: str) -> None:
+    with Image.open(folder / f"{name}.png") as image:
+        assert image.width == round(3.5 * 200)
+        assert image.info["dpi"] == pytest.approx((200, 200), abs=0.1)
+        pixels = np.asarray(image.convert("L"))
+    border = np.concatenate((pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
+    assert (border == 255).all()
+    assert 0.02 < np.mean(pixels < 250) < 0.9
+
+
+@every
+def test_no_legend_lies_on_a_chart_and_no_label_on_another(name: str) -> None:
+    (legend,) = sheet(name).legends
+    boxes = []
+    for axes in sheet(name).axes:
+        assert not legend.get_window_extent().overlaps(axes.get_window_extent())
+        boxes += [axis.label.get_window_extent() for axis in (axes.xaxis, axes.yaxis) if axis.label.get_text()]
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            texts = [
+                getattr(tick, side)
+                for tick in axis.get_major_ticks()
+                for side in ("label1", "label2")
+                if low <= tick.get_loc() <= high
+            ]
+            boxes += [text.get_window_extent() for text in texts if text.get_visible() and text.get_text()]
+    assert len(boxes) > 6
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+
+
+@every
+def test_text_is_legible_in_print(name: str) -> None:
+    from matplotlib.text import Text
+
+    sizes = [text.get_fontsize() for text in sheet(name).findobj(Text) if text.get_text()]
+    assert min(sizes) >= 7.0
+
+
+def test_the_same_seed_gives_the_same_picture(folder: Path) -> None:
+    assert png.render(catalogue.FIGURES["states"](1, SHORT)) == (folder / "states.png").read_bytes()
+    assert png.render(catalogue.FIGURES["states"](2, SHORT)) != (folder / "states.png").read_bytes()
+
+
+def test_a_picture_does_not_depend_on_how_matplotlib_is_configured() -> None:
+    import matplotlib as mpl
+
+    plain = png.render(made("excitation"))
+    with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "black", "savefig.bbox": "tight"}):
+        assert png.render(made("excitation")) == plain
+
+
+def test_what_is_drawn_is_where_it_belongs() -> None:
+    """A band, a curve and dots of known places, found again as pixels of their colours."""
+    x = np.linspace(0.0, 1.0, 101)
+    traces = (
+        Band(x, np.full(101, 6.0), np.full(101, 8.0), "band", "chance"),
+        Curve(x, np.full(101, 4.0), "curve", "estimate"),
+        Points(x, np.full(101, 2.0), "dots", "measured"),
+    )
+    figure = Figure("x", "x", "x", (Column("", (Row("y [1]", traces, (0.0, 10.0)),)),), (0.0, 1.0))
+    pixels = np.asarray(Image.open(io.BytesIO(png.render(figure))).convert("RGB")).astype(int)
+    (axes,) = png.sheet(figure).axes
+    assert (axes.get_xlim(), axes.get_ylim()) == ((0.0, 1.0), (0.0, 10.0))
+    height = len(pixels)
+    for name, level in (("chance-band", 7.0), ("estimate", 4.0), ("measured", 2.0)):
+        across, up = axes.transData.transform((0.503, level))
+        red, green, blue, opacity = colours()[name]
+        wanted = 255.0 * (1.0 - opacity * (1.0 - np.array((red, green, blue))))
+        around = pixels[round(height - up) - 4 : round(height - up) + 4, round(across) - 6 : round(across) + 6]
+        assert np.abs(around - wanted).sum(axis=-1).min() < 40.0, name
+
+
+# --- the page --------------------------------------------------------------------------------------------------------
+
+
+def test_the_page_holds_what_is_described(folder: Path) -> None:
+    specs = figures(read(folder / "figures.html"))
+    assert list(specs) == [f"{name}-{index}" for name in NAMES for index in range(len(made(name).columns))]
+    for name in NAMES:
+        for index, column in enumerate(made(name).columns):
+            spec = specs[f"{name}-{index}"]
+            if isinstance(column.content, Surface):
+                surface, ridge = spec["data"]
+                np.testing.assert_allclose(unpack(surface["z"]), column.content.magnitude, rtol=1e-6)
+                np.testing.assert_allclose(unpack(ridge["y"]), column.content.ridge, rtol=1e-6)
+                continue
+            for row_index, row in enumerate(column.content):
+                key = f"y{row_index + 1}" if row_index else "y"
+                axis = spec["layout"][key.replace("y", "yaxis")]
+                assert axis["title"]["text"] == in_html(row.label)
+                assert axis["range"] == pytest.approx(made(name).limits()[row_index])
+                drawn = [trace for trace in spec["data"] if trace["yaxis"] == key]
+                edges = [(e.low, e.high) if isinstance(e, Band) else (e.y,) for e in row.traces]
+                series = [np.sort(values) for edge in edges for values in edge]
+                assert len(drawn) == len(series)
+                shown = [np.sort(unpack(trace["y"])) for trace in drawn]
+                for values in series:
+                    assert any(np.allclose(values, other, rtol=1e-6, atol=1e-9) for other in shown), (name, row.label)
+
+            named = [trace["name"] for trace in spec["data"] if trace.get("showlegend", True)]
+            assert len(named) == len(set(named))
+
+
+def test_both_surfaces_have_one_scale(folder: Path) -> None:
+    specs = figures(read(folder / "figures.html"))
+    scales = [(spec["data"][0]["cmin"], spec["data"][0]["cmax"]) for key, spec in specs.items() if "bode" in key]
+    assert len(scales) == 2
+    assert len(set(scales)) == 1
+
+
+def test_the_page_needs_nothing_else(folder: Path) -> None:
+    found = read(folder / "figures.html")
+    for tag, attributes in found.tags:
+        assert tag not in ("link", "iframe", "img", "object", "embed"), tag
+        for name in ("src", "href"):
+            assert (attributes.get(name) or "#").startswith("#"), (tag, attributes)
+    own = (folder / "figures.html").read_text(encoding="utf-8").replace(found.scripts[1], "")
+    assert not re.search(r"https?:|//\w+\.|@import|url\((?!#)", own)
+    assert found.open == []
+
+
+def test_captions_are_the_same_on_the_page_and_beside_the_pictures(folder: Path) -> None:
+    text, captions = "".join(read(folder / "figures.html").text), (folder / "captions.md").read_text(encoding="utf-8")
+    for name in NAMES:
+        figure = made(name)
+        assert f"## {figure.title} ({name}.png)\n\n{figure.caption}\n" in captions
+        assert re.sub(r"\b(\w)_(\w+)", r"\1\2", figure.caption) in text
+        assert "nan" not in figure.caption
+
+
+def test_every_colour_of_the_page_exists_in_both_themes(folder: Path) -> None:
+    used = set(re.findall(r'"@([\w-]+)"', json.dumps(figures(read(folder / "figures.html")))))
+    light, dark = (set(re.findall(r"--([\w-]+):", part)) for part in (css(), "".join(css().split("@media")[1:])))
+    assert used
+    assert used <= light
+    assert used <= dark
+
+
+def test_text_is_set_in_type() -> None:
+    assert in_html("m_p < 2 & a_21") == "m<sub>p</sub> &lt; 2 &amp; a<sub>21</sub>"
+    assert in_mathtext("|θ/z̈| ẋ [N s/m], k_p") == r"|θ/$\ddot{z}$| $\dot{x}$ [N s/m], $k_{p}$"
+    assert "<sub>" not in page.build([made("states")]).split("<body>")[0]
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+
+def test_list_names_every_figure_and_writes_nothing(
+    lever: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = lever("figures", "--list")
+    assert (status, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines()[4:] if line.strip()] == NAMES
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_makes_what_is_asked_for(lever: Run, tmp_path: Path) -> None:
+    status, out, err = lever("figures", "--only", "states", "excitation", "--seed", "3", "--out", str(tmp_path))
+    assert (status, err) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "captions.md", "excitation.png", "figures.html", "states.png"
+    ]  # fmt: skip
+    assert out == f"Written to {tmp_path}: excitation.png, states.png, figures.html, captions.md\n"
+    assert read(tmp_path / "figures.html").ids("section") == ["excitation", "states"]
+    assert catalogue.FIGURES["states"](3, SHORT).caption in (tmp_path / "captions.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--only", "grips"), "unknown figure 'grips'; did you mean grip?"),
+        (("--only", "states", "none"), "unknown figure 'none'; there are bode"),
+        (("--only",), "argument --only: expected at least one argument (see `lever figures --help`)"),
+        (("--seed", "-1"), "argument --seed: -1 is negative"),
+        (("--seed", "x"), "argument --seed: invalid seed value: 'x'"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(lever: Run, tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
+    status, out, err = lever("figures", "--out", str(tmp_path / "out"), *arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(
+    lever: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(catalogue, "FIGURES", dict.fromkeys(NAMES))  # a call of any would be a TypeError
+    (tmp_path / "file").write_text("mine")
+    status, out, err = lever("figures", "--out", str(tmp_path / "file" / "out"))
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"lever: error: cannot make the folder {tmp_path}/file/out: ")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_picture_that_cannot_be_written_leaves_no_part_of_it(lever: Run, tmp_path: Path) -> None:
+    (tmp_path / "states.png" / "occupied").mkdir(parents=True)
+    status, out, err = lever("figures", "--only", "states", "--out", str(tmp_path))
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"lever: error: cannot write {tmp_path}/states.png: ")
+    assert [path.name for path in tmp_path.iterdir()] == ["states.png"]
