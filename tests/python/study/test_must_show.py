@@ -1,0 +1,42 @@
+"""What the firmware has to show, in the part of the campaign that takes seconds; `lever compare` is the whole of it.
+
+Seeds are fixed, so this is no lottery: a change of the firmware that costs accuracy, honesty or speed fails here.
+"""
+
+from __future__ import annotations
+
+import pytest
+from lever_cdkf.sil.study.compare import campaign, judgement, words
+from lever_cdkf.sil.study.compare.cases import Plan
+
+CASES = ("lever_fixed_dither_quiet", "linear_black_box_fixed_base_rough", "step_up", "step_down")
+ESTIMATORS = ("dual", "joint", "dual_shipped", "dual_no_change")
+MEASURED = {
+    "joint: error ÷ bound",
+    "dual: error ÷ bound, with dither",
+    "joint: NEES ÷ its 95 % limit",
+    "joint: NEES ÷ its lower 95 % limit",
+    "dual: stated σ ÷ rms error",
+    "dual: step followed in, median [s]",
+    "dual: step followed in, worst [s]",
+    "dual: steady frequency, rms [%]",
+    "dual: the same ÷ without change detection",
+    "firmware: runs with NaN or a refused factor",
+}
+
+
+@pytest.fixture(scope="module")
+def claims() -> dict[str, words.Claim]:
+    results = campaign.run(campaign.tasks(CASES, ESTIMATORS, Plan(20)), jobs=1)
+    return {claim.text: claim for claim in words.claims(judgement.judge(results))}
+
+
+@pytest.mark.parametrize("text", sorted(MEASURED))
+def test_claim(claims: dict[str, words.Claim], text: str) -> None:
+    claim = claims[text]
+    assert claim.kept is True, f"{claim.measured:.3g}, limit {claim.limit:g}, in {claim.where}"
+
+
+def test_nothing_else_was_measured(claims: dict[str, words.Claim]) -> None:
+    """Or it would not be held to."""
+    assert {text for text, claim in claims.items() if claim.kept is not None} == MEASURED
