@@ -15,8 +15,13 @@ void learning_start(learning_t *learning, const lever_config_t *config, dual_t *
 
 void learning_adapt(const lever_config_t *config, dual_t *dual)
 {
-    const adaptation_t adaptation = adaptation_of(config);
+    const adaptation_t adaptation = adaptation_of(config, dual->parameters.positive);
     adaptation_start(&adaptation, &dual->parameters);
+}
+
+static bool is_joint(const lever_config_t *config)
+{
+    return config->estimator == (uint8_t)LEVER_ESTIMATOR_JOINT;
 }
 
 /* A sudden change of the pilot opens the parameters' covariance, once: a disturbance that only looks like one would open it
@@ -29,7 +34,7 @@ static void follow_change(
         for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
             variance[i] = adaptation->floor[i] * config->settings.change_walk;
         }
-        dual_widen(dual, variance, config->estimator == (uint8_t)LEVER_ESTIMATOR_JOINT);
+        dual_widen(dual, variance, is_joint(config));
         noise_begin(&dual->noise);
         learning->changed = REPORTED;
     }
@@ -38,8 +43,8 @@ static void follow_change(
 static void learn(learning_t *learning, const lever_config_t *config, dual_t *dual, const lesson_t *lesson)
 {
     const lever_settings_t *settings = &config->settings;
-    const adaptation_t adaptation = adaptation_of(config);
-    const bool joint = (config->estimator == (uint8_t)LEVER_ESTIMATOR_JOINT);
+    const adaptation_t adaptation = adaptation_of(config, dual->parameters.positive);
+    const bool joint = is_joint(config);
     const float period = learning->unlearnt;
     float correction[MODEL_PARAMETERS];
     float learnt[MODEL_PARAMETERS];

@@ -27,15 +27,14 @@ prior_t prior_of(const lever_config_t *config)
     return rows_of(config).prior;
 }
 
-adaptation_t adaptation_of(const lever_config_t *config)
+adaptation_t adaptation_of(const lever_config_t *config, bool positive)
 {
     const lever_settings_t *s = &config->settings;
     const rows_t rows = rows_of(config); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
-    const bool is_signed = (config->model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX);
     adaptation_t adaptation;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         /* of the scaled parameter w, see parameter_filter.h */
-        const float walk = is_signed ? (rows.walk[i] / rows.prior.sigma[i]) : rows.walk[i];
+        const float walk = positive ? rows.walk[i] : (rows.walk[i] / rows.prior.sigma[i]);
         adaptation.floor[i] = walk * walk;
     }
     adaptation.ceiling = s->walk_ceiling * s->walk_ceiling;

@@ -50,6 +50,18 @@ static inline void random_floats(random_source_t *source, float *values, uint32_
     }
 }
 
+/* A factor [n x n] with diagonal in [1/2, 1], and rows below it. */
+static inline void random_factor(random_source_t *source, float *s, uint32_t rows, uint32_t n)
+{
+    random_floats(source, s, rows * n, 1.0);
+    for (uint32_t i = 0u; i < n; i++) {
+        s[(i * n) + i] = (float)random_between(source, 0.5, 1.0);
+        for (uint32_t j = i + 1u; j < n; j++) {
+            s[(i * n) + j] = 0.0f;
+        }
+    }
+}
+
 /* --- matrices ------------------------------------------------------------------------------------------------------ */
 
 static inline matrix_t matrix_zero(uint32_t rows, uint32_t columns)

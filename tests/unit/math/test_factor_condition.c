@@ -59,13 +59,7 @@ static void draw(uint32_t n, uint32_t carried, uint32_t outputs, double c_scale)
     now.n = n;
     now.rows = n + carried;
     now.outputs = outputs;
-    random_floats(&source, now.s, now.rows * n, 1.0);
-    for (uint32_t i = 0u; i < n; i++) {
-        now.s[(i * n) + i] = (float)random_between(&source, 0.5, 1.0);
-        for (uint32_t j = i + 1u; j < n; j++) {
-            now.s[(i * n) + j] = 0.0f;
-        }
-    }
+    random_factor(&source, now.s, now.rows, n);
     random_floats(&source, now.c, outputs * n, c_scale);
     random_floats(&source, now.innovation, outputs, 3.0 * (1.0 + c_scale));
     gather();

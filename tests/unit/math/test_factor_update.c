@@ -43,13 +43,7 @@ static void draw(uint32_t n, uint32_t carried, uint32_t p, uint32_t m, double c_
     update.rows = n + carried;
     update.p = p;
     update.m = m;
-    random_floats(&source, update.s, update.rows * n, 1.0);
-    for (uint32_t i = 0u; i < n; i++) {
-        update.s[(i * n) + i] = (float)random_between(&source, 0.5, 1.0);
-        for (uint32_t j = i + 1u; j < n; j++) {
-            update.s[(i * n) + j] = 0.0f;
-        }
-    }
+    random_factor(&source, update.s, update.rows, n);
     random_floats(&source, update.c, p * n, c_scale);
     random_floats(&source, update.innovation, p * m, 3.0 * c_scale);
 }
