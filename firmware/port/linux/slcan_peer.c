@@ -5,10 +5,6 @@
 #include <string.h>
 #include <time.h>
 
-#ifndef LEVER_VERSION
-#define LEVER_VERSION "0.0.0"
-#endif
-
 static bool put(void *self, const char *text, uint32_t length)
 {
     return tty_put(self, text, length);
@@ -17,7 +13,7 @@ static bool put(void *self, const char *text, uint32_t length)
 static void start(slcan_peer_t *peer)
 {
     const slcan_sink_t sink = {.self = &peer->tty, .put = put};
-    const slcan_identity_t identity = slcan_identity(LEVER_VERSION, "LCAN");
+    const slcan_identity_t identity = {.version = LEVER_SLCAN_VERSION, .serial = "LCAN"};
 
     slcan_init(&peer->slcan, &sink, &identity);
 }

@@ -342,30 +342,6 @@ static void carry_out(slcan_t *slcan, const slcan_line_t *line)
     }
 }
 
-/* Writes the number at the start of `text` as two digits; returns what follows it and its point. */
-static const char *write_two_digits(char digits[2], const char *text)
-{
-    uint32_t number = 0u;
-
-    while ((*text >= '0') && (*text <= '9')) {
-        number = ((10u * number) + (uint32_t)(*text - '0')) % 100u;
-        text++;
-    }
-    digits[0] = (char)('0' + (char)(number / 10u));
-    digits[1] = (char)('0' + (char)(number % 10u));
-    return (*text == '.') ? &text[1] : text;
-}
-
-slcan_identity_t slcan_identity(const char *version, const char *serial)
-{
-    slcan_identity_t identity = {.version = "0000"};
-    const char *const minor = write_two_digits(&identity.version[0], version);
-
-    (void)write_two_digits(&identity.version[2], minor);
-    (void)memcpy(identity.serial, serial, 4u);
-    return identity;
-}
-
 void slcan_init(slcan_t *slcan, const slcan_sink_t *sink, const slcan_identity_t *identity)
 {
     (void)memset(slcan, 0, sizeof *slcan);

@@ -84,9 +84,6 @@ typedef struct slcan_identity {
     char serial[5];  /* letters or digits */
 } slcan_identity_t;
 
-/* The identity of version "major.minor.patch", major in the place of the hardware, and a serial number of four characters. */
-slcan_identity_t slcan_identity(const char *version, const char *serial);
-
 enum slcan_channel { SLCAN_CHANNEL_CLOSED = 0, SLCAN_CHANNEL_OPEN = 1, SLCAN_CHANNEL_LISTEN = 2 };
 
 /* Bits of the status flags (answer to F). The peer itself sets the first and DATA_OVERRUN, for a frame that found no room. */
