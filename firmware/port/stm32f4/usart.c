@@ -34,7 +34,7 @@ void usart_start(const clock_rates_t *rates)
 {
     rcc.AHB1ENR |= RCC_AHB1_GPIOA;
     rcc.APB2ENR |= RCC_APB2_USART1;
-    (void)rcc.APB2ENR; /* RM0090 7.2.14: two cycles from a clock's enabling to the first access */
+    (void)rcc.APB2ENR; /* errata ES0182 2.1.13: a clock is there two cycles after its enabling */
     pin_to_peripheral(&gpioa, PIN_TRANSMIT, FUNCTION_USART);
     pin_to_peripheral(&gpioa, PIN_RECEIVE, FUNCTION_USART);
     usart1.BRR = rates->pll ? DIVIDER(CLOCK_PLL_APB2_HZ) : DIVIDER(CLOCK_RAW_HZ);
