@@ -58,12 +58,13 @@ static void transmit(void)
     }
 }
 
-/* RM0090 30.6.1: reading SR, then DR, clears ORE too. A byte with a framing or noise error spoils its line, which is refused. */
-void usart_interrupt(void)
+/* Takes all that has arrived. RM0090 30.6.1: reading SR, then DR, clears ORE too. A byte with a framing or noise error spoils
+ * its line, which is refused. */
+static void receive(void)
 {
-    const uint32_t status = usart1.SR;
+    uint32_t status = usart1.SR;
 
-    if ((status & ((uint32_t)USART_SR_RXNE | (uint32_t)USART_SR_ORE)) != 0u) {
+    while ((status & ((uint32_t)USART_SR_RXNE | (uint32_t)USART_SR_ORE)) != 0u) {
         const uint8_t byte = (uint8_t)usart1.DR;
         if ((status & USART_SR_ORE) != 0u) {
             overruns++;
@@ -71,7 +72,13 @@ void usart_interrupt(void)
         if (((status & USART_SR_RXNE) != 0u) && !ring_put(&received, &byte, 1u)) {
             overruns++;
         }
+        status = usart1.SR; /* in QEMU the next byte may be there at once, and then raises no interrupt of its own */
     }
+}
+
+void usart_interrupt(void)
+{
+    receive();
     if ((usart1.CR1 & USART_CR1_TXEIE) != 0u) {
         transmit();
     }
