@@ -24,7 +24,8 @@ TIME_LIMIT = "120"
 
 NEEDED = {
     "tests/vcan": pytest.mark.requires("ip", "candump", "linux.uml"),
-    "lever qemu": pytest.mark.requires("qemu-system-arm", "arm-none-eabi-gcc"),
+    "lever flash": pytest.mark.requires("arm-none-eabi-gcc", "openocd"),
+    "lever qemu": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
 }
 """By blocks with these words in them."""
 
