@@ -28,7 +28,7 @@ from typing import BinaryIO
 
 PACKAGES = "user-mode-linux busybox-static iproute2"
 MODULES = ("net/can/can.ko", "net/can/can-raw.ko", "drivers/net/can/dev/can-dev.ko", "drivers/net/can/vcan.ko")
-OPTIONAL_MODULES = ("net/sched/sch_tbf.ko", "net/can/can-gw.ko")
+OPTIONAL_MODULES = ("net/sched/sch_tbf.ko", "net/can/can-gw.ko", "drivers/net/can/slcan/slcan.ko")
 _POLL_S = 0.1
 
 
