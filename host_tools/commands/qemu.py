@@ -18,6 +18,9 @@ Runs the image for the STM32F405 in QEMU (machine netduinoplus2), with USART1 on
 is an SLCAN adapter with the estimator behind it. Waits until it answers and prints the channel, for `lever sim
 --interface slcan` and everything else that uses python-can's slcan. Runs until Ctrl-C; or, with a COMMAND, until that
 ends. In COMMAND, {channel} stands for the channel.
+
+The image has the default settings. Of a scenario it takes what a COMMAND message tells it (model, preload, estimator,
+adaptation, dither), not what stands under [settings] there.
 """
 _EPILOG = """\
 examples:
@@ -31,7 +34,11 @@ Exit status: that of COMMAND; without one 0.
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
-        "qemu", help="run the flash image on an emulated board", description=_DESCRIPTION, epilog=_EPILOG
+        "qemu",
+        usage="lever qemu [-h] [--icount] IMAGE [-- COMMAND...]",
+        help="run the flash image on an emulated board",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
     )
     parser.add_argument("image", metavar="IMAGE", type=Path, help="an .elf file, lever_stm32f4_slcan.elf")
     parser.add_argument(

@@ -22,7 +22,7 @@ static const char help[] =
     "On a CAN bus:\n"
     "  --can INTERFACE      SocketCAN interface, for instance can0 or vcan0; it must be up\n"
     "  --slcan DEVICE       SLCAN (LAWICEL) adapter on a serial device, for instance /dev/ttyUSB0 or "
-    "/dev/ttyACM0:1000000\n"
+    "/dev/ttyUSB0:1000000\n"
     "                       (baud; default 115200); its channel is opened at 1 Mbit/s, and closed at the end\n"
     "Without one, as an SLCAN adapter itself, with the estimator as all there is on its bus:\n"
     "  --pty LINK           on a pseudo-terminal, to which LINK is made; a host opens LINK: slcand, python-can's "
@@ -152,7 +152,7 @@ static bool check(const options_t *options, int rest, char *argv[], settings_err
         return refuse(error, bad, ": does not fit the other settings");
     }
     if ((options->action == OPTIONS_RUN) && (options->interface == NULL)) {
-        return refuse(error, "which interface? Say --can vcan0, for instance; --help tells more", "");
+        return refuse(error, "which interface? Say --can vcan0 or --pty lever0, for instance; --help tells more", "");
     }
     return true;
 }

@@ -67,6 +67,24 @@ static void test_the_interface_alone_gives_the_defaults(void)
     TEST_ASSERT_EQUAL_MEMORY(&expected, &options.config, sizeof expected);
 }
 
+static void test_each_medium_has_its_option_and_the_last_counts(void)
+{
+    static const struct {
+        const char *line;
+        const char *interface;
+        enum options_medium medium;
+    } media[] = {{"--can vcan0", "vcan0", OPTIONS_MEDIUM_CAN},
+        {"--slcan /dev/ttyACM0", "/dev/ttyACM0", OPTIONS_MEDIUM_SLCAN}, {"--pty lever0", "lever0", OPTIONS_MEDIUM_PTY},
+        {"--serial /dev/ttyS0:9600", "/dev/ttyS0:9600", OPTIONS_MEDIUM_SERIAL},
+        {"--can vcan0 --pty lever0", "lever0", OPTIONS_MEDIUM_PTY}};
+
+    for (size_t i = 0u; i < (sizeof media / sizeof media[0]); i++) {
+        TEST_ASSERT_TRUE(read_line(media[i].line));
+        TEST_ASSERT_EQUAL_INT(media[i].medium, options.medium);
+        TEST_ASSERT_EQUAL_STRING(media[i].interface, options.interface);
+    }
+}
+
 static void test_choices_and_settings_reach_the_configuration(void)
 {
     TEST_ASSERT_TRUE(read_line("--can can1 --preload fixed --adaptation annealing --model lever --estimator dual "
@@ -98,8 +116,9 @@ static void test_help_and_version_need_no_interface(void)
 
 static void test_what_is_wrong_is_said(void)
 {
-    assert_refused("", "which interface? Say --can vcan0, for instance; --help tells more");
+    assert_refused("", "which interface? Say --can vcan0 or --pty lever0, for instance; --help tells more");
     assert_refused("--can", "a value is missing after --can");
+    assert_refused("--pty", "a value is missing after --pty");
     assert_refused("--can vcan0 --fast", "unknown option (see --help): --fast");
     assert_refused("--can vcan0 vcan1", "no argument is expected outside the options: vcan1");
     assert_refused("--can vcan0 --preload loose", "preload: \"loose\" is not known; it can be fixed, trim");
@@ -134,6 +153,7 @@ int main(void)
     if ((file >= 0) && (write(file, text, sizeof text - 1u) == (ssize_t)(sizeof text - 1u)) && (close(file) == 0)) {
         UNITY_BEGIN();
         RUN_TEST(test_the_interface_alone_gives_the_defaults);
+        RUN_TEST(test_each_medium_has_its_option_and_the_last_counts);
         RUN_TEST(test_choices_and_settings_reach_the_configuration);
         RUN_TEST(test_the_later_of_file_and_option_counts);
         RUN_TEST(test_help_and_version_need_no_interface);
