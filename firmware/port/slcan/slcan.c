@@ -179,12 +179,12 @@ static bool is_accepted(const slcan_t *slcan, const slcan_frame_t *frame)
         return passes(upper, code >> 16, mask >> 16) || passes(upper, code, mask);
     }
     const uint32_t head = (frame->frame.id << 5) | (frame->remote ? 0x10u : 0u);
-    const bool has_data = !frame->remote && (frame->frame.length > 0u);
+    const bool has_data =
+        !frame->remote && (frame->frame.length > 0u); /* without, filter 1 has only the head to go by */
     const uint32_t first = has_data ? frame->frame.data[0] : 0u;
-    const bool data_matters = has_data; /* a frame without data is judged by identifier and RTR alone */
-    const uint32_t mask_1 = (mask >> 16) | (data_matters ? 0u : 0xFu);
-    const uint32_t mask_low = mask | (data_matters ? 0xFFF0u : 0xFFFFu);
-    const bool filter_1 = passes(head | (first >> 4), code >> 16, mask_1) && passes(first & 0xFu, code, mask_low);
+    const uint32_t half = has_data ? 0u : 0xFu; /* not to be compared */
+    const bool filter_1 = passes(head | (first >> 4), code >> 16, (mask >> 16) | half) &&
+                          passes(first & 0xFu, code, mask | 0xFFF0u | half);
 
     return filter_1 || passes(head, code, mask | 0xFu);
 }
