@@ -40,9 +40,9 @@ def test_shell(
     with can.CanutilsLogWriter(tmp_path / "session.log", channel="vcan0") as writer:
         for identifier, data in samples(0, 1)[0]:
             writer.on_message_received(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
-    commands = "".join(blocks(root, "sh")).splitlines()
-    assert len(commands) == 7
-    for command in commands:
-        done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False, cwd=tmp_path)
-        assert done.returncode == 0, f"{command}: {done.stderr}"
+    commands = [block for block in blocks(root, "sh") if "build/" not in block]  # tests/quality runs the others
+    assert len(commands) == 2
+    for block in commands:
+        done = subprocess.run(["sh", "-ec", block], capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert done.returncode == 0, f"{block}: {done.stderr}"
     assert (tmp_path / "my.json").is_file()
