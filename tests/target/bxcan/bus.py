@@ -8,8 +8,8 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Protocol
 
-from .frame import Frame
-from .schedule import Action, Schedule
+from target.bxcan.frame import Frame
+from target.bxcan.schedule import Action, Schedule
 
 BIT_NS = 1000
 INTERMISSION = 3

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from . import filters, mailboxes
-from .bus import BIT_NS, Bus, Error
-from .confinement import Confinement
-from .fifo import Fifo, Message
-from .filters import Filters
-from .frame import Frame
-from .mailboxes import Mailboxes
-from .schedule import Action, Timers
+from target.bxcan import filters, mailboxes
+from target.bxcan.bus import BIT_NS, Bus, Error
+from target.bxcan.confinement import Confinement
+from target.bxcan.fifo import Fifo, Message
+from target.bxcan.filters import Filters
+from target.bxcan.frame import Frame
+from target.bxcan.mailboxes import Mailboxes
+from target.bxcan.schedule import Action, Timers
 
 MCR, MSR, TSR, RF0R, RF1R, IER, ESR, BTR = range(0, 0x20, 4)
 MAILBOXES, FIFO_0, FIFO_1, FIFO_END = 0x180, 0x1B0, 0x1C0, 0x1D0
@@ -33,7 +33,7 @@ TX_IRQ, RX0_IRQ, RX1_IRQ, SCE_IRQ = 19, 20, 21, 22
 class Surroundings(Protocol):
     """What CAN1 has to do with on the chip."""
 
-    def apb1_hz(self) -> int: ...
+    def apb1_hz(self) -> float: ...
     def is_can_clocked(self) -> bool: ...
     def can_pin_problem(self) -> str | None:
         """What is wrong with the pins of CAN1_RX and CAN1_TX."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from .schedule import Schedule, Timers
+from target.bxcan.schedule import Schedule, Timers
 
 MHZ = 1_000_000
 HSI_HZ = 16 * MHZ

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .bus import Error
+from target.bxcan.bus import Error
 
 WARNING, PASSIVE, BUS_OFF = 96, 128, 256
 

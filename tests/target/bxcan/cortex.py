@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from .schedule import Schedule, Timers
+from target.bxcan.schedule import Schedule, Timers
 
 SYSTICK, CSR, RVR, CVR = 15, 0x010, 0x014, 0x018
 ISER, ICER, ISPR, ICPR, IABR, IPR, IPR_END = 0x100, 0x180, 0x200, 0x280, 0x300, 0x400, 0x4F0

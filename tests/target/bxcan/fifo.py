@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from .frame import Frame
+from target.bxcan.frame import Frame
 
 DEPTH = 3
 FULL, FOVR, RFOM = 1 << 3, 1 << 4, 1 << 5

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from .frame import Frame
+from target.bxcan.frame import Frame
 
 FMR, FM1R, FS1R, FFA1R, FA1R, BANKS, END = 0x200, 0x204, 0x20C, 0x214, 0x21C, 0x240, 0x320
 FMR_RESET = 0x2A1C0E01

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .frame import Frame
+from target.bxcan.frame import Frame
 
 TXRQ = 1
 RQCP, TXOK, ALST, TERR, ABRQ = 1, 2, 4, 8, 0x80

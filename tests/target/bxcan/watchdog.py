@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from .schedule import Schedule, Timers
+from target.bxcan.schedule import Schedule, Timers
 
 LSI_HZ = 32_000
 KR, PR, RLR, SR = 0, 4, 8, 0xC
