@@ -29,6 +29,13 @@ class Image:
     def is_code(self, address: int) -> bool:
         return any(start <= address < start + len(data) for start, data in self.segments)
 
+    def find(self, instruction: bytes) -> list[int]:
+        """Where a 16-bit instruction is, or what looks like it."""
+        places = []
+        for start, data in self.segments:
+            places += [start + k for k in range(0, len(data) - 1, 2) if data[k : k + 2] == instruction]
+        return places
+
     def describe(self, address: int) -> str:
         """The function that an address is in, for a person."""
         index = bisect.bisect_right(self._functions, (address, "\uffff")) - 1

@@ -11,17 +11,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from unicorn import UC_ARCH_ARM, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
+from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn import arm_const as arm
 
 from target.bxcan.chip import Chip, Misuse
 from target.bxcan.cortex import CPACR, HARD_FAULT, HFSR, VTOR
 from target.bxcan.elf import Image
 
-SLICE = 4000
-"""Instructions run at a time, when nothing is due before; within a slice only accesses to peripherals move time."""
+SLICE = 2000
+"""Instructions run at a time when nothing is due before. What software itself asks an interrupt for comes at the end of a
+slice, everything else at its time."""
 ACCESS_CYCLES = 4
-WFI = b"\x30\xbf"
+WFI, CPSIE = b"\x30\xbf", b"\x62\xb6"
 EXCEPTION_EXIT = 8
 """Number by which Unicorn tells that an EXC_RETURN value was loaded into the program counter."""
 EXC_RETURN_THREAD, EXC_RETURN_HANDLER = 0xFFFFFFE9, 0xFFFFFFE1
@@ -61,6 +62,8 @@ class Machine:
         self.cpu = self._make_cpu()
         for address, data in self.image.segments:
             self.cpu.mem_write(address, data)
+        for address in self.image.find(CPSIE):
+            self.cpu.hook_add(UC_HOOK_CODE, self._unmasked, None, address + 2, address + 2)
         self._start()
 
     def _make_cpu(self) -> Uc:
@@ -87,8 +90,8 @@ class Machine:
         self.is_asleep = False
 
     def _request_reset(self, cause: str) -> None:
+        """At the end of the slice: stopped within an access to a peripheral, Unicorn would repeat it."""
         self._reset_cause = cause
-        self.cpu.emu_stop()
 
     def _reset(self, cause: str) -> None:
         self._reset_cause = None
@@ -148,17 +151,17 @@ class Machine:
     def _write(self, cpu: Uc, offset: int, size: int, value: int, base: int) -> None:
         self._pass_time()
         self.chip.write(base + offset, size, value)
-        if self._has_interrupt():
-            cpu.emu_stop()
 
     def _pass_time(self) -> None:
         step = int(ACCESS_CYCLES * 1e9 / self.chip.clocks.hclk_hz())
         self.schedule.advance(self.schedule.now + step)
 
-    def _has_interrupt(self) -> bool:
+    def _unmasked(self, cpu: Uc, address: int, size: int, data: object) -> None:
+        """After the instruction that lets interrupts in: those that wait come at once."""
         cortex = self.chip.cortex
         cortex.ask(self.chip.can.interrupts())
-        return cortex.next_exception() is not None
+        if cortex.next_exception() is not None:
+            cpu.emu_stop()
 
     def _where(self) -> str:
         return self.image.describe(self.cpu.reg_read(arm.UC_ARM_REG_PC))
