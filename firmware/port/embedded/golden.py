@@ -3,9 +3,9 @@
     build/venv/bin/python firmware/port/embedded/golden.py            writes the header anew
     build/venv/bin/python firmware/port/embedded/golden.py --check    exit status 1 if it would change
 
-To be run after every change of the numbers that the estimator computes (tests/target says so when it was not). The input
-frames are encoded by the host's codec, which reads lever.dbc; the expected bits are those of the installed shared library;
-the CRC is zlib's.
+To be run after every change of the numbers that the estimator computes (tests/target says so when it was not). The
+input frames are encoded by the host's codec, which reads lever.dbc; the expected bits are those of the installed shared
+library; the CRC is zlib's.
 """
 
 from __future__ import annotations

@@ -78,10 +78,10 @@ typedef struct slcan_sink {
     bool (*put)(void *self, const char *text, uint32_t length);
 } slcan_sink_t;
 
-/* What V and N answer: four characters each, digits (hardware, then software, two each) and letters or digits. */
+/* What V and N answer: four characters each. */
 typedef struct slcan_identity {
-    char version[5];
-    char serial[5];
+    char version[5]; /* digits: hardware, then software, two each */
+    char serial[5];  /* letters or digits */
 } slcan_identity_t;
 
 enum slcan_channel { SLCAN_CHANNEL_CLOSED = 0, SLCAN_CHANNEL_OPEN = 1, SLCAN_CHANNEL_LISTEN = 2 };

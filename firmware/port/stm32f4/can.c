@@ -36,7 +36,7 @@ static void start_pins(void)
 {
     rcc.AHB1ENR |= RCC_AHB1_GPIOB;
     rcc.APB1ENR |= RCC_APB1_CAN1;
-    (void)rcc.APB1ENR; /* RM0090 7.2.14: two cycles from a clock's enabling to the first access */
+    (void)rcc.APB1ENR; /* errata ES0182 2.1.13: a clock is there two cycles after its enabling */
     pin_to_peripheral(&gpiob, PIN_RECEIVE, FUNCTION_CAN);
     pin_to_peripheral(&gpiob, PIN_TRANSMIT, FUNCTION_CAN);
 }
@@ -153,9 +153,7 @@ static void drop_all(void)
 
     counts.dropped += frames;
     ring_clear(&waiting);
-    for (uint32_t mailbox = 0u; mailbox < (uint32_t)CAN_MAILBOXES; mailbox++) {
-        can1.TSR = FIELD(CAN_TSR_ABRQ0, 8u * mailbox);
-    }
+    can1.TSR = CAN_TSR_ABRQ;
 }
 
 /* A request has ended: with success, or because it was taken back. */
@@ -193,7 +191,9 @@ void can_poll(uint32_t now_ms)
     static uint32_t since_ms; /* nothing has waited, or something was sent */
 
     interrupts_off();
-    off = (can1.ESR & CAN_ESR_BOFF) != 0u;
+    if ((can1.ESR & CAN_ESR_BOFF) == 0u) {
+        off = false;
+    }
     if ((sent != sent_before) || ((can1.TSR & CAN_TSR_TME) == CAN_TSR_TME)) {
         sent_before = sent;
         since_ms = now_ms;

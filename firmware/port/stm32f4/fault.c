@@ -7,7 +7,7 @@
 
 fault_record_t fault_last __attribute__((section(".noinit")));
 
-extern const uint32_t image_stack_top[];
+extern const uint32_t image_ram[]; /* of image.ld */
 extern const uint32_t image_ram_end[];
 
 enum { FRAME_LR = 5, FRAME_PC = 6, FRAME_PSR = 7, FRAME_WORDS = 8 }; /* PM0214 2.3.7: what an exception stacks */
@@ -31,9 +31,8 @@ __attribute__((used, noreturn)) void fault_record(const uint32_t *frame);
 __attribute__((used, noreturn)) void fault_record(const uint32_t *frame)
 {
     const uintptr_t stack = (uintptr_t)frame;
-    const uintptr_t lowest = (uintptr_t)image_stack_top & ~(uintptr_t)0xFFFFu; /* RAM begins at a multiple of 64 KiB */
-    const bool readable = (stack >= lowest) && (stack <= ((uintptr_t)image_ram_end - (FRAME_WORDS * sizeof *frame))) &&
-                          ((stack % 4u) == 0u);
+    const bool readable = (stack >= (uintptr_t)image_ram) &&
+                          (stack <= ((uintptr_t)image_ram_end - (FRAME_WORDS * sizeof *frame))) && ((stack % 4u) == 0u);
 
     fault_last.pc = readable ? frame[FRAME_PC] : 0u;
     fault_last.lr = readable ? frame[FRAME_LR] : 0u;

@@ -96,7 +96,7 @@ static uint8_t test_all(const clock_rates_t *rates)
     faults |= rom_is_intact() ? 0u : (uint32_t)LEVER_PLATFORM_ROM;
     watchdog_kick();
     faults |= self_test(&memory) ? 0u : (uint32_t)LEVER_PLATFORM_SELF_TEST;
-    watchdog_kick();
+    watchdog_tighten();
     return (uint8_t)faults;
 }
 

@@ -157,9 +157,9 @@ enum can_bits {
     CAN_MCR_DBF = BIT(16),
     CAN_MSR_INAK = BIT(0),
     CAN_MSR_ERRI = BIT(2),
-    CAN_TSR_RQCP0 = BIT(0), /* this and the next three of mailbox 0; mailbox m has them 8 m higher */
+    CAN_TSR_RQCP0 = BIT(0), /* this and the next of mailbox 0; mailbox m has them 8 m higher */
     CAN_TSR_TXOK0 = BIT(1),
-    CAN_TSR_ABRQ0 = BIT(7),
+    CAN_TSR_ABRQ = 0x808080, /* one bit for each mailbox */
     CAN_TSR_CODE_LOWEST = 24,
     CAN_TSR_TME = 7 << 26, /* one bit for each mailbox */
     CAN_RFR_FMP = 3,       /* field */

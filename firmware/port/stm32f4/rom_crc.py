@@ -1,4 +1,4 @@
-"""The last step of building an image: puts the CRC-32 of its flash into it, writes .hex and .bin, and says what it takes.
+"""The last step of building an image: puts the CRC-32 of its flash into it, writes .hex and .bin, and says its size.
 
 The linker script leaves four bytes for the CRC behind everything else in flash (section .rom_crc); rom.c checks it.
 """

@@ -11,12 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
+from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, UC_PROT_EXEC, UC_PROT_READ, Uc, UcError
 from unicorn import arm_const as arm
 
 from target.bxcan.chip import Chip, Misuse
 from target.bxcan.cortex import CPACR, HARD_FAULT, HFSR, VTOR
-from target.bxcan.elf import Image
+from target.bxcan.elf import FLASH, Image
 
 SLICE = 2000
 """Instructions run at a time when nothing is due before. What software itself asks an interrupt for comes at the end of a
@@ -55,13 +55,13 @@ class Machine:
         self.faults: list[int] = []
         """Addresses of the instructions that have made a hard fault."""
         self.is_asleep = False
+        self.sleeps = set(self.image.find(WFI))
         self._wants_exit = False
         self._reset_cause: str | None = None
         chip.on_reset = self._request_reset
         chip.where = self._where
         self.cpu = self._make_cpu()
-        for address, data in self.image.segments:
-            self.cpu.mem_write(address, data)
+        self.cpu.mem_write(FLASH, self.image.flash)
         for address in self.image.find(CPSIE):
             self.cpu.hook_add(UC_HOOK_CODE, self._unmasked, None, address + 2, address + 2)
         self._start()
@@ -69,7 +69,7 @@ class Machine:
     def _make_cpu(self) -> Uc:
         cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
-        cpu.mem_map(0x08000000, 1 << 20, 1 | 4)
+        cpu.mem_map(FLASH, 1 << 20, UC_PROT_READ | UC_PROT_EXEC)
         cpu.mem_map(0x20000000, 128 << 10)
         for base, size in self.chip.REGIONS:
             cpu.mmio_map(base, size, self._read, base, self._write, base)
@@ -79,8 +79,8 @@ class Machine:
     # --- reset -------------------------------------------------------------------------------------------------
 
     def _start(self) -> None:
-        stack, entry = struct.unpack("<II", self.cpu.mem_read(self.image.vectors, 8))
-        self.chip.cortex.registers[VTOR] = self.image.vectors
+        stack, entry = struct.unpack("<II", self.cpu.mem_read(FLASH, 8))
+        self.chip.cortex.registers[VTOR] = FLASH
         for register in (*CORE_AND_LINK, arm.UC_ARM_REG_PRIMASK):
             self.cpu.reg_write(register, 0)
         self.cpu.reg_write(arm.UC_ARM_REG_XPSR, XPSR_THUMB)
@@ -139,7 +139,7 @@ class Machine:
         if self._wants_exit:
             self._wants_exit = False
             self._leave()
-        elif self.image.is_code(pc - 2) and bytes(self.cpu.mem_read(pc - 2, 2)) == WFI:
+        elif pc - 2 in self.sleeps:
             self.is_asleep = True
         else:
             self.schedule.advance(start + max(1, round(count * cycle_ns)))
