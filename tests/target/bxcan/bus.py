@@ -111,7 +111,7 @@ class Bus:
             self._end_after(bits - 8, lambda: self._fail(Error.ACKNOWLEDGE, Error.NONE))
         else:
             self.dominant_until = self.schedule.now + (bits - 8) * BIT_NS
-            self.schedule.at(self.schedule.now + bits * BIT_NS, lambda: self._succeed(frame))
+            self.schedule.at(self.schedule.now + bits * BIT_NS, lambda: self._end(frame))
 
     def _end_after(self, bits: int, fail: Action) -> None:
         """An error flag follows those bits, and then its delimiter."""
@@ -119,7 +119,10 @@ class Bus:
         self.dominant_until = max(self.dominant_until, end - 8 * BIT_NS)
         self.schedule.at(end, fail)
 
-    def _succeed(self, frame: Frame) -> None:
+    def _end(self, frame: Frame) -> None:
+        if self.is_shorted:  # since the frame has begun
+            self._fail(Error.BIT_DOMINANT, Error.CRC)
+            return
         sender = self._take_sender()
         self.frames += 1
         self._intermission(INTERMISSION)

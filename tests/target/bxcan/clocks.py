@@ -13,23 +13,24 @@ CR, PLLCFGR, CFGR, AHB1ENR, APB1RSTR, APB1ENR, APB2ENR, CSR, END = 0, 4, 8, 0x30
 RESET_VALUES = {CR: 0x83, PLLCFGR: 0x24003010, AHB1ENR: 0x00100000, 0x50: 0x7E6791FF, 0x54: 0xF1, 0x58: 1}
 RESET_VALUES |= {0x60: 0x36FEC9FF, 0x64: 0x00075F33, 0x84: 0x24003000}
 BITS = {CR: 0x030F00F9, PLLCFGR: 0x0F437FFF, CFGR: 0xFFFFFCF3}
-HSION, HSEON, HSEBYP, PLLON = 1, 1 << 16, 1 << 18, 1 << 24
+HSION, HSEON, CSSON, PLLON = 1, 1 << 16, 1 << 19, 1 << 24
 HSI, HSE, PLL = 0, 1, 2
 POWER_ON, SOFTWARE, WATCHDOG = 0x0E000000, 1 << 28 | 1 << 26, 1 << 29 | 1 << 26
 """Reset flags of RCC_CSR; the pin NRST goes low with each of them."""
 START_NS = {HSEON: 2_000_000, PLLON: 200_000, HSION: 4_000}
-AHB_DIVIDER = {k: 1 for k in range(8)} | dict(zip(range(8, 16), (2, 4, 8, 16, 64, 128, 256, 512), strict=True))
-APB_DIVIDER = {k: 1 for k in range(4)} | {4: 2, 5: 4, 6: 8, 7: 16}
+AHB_DIVIDER = dict.fromkeys(range(8), 1) | dict(zip(range(8, 16), (2, 4, 8, 16, 64, 128, 256, 512), strict=True))
+APB_DIVIDER = dict.fromkeys(range(4), 1) | {4: 2, 5: 4, 6: 8, 7: 16}
 
 
 class Clocks:
-    """`hse_hz` 0: a crystal that does not start."""
+    """`hse_hz` 0: a crystal that does not start; `pll_locks`: whether the PLL ever does."""
 
-    def __init__(self, schedule: Schedule, misuse: Callable[[str], None], hse_hz: int) -> None:
+    def __init__(self, schedule: Schedule, misuse: Callable[[str], None], hse_hz: int, pll_locks: bool) -> None:
         self.timers = Timers(schedule)
         self.misuse = misuse
-        self.hse_hz = hse_hz
+        self.hse_hz, self.pll_locks = hse_hz, pll_locks
         self.on_can_reset: Callable[[], None] = lambda: None
+        self.on_crystal_failure: Callable[[], None] = lambda: None
         self.reset(POWER_ON)
 
     def reset(self, cause: int) -> None:
@@ -99,7 +100,7 @@ class Clocks:
             self._check_pll()
         for bit in (HSION, HSEON, PLLON):
             if after & ~before & bit:
-                if bit != HSEON or self.hse_hz:
+                if (bit != HSEON or self.hse_hz) and (bit != PLLON or self.pll_locks):
                     self.timers.after(START_NS[bit], lambda bit=bit: self._becomes_ready(bit))  # type: ignore[misc]
             elif not after & bit:
                 self.ready &= ~bit
@@ -109,6 +110,16 @@ class Clocks:
     def _becomes_ready(self, bit: int) -> None:
         if self.registers[CR] & bit:
             self.ready |= bit
+
+    def break_crystal(self) -> None:
+        """The crystal stops. The clock security system notices (7.2.7): HSI takes over, and an NMI says so."""
+        self.hse_hz = 0
+        self.ready &= ~HSEON
+        if self.registers[CR] & CSSON:
+            self.registers[CR] &= ~(HSEON | PLLON)
+            self.ready &= ~PLLON
+            self.source = HSI
+            self.on_crystal_failure()
 
     def _check_pll(self) -> None:
         value = self.registers[PLLCFGR]

@@ -11,10 +11,21 @@ from target.bxcan.schedule import Schedule, Timers
 
 SYSTICK, CSR, RVR, CVR = 15, 0x010, 0x014, 0x018
 ISER, ICER, ISPR, ICPR, IABR, IPR, IPR_END = 0x100, 0x180, 0x200, 0x280, 0x300, 0x400, 0x4F0
-CPUID, ICSR, VTOR, AIRCR, SCR, CCR, SHPR, SHCSR, CFSR, HFSR = 0xD00, 0xD04, 0xD08, 0xD0C, 0xD10, 0xD14, 0xD18, 0xD24, 0xD28, 0xD2C
+CPUID, ICSR, VTOR, AIRCR, SCR, CCR, SHPR, SHCSR, CFSR, HFSR = (
+    0xD00,
+    0xD04,
+    0xD08,
+    0xD0C,
+    0xD10,
+    0xD14,
+    0xD18,
+    0xD24,
+    0xD28,
+    0xD2C,
+)
 CPACR, DEMCR = 0xD88, 0xDFC
 VECTKEY, SYSRESETREQ = 0x05FA, 4
-HARD_FAULT = 3
+NMI, HARD_FAULT = 2, 3
 THREAD_PRIORITY = 256
 """Lower than that of any interrupt."""
 
@@ -48,8 +59,8 @@ class Cortex:
 
     def priority(self, exception: int) -> int:
         """Of an exception (interrupts from 16 on); four bits are there."""
-        if exception == HARD_FAULT:
-            return -1
+        if exception in (NMI, HARD_FAULT):
+            return exception - 4
         return self.priorities[exception - 16] if exception >= 16 else self.system_priorities[exception - 4]
 
     def execution_priority(self) -> int:

@@ -11,12 +11,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, UC_PROT_EXEC, UC_PROT_READ, Uc, UcError
-from unicorn import arm_const as arm
-
 from target.bxcan.chip import Chip, Misuse
 from target.bxcan.cortex import CPACR, HARD_FAULT, HFSR, VTOR
 from target.bxcan.elf import FLASH, Image
+from unicorn import (
+    UC_ARCH_ARM,
+    UC_HOOK_CODE,
+    UC_HOOK_INTR,
+    UC_MODE_MCLASS,
+    UC_MODE_THUMB,
+    UC_PROT_EXEC,
+    UC_PROT_READ,
+    Uc,
+    UcError,
+)
+from unicorn import arm_const as arm
 
 SLICE = 2000
 """Instructions run at a time when nothing is due before. What software itself asks an interrupt for comes at the end of a
@@ -119,7 +128,7 @@ class Machine:
         exception = cortex.next_exception()
         if exception is not None:
             self.is_asleep = False
-            if exception == HARD_FAULT or not self.cpu.reg_read(arm.UC_ARM_REG_PRIMASK):
+            if exception <= HARD_FAULT or not self.cpu.reg_read(arm.UC_ARM_REG_PRIMASK):
                 self._enter(exception)
         due = min(end, self.schedule.next_ns() or end)
         if self.is_asleep:
@@ -218,6 +227,20 @@ class Machine:
         if HARD_FAULT in self.chip.cortex.active:
             raise MachineError(f"lock-up: {error}, {self._where()}")
         self.chip.cortex.pending.add(HARD_FAULT)
+
+    # --- tampering ---------------------------------------------------------------------------------------------
+
+    def patch(self, symbol: str, code: bytes) -> Callable[[], None]:
+        """Replaces the beginning of a function; returns what undoes it."""
+        address = self.image.symbols[symbol]
+        before = bytes(self.cpu.mem_read(address, len(code)))
+
+        def write(content: bytes) -> None:
+            self.cpu.mem_write(address, content)
+            self.cpu.ctl_remove_cache(address, address + len(content))
+
+        write(code)
+        return lambda: write(before)
 
     # --- looking in --------------------------------------------------------------------------------------------
 

@@ -107,14 +107,13 @@ class Mailboxes:
                 box.status = 0
             box.status &= ~(written & (TXOK | ALST | TERR))
             if written & ABRQ:
-                self._abort(k, box)
+                self._abort(box)
 
-    def _abort(self, number: int, box: Mailbox) -> None:
-        if not box.is_pending:
-            self.misuse(f"aborts the empty transmit mailbox {number}")
-        elif box is self.sending:
+    def _abort(self, box: Mailbox) -> None:
+        """An empty mailbox stays as it is (32.9.2)."""
+        if box is self.sending:
             box.status |= ABRQ
-        else:
+        elif box.is_pending:
             self.complete(box, 0)
 
     def complete(self, box: Mailbox, result: int) -> None:

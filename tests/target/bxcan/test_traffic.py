@@ -1,0 +1,115 @@
+"""Frames through the driver: the same as from the firmware in this process, in the same order, on a busy bus too."""
+
+from __future__ import annotations
+
+import can
+import pytest
+from lever_cdkf.host_tools.native import lib
+from lever_cdkf.sil import loop, scenario
+from target.bxcan.board import MS, Board, BoardBus
+from target.bxcan.bus import Peer
+from target.bxcan.frame import Frame
+from target.bxcan.talk import PLATFORM_HEALTH, STATE_ESTIMATE, Talk, is_estimate
+
+URGENT = Frame(0x010, b"\x55" * 8)
+"""Of another node, more important than anything of ours."""
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("steady", ["duration=1 s"]),
+        ("steady", ["duration=0.5 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
+        ("linear_black_box", ["duration=0.5 s", "estimator.estimator=joint"]),
+        ("linear_physical", ["duration=0.5 s"]),
+    ],
+)
+def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
+    board: Board, name: str, changes: list[str]
+) -> None:
+    """Bit for bit, every frame but PLATFORM_HEALTH, which the firmware in this process has no board for."""
+    played = scenario.load(name, changes)
+    bus = BoardBus(board)
+    there = loop.run(played, bus).frames()
+    bus.shutdown()
+    with can.Bus(interface="lever") as reference:
+        here = loop.run(played, reference).frames()
+    ours = there.identifier != PLATFORM_HEALTH
+    assert there.identifier[ours].tolist() == here.identifier.tolist()
+    assert there.data[ours].tobytes() == here.data.tobytes()
+    assert len(there.of(STATE_ESTIMATE)) == len(played.time())
+    assert board.machine.resets == []
+
+
+def test_platform_health_of_a_board_that_is_well(talk: Talk) -> None:
+    report = talk.report("PLATFORM_HEALTH")
+    quantities = ("faults", "transmit_errors", "receive_errors", "bus_offs", "overruns", "dropped")
+    assert {name: report[name] for name in quantities} == dict.fromkeys(quantities, 0)
+
+
+def send_ahead_of(talk: Talk, urgent: Peer, count: int) -> None:
+    """Sends a sample, and has so many urgent frames ready before it can be answered."""
+    board = talk.board
+    talk.send()
+    assert board.machine.run(MS, lambda: len(board.peer.queue) == 1 and board.bus.sender is board.peer)
+    urgent.send(*[URGENT] * count)
+
+
+def answers(frames: list[Frame]) -> list[Frame]:
+    """Without what the firmware in this process does not send."""
+    return [frame for frame in frames if frame.identifier != PLATFORM_HEALTH]
+
+
+def test_order_is_kept_on_a_busy_bus(talk: Talk, board: Board) -> None:
+    """For 8 ms another node leaves no gap: two samples' answers wait in mailboxes and queue, and then go out as asked."""
+    urgent = Peer(board.bus)
+    talk.ask()
+    talk.expected()
+    heard = len(board.peer.heard)
+    send_ahead_of(talk, urgent, 65)
+    talk.send()
+    pending = 0
+
+    def all_answered() -> bool:
+        nonlocal pending
+        pending = max(pending, sum(box.is_pending for box in board.can.tx.boxes))
+        ours = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
+        return sum(map(is_estimate, ours)) == 2
+
+    assert board.machine.run(40 * MS, all_answered)
+    board.run(MS)
+    received = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
+    assert answers(received) == talk.expected()
+    assert not urgent.queue
+
+
+def test_all_mailboxes_wait_and_identifiers_do_not_decide(talk: Talk, board: Board) -> None:
+    """STATE_ESTIMATE ends a step though its identifier is the least; with three mailboxes pending that is TXFP's doing."""
+    urgent = Peer(board.bus)
+    waited = 0
+    for _ in range(120):
+        heard = len(board.peer.heard)
+        send_ahead_of(talk, urgent, 10)
+        board.run(MS)
+        waited = max(waited, sum(box.is_pending for box in board.can.tx.boxes))
+        board.machine.run(
+            20 * MS, lambda first=heard: is_estimate(board.peer.frames()[-1]) and len(board.peer.heard) > first
+        )
+        received = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
+        assert answers(received) == talk.expected()
+    assert waited == 3
+
+
+def test_answers_that_wait_too_long_are_dropped_and_counted(talk: Talk, board: Board) -> None:
+    """A bus that is taken for 60 ms: a motor command must not come out long after its sample."""
+    urgent = Peer(board.bus)
+    talk.report("PLATFORM_HEALTH")
+    heard = len(board.peer.heard)
+    send_ahead_of(talk, urgent, 500)
+    board.run(70 * MS)
+    assert not urgent.queue
+    assert board.machine.resets == []
+    assert [frame for frame in board.peer.frames()[heard:] if frame != URGENT] == []
+    report = talk.report("PLATFORM_HEALTH")
+    assert report["dropped"] > 0
+    assert int(report["faults"]) == lib.LEVER_PLATFORM_DROPPED
