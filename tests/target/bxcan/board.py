@@ -1,4 +1,4 @@
-"""The board on a table: the image in its chip, on a bus with one other node, and that node as a python-can interface."""
+"""The board on a table: the image in its chip, on a bus with one other node, which is also a python-can interface."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A CAN bus, frame by frame: arbitration, acknowledgement, destroyed frames, short circuit; at 1 Mbit/s.
 
-Whoever is on the bus is a Node. Times are those of the bits on the wire; of a frame in conflict only the winner is seen.
+Whoever is on the bus is a Node. Times are those of the bits on the wire; of frames in conflict only one is seen.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ MAILBOXES, FIFO_0, FIFO_1, FIFO_END = 0x180, 0x1B0, 0x1C0, 0x1D0
 
 INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM, TTCM, RESET, DBF = (1 << k for k in (0, 1, 2, 3, 4, 5, 6, 7, 15, 16))
 MCR_RESET, BTR_RESET = 0x00010002, 0x01230000
-MCR_BITS, IER_BITS, BTR_BITS = 0x000180FF, 0x00038F7F, 0xC37F03FF
+MCR_BITS, MSR_BITS, IER_BITS, BTR_BITS = 0x000180FF, 0xF1F, 0x00038F7F, 0xC37F03FF
 INAK, SLAK, ERRI, WKUI, SLAKI = 1, 2, 4, 8, 16
 LBKM, SILM = 1 << 30, 1 << 31
 TMEIE, LECIE, ERRIE = 1, 1 << 11, 1 << 15
@@ -59,7 +59,7 @@ class BxCan:
         self.flags = 0
         self.tx = Mailboxes(misuse)
         self.filters = Filters(misuse)
-        self.fifos = (Fifo(0, misuse), Fifo(1, misuse))
+        self.fifos = (Fifo(0, misuse, self.timers), Fifo(1, misuse, self.timers))
         self._is_changing = False
         self._is_fit = False
         self.confinement.clear()
@@ -99,24 +99,25 @@ class BxCan:
                 self.bus.request()
         elif filters.FMR <= offset < filters.END:
             self.filters.write(offset, value)
-        elif offset in (RF0R, RF1R):
-            self.fifos[offset == RF1R].write_status(value)
-        elif offset == TSR:
-            self.tx.write_status(value)
-        elif offset == MCR:
-            self._write_mcr(value)
-        elif offset == BTR:
-            self._write_btr(value)
-        elif offset == IER:
-            self._expect_only(IER_BITS, value, "IER")
-            self.ier = value & IER_BITS
-        elif offset == MSR:
-            self._expect_only(0xF1F, value, "MSR")
-            self.flags &= ~(value & (ERRI | WKUI | SLAKI))
-        elif offset == ESR:
-            self.lec = value >> 4 & 7
         else:
-            self._misuse(f"writes the read-only or reserved register {offset:#x}")
+            controls = {MCR: self._write_mcr, MSR: self._write_msr, TSR: self.tx.write_status, IER: self._write_ier}
+            controls |= {RF0R: self.fifos[0].write_status, RF1R: self.fifos[1].write_status}
+            controls |= {ESR: self._write_esr, BTR: self._write_btr}
+            if offset in controls:
+                controls[offset](value)
+            else:
+                self._misuse(f"writes the read-only or reserved register {offset:#x}")
+
+    def _write_ier(self, value: int) -> None:
+        self._expect_only(IER_BITS, value, "IER")
+        self.ier = value & IER_BITS
+
+    def _write_msr(self, value: int) -> None:
+        self._expect_only(MSR_BITS, value, "MSR")
+        self.flags &= ~(value & (ERRI | WKUI | SLAKI))
+
+    def _write_esr(self, value: int) -> None:
+        self.lec = value >> 4 & 7
 
     def _is_accessible(self, offset: int, size: int) -> bool:
         if not self.surroundings.is_can_clocked():

@@ -31,11 +31,12 @@ class Clocks:
         self.hse_hz, self.pll_locks = hse_hz, pll_locks
         self.on_can_reset: Callable[[], None] = lambda: None
         self.on_crystal_failure: Callable[[], None] = lambda: None
+        self.registers: dict[int, int] = {}
         self.reset(POWER_ON)
 
     def reset(self, cause: int) -> None:
         self.timers.cancel()
-        kept = self.registers[CSR] & 0xFE000000 if cause != POWER_ON else 0
+        kept = self.registers.get(CSR, 0) & 0xFE000000
         self.registers = dict.fromkeys(range(0, END, 4), 0) | RESET_VALUES | {CSR: kept | cause}
         self.ready = HSION
         self.source = HSI

@@ -1,4 +1,4 @@
-"""What a Cortex-M4 has beside its instructions: NVIC, system control block, SysTick, cycle counter (ARMv7-M, DDI 0403E).
+"""What a Cortex-M4 has beside its instructions: NVIC, system control block, SysTick (ARMv7-M, DDI 0403E).
 
 The core itself is Unicorn's, which knows no interrupts: entering and leaving them is in machine.py.
 """
@@ -11,19 +11,8 @@ from target.bxcan.schedule import Schedule, Timers
 
 SYSTICK, CSR, RVR, CVR = 15, 0x010, 0x014, 0x018
 ISER, ICER, ISPR, ICPR, IABR, IPR, IPR_END = 0x100, 0x180, 0x200, 0x280, 0x300, 0x400, 0x4F0
-CPUID, ICSR, VTOR, AIRCR, SCR, CCR, SHPR, SHCSR, CFSR, HFSR = (
-    0xD00,
-    0xD04,
-    0xD08,
-    0xD0C,
-    0xD10,
-    0xD14,
-    0xD18,
-    0xD24,
-    0xD28,
-    0xD2C,
-)
-CPACR, DEMCR = 0xD88, 0xDFC
+CPUID, ICSR, VTOR, AIRCR, CCR, SHPR, CFSR, HFSR = 0xD00, 0xD04, 0xD08, 0xD0C, 0xD14, 0xD18, 0xD28, 0xD2C
+CPACR, FPCCR = 0xD88, 0xF34
 VECTKEY, SYSRESETREQ = 0x05FA, 4
 NMI, HARD_FAULT = 2, 3
 THREAD_PRIORITY = 256
@@ -46,7 +35,7 @@ class Cortex:
 
     def reset(self) -> None:
         self.timers.cancel()
-        self.registers: dict[int, int] = {CPUID: 0x410FC241, VTOR: 0, AIRCR: 0xFA050000, CCR: 0x200, 0xF34: 0xC0000000}
+        self.registers: dict[int, int] = {CPUID: 0x410FC241, VTOR: 0, AIRCR: 0xFA050000, CCR: 0x200, FPCCR: 0xC0000000}
         self.enabled: set[int] = set()
         self.pending: set[int] = set()
         self.active: list[int] = []

@@ -6,9 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from target.bxcan.frame import Frame
+from target.bxcan.schedule import Timers
 
 DEPTH = 3
 FULL, FOVR, RFOM = 1 << 3, 1 << 4, 1 << 5
+RELEASE_NS = 100
+"""How long a message is being released, some cycles of APB1: RFOM reads as 1 and FMP as before."""
 
 
 @dataclass
@@ -32,6 +35,7 @@ class Message:
 class Fifo:
     number: int
     misuse: Callable[[str], None]
+    timers: Timers
     messages: list[Message] = field(default_factory=list)
     flags: int = 0
     lost: int = 0
@@ -66,14 +70,21 @@ class Fifo:
             self.misuse(f"sets reserved bits of RF{self.number}R: {value:#010x}")
         self.flags &= ~(value & (FULL | FOVR))
         if value & RFOM:
-            if self.messages:
-                self.messages.pop(0)
-                self.taken += 1
-            else:
+            if not self.messages:
                 self.misuse(f"releases FIFO {self.number}, which is empty")
+            elif self.flags & RFOM:
+                self.misuse(f"releases FIFO {self.number} again while RFOM is 1")
+            else:
+                self.flags |= RFOM
+                self.timers.after(RELEASE_NS, self._released)
+
+    def _released(self) -> None:
+        self.flags &= ~RFOM
+        self.messages.pop(0)
+        self.taken += 1
 
     def read(self, register: int) -> int:
-        if not self.messages:
-            self.misuse(f"reads a message from FIFO {self.number}, which is empty")
+        if not self.messages or self.flags & RFOM:
+            self.misuse(f"reads a message from FIFO {self.number}, which is empty or being released")
             return 0
         return self.messages[0].read(register)

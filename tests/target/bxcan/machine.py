@@ -1,7 +1,7 @@
 """An STM32F405 that runs an image: Unicorn's Cortex-M4F in the simulated chip, on a simulated CAN bus.
 
-Unicorn has instructions and memory, and nothing else. Here are time (one cycle for an instruction, a few for an access to
-a peripheral), interrupts (DDI 0403E B1.5), WFI, reset and hard faults. Every run is the same to the bit.
+Unicorn has instructions and memory, and nothing else. Here are time (one cycle for an instruction, a few for an access
+to a peripheral), interrupts (DDI 0403E B1.5), WFI, reset and hard faults. Every run is the same to the bit.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from unicorn import (
 from unicorn import arm_const as arm
 
 SLICE = 2000
-"""Instructions run at a time when nothing is due before. What software itself asks an interrupt for comes at the end of a
-slice, everything else at its time."""
+"""Instructions run at a time when nothing is due before. Interrupts that software itself causes come at the end of a
+slice, all others at their time."""
 ACCESS_CYCLES = 4
 WFI, CPSIE = b"\x30\xbf", b"\x62\xb6"
 EXCEPTION_EXIT = 8

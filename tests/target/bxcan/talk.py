@@ -63,11 +63,11 @@ class Talk:
         assert answered, f"sample {self.next - 1} has no answer"
         return [frame for _, frame in heard[before:]]
 
-    def report(self, name: str) -> dict[str, object]:
+    def report(self, name: str) -> dict[str, float]:
         """Goes on until the image sends this message, and returns its values."""
         identifier = codec.message(name).frame_id
         for _ in range(1000):
             for frame in self.ask():
                 if frame.identifier == identifier:
-                    return dict(codec.decode(identifier, frame.data)[1])
+                    return codec.decode(identifier, frame.data)[1]
         raise AssertionError(f"no {name} in 1000 samples")

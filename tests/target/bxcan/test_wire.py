@@ -45,7 +45,8 @@ def test_arbitration_is_that_of_the_standard() -> None:
         Frame(0x110 << 18 | 1, extended=True),
         Frame(0x111),
     ]
-    assert sorted(reversed(ranked), key=lambda frame: frame.arbitration) == ranked
+    mixed = [ranked[k] for k in (3, 0, 5, 2, 4, 1)]
+    assert sorted(mixed, key=lambda frame: frame.arbitration) == ranked
 
 
 def filters(**registers: int) -> Filters:
