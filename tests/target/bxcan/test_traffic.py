@@ -18,10 +18,10 @@ URGENT = Frame(0x010, b"\x55" * 8)
 @pytest.mark.parametrize(
     ("name", "changes"),
     [
-        ("steady", ["duration=1 s"]),
-        ("steady", ["duration=0.5 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
-        ("linear_black_box", ["duration=0.5 s", "estimator.estimator=joint"]),
-        ("linear_physical", ["duration=0.5 s"]),
+        ("steady", ["duration=3 s"]),
+        ("steady", ["duration=1 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
+        ("linear_black_box", ["duration=1 s", "estimator.estimator=joint"]),
+        ("linear_physical", ["duration=1 s"]),
     ],
 )
 def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
