@@ -57,6 +57,8 @@ class Bus:
         """So many of the next frames are destroyed, by noise that makes a recessive bit dominant."""
         self.is_shorted = False
         """CAN_H and CAN_L touch: what is sent as dominant stays recessive."""
+        self.is_held = False
+        """Some node keeps the bus dominant, so that nobody can begin; for before a board starts."""
         self.sender: Node | None = None
         self.frames = 0
         """Frames that arrived."""
@@ -70,7 +72,7 @@ class Bus:
 
     def request(self) -> None:
         """A node has something to send."""
-        if not self._is_busy and any(node.offer() for node in self.nodes):
+        if not self._is_busy and not self.is_held and any(node.offer() for node in self.nodes):
             self._is_busy = True
             self.schedule.at(self.schedule.now + BIT_NS, self._arbitrate)
 
@@ -79,7 +81,7 @@ class Bus:
         start = max(self.schedule.now, self.dominant_until)
 
         def look() -> None:
-            if self.dominant_until > start:
+            if self.is_held or self.dominant_until > start:
                 self.when_recessive(runs, action)
             elif runs > 1:
                 self.when_recessive(runs - 1, action)

@@ -30,7 +30,7 @@ from unicorn import arm_const as arm
 SLICE = 2000
 """Instructions run at a time when nothing is due before. Interrupts that software itself causes come at the end of a
 slice, all others at their time."""
-ACCESS_CYCLES = 4
+ACCESS_CYCLES, EXCEPTION_CYCLES = 4, 12
 WFI, CPSIE = b"\x30\xbf", b"\x62\xb6"
 EXCEPTION_EXIT = 8
 """Number by which Unicorn tells that an EXC_RETURN value was loaded into the program counter."""
@@ -154,15 +154,15 @@ class Machine:
             self.schedule.advance(start + max(1, round(count * cycle_ns)))
 
     def _read(self, cpu: Uc, offset: int, size: int, base: int) -> int:
-        self._pass_time()
+        self._pass_time(ACCESS_CYCLES)
         return self.chip.read(base + offset, size)
 
     def _write(self, cpu: Uc, offset: int, size: int, value: int, base: int) -> None:
-        self._pass_time()
+        self._pass_time(ACCESS_CYCLES)
         self.chip.write(base + offset, size, value)
 
-    def _pass_time(self) -> None:
-        step = int(ACCESS_CYCLES * 1e9 / self.chip.clocks.hclk_hz())
+    def _pass_time(self, cycles: int) -> None:
+        step = int(cycles * 1e9 / self.chip.clocks.hclk_hz())
         self.schedule.advance(self.schedule.now + step)
 
     def _unmasked(self, cpu: Uc, address: int, size: int, data: object) -> None:
@@ -201,6 +201,7 @@ class Machine:
         cpu.reg_write(arm.UC_ARM_REG_SP, stack)
         cpu.reg_write(arm.UC_ARM_REG_LR, EXC_RETURN_HANDLER if cortex.active else EXC_RETURN_THREAD)
         cortex.enter(exception)
+        self._pass_time(EXCEPTION_CYCLES)
         cpu.reg_write(arm.UC_ARM_REG_XPSR, XPSR_THUMB | exception)
         (handler,) = struct.unpack("<I", cpu.mem_read(cortex.registers[VTOR] + 4 * exception, 4))
         if not handler & 1:
@@ -212,6 +213,7 @@ class Machine:
         if not cortex.active:
             raise MachineError("return from an exception in none")
         cortex.leave()
+        self._pass_time(EXCEPTION_CYCLES)
         stack = cpu.reg_read(arm.UC_ARM_REG_SP)
         values = FRAME.unpack(cpu.mem_read(stack, FRAME.size))
         for register, value in zip((*CORE_AND_LINK, *FLOATS), (*values[:6], *values[8:25]), strict=True):

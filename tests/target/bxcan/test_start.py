@@ -11,7 +11,7 @@ from target.bxcan.board import MS, Board
 from target.bxcan.bxcan import ABOM, INAK, INRQ, NART, RFLM, TTCM, TXFP
 from target.bxcan.clocks import HSE, HSI, MHZ, PLL
 from target.bxcan.frame import Frame
-from target.bxcan.talk import INPUTS, Talk
+from target.bxcan.talk import INPUTS, Talk, is_estimate
 
 MakeBoard = Callable[..., Board]
 REGISTERS = {bxcan.MCR: "MCR", bxcan.BTR: "BTR", bxcan.IER: "IER", filters.FMR: "FMR", filters.FA1R: "FA1R"}
@@ -52,6 +52,30 @@ def test_nothing_is_sent_before_a_sample_has_come(board: Board) -> None:
     board.run(200 * MS)
     assert board.bus.frames == 0
     assert board.machine.resets == []
+
+
+def test_joins_a_busy_bus(make_board: MakeBoard) -> None:
+    """Between two frames, which leave no more than the 11 recessive bits that it takes."""
+    board = make_board()
+    board.machine.run(15 * MS)
+    board.peer.send(*[Frame(0x050, bytes(8))] * 400)
+    board.start()
+    assert board.peer.queue, "the bus has fallen silent before"
+    with Talk(board) as talk:
+        del board.peer.queue[1:]
+        assert is_estimate(talk.ask()[-1])
+
+
+def test_waits_for_a_dead_bus_without_hanging(make_board: MakeBoard) -> None:
+    board = make_board()
+    board.bus.is_held = True
+    board.run(500 * MS)
+    assert not board.can.acknowledges()
+    assert board.machine.resets == []
+    board.bus.is_held = False
+    board.start()
+    with Talk(board) as talk:
+        assert is_estimate(talk.ask()[-1])
 
 
 def test_the_processor_sleeps_while_there_is_nothing_to_do(board: Board) -> None:

@@ -30,6 +30,27 @@ def test_destroyed_frames_are_sent_again_and_shown(talk: Talk, board: Board) -> 
     assert report["dropped"] == report["bus_offs"] == 0
 
 
+def test_nobody_acknowledges(talk: Talk, board: Board) -> None:
+    """The other node is gone: the answer is tried for a while, then dropped, and the next one after its return is new."""
+    talk.report("PLATFORM_HEALTH")
+    talk.send()
+    assert board.machine.run(MS, lambda: not board.peer.queue)
+    board.peer.is_connected = False
+    board.run(10 * MS)
+    assert any(box.is_pending for box in board.can.tx.boxes)
+    assert board.can.confinement.transmit == 128
+    board.run(90 * MS)
+    assert not any(box.is_pending for box in board.can.tx.boxes)
+    assert board.machine.resets == []
+    board.peer.is_connected = True
+    board.run(5 * MS)
+    assert sum(map(is_estimate, board.peer.frames())) == talk.next - 1
+    report = talk.report("PLATFORM_HEALTH")
+    assert report["dropped"] == 1
+    assert report["bus_offs"] == 0
+    assert 0 < report["transmit_errors"] < 128
+
+
 def test_error_counters_are_those_of_the_controller(talk: Talk, board: Board) -> None:
     talk.ask()
     confinement = board.can.confinement
