@@ -7,6 +7,7 @@ to a peripheral), interrupts (DDI 0403E B1.5), WFI, reset and hard faults. Every
 from __future__ import annotations
 
 import struct
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,8 @@ SLICE = 2000
 """Instructions run at a time when nothing is due before. Interrupts that software itself causes come at the end of a
 slice, all others at their time."""
 ACCESS_CYCLES, EXCEPTION_CYCLES = 4, 12
+STORM = 1000
+"""So many exceptions within a millisecond are a cause that nobody clears; the image has some ten."""
 WFI, CPSIE = b"\x30\xbf", b"\x62\xb6"
 EXCEPTION_EXIT = 8
 """Number by which Unicorn tells that an EXC_RETURN value was loaded into the program counter."""
@@ -65,6 +68,7 @@ class Machine:
         """Addresses of the instructions that have made a hard fault."""
         self.is_asleep = False
         self.sleeps = set(self.image.find(WFI))
+        self._recent: deque[int] = deque(maxlen=STORM)
         self._wants_exit = False
         self._reset_cause: str | None = None
         chip.on_reset = self._request_reset
@@ -189,6 +193,9 @@ class Machine:
         if not cortex.registers.get(CPACR, 0):
             raise MachineError(f"exception {exception} before the FPU is on")
         stack, pc, xpsr = cpu.reg_read_batch([arm.UC_ARM_REG_SP, arm.UC_ARM_REG_PC, arm.UC_ARM_REG_XPSR])
+        self._recent.append(self.schedule.now)
+        if len(self._recent) == STORM and self.schedule.now - self._recent[0] < 1_000_000:
+            raise MachineError(f"exception {exception} comes again and again, {self._where()}")
         pad = stack & 4
         state = xpsr & (XPSR_FLAGS | 0x1FF) | XPSR_THUMB | (XPSR_ALIGN if pad else 0)
         frame = FRAME.pack(*cpu.reg_read_batch(CORE_AND_LINK), pc, state, *cpu.reg_read_batch(FLOATS), 0)

@@ -133,7 +133,7 @@ class Board:
         finally:
             self._line.settimeout(ANSWER_TIME)
 
-    def platform_health(self) -> dict[str, object]:
+    def platform_health(self) -> dict[str, float]:
         """What PLATFORM_HEALTH says after some samples of a lever that rests."""
         assert self.command("O") == ""
         lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")

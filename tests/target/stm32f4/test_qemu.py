@@ -20,7 +20,7 @@ NOWHERE = 0x6000_0000
 FAULT_SEEN = 0x5EE4_FA17
 
 
-def faults_of(image: Path, folder: Path) -> object:
+def faults_of(image: Path, folder: Path) -> float:
     with running(image, folder) as board:
         board.wait_for_answer()
         return board.platform_health()["faults"]
