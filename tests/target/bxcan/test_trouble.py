@@ -31,7 +31,7 @@ def test_destroyed_frames_are_sent_again_and_shown(talk: Talk, board: Board) -> 
 
 
 def test_nobody_acknowledges(talk: Talk, board: Board) -> None:
-    """The other node is gone: the answer is tried for a while, then dropped, and the next one after its return is new."""
+    """The other node is gone: the answer is tried for a while and then dropped; what comes after its return is new."""
     talk.report("PLATFORM_HEALTH")
     talk.send()
     assert board.machine.run(MS, lambda: not board.peer.queue)
