@@ -29,6 +29,11 @@ def is_estimate(frame: Frame) -> bool:
     return frame.identifier == STATE_ESTIMATE
 
 
+def answers(frames: list[Frame]) -> list[Frame]:
+    """Without what the firmware in this process does not send."""
+    return [frame for frame in frames if frame.identifier != PLATFORM_HEALTH]
+
+
 class Talk:
     def __init__(self, board: Board) -> None:
         self.board = board
@@ -44,10 +49,14 @@ class Talk:
 
     def send(self) -> None:
         """The next sample, to both."""
-        for frame in sample(self.next):
-            self.board.peer.send(frame)
-            self.reference.send(can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False))
+        frames = sample(self.next)
         self.next += 1
+        self.board.peer.send(*frames)
+        self.tell_reference(*frames)
+
+    def tell_reference(self, *frames: Frame) -> None:
+        for frame in frames:
+            self.reference.send(can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False))
 
     def expected(self) -> list[Frame]:
         """What the firmware in this process has answered since the last call."""

@@ -9,7 +9,7 @@ from lever_cdkf.sil import loop, scenario
 from target.bxcan.board import MS, Board, BoardBus
 from target.bxcan.bus import Peer
 from target.bxcan.frame import Frame
-from target.bxcan.talk import PLATFORM_HEALTH, STATE_ESTIMATE, Talk, is_estimate
+from target.bxcan.talk import PLATFORM_HEALTH, STATE_ESTIMATE, Talk, answers, is_estimate
 
 URGENT = Frame(0x010, b"\x55" * 8)
 """Of another node, more important than anything of ours."""
@@ -55,11 +55,6 @@ def send_ahead_of(talk: Talk, urgent: Peer, count: int) -> None:
     urgent.send(*[URGENT] * count)
 
 
-def answers(frames: list[Frame]) -> list[Frame]:
-    """Without what the firmware in this process does not send."""
-    return [frame for frame in frames if frame.identifier != PLATFORM_HEALTH]
-
-
 def test_order_is_kept_on_a_busy_bus(talk: Talk, board: Board) -> None:
     """For 8 ms another node leaves no gap: the answers to two samples wait in mailboxes and queue."""
     urgent = Peer(board.bus)
@@ -80,11 +75,12 @@ def test_order_is_kept_on_a_busy_bus(talk: Talk, board: Board) -> None:
     board.run(MS)
     received = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
     assert answers(received) == talk.expected()
+    assert is_estimate(received[-1])
     assert not urgent.queue
 
 
-def test_all_mailboxes_wait_and_identifiers_do_not_decide(talk: Talk, board: Board) -> None:
-    """STATE_ESTIMATE ends a step though its identifier is the least."""
+def test_all_mailboxes_wait(talk: Talk, board: Board) -> None:
+    """And identifiers do not decide: STATE_ESTIMATE ends a step though its own is the least."""
     urgent = Peer(board.bus)
     waited = 0
     for _ in range(120):
@@ -95,6 +91,7 @@ def test_all_mailboxes_wait_and_identifiers_do_not_decide(talk: Talk, board: Boa
         board.run(5 * MS)
         received = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
         assert answers(received) == talk.expected()
+        assert is_estimate(received[-1])
     assert waited == 3
 
 

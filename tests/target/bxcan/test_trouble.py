@@ -7,7 +7,7 @@ from lever_cdkf.host_tools.native import lib
 from target.bxcan.board import MS, Board
 from target.bxcan.bus import BIT_NS
 from target.bxcan.chip import SOFTWARE_RESET, WATCHDOG_RESET
-from target.bxcan.talk import Talk, is_estimate, sample
+from target.bxcan.talk import Talk, answers, is_estimate, sample
 
 HANG = b"\xfe\xe7"
 """b . (DDI 0403E A7.7.12)"""
@@ -125,12 +125,16 @@ def test_fifo_overrun_is_counted_and_shown(talk: Talk, board: Board, frames: int
     talk.report("PLATFORM_HEALTH")
     inputs = [frame for k in range(talk.next, talk.next + frames) for frame in sample(k)][:frames]
     talk.next += (frames + 1) // 2
+    talk.expected()
+    heard = len(board.peer.heard)
     board.peer.send(*inputs)
     board.schedule.advance(board.schedule.now + frames * MS // 4)
     assert [message.frame for message in board.can.fifos[0].messages] == inputs[:3]
     assert board.can.fifos[0].lost == lost
     board.run(5 * MS)
     assert board.can.fifos[0].messages == []
+    talk.tell_reference(*inputs[:3])
+    assert answers(board.peer.frames()[heard:]) == talk.expected()
     report = talk.report("PLATFORM_HEALTH")
     assert report["overruns"] == min(1, lost), "once for a series, as RM0090's FOVR tells no more"
     assert int(report["faults"]) == (lib.LEVER_PLATFORM_OVERRUN if lost else 0)
