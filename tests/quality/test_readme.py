@@ -22,8 +22,12 @@ TIME_LIMIT = "120"
 """For one block [s]."""
 
 
-VCAN = pytest.mark.requires("ip", "candump", "linux.uml")
-"""Of a block that goes to a place with a vcan0."""
+NEEDED = {
+    "tests/vcan": pytest.mark.requires("ip", "candump", "linux.uml"),
+    "lever flash": pytest.mark.requires("arm-none-eabi-gcc", "openocd"),
+    "lever qemu": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
+}
+"""By blocks with these words in them."""
 
 
 def blocks(language: str) -> list[object]:
@@ -31,7 +35,7 @@ def blocks(language: str) -> list[object]:
         pytest.param(
             content,
             id=f"{readme.relative_to(tools.ROOT)}:{line}",
-            marks=[VCAN] if "tests/vcan" in content else [],
+            marks=[mark for words, mark in NEEDED.items() if words in content],
         )
         for readme in READMES
         for line, content in readmes.blocks(readme, language).items()

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from target.bxcan.chip import Chip, Misuse
+from target.bxcan.chip import Chip
 from target.bxcan.cortex import CPACR, HARD_FAULT, HFSR, VTOR
 from target.bxcan.elf import FLASH, Image
 from unicorn import (
@@ -182,10 +182,9 @@ class Machine:
     # --- exceptions (DDI 0403E B1.5.6 to B1.5.8) ---------------------------------------------------------------
 
     def _interrupted(self, cpu: Uc, number: int, data: object) -> None:
-        if number == EXCEPTION_EXIT:
-            self._wants_exit = True
-        else:
-            self._request_reset(f"exception {number} of the core, which is not modelled, {self._where()}")
+        if number != EXCEPTION_EXIT:
+            raise MachineError(f"exception {number} of QEMU's core is not modelled, {self._where()}")
+        self._wants_exit = True
         cpu.emu_stop()
 
     def _enter(self, exception: int) -> None:
@@ -253,9 +252,6 @@ class Machine:
 
     # --- looking in --------------------------------------------------------------------------------------------
 
-    def word(self, symbol: str) -> int:
-        """A 32-bit variable of the image."""
-        return int.from_bytes(self.cpu.mem_read(self.image.symbols[symbol], 4), "little")
-
-
-__all__ = ["Machine", "MachineError", "Misuse", "Reset"]
+    def word(self, symbol: str, offset: int = 0) -> int:
+        """32 bits of a variable of the image."""
+        return int.from_bytes(self.cpu.mem_read(self.image.symbols[symbol] + offset, 4), "little")

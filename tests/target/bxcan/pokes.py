@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from target.bxcan.bus import BIT_NS, Bus, Peer
-from target.bxcan.bxcan import ABOM, BTR, ESR, IER, INAK, INRQ, MAILBOXES, MCR, MSR, RF0R, TSR, BxCan
+from target.bxcan.bxcan import ABOM, BTR, INAK, INRQ, MAILBOXES, MCR, MSR, BxCan
 from target.bxcan.filters import FA1R, FM1R, FMR, FMR_RESET, FS1R
 from target.bxcan.frame import Frame
 from target.bxcan.schedule import Schedule
@@ -72,6 +72,3 @@ class Desk:
         self.write(at + 12, int.from_bytes(data[4:], "little"))
         identifier = frame.identifier << 3 | 4 if frame.extended else frame.identifier << 21
         self.write(at, identifier | frame.remote << 1 | 1)
-
-
-__all__ = ["BTR", "BTR_1_MBIT", "ESR", "IER", "MCR", "MSR", "RF0R", "TSR", "Desk"]

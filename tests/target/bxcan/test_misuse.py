@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from target.bxcan.bxcan import INRQ, MAILBOXES, RF1R
+from target.bxcan.bxcan import BTR, INRQ, MAILBOXES, MCR, RF0R, RF1R
 from target.bxcan.fifo import RFOM
 from target.bxcan.filters import FM1R, FMR
 from target.bxcan.frame import Frame
-from target.bxcan.pokes import BTR, BTR_1_MBIT, MCR, RF0R, Desk
+from target.bxcan.pokes import BTR_1_MBIT, Desk
 
 SAMPLE = Frame(0x110, bytes(range(8)))
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 from target.bxcan.bus import BIT_NS
-from target.bxcan.bxcan import ABOM, IER, INRQ, NART, RFLM, SLAK, SLEEP, TXFP
+from target.bxcan.bxcan import ABOM, BTR, ESR, IER, INRQ, MCR, MSR, NART, RF0R, RFLM, SLAK, SLEEP, TSR, TXFP
 from target.bxcan.fifo import FOVR, FULL, RFOM
 from target.bxcan.filters import FA1R, FMR, FMR_RESET
 from target.bxcan.frame import Frame
-from target.bxcan.pokes import BTR, BTR_1_MBIT, ESR, MCR, MSR, RF0R, TSR, Desk
+from target.bxcan.pokes import BTR_1_MBIT, Desk
 
 SAMPLE = Frame(0x110, bytes(range(8)))
 
