@@ -49,8 +49,11 @@ class Talk:
 
     def send(self) -> None:
         """The next sample, to both."""
-        frames = sample(self.next)
+        self.tell(*sample(self.next))
         self.next += 1
+
+    def tell(self, *frames: Frame) -> None:
+        """Any frames, to both."""
         self.board.peer.send(*frames)
         self.tell_reference(*frames)
 

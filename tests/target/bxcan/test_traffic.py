@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import can
 import pytest
+from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.native import lib
 from lever_cdkf.sil import loop, scenario
 from target.bxcan.board import MS, Board, BoardBus
 from target.bxcan.bus import Peer
 from target.bxcan.frame import Frame
-from target.bxcan.talk import PLATFORM_HEALTH, STATE_ESTIMATE, Talk, answers, is_estimate
+from target.bxcan.talk import COMMAND, PLATFORM_HEALTH, STATE_ESTIMATE, Talk, answers, is_estimate
 
 URGENT = Frame(0x010, b"\x55" * 8)
 """Of another node, more important than anything of ours."""
@@ -45,6 +46,22 @@ def test_platform_health_of_a_board_that_is_well(talk: Talk) -> None:
     report = talk.report("PLATFORM_HEALTH")
     quantities = ("faults", "transmit_errors", "receive_errors", "bus_offs", "overruns", "dropped")
     assert {name: report[name] for name in quantities} == dict.fromkeys(quantities, 0)
+
+
+def test_keeps_up_with_samples_each_millisecond(talk: Talk, board: Board) -> None:
+    """Not in lock-step: the sensors do not wait. With dither, so that a motor command goes out with every estimate."""
+    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
+    talk.tell(Frame(COMMAND, codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **keep})))
+    start, count = board.schedule.now + MS, 250
+    for k in range(count):
+        board.schedule.at(start + k * MS, talk.send)
+    board.run((count + 5) * MS)
+    expected = talk.expected()
+    assert answers(board.peer.frames()) == expected
+    assert len(expected) > 2 * count
+    times = [time for time, frame in board.peer.heard if is_estimate(frame)]
+    lateness = [time - start - k * MS for k, time in enumerate(times)]
+    assert max(lateness) < 2 * MS, "the frames of a whole step take 1.1 ms on the bus"
 
 
 def send_ahead_of(talk: Talk, urgent: Peer, count: int) -> None:
