@@ -1,0 +1,127 @@
+"""Frames through the driver: the same as from the firmware in this process, in the same order, on a busy bus too."""
+
+from __future__ import annotations
+
+import can
+import pytest
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.native import lib
+from lever_cdkf.sil import loop, scenario
+from target.bxcan.board import MS, Board, BoardBus
+from target.bxcan.bus import Peer
+from target.bxcan.frame import Frame
+from target.bxcan.talk import COMMAND, PLATFORM_HEALTH, STATE_ESTIMATE, Talk, answers, is_estimate
+
+URGENT = Frame(0x010, b"\x55" * 8)
+"""Of another node, more important than anything of ours."""
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("steady", ["duration=3 s"]),
+        ("steady", ["duration=1 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
+        ("linear_black_box", ["duration=1 s", "estimator.estimator=joint"]),
+        ("linear_physical", ["duration=1 s"]),
+    ],
+)
+def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
+    board: Board, name: str, changes: list[str]
+) -> None:
+    """Bit for bit, every frame but PLATFORM_HEALTH, which the firmware in this process has no board for."""
+    played = scenario.load(name, changes)
+    bus = BoardBus(board)
+    there = loop.run(played, bus).frames()
+    bus.shutdown()
+    with can.Bus(interface="lever") as reference:
+        here = loop.run(played, reference).frames()
+    ours = there.identifier != PLATFORM_HEALTH
+    assert there.identifier[ours].tolist() == here.identifier.tolist()
+    assert there.data[ours].tobytes() == here.data.tobytes()
+    assert len(there.of(STATE_ESTIMATE)) == len(played.time())
+    assert board.machine.resets == []
+
+
+def test_platform_health_of_a_board_that_is_well(talk: Talk) -> None:
+    report = talk.report("PLATFORM_HEALTH")
+    quantities = ("faults", "transmit_errors", "receive_errors", "bus_offs", "overruns", "dropped")
+    assert {name: report[name] for name in quantities} == dict.fromkeys(quantities, 0)
+
+
+def test_keeps_up_with_samples_each_millisecond(talk: Talk, board: Board) -> None:
+    """Not in lock-step: the sensors do not wait. With dither, so that a motor command goes out with every estimate."""
+    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
+    talk.tell(Frame(COMMAND, codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **keep})))
+    start, count = board.schedule.now + MS, 250
+    for k in range(count):
+        board.schedule.at(start + k * MS, talk.send)
+    board.run((count + 5) * MS)
+    expected = talk.expected()
+    assert answers(board.peer.frames()) == expected
+    assert len(expected) > 2 * count
+    times = [time for time, frame in board.peer.heard if is_estimate(frame)]
+    lateness = [time - start - k * MS for k, time in enumerate(times)]
+    assert max(lateness) < 2 * MS, "the frames of a whole step take 1.1 ms on the bus"
+
+
+def send_ahead_of(talk: Talk, urgent: Peer, count: int) -> None:
+    """Sends a sample, and has so many urgent frames ready before it can be answered."""
+    board = talk.board
+    talk.send()
+    assert board.machine.run(MS, lambda: len(board.peer.queue) == 1 and board.bus.sender is board.peer)
+    urgent.send(*[URGENT] * count)
+
+
+def test_order_is_kept_on_a_busy_bus(talk: Talk, board: Board) -> None:
+    """For 8 ms another node leaves no gap: the answers to two samples wait in mailboxes and queue."""
+    urgent = Peer(board.bus)
+    talk.ask()
+    talk.expected()
+    heard = len(board.peer.heard)
+    send_ahead_of(talk, urgent, 65)
+    talk.send()
+    pending = 0
+
+    def all_answered() -> bool:
+        nonlocal pending
+        pending = max(pending, sum(box.is_pending for box in board.can.tx.boxes))
+        ours = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
+        return sum(map(is_estimate, ours)) == 2
+
+    assert board.machine.run(40 * MS, all_answered)
+    board.run(MS)
+    received = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
+    assert answers(received) == talk.expected()
+    assert is_estimate(received[-1])
+    assert not urgent.queue
+
+
+def test_all_mailboxes_wait(talk: Talk, board: Board) -> None:
+    """And identifiers do not decide: STATE_ESTIMATE ends a step though its own is the least."""
+    urgent = Peer(board.bus)
+    waited = 0
+    for _ in range(120):
+        heard = len(board.peer.heard)
+        send_ahead_of(talk, urgent, 10)
+        board.run(MS)
+        waited = max(waited, sum(box.is_pending for box in board.can.tx.boxes))
+        board.run(5 * MS)
+        received = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
+        assert answers(received) == talk.expected()
+        assert is_estimate(received[-1])
+    assert waited == 3
+
+
+def test_answers_that_wait_too_long_are_dropped_and_counted(talk: Talk, board: Board) -> None:
+    """A bus that is taken for 60 ms: a motor command must not come out long after its sample."""
+    urgent = Peer(board.bus)
+    talk.report("PLATFORM_HEALTH")
+    heard = len(board.peer.heard)
+    send_ahead_of(talk, urgent, 500)
+    board.run(70 * MS)
+    assert not urgent.queue
+    assert board.machine.resets == []
+    assert [frame for frame in board.peer.frames()[heard:] if frame != URGENT] == []
+    report = talk.report("PLATFORM_HEALTH")
+    assert report["dropped"] > 0
+    assert int(report["faults"]) == lib.LEVER_PLATFORM_DROPPED
