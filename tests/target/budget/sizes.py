@@ -1,0 +1,36 @@
+"""What the core occupies: bytes of its sections, and of an instance."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from .image import core_library, core_objects, run_tool
+
+_SECTION = re.compile(r"^\.(text|rodata|data|bss)(?:\.\S*)?\s+(\d+)\s", re.MULTILINE)
+_INSTANCE = re.compile(r"DW_TAG_structure_type\)\s+<\w+>\s+DW_AT_name\s+:[^\n]*\blever\s+<\w+>\s+DW_AT_byte_size\s+: (\d+)")
+
+
+def of_library(elf: Path) -> dict[str, int]:
+    """Bytes of text, rodata, data and bss in the static library of the core, whether a program needs all of it or not."""
+    total = dict.fromkeys(("text", "rodata", "data", "bss"), 0)
+    for kind, count in _SECTION.findall(run_tool("size", "-A", core_library(elf))):
+        total[kind] += int(count)
+    return total
+
+
+def of_files(elf: Path) -> dict[str, int]:
+    """Bytes of text and rodata by source file ("filter/dual.c")."""
+    found = {}
+    for name, path in core_objects(elf).items():
+        sections = _SECTION.findall(run_tool("size", "-A", path))
+        found[name] = sum(int(count) for kind, count in sections if kind in ("text", "rodata"))
+    return found
+
+
+def of_instance(elf: Path) -> int:
+    """sizeof(struct lever), from the debugging information: nobody outside of the core knows it."""
+    output = run_tool("readelf", "--debug-dump=info", core_objects(elf)["app/lever.c"])
+    found = _INSTANCE.search(output)
+    assert found is not None, "no struct lever in app/lever.c"
+    return int(found.group(1))
