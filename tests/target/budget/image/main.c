@@ -1,11 +1,12 @@
 /* Runs the estimator over recorded samples and writes, for every sample, the time it took and the stack it used.
  *
- *     budget OUTPUT update|tick [model=N estimator=N preload=N adaptation=N] [SETTING=BITS …] dither_rms=BITS
+ *     budget OUTPUT update|tick [model=N estimator=N preload=N adaptation=N] [SETTING=BITS …] [dither_rms=BITS] [paint=0]
  *
  * All numbers are hexadecimal, those of settings and torque the bits of a float. The samples lie in flash, behind a
  * header_t: for `update` lever_sample_t, each one measured call of lever_update(); for `tick` two frames for a sample,
  * measured from the first lever_on_frame() to the lever_next_frame() that returns false. OUTPUT gets an intro_t, a
- * record_t for each sample, and the last lever_estimate_t. Time is in ticks of SysTick. */
+ * record_t for each sample, and the last lever_estimate_t. Time is in ticks of SysTick. Without painting, the stack is not
+ * measured. */
 #include "semihosting.h"
 
 #include "lever_cdkf.h"
@@ -61,6 +62,7 @@ static lever_memory_t memory;
 static record_t records[1024];
 static uint32_t record_count;
 static uint32_t output;
+static uint32_t painted_words = PAINTED_WORDS;
 
 /* --- measuring ------------------------------------------------------------------------------------------------- */
 
@@ -80,7 +82,7 @@ static inline uint32_t *stack_pointer(void)
 __attribute__((always_inline)) static inline void paint_stack(void)
 {
     volatile uint32_t *word = stack_pointer();
-    for (uint32_t i = 1u; i <= PAINTED_WORDS; i++) {
+    for (uint32_t i = 1u; i <= painted_words; i++) {
         word[-(int32_t)i] = PAINT;
     }
 }
@@ -88,7 +90,7 @@ __attribute__((always_inline)) static inline void paint_stack(void)
 __attribute__((always_inline)) static inline uint16_t stack_used(void)
 {
     const volatile uint32_t *word = stack_pointer();
-    uint32_t used = PAINTED_WORDS;
+    uint32_t used = painted_words;
     while ((used > 0u) && (word[-(int32_t)used] == PAINT)) {
         used--;
     }
@@ -217,6 +219,9 @@ static void take_argument(char *word, lever_config_t *config, lever_command_t *c
             *choices[i] = (uint8_t)bits;
             return;
         }
+    }
+    if (strcmp(word, "paint") == 0) {
+        target = &painted_words;
     }
     if (target == NULL) {
         semihosting_exit(word);

@@ -1,0 +1,131 @@
+"""Where the instructions of a step go: by function, by inlined function, by source line, by kind of instruction."""
+
+from __future__ import annotations
+
+import subprocess
+from collections import Counter
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from lever_cdkf.host_tools.tables import Row, Tables
+
+from .image import tool
+from .trace import Instruction, disassemble, functions
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A function, or one that was inlined, and a line of it."""
+
+    function: str
+    file: str
+    line: int
+
+
+def _frames(elf: Path, addresses: list[int]) -> dict[int, list[Frame]]:
+    """The frames of each address, innermost first; more than one where functions were inlined."""
+    command = [tool("addr2line"), "--inlines", "--functions", "--addresses", f"--exe={elf}"]
+    asked = "\n".join(map(hex, addresses))
+    output = subprocess.run(command, input=asked, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+    found: dict[int, list[Frame]] = {}
+    frames: list[Frame] = []
+    lines = iter(output)
+    for text in lines:
+        if text.startswith("0x"):
+            frames = found.setdefault(int(text, 16), [])
+            continue
+        file, _, line = next(lines).partition(" (")[0].rpartition(":")
+        frames.append(Frame(text, file, int(line) if line.isdigit() else 0))
+    return found
+
+
+def _kind(instruction: Instruction) -> str:
+    name = instruction.mnemonic.split(".")[0]
+    if instruction.operations:
+        division = name.startswith(("vdiv", "vsqrt"))
+        return "float: divide, square root" if division else "float: add, subtract, multiply"
+    if name.startswith(("vldr", "vstr", "vldm", "vstm", "vpush", "vpop")):
+        return "float: load, store"
+    if name.startswith(("vcmp", "vmrs")):
+        return "float: compare"
+    if name.startswith("v"):
+        return "float: move, convert, sign"
+    if name.startswith(("ldr", "ldm", "pop")):
+        return "load"
+    if name.startswith(("str", "stm", "push")):
+        return "store"
+    if name.startswith(("b", "cb", "tb")) and not name.startswith(("bic", "bfi", "bfc")):
+        return "branch, call"
+    if name.startswith("it"):
+        return "condition (it)"
+    return "integer"
+
+
+@cache
+def _text(file: str) -> tuple[str, ...]:
+    path = Path(file)
+    return tuple(path.read_text(encoding="utf-8").splitlines()) if path.is_file() else ()
+
+
+def _source(file: str, line: int) -> str:
+    lines = _text(file)
+    return lines[line - 1].strip()[:80] if 0 < line <= len(lines) else ""
+
+
+def _place(file: str) -> str:
+    """The last two parts of a path: filter/dual.c."""
+    return "/".join(file.split("/")[-2:])
+
+
+def tables(elf: Path, executed: list[Counter[int]], lines: int) -> Tables:
+    """Instructions and floating-point operations, as means over the samples; the `lines` busiest lines of the source."""
+    steps = len(executed)
+    total: Counter[int] = Counter()
+    for seen in executed:
+        total.update(seen)
+    code = disassemble(elf)
+    frames = _frames(elf, sorted(total))
+    symbols = functions(elf)
+    by: dict[str, dict[str, list[float]]] = {"function": {}, "inlined": {}, "inclusive": {}, "line": {}, "kind": {}}
+
+    def add(table: str, key: str, times: int, operations: int) -> None:
+        entry = by[table].setdefault(key, [0.0, 0.0])
+        entry[0] += times / steps
+        entry[1] += times * operations / steps
+
+    for address, times in total.items():
+        instruction = code[address]
+        operations = instruction.operations
+        symbol = next((name for begin, size, name in symbols if begin <= address < begin + size), "?")
+        stack = frames[address]
+        add("function", f"{symbol} ({_place(stack[-1].file)})", times, operations)
+        add("inlined", f"{stack[0].function} ({_place(stack[0].file)})", times, operations)
+        for function in {frame.function for frame in stack}:
+            add("inclusive", function, times, operations)
+        inner = stack[0]
+        add("line", f"{_place(inner.file)}:{inner.line}  {_source(inner.file, inner.line)}", times, operations)
+        add("kind", _kind(instruction), times, operations)
+    whole = sum(total.values()) / steps
+    titles = {
+        "function": "By function (what was inlined into it included, what it calls not)",
+        "inclusive": "By function, itself wherever it was inlined and what was inlined into it",
+        "inlined": "By function, itself only",
+        "line": f"By source line, the busiest {lines}",
+        "kind": "By kind of instruction",
+    }
+    return {title: _rows(by[name], whole, lines if name == "line" else None) for name, title in titles.items()}
+
+
+def _rows(entries: dict[str, list[float]], whole: float, most: int | None) -> list[Row]:
+    ordered = sorted(entries.items(), key=lambda entry: -entry[1][0])[:most]
+    return [
+        {
+            "instructions a step": round(instructions, 1),
+            "share [%]": round(100.0 * instructions / whole, 1),
+            "float operations": round(operations, 1),
+            "where": name,
+        }
+        for name, (instructions, operations) in ordered
+        if instructions >= 0.05
+    ]
