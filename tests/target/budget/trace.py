@@ -26,7 +26,8 @@ _RAM, _RAM_BYTES = 0x20000000, 128 << 10
 _SYSTEM, _SYSTEM_BYTES = 0xE000E000, 0x1000
 _SYST_CVR = 0xE000E018
 _BREAKPOINT = 7  # the engine's number of the exception that semihosting uses
-_SYS_WRITE0, _SYS_GET_CMDLINE, _SYS_EXIT = 0x04, 0x15, 0x18
+_SYS_WRITE0, _SYS_WRITE, _SYS_GET_CMDLINE, _SYS_EXIT = 0x04, 0x05, 0x15, 0x18
+_RECORDS = 1024  # that the image keeps before it writes them
 _MEASURED_BEFORE = 2
 """The image measures nothing, then a loop, before the first sample."""
 
@@ -110,6 +111,7 @@ class _Machine:
 
     def __init__(self, elf: Path, samples: bytes, words: list[str]) -> None:
         self._words = " ".join(words).encode() + b"\0"
+        self._following = False
         self._measuring = False
         self._measured = -_MEASURED_BEFORE
         self._wanted = range(0)
@@ -124,10 +126,7 @@ class _Machine:
         run_tool("objcopy", "-O", "binary", elf, binary)
         uc.mem_write(_FLASH, binary.read_bytes())
         uc.mem_write(SAMPLES_ADDRESS, samples)
-        main, size = next((address, size) for address, size, name in functions(elf) if name == "main")
-        uc.hook_add(unicorn.UC_HOOK_CODE, self._on_code, begin=main, end=main + size - 1)
-        uc.hook_add(unicorn.UC_HOOK_BLOCK, self._on_code, begin=_FLASH, end=main - 1)
-        uc.hook_add(unicorn.UC_HOOK_BLOCK, self._on_code, begin=main + size, end=_FLASH + _FLASH_BYTES)
+        self._main, self._main_bytes = next(entry[:2] for entry in functions(elf) if entry[2] == "main")
         uc.hook_add(unicorn.UC_HOOK_MEM_READ, self._on_clock, begin=_SYST_CVR, end=_SYST_CVR + 3)
         uc.hook_add(unicorn.UC_HOOK_INTR, self._on_exception)
 
@@ -138,12 +137,23 @@ class _Machine:
         self._uc.reg_write(arm_const.UC_ARM_REG_SP, stack)
         try:
             self._uc.emu_start(start | 1, 0)
+            self._follow()
+            self._uc.emu_start(self._uc.reg_read(arm_const.UC_ARM_REG_PC) | 1, 0)
         except unicorn.UcError as error:
             where = self._uc.reg_read(arm_const.UC_ARM_REG_PC)
             raise LeverError(f"the image in Unicorn: {error} at {where:#x}") from None
         if len(self._paths) < len(self._wanted):
             raise LeverError(f"the image in Unicorn ended early: {self._message}")
         return self._paths
+
+    def _follow(self) -> None:
+        """From here on what is executed is noted; before, that would only take time."""
+        begin, end = self._main, self._main + self._main_bytes
+        self._uc.hook_add(unicorn.UC_HOOK_CODE, self._on_code, begin=begin, end=end - 1)
+        self._uc.hook_add(unicorn.UC_HOOK_BLOCK, self._on_code, begin=_FLASH, end=begin - 1)
+        self._uc.hook_add(unicorn.UC_HOOK_BLOCK, self._on_code, begin=end, end=_FLASH + _FLASH_BYTES)
+        self._uc.ctl_flush_tb()
+        self._following = True
 
     def _on_code(self, _uc: Any, address: int, size: int, _data: Any) -> None:
         self._path.append((address, size))
@@ -172,3 +182,5 @@ class _Machine:
             uc.mem_write(text, self._words)
         uc.reg_write(arm_const.UC_ARM_REG_R0, 0)  # done; what is written goes nowhere
         uc.reg_write(arm_const.UC_ARM_REG_PC, (uc.reg_read(arm_const.UC_ARM_REG_PC) + 2) | 1)
+        if operation == _SYS_WRITE and not self._following and self._measured + _RECORDS > self._wanted.start:
+            uc.emu_stop()  # between two samples, and for the last time before the first that is wanted
