@@ -218,7 +218,8 @@ enum lever_fault {
     LEVER_FAULT_EXCITATION = 128,   /* too little motion to learn from; the parameters stand, and grow uncertain */
     LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model */
     LEVER_FAULT_RECOVERED = 512,    /* an invalid factor or estimate was refused and restarted at this sample */
-    LEVER_FAULT_CHANGE = 1024       /* the pilot has changed suddenly within the last second; learning anew */
+    LEVER_FAULT_CHANGE = 1024,      /* the pilot has changed suddenly within the last second; learning anew */
+    LEVER_FAULT_PLATFORM = 2048     /* the machine reports a fault of its own: lever_platform() */
 };
 
 typedef struct lever_health {
@@ -234,6 +235,31 @@ typedef struct lever_health {
 } lever_health_t;
 
 void lever_health(const lever_t *lever, lever_health_t *health);
+
+/* Conditions of the machine that the estimator runs on, for its port to report. */
+enum lever_platform_fault {
+    LEVER_PLATFORM_CLOCK = 1,       /* the crystal did not start: on a less accurate oscillator */
+    LEVER_PLATFORM_ROM = 2,         /* the program memory does not have its checksum */
+    LEVER_PLATFORM_SELF_TEST = 4,   /* the estimator did not give its golden vector at power-on */
+    LEVER_PLATFORM_WATCHDOG = 8,    /* the last reset was the watchdog's */
+    LEVER_PLATFORM_HARD_FAULT = 16, /* the last reset was that of a hard fault */
+    LEVER_PLATFORM_BUS_OFF = 32,    /* the CAN controller is off the bus */
+    LEVER_PLATFORM_OVERRUN = 64,    /* received frames have been lost since the last report */
+    LEVER_PLATFORM_DROPPED = 128    /* frames to send have been dropped since the last report */
+};
+
+typedef struct lever_platform {
+    uint8_t faults;          /* of enum lever_platform_fault */
+    uint8_t transmit_errors; /* error counters of the CAN controller, as they stand */
+    uint8_t receive_errors;
+    uint8_t bus_offs;  /* times that the controller went off the bus */
+    uint16_t overruns; /* received frames lost in the machine */
+    uint16_t dropped;  /* frames to send dropped */
+} lever_platform_t;
+
+/* Takes the port's report, which stands until the next one. From the first report on PLATFORM_HEALTH is sent beside HEALTH,
+ * and any of the faults raises LEVER_FAULT_PLATFORM. Without one nothing of it is sent. */
+void lever_platform(lever_t *lever, const lever_platform_t *platform);
 
 /* --- CAN ------------------------------------------------------------------------------------------------------- */
 

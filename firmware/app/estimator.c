@@ -174,6 +174,7 @@ static taken_t take_sample(estimator_t *estimator, const lever_sample_t *sample)
     faults |= torque ? 0u : (uint32_t)LEVER_FAULT_TORQUE;
     faults |= base ? 0u : (uint32_t)LEVER_FAULT_BASE;
     faults |= estimator->communication_fault ? (uint32_t)LEVER_FAULT_COMMUNICATION : 0u;
+    faults |= (estimator->platform.faults != 0u) ? (uint32_t)LEVER_FAULT_PLATFORM : 0u;
     estimator->faults = (uint16_t)faults;
     estimator->communication_fault = false;
     return taken;
@@ -477,6 +478,12 @@ void estimator_health(const estimator_t *estimator, lever_health_t *health)
     health->recoveries = estimator->recoveries;
     health->excitation = sqrtf(estimator->followed.excitation_square);
     health->dither = estimator->dither.torque;
+}
+
+void estimator_platform(estimator_t *estimator, const lever_platform_t *platform)
+{
+    estimator->platform = *platform;
+    estimator->has_platform = true;
 }
 
 const char *lever_parameter_name(uint8_t model, uint32_t index)

@@ -48,6 +48,8 @@ typedef struct estimator {
     uint8_t nis_size;
     uint16_t faults;
     bool communication_fault; /* reported by the CAN side for the next sample */
+    bool has_platform;
+    lever_platform_t platform; /* the port's last report, if there was one */
     dither_t dither;
     uint32_t samples;
     uint32_t lost;
@@ -63,6 +65,7 @@ void estimator_init(estimator_t *estimator, const lever_config_t *config);
 enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample);
 bool estimator_command(estimator_t *estimator, const lever_command_t *command);
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate);
+void estimator_platform(estimator_t *estimator, const lever_platform_t *platform);
 
 /* State i of the estimate as the sensors see it: theta [rad], theta_dot [rad/s]. */
 float estimator_state(const estimator_t *estimator, uint32_t i);

@@ -45,6 +45,11 @@ void lever_health(const lever_t *lever, lever_health_t *health)
     estimator_health(&lever->estimator, health);
 }
 
+void lever_platform(lever_t *lever, const lever_platform_t *platform)
+{
+    estimator_platform(&lever->estimator, platform);
+}
+
 enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *frame)
 {
     return link_on_frame(&lever->link, &lever->estimator, frame);

@@ -9,6 +9,7 @@ enum output {
     OUTPUT_SIGMA,
     OUTPUT_DYNAMICS,
     OUTPUT_HEALTH,
+    OUTPUT_PLATFORM,
     OUTPUT_STATE_ESTIMATE
 };
 
@@ -17,7 +18,7 @@ enum output {
 
 static const uint8_t data_ids[LINK_OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_PILOT_PARAMETERS_DATA_ID,
     MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID, MESSAGE_HEALTH_DATA_ID,
-    MESSAGE_STATE_ESTIMATE_DATA_ID};
+    MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_STATE_ESTIMATE_DATA_ID};
 
 /* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame that
  * is repeated or one step late (which a sample's time would tell, too). */
@@ -143,7 +144,7 @@ enum lever_mode link_step(link_t *link, estimator_t *estimator)
         (void)estimator_update(estimator, &link->sample);
         uint32_t due = BIT(OUTPUT_STATE_ESTIMATE);
         if (is_publication_due(link, estimator)) {
-            due |= DIVIDED_OUTPUTS;
+            due |= DIVIDED_OUTPUTS | (estimator->has_platform ? BIT(OUTPUT_PLATFORM) : 0u);
         }
         if (was_on || dither_is_on(&estimator->dither)) {
             due |= BIT(OUTPUT_MOTOR_COMMAND);
@@ -209,6 +210,20 @@ static bool encode_health(const estimator_t *estimator, lever_frame_t *frame)
     return message_health_encode(frame, &message);
 }
 
+static bool encode_platform(const estimator_t *estimator, lever_frame_t *frame)
+{
+    const lever_platform_t *platform = &estimator->platform;
+    message_platform_health_t message;
+    message.model = estimator->config.model;
+    message.faults = platform->faults;
+    message.transmit_errors = platform->transmit_errors;
+    message.receive_errors = platform->receive_errors;
+    message.bus_offs = platform->bus_offs;
+    message.overruns = (uint8_t)(platform->overruns & 0xFFu);
+    message.dropped = (uint8_t)(platform->dropped & 0xFFu);
+    return message_platform_health_encode(frame, &message);
+}
+
 static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_state_estimate_t message;
@@ -219,8 +234,8 @@ static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *f
     return message_state_estimate_encode(frame, &message);
 }
 
-static bool (*const encoders[LINK_OUTPUTS])(const estimator_t *, lever_frame_t *) = {
-    encode_motor_command, encode_parameters, encode_sigma, encode_dynamics, encode_health, encode_state_estimate};
+static bool (*const encoders[LINK_OUTPUTS])(const estimator_t *, lever_frame_t *) = {encode_motor_command,
+    encode_parameters, encode_sigma, encode_dynamics, encode_health, encode_platform, encode_state_estimate};
 
 bool link_next_frame(link_t *link, const estimator_t *estimator, lever_frame_t *frame)
 {

@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { LINK_OUTPUTS = 6 }; /* messages that are sent */
+enum { LINK_OUTPUTS = 7 }; /* messages that are sent */
 
 typedef struct link {
     e2e_receiver_t lever_receiver;

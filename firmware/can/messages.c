@@ -420,3 +420,41 @@ bool message_motor_command_decode(message_motor_command_t *message, const lever_
     message->dither = get_quantity(payload, &dither_field);
     return true;
 }
+
+/* --- PLATFORM_HEALTH --------------------------------------------------------------------------------------------- */
+
+static const code_t platform_faults_field = {16u, 255u};
+static const code_t transmit_errors_field = {24u, 255u};
+static const code_t receive_errors_field = {32u, 255u};
+static const code_t bus_offs_field = {40u, 255u};
+static const code_t overruns_field = {48u, 255u};
+static const code_t dropped_field = {56u, 255u};
+
+bool message_platform_health_encode(lever_frame_t *frame, const message_platform_health_t *message)
+{
+    writer_t writer = {0u, false};
+    put_code(&writer, model_field, message->model);
+    put_code(&writer, platform_faults_field, message->faults);
+    put_code(&writer, transmit_errors_field, message->transmit_errors);
+    put_code(&writer, receive_errors_field, message->receive_errors);
+    put_code(&writer, bus_offs_field, message->bus_offs);
+    put_code(&writer, overruns_field, message->overruns);
+    put_code(&writer, dropped_field, message->dropped);
+    return write_frame(frame, MESSAGE_PLATFORM_HEALTH_ID, &writer);
+}
+
+bool message_platform_health_decode(message_platform_health_t *message, const lever_frame_t *frame)
+{
+    if (!is_message(frame, MESSAGE_PLATFORM_HEALTH_ID)) {
+        return false;
+    }
+    uint64_t payload = read_payload(frame);
+    message->model = (uint8_t)get_code(payload, model_field);
+    message->faults = (uint8_t)get_code(payload, platform_faults_field);
+    message->transmit_errors = (uint8_t)get_code(payload, transmit_errors_field);
+    message->receive_errors = (uint8_t)get_code(payload, receive_errors_field);
+    message->bus_offs = (uint8_t)get_code(payload, bus_offs_field);
+    message->overruns = (uint8_t)get_code(payload, overruns_field);
+    message->dropped = (uint8_t)get_code(payload, dropped_field);
+    return true;
+}

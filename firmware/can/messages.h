@@ -33,7 +33,8 @@ enum message_id {
     MESSAGE_PILOT_SIGMA_ID = 0x212,
     MESSAGE_PILOT_DYNAMICS_ID = 0x213,
     MESSAGE_HEALTH_ID = 0x214,
-    MESSAGE_MOTOR_COMMAND_ID = 0x215
+    MESSAGE_MOTOR_COMMAND_ID = 0x215,
+    MESSAGE_PLATFORM_HEALTH_ID = 0x216
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -46,7 +47,8 @@ enum message_data_id {
     MESSAGE_PILOT_SIGMA_DATA_ID = 81,
     MESSAGE_PILOT_DYNAMICS_DATA_ID = 97,
     MESSAGE_HEALTH_DATA_ID = 113,
-    MESSAGE_MOTOR_COMMAND_DATA_ID = 129
+    MESSAGE_MOTOR_COMMAND_DATA_ID = 129,
+    MESSAGE_PLATFORM_HEALTH_DATA_ID = 145
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -139,5 +141,18 @@ typedef struct message_motor_command {
 
 bool message_motor_command_encode(lever_frame_t *frame, const message_motor_command_t *message);
 bool message_motor_command_decode(message_motor_command_t *message, const lever_frame_t *frame);
+
+typedef struct message_platform_health {
+    uint8_t faults; /* of enum lever_platform_fault */
+    uint8_t transmit_errors;
+    uint8_t receive_errors;
+    uint8_t bus_offs; /* the low eight bits of the counts of lever_platform_t, here and below */
+    uint8_t overruns;
+    uint8_t dropped;
+    uint8_t model;
+} message_platform_health_t;
+
+bool message_platform_health_encode(lever_frame_t *frame, const message_platform_health_t *message);
+bool message_platform_health_decode(message_platform_health_t *message, const lever_frame_t *frame);
 
 #endif

@@ -18,7 +18,7 @@ def test_data_ids(codec: Codec) -> None:
 
 def test_no_two_messages_share_a_data_id() -> None:
     used = [data_id_base(message) + counter for message in DBC.messages for counter in range(16)]
-    assert len(set(used)) == len(used) == 16 * 9
+    assert len(set(used)) == len(used) == 16 * 10
     assert max(used) <= 255
 
 
@@ -80,11 +80,12 @@ def test_named_values_are_the_enums(codec: Codec) -> None:
             assert signal.choices is not None
             assert {value: str(name) for value, name in signal.choices.items()} == expected, signal.name
             tested += 1
-    assert tested == 12
+    assert tested == 13
 
 
-def test_every_fault_has_its_bit(codec: Codec) -> None:
-    faults = DBC.get_message_by_name("HEALTH").get_signal_by_name("faults")
-    bits = codec.enum("lever_fault").values()
+@pytest.mark.parametrize(("message", "enum"), [("HEALTH", "lever_fault"), ("PLATFORM_HEALTH", "lever_platform_fault")])
+def test_every_fault_has_its_bit(codec: Codec, message: str, enum: str) -> None:
+    faults = DBC.get_message_by_name(message).get_signal_by_name("faults")
+    bits = codec.enum(enum).values()
     assert all(bit.bit_count() == 1 and bit < 1 << faults.length for bit in bits)
     assert len(set(bits)) == len(bits)

@@ -287,6 +287,42 @@ static void test_motor_command_says_the_dither_of_health(void)
     TEST_ASSERT_TRUE(message.torque != 0.0f);
 }
 
+/* --- what the port reports ------------------------------------------------------------------------------------------ */
+
+static void test_platform_health_is_sent_from_the_first_report_on(void)
+{
+    const uint32_t wanted[] = {0x211u, 0x212u, 0x213u, 0x214u, 0x216u, 0x210u};
+    const lever_platform_t report = {
+        .faults = (uint8_t)((uint8_t)LEVER_PLATFORM_CLOCK | (uint8_t)LEVER_PLATFORM_BUS_OFF),
+        .transmit_errors = 255u,
+        .receive_errors = 96u,
+        .bus_offs = 3u,
+        .overruns = 258u,
+        .dropped = 1021u};
+    message_platform_health_t message;
+    lever_platform(lever, &report);
+    assert_ids(wanted, 6u, answers());
+    TEST_ASSERT_TRUE(message_platform_health_decode(&message, &frames[4]));
+    TEST_ASSERT_EQUAL_UINT8(report.faults, message.faults);
+    TEST_ASSERT_EQUAL_UINT8(255u, message.transmit_errors);
+    TEST_ASSERT_EQUAL_UINT8(96u, message.receive_errors);
+    TEST_ASSERT_EQUAL_UINT8(3u, message.bus_offs);
+    TEST_ASSERT_EQUAL_UINT8(2u, message.overruns);
+    TEST_ASSERT_EQUAL_UINT8(253u, message.dropped);
+}
+
+static void test_a_fault_of_the_platform_is_one_of_health_as_long_as_it_is_reported(void)
+{
+    lever_platform_t report = {.faults = (uint8_t)LEVER_PLATFORM_WATCHDOG};
+    lever_platform(lever, &report);
+    (void)sender_run(&sender, lever, 10u);
+    TEST_ASSERT_BITS_HIGH(LEVER_FAULT_PLATFORM, rig_health(lever).faults);
+    report.faults = 0u;
+    lever_platform(lever, &report);
+    (void)sender_run(&sender, lever, 1u);
+    TEST_ASSERT_BITS_LOW(LEVER_FAULT_PLATFORM, rig_health(lever).faults);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -307,5 +343,7 @@ int main(void)
     RUN_TEST(test_dynamics_say_what_the_estimate_says);
     RUN_TEST(test_health_says_mode_faults_counts_and_excitation);
     RUN_TEST(test_motor_command_says_the_dither_of_health);
+    RUN_TEST(test_platform_health_is_sent_from_the_first_report_on);
+    RUN_TEST(test_a_fault_of_the_platform_is_one_of_health_as_long_as_it_is_reported);
     return UNITY_END();
 }

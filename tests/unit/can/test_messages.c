@@ -74,6 +74,7 @@ static const message_pilot_parameters_t blank_pilot_parameters = {0};
 static const message_pilot_sigma_t blank_pilot_sigma = {0};
 static const message_pilot_dynamics_t blank_pilot_dynamics = {0};
 static const message_health_t blank_health = {0};
+static const message_platform_health_t blank_platform_health = {0};
 static const message_motor_command_t blank_motor_command = {0};
 
 /* A pair of functions of a field, in a message that is otherwise `base`. */
@@ -137,6 +138,13 @@ CODE(health, faults, uint16_t)
 CODE(health, lost, uint8_t)
 CODE(health, corrupt, uint8_t)
 CODE(health, late, uint8_t)
+CODE(platform_health, model, uint8_t)
+CODE(platform_health, faults, uint8_t)
+CODE(platform_health, transmit_errors, uint8_t)
+CODE(platform_health, receive_errors, uint8_t)
+CODE(platform_health, bus_offs, uint8_t)
+CODE(platform_health, overruns, uint8_t)
+CODE(platform_health, dropped, uint8_t)
 CODE(motor_command, model, uint8_t)
 
 /* --- physical values -------------------------------------------------------------------------------------------- */
@@ -351,6 +359,13 @@ static const code_t codes[] = {
     CODE_ROW(health, lost, 0x214u, 32u, 8u, UINT8_MAX),
     CODE_ROW(health, corrupt, 0x214u, 40u, 8u, UINT8_MAX),
     CODE_ROW(health, late, 0x214u, 48u, 8u, UINT8_MAX),
+    CODE_ROW(platform_health, model, 0x216u, 12u, 4u, UINT8_MAX),
+    CODE_ROW(platform_health, faults, 0x216u, 16u, 8u, UINT8_MAX),
+    CODE_ROW(platform_health, transmit_errors, 0x216u, 24u, 8u, UINT8_MAX),
+    CODE_ROW(platform_health, receive_errors, 0x216u, 32u, 8u, UINT8_MAX),
+    CODE_ROW(platform_health, bus_offs, 0x216u, 40u, 8u, UINT8_MAX),
+    CODE_ROW(platform_health, overruns, 0x216u, 48u, 8u, UINT8_MAX),
+    CODE_ROW(platform_health, dropped, 0x216u, 56u, 8u, UINT8_MAX),
     CODE_ROW(motor_command, model, 0x215u, 12u, 4u, UINT8_MAX),
 };
 enum { CODES = (int)(sizeof codes / sizeof codes[0]) };
@@ -418,6 +433,7 @@ AGAIN(pilot_parameters)
 AGAIN(pilot_sigma)
 AGAIN(pilot_dynamics)
 AGAIN(health)
+AGAIN(platform_health)
 AGAIN(motor_command)
 
 typedef struct kind {
@@ -438,6 +454,7 @@ static const kind_t kinds[] = {
     {pilot_dynamics_again, 0x213u, 0u, 0xF0u, {0u}},
     {health_again, 0x214u, 0u, 0xF0u, {0u}},
     {motor_command_again, 0x215u, 0u, 0xF0u, {[6] = 0xFFu, [7] = 0xFFu}},
+    {platform_health_again, 0x216u, 0u, 0xF0u, {0u}},
 };
 enum { KINDS = (int)(sizeof kinds / sizeof kinds[0]) };
 
