@@ -1,17 +1,60 @@
-"""Where the instructions of a step go: by function, by inlined function, by source line, by kind of instruction."""
+"""`budget profile`: where the instructions of a step go, by function, source line and kind of instruction."""
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 from collections import Counter
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from lever_cdkf.host_tools.tables import Row, Tables
+import numpy as np
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.tables import Row, Tables, print_tables
 
-from .image import tool
-from .trace import Instruction, disassemble, functions
+from . import image
+from .recording import record
+from .trace import Instruction, Trace, disassemble, functions, trace
+
+
+def run(args: argparse.Namespace) -> int:
+    """The command. Raises LeverError."""
+    recording = record(args.model)
+    first, last = _window(args.window, len(recording.samples))
+    elf = image.build(args.build, args.firmware, args.flags)
+    traced = trace(elf, recording, args.model, args.estimator, args.form, first, last)
+    chosen = _choose(traced, args.worst, args.learning)
+    instructions, operations = traced.instructions[chosen], traced.operations[chosen]
+    print(
+        f"{args.estimator} {args.model} {args.form}: {len(chosen)} samples from {(first + chosen[0]) * 1e-3:.3f} s on, "
+        f"mean {instructions.mean():.1f} instructions and {operations.mean():.1f} floating-point operations, "
+        f"{instructions.min()} to {instructions.max()} instructions"
+    )
+    print_tables(tables(elf, [traced.executed[i] for i in chosen], args.lines), args.json)
+    return 0
+
+
+def _window(text: str, count: int) -> tuple[int, int]:
+    """First and last sample of "FROM:TO" in seconds, at 1 kHz. Raises LeverError."""
+    try:
+        first, end = (round(1000.0 * float(time)) for time in text.split(":"))
+    except ValueError:
+        raise LeverError(f"--window {text}: two times in seconds are needed, such as 2:3") from None
+    if not 0 <= first < end <= count:
+        raise LeverError(f"--window {text}: must lie in the recording, 0:{count * 1e-3:g}")
+    return first, end - 1
+
+
+def _choose(traced: Trace, worst: bool, learning: str | None) -> list[int]:
+    """Indices of the samples that are looked at. Raises LeverError when there is none."""
+    instructions = traced.instructions
+    many = instructions > 1.1 * np.median(instructions)
+    wanted = np.full(len(instructions), True) if learning is None else many == (learning == "with")
+    chosen = [int(i) for i in np.flatnonzero(wanted)]
+    if not chosen:
+        raise LeverError("no sample of the window is of that kind")
+    return [max(chosen, key=lambda i: int(instructions[i]))] if worst else chosen
 
 
 @dataclass(frozen=True)
@@ -25,7 +68,7 @@ class Frame:
 
 def _frames(elf: Path, addresses: list[int]) -> dict[int, list[Frame]]:
     """The frames of each address, innermost first; more than one where functions were inlined."""
-    command = [tool("addr2line"), "--inlines", "--functions", "--addresses", f"--exe={elf}"]
+    command = [image.tool("addr2line"), "--inlines", "--functions", "--addresses", f"--exe={elf}"]
     asked = "\n".join(map(hex, addresses))
     output = subprocess.run(command, input=asked, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
     found: dict[int, list[Frame]] = {}
@@ -79,7 +122,7 @@ def _place(file: str) -> str:
 
 
 def tables(elf: Path, executed: list[Counter[int]], lines: int) -> Tables:
-    """Instructions and floating-point operations, as means over the samples; the `lines` busiest lines of the source."""
+    """Instructions and floating-point operations, as means over the samples; `lines` of the source, the busiest."""
     steps = len(executed)
     total: Counter[int] = Counter()
     for seen in executed:

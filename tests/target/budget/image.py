@@ -1,8 +1,8 @@
 """Builds the image, runs it in QEMU over a recording, and reads what it measured.
 
 `-icount shift=3` makes every instruction take 8 ns of the emulated clock, so SysTick at 168 MHz counts 1.344 ticks an
-instruction, whatever the host does meanwhile. The image times a loop of known length first, and a run whose loop comes out
-otherwise is refused.
+instruction, whatever the host does meanwhile. The image times a loop of known length first, and a run whose loop comes
+out otherwise is refused.
 """
 
 from __future__ import annotations
@@ -24,16 +24,19 @@ from .recording import Recording
 
 SOURCE = Path(__file__).with_name("image")
 FIRMWARE = SOURCE.parents[3] / "firmware"
+SHIPPED = "-O3 -DNDEBUG"
+"""What CMake gives a Release build."""
 MACHINE = "netduinoplus2"
 SAMPLES_ADDRESS = 0x08040000
 TICKS_AN_INSTRUCTION = 8e-9 * 168e6
 ESTIMATORS = ("dual", "joint")
 FORMS = ("update", "tick")
 """What is measured: lever_update() alone, or all that a sample takes from its frames to the last one of the answer."""
+CALLED_ONCE = ("lever_init", "lever_command", "lever_platform", "lever_estimate", "lever_health")
 
 _TOOLCHAIN_PACKAGES = "gcc-arm-none-eabi libnewlib-arm-none-eabi"
 _TIME_LIMIT_S = 120.0
-_INTRO = struct.Struct("<7I")
+_INTRO = struct.Struct("<8I")
 _RECORD = np.dtype(
     [("ticks", "<u4"), ("stack", "<u2"), ("faults", "<u2"), ("mode", "u1"), ("frames", "u1"), ("reserved", "<u2")]
 )
@@ -47,10 +50,13 @@ class Run:
     """Of the measured calls, without those of the measurement."""
     overhead: int
     """Instructions of a measurement with nothing in between, which have been subtracted."""
+    loop_instructions: int
+    """Of a loop that was measured to calibrate the clock, and what came out."""
+    loop_measured: float
     stack: NDArray[np.int64]
     """Bytes that the measured calls wrote below the caller's stack."""
     calls_stack: dict[str, int]
-    """The same of functions called once: lever_init, lever_command, lever_estimate, lever_health."""
+    """The same of the functions CALLED_ONCE."""
     mode: NDArray[np.int64]
     """A key of enum_names("lever_mode")."""
     faults: NDArray[np.int64]
@@ -103,13 +109,17 @@ def compiler() -> str:
     return run_tool("gcc", "--version").splitlines()[0]
 
 
-def build(folder: Path, firmware: Path = FIRMWARE, flags: str = "-O3 -DNDEBUG") -> Path:
+def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED) -> Path:
     """Builds the image of a firmware folder in `folder`, and returns its .elf. Raises LeverError."""
     compiler()
     if not (firmware / "lever_cdkf.h").is_file():
         raise LeverError(f"{firmware}: no lever_cdkf.h there: give the firmware folder of a source tree")
     toolchain = f"--toolchain={SOURCE / 'cortex-m4f.cmake'}"
-    settings = ["-DCMAKE_BUILD_TYPE=Release", f"-DLEVER_FIRMWARE={firmware.resolve()}", f"-DCMAKE_C_FLAGS_RELEASE={flags}"]
+    settings = [
+        "-DCMAKE_BUILD_TYPE=Release",
+        f"-DLEVER_FIRMWARE={firmware.resolve()}",
+        f"-DCMAKE_C_FLAGS_RELEASE={flags}",
+    ]
     _run(["cmake", "-S", str(SOURCE), "-B", str(folder), toolchain, *settings], "configuring the image")
     _run(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
     return folder / "budget.elf"
@@ -142,7 +152,7 @@ def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) 
 
 def _read(data: bytes, count: int) -> Run:
     """What the image wrote. Raises LeverError when its own loop was not timed right, or something is missing."""
-    empty, calibration, rounds, init, command, estimate, health = _INTRO.unpack_from(data)
+    empty, calibration, rounds, *stacks = _INTRO.unpack_from(data)
     looped = (calibration - empty) / TICKS_AN_INSTRUCTION
     if abs(looped - 2 * rounds) > 1.0:
         raise LeverError(f"QEMU's clock is off: a loop of {2 * rounds} instructions was timed as {looped:.1f}")
@@ -152,6 +162,13 @@ def _read(data: bytes, count: int) -> Run:
     records = np.frombuffer(data[_INTRO.size : end], _RECORD)
     instructions = np.rint((records["ticks"].astype(np.int64) - empty) / TICKS_AN_INSTRUCTION)
     whole = {name: records[name].astype(np.int64) for name in ("stack", "mode", "faults", "frames")}
-    once = {"lever_init": init, "lever_command": command, "lever_estimate": estimate, "lever_health": health}
-    overhead = round(empty / TICKS_AN_INSTRUCTION)
-    return Run(instructions.astype(np.int64), overhead, calls_stack=once, estimate=data[end:], **whole)
+    once = dict(zip(CALLED_ONCE, stacks, strict=True))
+    return Run(
+        instructions.astype(np.int64),
+        overhead=round(empty / TICKS_AN_INSTRUCTION),
+        loop_instructions=2 * rounds,
+        loop_measured=looped,
+        calls_stack=once,
+        estimate=data[end:],
+        **whole,
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,21 +12,27 @@ import numpy as np
 from lever_cdkf.host_tools.library import enum_names, lib
 from numpy.typing import NDArray
 
-from . import image, sizes
+from . import image, sizes, stack, trace
 from .image import ESTIMATORS, FORMS, Run
 from .recording import MODELS, Recording, record
 
 START_UP_S = 2.0
-"""Until then the estimator starts up: it aligns, dither fades in, caution_time passes. Counted by itself."""
-_RUNNING = next(code for code, name in enum_names("lever_mode").items() if name == "run")
+"""Until then the estimator starts up: it aligns, the dither fades in, caution_time passes. Counted by itself."""
+TRACED = (2048, 2347)
+"""First and last sample whose floating-point operations are counted: thirty learning periods in steady running."""
 
 Case = tuple[str, str, str]
 """Estimator, model, and one of FORMS."""
+Tell = Callable[[int, int, str], None]
+"""Told what is done, of how much, and what comes now."""
+
+_RUNNING = next(code for code, name in enum_names("lever_mode").items() if name == "run")
+_FACADE = re.compile(r"^[a-z_][\w ]*[ *](lever_\w+)\(", re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class Count:
-    """Instructions over a recording, in mode run after START_UP_S, and before that."""
+    """Instructions a sample over a recording: in mode run after START_UP_S, and before that."""
 
     mean: float
     median: float
@@ -35,58 +42,105 @@ class Count:
     start_up_worst: int
 
     @staticmethod
-    def of(instructions: NDArray[np.int64], time: NDArray[np.float64], running: NDArray[np.bool_]) -> Count:
-        """Of a value for each sample, at the times [s]."""
-        steady = running & (time >= START_UP_S)
-        counted = instructions[steady]
+    def of(run: Run, time: NDArray[np.float64]) -> Count:
+        """Of a run over samples at the times [s]."""
+        steady = (run.mode == _RUNNING) & (time >= START_UP_S)
+        counted = run.instructions[steady]
         return Count(
             mean=round(float(counted.mean()), 1),
             median=float(np.median(counted)),
             worst=int(counted.max()),
             worst_s=float(time[steady][counted.argmax()]),
-            start_up_worst=int(instructions[time < START_UP_S].max()),
+            start_up_worst=int(run.instructions[time < START_UP_S].max()),
         )
 
 
-def times(recording: Recording) -> NDArray[np.float64]:
-    """Of the samples [s]."""
+def sample_times(recording: Recording) -> NDArray[np.float64]:
+    """Of a recording [s]."""
     return recording.samples["time_us"].astype(np.float64) * 1e-6
 
 
-def run_all(elf: Path, tell: Callable[[int, int, str], None]) -> dict[Case, Run]:
-    """The image over every case; `tell` is called with the runs done, all runs, and the last one's name."""
+def facade(firmware: Path) -> list[str]:
+    """The functions of lever_cdkf.h."""
+    return _FACADE.findall((firmware / "lever_cdkf.h").read_text(encoding="utf-8"))
+
+
+def measure(elf: Path, firmware: Path, tell: Tell = lambda done, total, what: None) -> dict[str, Any]:
+    """Runs the image over every case and returns what budget.json holds. Raises LeverError."""
     cases = [(estimator, model, form) for form in FORMS for estimator in ESTIMATORS for model in MODELS]
-    runs = {}
-    for done, case in enumerate(cases):
-        tell(done, len(cases), " ".join(case))
-        estimator, model, form = case
-        runs[case] = image.run(elf, record(model), model, estimator, form)
-    return runs
+    traced = [case for case in cases if case[2] == "update"]
+    total = len(cases) + len(traced)
+    runs: dict[Case, Run] = {}
+    for done, (estimator, model, form) in enumerate(cases):
+        tell(done, total, f"{estimator} {model} {form} in QEMU")
+        runs[estimator, model, form] = image.run(elf, record(model), model, estimator, form)
+    operations: dict[str, Any] = {}
+    for done, (estimator, model, form) in enumerate(traced, start=len(cases)):
+        tell(done, total, f"{estimator} {model} {form} in Unicorn")
+        found = trace.trace(elf, record(model), model, estimator, form, *TRACED)
+        operations.setdefault(estimator, {})[model] = _operations(found)
+    return {
+        "processor": "Cortex-M4F, as QEMU's netduinoplus2 has it",
+        "compiler": image.compiler(),
+        "calibration": _calibration(runs),
+        "instructions": _instructions(runs),
+        "floating_point_operations": operations,
+        **_bytes(elf),
+        **_stack(elf, firmware, runs),
+    }
 
 
-def count(run: Run, model: str) -> Count:
-    """Instructions of a run."""
-    return Count.of(run.instructions, times(record(model)), run.mode == _RUNNING)
-
-
-def budget(elf: Path, runs: dict[Case, Run]) -> dict[str, Any]:
-    """What budget.json holds."""
-    instructions: dict[str, Any] = {"tick": {}}
+def _instructions(runs: dict[Case, Run]) -> dict[str, Any]:
+    instructions: dict[str, Any] = {}
     for (estimator, model, form), run in runs.items():
-        place = instructions["tick"] if form == "tick" else instructions
-        place.setdefault(estimator, {})[model] = vars(count(run, model))
+        place = instructions.setdefault("tick", {}) if form == "tick" else instructions
+        place.setdefault(estimator, {})[model] = vars(Count.of(run, sample_times(record(model))))
+    return instructions
+
+
+def _operations(found: trace.Trace) -> dict[str, float]:
+    mean = float(found.operations.mean())
+    ratio = float(found.instructions.mean()) / mean
+    return {"mean": round(mean, 1), "worst": int(found.operations.max()), "instructions_per_operation": round(ratio, 3)}
+
+
+def _calibration(runs: dict[Case, Run]) -> dict[str, float]:
+    """Of all runs the one that is off most; image.run() has refused what is not right."""
+    worst = max(runs.values(), key=lambda run: abs(run.loop_measured - run.loop_instructions))
+    return {
+        "loop_instructions": worst.loop_instructions,
+        "loop_measured": round(worst.loop_measured, 2),
+        "overhead_subtracted": worst.overhead,
+    }
+
+
+def _bytes(elf: Path) -> dict[str, Any]:
     library = sizes.of_library(elf)
     return {
-        "processor": "Cortex-M4F: QEMU's netduinoplus2 (STM32F405)",
-        "compiler": image.compiler(),
-        "overhead_instructions": max(run.overhead for run in runs.values()),
-        "instructions": instructions,
-        "text_bytes": library["text"] + library["rodata"],
-        "code_bytes": library["text"],
+        "text_bytes": library["text"],
         "rodata_bytes": library["rodata"],
         "data_bytes": library["data"],
         "bss_bytes": library["bss"],
         "instance_bytes": sizes.of_instance(elf),
         "memory_bytes": int(lib.LEVER_MEMORY_BYTES),
-        "stack_painted_bytes": max(int(run.stack.max()) for run in runs.values()),
+        "files": sizes.of_files(elf),
+    }
+
+
+def _stack(elf: Path, firmware: Path, runs: dict[Case, Run]) -> dict[str, Any]:
+    """The worst case by the call graph, and what was seen to be written in all runs."""
+    chains = stack.worst_case(elf, facade(firmware))
+    painted = {"lever_update": 0, "tick": 0, **dict.fromkeys(image.CALLED_ONCE, 0)}
+    for (_, _, form), run in runs.items():
+        name = "lever_update" if form == "update" else "tick"
+        for function, found in ((name, int(run.stack.max())), *run.calls_stack.items()):
+            painted[function] = max(painted[function], found)
+    return {
+        "stack_bytes": max(chain.bytes for chain in chains.values()),
+        "stack_painted_bytes": max(painted.values()),
+        "stack": {
+            name: {"bytes": chain.bytes, "chain": [f"{function} {frame}" for function, frame in chain.chain]}
+            for name, chain in chains.items()
+        },
+        "stack_painted": painted,
     }

@@ -1,7 +1,7 @@
 """What the image is fed with: the samples of a simulated run, as structs and as frames.
 
-The plant of sil/ runs against the firmware in this process, which asks for the dither; what is on the bus then is the same
-whatever estimator listens, so one recording serves dual and joint.
+The plant of sil/ runs against the firmware in this process, which asks for the dither; what is on the bus then is the
+same whatever estimator listens, so one recording serves dual and joint.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ def record(model: str) -> Recording:
     sent = [frames.of(codec.message(name).frame_id) for name in ("LEVER_SAMPLE", "BASE_SAMPLE")]
     assert len(sent[0]) == len(sent[1])
     lever, base = (
-        codec.decode_columns(name, frames.data[rows]) for name, rows in zip(("LEVER_SAMPLE", "BASE_SAMPLE"), sent, strict=True)
+        codec.decode_columns(name, frames.data[rows])
+        for name, rows in zip(("LEVER_SAMPLE", "BASE_SAMPLE"), sent, strict=True)
     )
     columns = {**lever, **base}
     samples = np.zeros(len(sent[0]), SAMPLE)

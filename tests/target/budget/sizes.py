@@ -8,23 +8,27 @@ from pathlib import Path
 from .image import core_library, core_objects, run_tool
 
 _SECTION = re.compile(r"^\.(text|rodata|data|bss)(?:\.\S*)?\s+(\d+)\s", re.MULTILINE)
-_INSTANCE = re.compile(r"DW_TAG_structure_type\)\s+<\w+>\s+DW_AT_name\s+:[^\n]*\blever\s+<\w+>\s+DW_AT_byte_size\s+: (\d+)")
+_INSTANCE = re.compile(
+    r"DW_TAG_structure_type\)\s+<\w+>\s+DW_AT_name\s+:[^\n]*\blever\s+<\w+>\s+DW_AT_byte_size\s+: (\d+)"
+)
 
 
 def of_library(elf: Path) -> dict[str, int]:
-    """Bytes of text, rodata, data and bss in the static library of the core, whether a program needs all of it or not."""
+    """Bytes of text, rodata, data and bss in the core's static library, whether a program needs all of it or not."""
     total = dict.fromkeys(("text", "rodata", "data", "bss"), 0)
     for kind, count in _SECTION.findall(run_tool("size", "-A", core_library(elf))):
         total[kind] += int(count)
     return total
 
 
-def of_files(elf: Path) -> dict[str, int]:
+def of_files(elf: Path) -> dict[str, dict[str, int]]:
     """Bytes of text and rodata by source file ("filter/dual.c")."""
     found = {}
     for name, path in core_objects(elf).items():
-        sections = _SECTION.findall(run_tool("size", "-A", path))
-        found[name] = sum(int(count) for kind, count in sections if kind in ("text", "rodata"))
+        found[name] = dict.fromkeys(("text", "rodata"), 0)
+        for kind, count in _SECTION.findall(run_tool("size", "-A", path)):
+            if kind in found[name]:
+                found[name][kind] += int(count)
     return found
 
 

@@ -1,8 +1,9 @@
 """The most stack that a call of the façade can take, from the compiler's call graph (gcc -fcallgraph-info=su).
 
 What the graph leaves open is resolved so:
-- A call through a pointer may reach every function whose address stands in a constant table of the caller's own file, or of a
-  folder below the caller's (firmware/README.md: who includes whom): the models for filter/, the encoders for app/link.c.
+- A call through a pointer may reach every function whose address stands in a constant table of the caller's own file,
+  or of a folder below the caller's (firmware/README.md: who includes whom): from filter/ the models' functions, from
+  app/link.c its encoders too.
 - A function of the C library takes all that its instructions push, whatever path they take.
 A graph with a circle, a frame without a bound, or a call that cannot be resolved is refused.
 """
@@ -25,7 +26,9 @@ _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n(\d+) bytes \((\
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _TABLE = re.compile(r"RELOCATION RECORDS FOR \[\.(?:rodata|data)[^\]]*\]:\n(?:OFFSET.*\n)?((?:[0-9a-f]{8} .*\n)*)")
 _ENTRY = re.compile(r"^[0-9a-f]{8} R_ARM_ABS32\s+(\w+)$", re.MULTILINE)
-_PUSH = re.compile(r"\t(?:push|stmdb\s+sp!,|v?push(?:\.w)?)\s*\{([^}]*)\}|\tsub(?:\.w|w)?\s+sp, (?:sp, )?#(\d+)|\[sp, #-(\d+)\]!")
+_PUSH = re.compile(
+    r"\t(?:push|stmdb\s+sp!,|v?push(?:\.w)?)\s*\{([^}]*)\}|\tsub(?:\.w|w)?\s+sp, (?:sp, )?#(\d+)|\[sp, #-(\d+)\]!"
+)
 
 
 @dataclass
@@ -64,7 +67,9 @@ class CallGraph:
             self._functions[names[title]] = _Function(file, int(frame))
         for source, target in _EDGE.findall(text):
             self._functions[names[source]].calls.add(names[target])
-        entries = {entry for table in _TABLE.findall(run_tool("objdump", "-r", path)) for entry in _ENTRY.findall(table)}
+        entries = {
+            entry for table in _TABLE.findall(run_tool("objdump", "-r", path)) for entry in _ENTRY.findall(table)
+        }
         local = {name.rpartition(":")[2]: name for name, function in self._functions.items() if function.file == file}
         self._tables[file] = {local[entry] for entry in entries if entry in local}
 
@@ -90,7 +95,9 @@ class CallGraph:
         if _INDIRECT in function.calls:
             reached = self._reached_from(function.file)
             if not reached:
-                raise LeverError(f"{name} calls through a pointer, and no constant table that it may use has a function")
+                raise LeverError(
+                    f"{name} calls through a pointer, and no constant table that it may use has a function"
+                )
             callees |= reached
         return callees
 

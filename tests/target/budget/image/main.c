@@ -40,8 +40,9 @@ typedef struct intro {
     uint32_t empty_ticks;       /* between two readings with nothing in between */
     uint32_t calibration_ticks; /* of 2 * calibration_rounds instructions, and the former */
     uint32_t calibration_rounds;
-    uint32_t init_stack; /* bytes that lever_init() and the others took at most */
+    uint32_t init_stack; /* bytes that lever_init() took, and so on */
     uint32_t command_stack;
+    uint32_t platform_stack;
     uint32_t estimate_stack;
     uint32_t health_stack;
 } intro_t;
@@ -230,9 +231,11 @@ static void take_argument(char *word, lever_config_t *config, lever_command_t *c
     (void)memcpy(target, &bits, sizeof bits);
 }
 
-/* The instance as the arguments want it; measures the stack of the calls that are made once. */
+/* The instance as the arguments want it, with a report of the machine as ports give it, so that PLATFORM_HEALTH is sent too;
+ * measures the stack of the calls that are made once. */
 static lever_t *begin(const lever_config_t *config, const lever_command_t *command, intro_t *intro)
 {
+    static const lever_platform_t platform;
     lever_health_t health;
     lever_estimate_t estimate;
     paint_stack();
@@ -247,6 +250,9 @@ static lever_t *begin(const lever_config_t *config, const lever_command_t *comma
     if (!known) {
         semihosting_exit("command refused");
     }
+    paint_stack();
+    lever_platform(lever, &platform);
+    intro->platform_stack = stack_used();
     paint_stack();
     lever_estimate(lever, &estimate);
     intro->estimate_stack = stack_used();

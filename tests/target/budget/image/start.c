@@ -39,5 +39,5 @@ typedef struct vectors {
     vector_t handlers[15];
 } vectors_t;
 
-__attribute__((section(".vectors"), used)) static const vectors_t vectors = {
-    stack_top, {reset, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault}};
+__attribute__((section(".vectors"), used)) static const vectors_t vectors = {stack_top,
+    {reset, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault, fault}};
