@@ -38,10 +38,11 @@ def numbers(budget: dict[str, Any]) -> dict[str, float]:
         for key, value in entry.items():
             if isinstance(value, dict):
                 walk(value, f"{path}.{key}")
-            elif key in _COUNTED:
+            elif key in _COUNTED or path == "instructions_after_gap":
                 found[f"{path}.{key}"] = value
 
-    walk(budget["instructions"], "instructions")
+    for part in ("instructions", "instructions_after_gap"):
+        walk(budget[part], part)
     return found | {name: budget[name] for name in _BYTES}
 
 

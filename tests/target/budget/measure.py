@@ -21,10 +21,18 @@ START_UP_S = 2.0
 TRACED = (2048, 2347)
 """First and last sample whose floating-point operations are counted: thirty learning periods in steady running."""
 
+GAP_S = (10.0, 10.4)
+"""Where samples are left out, to see what the first one after a gap takes; less than gap_limit."""
+
 Case = tuple[str, str, str]
 """Estimator, model, and one of FORMS."""
 Tell = Callable[[int, int, str], None]
 """Told what is done, of how much, and what comes now."""
+
+
+def _silent(done: int, total: int, what: str) -> None:
+    """Nobody wants to know."""
+
 
 _RUNNING = next(code for code, name in enum_names("lever_mode").items() if name == "run")
 _FACADE = re.compile(r"^[a-z_][\w ]*[ *](lever_\w+)\(", re.MULTILINE)
@@ -65,26 +73,25 @@ def facade(firmware: Path) -> list[str]:
     return _FACADE.findall((firmware / "lever_cdkf.h").read_text(encoding="utf-8"))
 
 
-def measure(elf: Path, firmware: Path, tell: Tell = lambda done, total, what: None) -> dict[str, Any]:
-    """Runs the image over every case and returns what budget.json holds. Raises LeverError."""
+def run_all(elf: Path, tell: Tell = _silent) -> dict[Case, Run]:
+    """The image in QEMU, over every case. Raises LeverError."""
     cases = [(estimator, model, form) for form in FORMS for estimator in ESTIMATORS for model in MODELS]
-    traced = [case for case in cases if case[2] == "update"]
-    total = len(cases) + len(traced)
-    runs: dict[Case, Run] = {}
+    runs = {}
     for done, (estimator, model, form) in enumerate(cases):
-        tell(done, total, f"{estimator} {model} {form} in QEMU")
+        tell(done, len(cases), f"{estimator} {model} {form} in QEMU")
         runs[estimator, model, form] = image.run(elf, record(model), model, estimator, form)
-    operations: dict[str, Any] = {}
-    for done, (estimator, model, form) in enumerate(traced, start=len(cases)):
-        tell(done, total, f"{estimator} {model} {form} in Unicorn")
-        found = trace.trace(elf, record(model), model, estimator, form, *TRACED)
-        operations.setdefault(estimator, {})[model] = _operations(found)
+    return runs
+
+
+def budget(elf: Path, firmware: Path, runs: dict[Case, Run], tell: Tell = _silent) -> dict[str, Any]:
+    """What budget.json holds, of the runs of an image of this firmware. Raises LeverError."""
     return {
         "processor": "Cortex-M4F, as QEMU's netduinoplus2 has it",
         "compiler": image.compiler(),
         "calibration": _calibration(runs),
         "instructions": _instructions(runs),
-        "floating_point_operations": operations,
+        "instructions_after_gap": _after_gap(elf),
+        "floating_point_operations": _operations(elf, tell),
         **_bytes(elf),
         **_stack(elf, firmware, runs),
     }
@@ -98,10 +105,27 @@ def _instructions(runs: dict[Case, Run]) -> dict[str, Any]:
     return instructions
 
 
-def _operations(found: trace.Trace) -> dict[str, float]:
-    mean = float(found.operations.mean())
-    ratio = float(found.instructions.mean()) / mean
-    return {"mean": round(mean, 1), "worst": int(found.operations.max()), "instructions_per_operation": round(ratio, 3)}
+def _after_gap(elf: Path) -> dict[str, int]:
+    """The dearest call there is: the first sample after a gap, lever model."""
+    cut, first = record("lever").without(GAP_S), round(GAP_S[0] * 1e3)
+    runs = {estimator: image.run(elf, cut, "lever", estimator, "update") for estimator in ESTIMATORS}
+    return {estimator: int(run.instructions[first]) for estimator, run in runs.items()}
+
+
+def _operations(elf: Path, tell: Tell) -> dict[str, Any]:
+    """Of lever_update(), executed in the samples TRACED: the floor under its instructions, and how far that is away."""
+    operations: dict[str, Any] = {}
+    cases = [(estimator, model) for estimator in ESTIMATORS for model in MODELS]
+    for done, (estimator, model) in enumerate(cases):
+        tell(done, len(cases), f"{estimator} {model} in Unicorn")
+        found = trace.trace(elf, record(model), model, estimator, "update", *TRACED)
+        mean = float(found.operations.mean())
+        operations.setdefault(estimator, {})[model] = {
+            "mean": round(mean, 1),
+            "worst": int(found.operations.max()),
+            "instructions_per_operation": round(float(found.instructions.mean()) / mean, 3),
+        }
+    return operations
 
 
 def _calibration(runs: dict[Case, Run]) -> dict[str, float]:

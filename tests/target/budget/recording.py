@@ -7,7 +7,7 @@ same whatever estimator listens, so one recording serves dual and joint.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -46,6 +46,12 @@ class Recording:
         """What the image expects in flash, for "update" or "tick"."""
         records = self.samples if form == "update" else self.frames
         return struct.pack("<II", len(self.samples), records.dtype.itemsize) + records.tobytes()
+
+    def without(self, gap_s: tuple[float, float]) -> Recording:
+        """The same, but for the samples from the first time [s] up to the second."""
+        time = self.samples["time_us"] * 1e-6
+        kept = (time < gap_s[0]) | (time >= gap_s[1])
+        return replace(self, samples=self.samples[kept], frames=self.frames[np.repeat(kept, 2)])
 
 
 @cache

@@ -18,7 +18,8 @@ def run(args: argparse.Namespace) -> int:
     """The command. Raises LeverError."""
     elf = image.build(args.build, args.firmware, args.flags)
     with Progress("budget") as progress:
-        budget = measure.measure(elf, args.firmware, progress.show)
+        runs = measure.run_all(elf, progress.show)
+        budget = measure.budget(elf, args.firmware, runs, progress.show)
     print_tables(tables(budget))
     if args.json is not None:
         write_text(args.json, json.dumps(budget, indent=2) + "\n")
@@ -59,7 +60,15 @@ def tables(budget: dict[str, Any]) -> Tables:
         for name, entry in budget["stack"].items()
     ]
     files = [{"file": file, **sections} for file, sections in budget["files"].items()]
-    return {title: _instructions(budget), "Memory": memory, "Code by file [bytes]": files, "Stack by function": stack}
+    gap: Row = {**budget["instructions_after_gap"]}
+    first_after = f"Instructions of lever_update() for the first sample after a gap of {_gap():g} s, lever model"
+    return {
+        title: _instructions(budget),
+        first_after: [gap],
+        "Memory": memory,
+        "Code by file [bytes]": files,
+        "Stack by function": stack,
+    }
 
 
 _BYTES = {
@@ -74,8 +83,13 @@ _BYTES = {
 }
 
 
+def _gap() -> float:
+    return round(measure.GAP_S[1] - measure.GAP_S[0], 3)
+
+
 def _instructions(budget: dict[str, Any]) -> list[Row]:
-    instructions, rows = budget["instructions"], []
+    instructions = budget["instructions"]
+    rows: list[Row] = []
     for what, place in (("lever_update()", instructions), ("whole tick", instructions["tick"])):
         for estimator in image.ESTIMATORS:
             for model, entry in place[estimator].items():

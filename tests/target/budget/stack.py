@@ -11,6 +11,7 @@ A graph with a circle, a frame without a bound, or a call that cannot be resolve
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -49,12 +50,13 @@ class Deepest:
 class CallGraph:
     """The functions of the core; a name is "filter/dual.c:is_joint" when static, else as the linker sees it."""
 
-    def __init__(self, elf: Path) -> None:
+    def __init__(self, objects: Mapping[str, Path], elf: Path) -> None:
+        """`objects`: the object file of each source file, with its .ci beside it; `elf`: what they are linked into."""
         self._elf = elf
         self._functions: dict[str, _Function] = {}
         self._tables: dict[str, set[str]] = {}
         self._known: dict[str, Deepest] = {}
-        for file, path in core_objects(elf).items():
+        for file, path in objects.items():
             self._read(file, path)
 
     def _read(self, file: str, path: Path) -> None:
@@ -129,5 +131,5 @@ def _pushed(registers: str, count: str) -> int:
 
 def worst_case(elf: Path, facade: list[str]) -> dict[str, Deepest]:
     """The deepest chain of each function of the façade. Raises LeverError."""
-    graph = CallGraph(elf)
+    graph = CallGraph(core_objects(elf), elf)
     return {name: graph.deepest(name) for name in facade}
