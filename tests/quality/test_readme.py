@@ -22,8 +22,11 @@ TIME_LIMIT = "120"
 """For one block [s]."""
 
 
-VCAN = pytest.mark.requires("ip", "candump", "linux.uml")
-"""Of a block that goes to a place with a vcan0."""
+NEEDS = {
+    "tests/vcan": pytest.mark.requires("ip", "candump", "linux.uml"),
+    "tests/target": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
+}
+"""Tools that a block needs by what it mentions."""
 
 
 def blocks(language: str) -> list[object]:
@@ -31,7 +34,7 @@ def blocks(language: str) -> list[object]:
         pytest.param(
             content,
             id=f"{readme.relative_to(tools.ROOT)}:{line}",
-            marks=[VCAN] if "tests/vcan" in content else [],
+            marks=[mark for place, mark in NEEDS.items() if place in content],
         )
         for readme in READMES
         for line, content in readmes.blocks(readme, language).items()

@@ -7,6 +7,7 @@ out otherwise is refused.
 
 from __future__ import annotations
 
+import fcntl
 import shlex
 import struct
 import subprocess
@@ -120,8 +121,11 @@ def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED) -> Path
         f"-DLEVER_FIRMWARE={firmware.resolve()}",
         f"-DCMAKE_C_FLAGS_RELEASE={flags}",
     ]
-    _run(["cmake", "-S", str(SOURCE), "-B", str(folder), toolchain, *settings], "configuring the image")
-    _run(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as lock:  # tests that run side by side build it too
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        _run(["cmake", "-S", str(SOURCE), "-B", str(folder), toolchain, *settings], "configuring the image")
+        _run(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
     return folder / "budget.elf"
 
 

@@ -47,11 +47,15 @@ def _judge(budget: dict[str, Any]) -> int:
 def tables(budget: dict[str, Any]) -> Tables:
     """The budget as it is printed."""
     calibration = budget["calibration"]
-    title = (
-        f"Instructions a sample on a {budget['processor']}; {budget['compiler']}; a loop of "
-        f"{calibration['loop_instructions']} was measured as {calibration['loop_measured']:g}, and "
-        f"{calibration['overhead_subtracted']} is subtracted for measuring"
-    )
+    measured: list[Row] = [
+        {"how": "processor", "what": budget["processor"]},
+        {"how": "compiler", "what": budget["compiler"]},
+        {
+            "how": f"loop of {calibration['loop_instructions']} instructions",
+            "what": f"{calibration['loop_measured']:.0f}",
+        },
+        {"how": "subtracted for measuring", "what": str(calibration["overhead_subtracted"])},
+    ]
     memory = [
         {"what": what, "bytes": budget[name], "limit [bytes]": golden.LIMITS.get(name)} for name, what in _BYTES.items()
     ]
@@ -60,11 +64,9 @@ def tables(budget: dict[str, Any]) -> Tables:
         for name, entry in budget["stack"].items()
     ]
     files = [{"file": file, **sections} for file, sections in budget["files"].items()]
-    gap: Row = {**budget["instructions_after_gap"]}
-    first_after = f"Instructions of lever_update() for the first sample after a gap of {_gap():g} s, lever model"
     return {
-        title: _instructions(budget),
-        first_after: [gap],
+        "How it was measured": measured,
+        "Instructions a sample": _instructions(budget),
         "Memory": memory,
         "Code by file [bytes]": files,
         "Stack by function": stack,
@@ -81,10 +83,6 @@ _BYTES = {
     "stack_bytes": "stack, worst case of the call graph",
     "stack_painted_bytes": "stack, seen to be written in the runs",
 }
-
-
-def _gap() -> float:
-    return round(measure.GAP_S[1] - measure.GAP_S[0], 3)
 
 
 def _instructions(budget: dict[str, Any]) -> list[Row]:
@@ -108,4 +106,8 @@ def _instructions(budget: dict[str, Any]) -> list[Row]:
                 row["floating-point operations"] = operations.get("mean")
                 row["instructions / operation"] = operations.get("instructions_per_operation")
                 rows.append(row)
+    gap = f"after a gap of {measure.GAP_S[1] - measure.GAP_S[0]:.1f} s"
+    for estimator, most in budget["instructions_after_gap"].items():
+        blank = dict.fromkeys(rows[0], None)
+        rows.append({**blank, "measured": gap, "estimator": estimator, "model": "lever", "worst": most})
     return rows

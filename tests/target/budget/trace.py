@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import struct
+import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,6 +64,13 @@ def functions(elf: Path) -> list[tuple[int, int, str]]:
     """Address, bytes and name of every function in the image; several may have one name."""
     found = _SYMBOL.findall(run_tool("nm", "-S", elf))
     return sorted((int(address, 16) & ~1, int(size, 16), name) for address, size, name in found)
+
+
+def _flash(elf: Path) -> bytes:
+    """The image as it is in flash."""
+    with tempfile.NamedTemporaryFile(prefix="lever-budget-") as file:
+        run_tool("objcopy", "-O", "binary", elf, file.name)
+        return Path(file.name).read_bytes()
 
 
 @dataclass(frozen=True)
@@ -122,9 +130,7 @@ class _Machine:
         uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
         for address, size in ((_FLASH, _FLASH_BYTES), (_RAM, _RAM_BYTES), (_SYSTEM, _SYSTEM_BYTES)):
             uc.mem_map(address, size)
-        binary = elf.with_suffix(".bin")
-        run_tool("objcopy", "-O", "binary", elf, binary)
-        uc.mem_write(_FLASH, binary.read_bytes())
+        uc.mem_write(_FLASH, _flash(elf))
         uc.mem_write(SAMPLES_ADDRESS, samples)
         self._main, self._main_bytes = next(entry[:2] for entry in functions(elf) if entry[2] == "main")
         uc.hook_add(unicorn.UC_HOOK_MEM_READ, self._on_clock, begin=_SYST_CVR, end=_SYST_CVR + 3)
