@@ -45,7 +45,16 @@ def _parser() -> argparse.ArgumentParser:
     what = parser.add_subparsers(required=True, metavar="WHAT")
     table = what.add_parser("table", parents=[common], help="instructions, bytes, stack")
     table.add_argument("--check", action="store_true", help="against the limits and the golden values")
-    table.add_argument("--accept", action="store_true", help="make this the golden values")
+    table.add_argument(
+        "--accept", action="store_true", help="make this the golden values, and what firmware/port/PORTING.md says"
+    )
+    table.add_argument(
+        "--images",
+        type=Path,
+        default=_BUILD.parent / "stm32f4",
+        metavar="DIR",
+        help="of the port, to --accept (%(default)s)",
+    )
     table.set_defaults(run=report.run)
     profile = what.add_parser("profile", parents=[common], help="where the instructions of a step go")
     profile.add_argument("--model", choices=MODELS, default=MODELS[0], help="default: %(default)s")

@@ -43,7 +43,8 @@ def numbers(budget: dict[str, Any]) -> dict[str, float]:
 
     for part in ("instructions", "instructions_after_gap"):
         walk(budget[part], part)
-    return found | {name: budget[name] for name in _BYTES}
+    stack = {f"stack.{name}": entry["bytes"] for name, entry in budget["stack"].items() if entry["bytes"] > 0}
+    return found | {name: budget[name] for name in _BYTES} | stack
 
 
 def beyond_limits(budget: dict[str, Any]) -> list[str]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from lever_cdkf.host_tools.files import write_text
 from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, Tables, print_tables
 
-from . import golden, image, measure
+from . import golden, guide, image, measure, port_sizes
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,9 +25,19 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_text(args.json, json.dumps(budget, indent=2) + "\n")
     if args.accept:
-        golden.accept(budget)
-        print(f"accepted: {golden.GOLDEN}")
+        _accept(budget, args.images)
     return _judge(budget) if args.check else 0
+
+
+def _accept(budget: dict[str, Any], images: Path) -> None:
+    """Makes this the golden values, and what the porting guide says. Raises LeverError."""
+    sizes = {name: port_sizes.of_port(name, guide.port_image(images, name)) for name in port_sizes.TRANSPORTS}
+    golden.accept(budget)
+    values = golden.load()["values"]
+    guide.update(
+        {"instructions": guide.instructions(values), "memory": guide.memory(values), "port": guide.port(sizes)}
+    )
+    print(f"accepted: {golden.GOLDEN} and {guide.GUIDE}")
 
 
 def _judge(budget: dict[str, Any]) -> int:
