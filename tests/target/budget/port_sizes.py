@@ -1,4 +1,4 @@
-"""What the four functions of port/embedded/port.h take on the STM32F405, with all they call: bytes of code, lines of C."""
+"""What the four functions of port/embedded/port.h take on the STM32F405, with all they call: bytes and lines of C."""
 
 from __future__ import annotations
 

@@ -111,10 +111,17 @@ class CallGraph:
     def _frame(self, name: str) -> int:
         if name in self._functions:
             return self._functions[name].frame
-        code = run_tool("objdump", "-d", "--no-show-raw-insn", f"--disassemble={name}", self._elf)
-        if f"<{name}>:" not in code or re.search(r"\tbl\s", code):
+        pushed, calls = pushed_by(self._elf, name)
+        if calls:
             raise LeverError(f"{name} is called and is neither in the core nor a leaf of the C library")
-        return sum(_pushed(registers, subtracted or stored) for registers, subtracted, stored in _PUSH.findall(code))
+        return pushed
+
+
+def pushed_by(elf: Path, name: str) -> tuple[int, bool]:
+    """Bytes that all instructions of a function push, and whether it may call (or is not there)."""
+    code = run_tool("objdump", "-d", "--no-show-raw-insn", f"--disassemble={name}", elf)
+    pushed = sum(_pushed(registers, subtracted or stored) for registers, subtracted, stored in _PUSH.findall(code))
+    return pushed, f"<{name}>:" not in code or re.search(r"\tbl\s", code) is not None
 
 
 def _pushed(registers: str, count: str) -> int:

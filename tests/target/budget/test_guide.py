@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import readmes
 from lever_cdkf.host_tools.native import FRAME_SAMPLE, Config, Estimator
-from target.budget import golden, guide, port_sizes
+from target.budget import golden, guide, port_sizes, stack
 from target.budget.recording import FRAME, record
 
 PLATFORM_HEALTH = 0x216
@@ -62,6 +62,16 @@ def test_the_four_functions_are_as_large_as_it_says(build_dir: Path) -> None:
     for old, new in zip(numbers.findall(said), numbers.findall(measured), strict=True):
         of_said, of_measured = (int(each.replace(",", "")) for each in (old, new))
         assert of_measured == pytest.approx(of_said, rel=0.05), f"{golden.ACCEPT} writes it"
+
+
+@pytest.mark.requires("arm-none-eabi-gcc")
+def test_the_loop_takes_the_stack_that_it_says(build_dir: Path) -> None:
+    text = guide.GUIDE.read_text(encoding="utf-8")
+    said = re.search(r"(\d+) bytes for the loop \((\d+) for `self_test\(\)`", text)
+    assert said is not None
+    for function, bytes_ in zip(("embedded_turn", "self_test"), said.groups(), strict=True):
+        pushed, _ = stack.pushed_by(guide.port_image(build_dir / "stm32f4", "can"), function)
+        assert 0.8 * int(bytes_) < pushed <= int(bytes_), function
 
 
 @pytest.fixture(scope="module")
