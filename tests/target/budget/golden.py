@@ -18,7 +18,7 @@ LIMITS = {
     "instructions.joint.lever.mean": 4000,
     "instructions.tick.dual.lever.mean": 4000,
     "text_bytes": 16 << 10,
-    "instance_bytes": 1 << 10,
+    "memory_bytes": 1 << 10,
     "stack_bytes": 1 << 10,
     "data_bytes": 0,
     "bss_bytes": 0,
@@ -27,7 +27,7 @@ WORST_TO_MEAN = 1.10
 """Greatest ratio in steady running, of every estimator and model and of the whole tick."""
 
 _COUNTED = ("mean", "worst", "start_up_worst")
-_BYTES = ("text_bytes", "rodata_bytes", "data_bytes", "bss_bytes", "instance_bytes", "stack_bytes")
+_BYTES = ("text_bytes", "rodata_bytes", "data_bytes", "bss_bytes", "instance_bytes", "memory_bytes", "stack_bytes")
 
 
 def numbers(budget: dict[str, Any]) -> dict[str, float]:

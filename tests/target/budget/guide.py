@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from lever_cdkf.host_tools.files import write_text
-from lever_cdkf.host_tools.library import ffi, lib
+from lever_cdkf.host_tools.library import ffi
 
 from .image import ESTIMATORS, FIRMWARE
 from .port_sizes import FUNCTIONS, TRANSPORTS, Size
@@ -62,7 +62,7 @@ def _counts(what: str, case: str, values: Values) -> str:
 
 def memory(values: Values) -> str:
     """The table of flash, RAM and stack."""
-    room, used = lib.LEVER_MEMORY_BYTES, values["instance_bytes"]
+    room, used = values["memory_bytes"], values["instance_bytes"]
     rows = {
         "flash: code of the core, all of it": values["text_bytes"],
         "flash: its constants, of which the texts of the settings are most": values["rodata_bytes"],

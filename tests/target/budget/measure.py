@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.library import enum_names, lib
+from lever_cdkf.host_tools.library import enum_names
 from numpy.typing import NDArray
 
 from . import image, sizes, stack, trace
@@ -139,14 +139,14 @@ def _calibration(runs: dict[Case, Run]) -> dict[str, float]:
 
 
 def _bytes(elf: Path) -> dict[str, Any]:
-    library = sizes.of_library(elf)
+    library, instance = sizes.of_library(elf), sizes.of_instance(elf)
     return {
         "text_bytes": library["text"],
         "rodata_bytes": library["rodata"],
         "data_bytes": library["data"],
         "bss_bytes": library["bss"],
-        "instance_bytes": sizes.of_instance(elf),
-        "memory_bytes": int(lib.LEVER_MEMORY_BYTES),
+        "instance_bytes": instance["lever"],
+        "memory_bytes": instance["lever_memory"],
         "files": sizes.of_files(elf),
     }
 

@@ -8,9 +8,7 @@ from pathlib import Path
 from .image import core_library, core_objects, run_tool
 
 _SECTION = re.compile(r"^\.(text|rodata|data|bss)(?:\.\S*)?\s+(\d+)\s", re.MULTILINE)
-_INSTANCE = re.compile(
-    r"DW_TAG_structure_type\)\s+<\w+>\s+DW_AT_name\s+:[^\n]*\blever\s+<\w+>\s+DW_AT_byte_size\s+: (\d+)"
-)
+_TYPE = r"DW_TAG_{kind}_type\)\s+<\w+>\s+DW_AT_name\s+:[^\n]*\b{name}\s+<\w+>\s+DW_AT_byte_size\s+: (\d+)"
 
 
 def of_library(elf: Path) -> dict[str, int]:
@@ -32,9 +30,13 @@ def of_files(elf: Path) -> dict[str, dict[str, int]]:
     return found
 
 
-def of_instance(elf: Path) -> int:
-    """sizeof(struct lever), from the debugging information: nobody outside of the core knows it."""
+def of_instance(elf: Path) -> dict[str, int]:
+    """Bytes of struct lever and of the union lever_memory that has to hold it, from the debugging information: nobody
+    outside of the core knows the former."""
     output = run_tool("readelf", "--debug-dump=info", core_objects(elf)["app/lever.c"])
-    found = _INSTANCE.search(output)
-    assert found is not None, "no struct lever in app/lever.c"
-    return int(found.group(1))
+    found = {}
+    for kind, name in (("structure", "lever"), ("union", "lever_memory")):
+        size = re.search(_TYPE.format(kind=kind, name=name), output)
+        assert size is not None, f"no {kind} {name} in app/lever.c"
+        found[name] = int(size[1])
+    return found
