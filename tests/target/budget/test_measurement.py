@@ -156,13 +156,13 @@ def test_what_cannot_be_bounded_is_refused(tmp_path: Path, source: str, message:
 
 
 def test_a_dearer_firmware_is_noticed(elf: Path, runs: Runs, tmp_path: Path) -> None:
-    """A buffer of 1200 bytes that is filled in each step, in a copy of the firmware."""
+    """A buffer of 1600 bytes that is filled in each step, in a copy of the firmware."""
     firmware = tmp_path / "firmware"
     shutil.copytree(image.FIRMWARE, firmware)
     source = firmware / "app/estimator.c"
     text = source.read_text(encoding="utf-8")
     before, brace, _ = text.partition("enum lever_mode estimator_update(")[2].partition("{")
-    waste = "volatile float waste[300]; for (uint32_t i = 0u; i < 300u; i++) { waste[i] = 1.0f; }"
+    waste = "volatile float waste[400]; for (uint32_t i = 0u; i < 400u; i++) { waste[i] = 1.0f; }"
     source.write_text(text.replace(f"{before}{brace}", f"{before}{brace}{waste}", 1), encoding="utf-8")
     dearer = image.build(tmp_path / "build", firmware)
     run, was = image.run(dearer, record("lever"), "lever", "dual", "update"), runs["dual", "lever", "update"]
