@@ -110,8 +110,9 @@ def compiler() -> str:
     return run_tool("gcc", "--version").splitlines()[0]
 
 
-def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED) -> Path:
-    """Builds the image of a firmware folder in `folder`, and returns its .elf. Raises LeverError."""
+def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED, processor: str | None = None) -> Path:
+    """Builds the image of a firmware folder in `folder`, and returns its .elf. `flags` are those of the optimiser,
+    `processor` those that choose another processor than the M4F. Raises LeverError."""
     compiler()
     if not (firmware / "lever_cdkf.h").is_file():
         raise LeverError(f"{firmware}: no lever_cdkf.h there: give the firmware folder of a source tree")
