@@ -11,7 +11,7 @@ from lever_cdkf.host_tools.native import run_samples
 from quality import tools
 
 PROJECT = Path(__file__).with_name("package")
-TOOLCHAIN = tools.ROOT / "tests/target/budget/image/cortex-m4f.cmake"
+TOOLCHAIN = tools.FIRMWARE / "port/stm32f4/toolchain.cmake"
 
 
 def install(folder: Path, *settings: str | Path) -> Path:

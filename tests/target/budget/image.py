@@ -116,12 +116,9 @@ def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED, process
     compiler()
     if not (firmware / "lever_cdkf.h").is_file():
         raise LeverError(f"{firmware}: no lever_cdkf.h there: give the firmware folder of a source tree")
-    toolchain = f"--toolchain={SOURCE / 'cortex-m4f.cmake'}"
-    settings = [
-        "-DCMAKE_BUILD_TYPE=Release",
-        f"-DLEVER_FIRMWARE={firmware.resolve()}",
-        f"-DCMAKE_C_FLAGS_RELEASE={flags}",
-    ]
+    toolchain = f"--toolchain={FIRMWARE / 'port/stm32f4/toolchain.cmake'}"
+    settings = ["-DCMAKE_BUILD_TYPE=Release", f"-DLEVER_FIRMWARE={firmware.resolve()}"]
+    settings += [f"-DCMAKE_C_FLAGS_RELEASE={flags}", *([] if processor is None else [f"-DCMAKE_C_FLAGS={processor}"])]
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as lock:  # tests that run side by side build it too
         fcntl.flock(lock, fcntl.LOCK_EX)

@@ -52,6 +52,14 @@ def test_the_image_computes_what_the_host_computes(runs: Runs, estimator: str, m
             assert values[0] == values[1], (form, name)
 
 
+def test_a_processor_without_fpu_computes_the_same(runs: Runs, tmp_path: Path) -> None:
+    """And takes about twenty times the instructions: PORTING.md."""
+    elf = image.build(tmp_path, processor="-mcpu=cortex-m4 -mthumb -mfloat-abi=soft")
+    soft, hard = image.run(elf, record("lever"), "lever", "dual", "update"), runs["dual", "lever", "update"]
+    assert soft.estimate == hard.estimate
+    assert 15.0 < soft.instructions.mean() / hard.instructions.mean() < 25.0
+
+
 @pytest.mark.parametrize(("estimator", "model"), CASES)
 def test_the_recording_makes_the_estimator_work(runs: Runs, estimator: str, model: str) -> None:
     """It aligns, runs, learns from sample to sample, notices the change at 6 s, and publishes."""
