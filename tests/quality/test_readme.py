@@ -22,11 +22,13 @@ TIME_LIMIT = "120"
 """For one block [s]."""
 
 
-NEEDS = {
+NEEDED = {
     "tests/vcan": pytest.mark.requires("ip", "candump", "linux.uml"),
     "tests/target": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
+    "lever flash": pytest.mark.requires("arm-none-eabi-gcc", "openocd"),
+    "lever qemu": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
 }
-"""Tools that a block needs by what it mentions."""
+"""By blocks with these words in them."""
 
 
 def blocks(language: str) -> list[object]:
@@ -34,7 +36,7 @@ def blocks(language: str) -> list[object]:
         pytest.param(
             content,
             id=f"{readme.relative_to(tools.ROOT)}:{line}",
-            marks=[mark for place, mark in NEEDS.items() if place in content],
+            marks=[mark for words, mark in NEEDED.items() if words in content],
         )
         for readme in READMES
         for line, content in readmes.blocks(readme, language).items()
