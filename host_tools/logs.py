@@ -217,7 +217,8 @@ def _size(path: str) -> int:
 def _open_text(path: str) -> Iterator[tuple[Any, Callable[[], int]]]:
     """The bytes of a text that may be compressed, and a function that tells how many bytes of the file are read."""
     if path == "-":
-        yield open(sys.stdin.fileno(), "rb", buffering=0, closefd=False), lambda: 0
+        with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as file:
+            yield file, lambda: 0
         return
     with open(path, "rb", buffering=0) as file:
         if not _is_file(path):

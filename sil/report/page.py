@@ -55,7 +55,7 @@ def build(run: Run) -> str:
 
 def _subtitle(run: Run) -> str:
     description = html.escape(run.summary.get("scenario", {}).get("description") or "")
-    length = f"{len(run.time):,} samples in {run.end:.0f} s.".replace(",", "\u2009")
+    length = f"{run.samples:,} samples in {run.end:.0f} s.".replace(",", "\u2009")
     return f"{description} {length}".strip()
 
 
