@@ -63,5 +63,5 @@ def _scalar(kind: Any) -> str:
     """numpy's name of a number or enum."""
     if kind.cname == "_Bool":
         return "bool"
-    letter = "f" if kind.cname == "float" else "i" if kind.cname.startswith("int") else "u"
+    letter = "f" if kind.cname in ("float", "double") else "i" if kind.cname.startswith("int") else "u"
     return f"{letter}{ffi.sizeof(kind)}"
