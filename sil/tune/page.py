@@ -9,7 +9,7 @@ import numpy as np
 from lever_cdkf.host_tools.tables import Row
 
 from ..report.document import document
-from ..report.figure import Figure, axis, band, dots, line
+from ..report.figure import Figure, Spec, axis, band, dots, line
 from ..report.page import Page
 from ..report.words import number, table
 from .judgement import Fit
@@ -73,7 +73,7 @@ def _intervals(found: Sequence[Found]) -> Figure | None:
     return figure
 
 
-def _dot(x: float, lane: int, name: str, marker: Mapping[str, object], more: Mapping[str, object]) -> dict[str, object]:
+def _dot(x: float, lane: int, name: str, marker: Spec, more: Spec) -> Spec:
     return dots(np.array((x,)), np.array((float(lane),)), name, "estimate", marker=dict(marker), **more)
 
 

@@ -30,13 +30,13 @@ class Recording:
     @property
     def duration(self) -> float:
         """From the first sample to the last, gaps included [s]."""
-        return float(self.time[-1]) if len(self.samples) else 0.0
+        return float(self.time[-1])
 
     @property
     def time(self) -> Array:
-        """Of each sample since the first [s]; time_us wraps."""
-        steps = np.diff(self.samples["time_us"]).astype(np.int32)
-        return np.concatenate(([0.0], np.cumsum(steps, dtype=np.int64) * 1e-6))
+        """Of each sample since the first [s]; time_us wraps, and goes on where its sender has started it anew."""
+        steps = _steps(self.samples) * 1e-6
+        return np.concatenate(([0.0], np.cumsum(np.where(steps > 0.0, steps, self.period))))
 
 
 def read(
@@ -62,22 +62,24 @@ def read(
         if since[-1] > start + length:
             break
     name = ", ".join(os.fspath(path) for path in paths)
-    frames, chosen = _of_one_bus(np.concatenate(pieces), log.buses.names(), bus, name)
-    return _recording(frames, chosen, name)
-
-
-def _of_one_bus(frames: Array, names: Sequence[str], bus: str | None, log: str) -> tuple[Array, str]:
-    """The frames of the bus that is asked for, or of the only one that has samples; and its name. Raises LeverError."""
+    frames = np.concatenate(pieces)
     base = codec.message("BASE_SAMPLE").frame_id
-    found = [names[index] for index in np.unique(frames["bus"][frames["id"] == base])]
-    if not found:
-        raise LeverError(f"{log}: no BASE_SAMPLE ({base:#x}) there, so no samples: see `lever dbc` for the messages")
+    if not (frames["id"] == base).any():
+        raise LeverError(
+            f"{name}: no BASE_SAMPLE ({base:#x}) from {start:g} s on, so no samples: `lever dbc` has the messages"
+        )
+    found = [log.buses.names()[index] for index in np.unique(frames["bus"][frames["id"] == base])]
+    chosen = _chosen(found, bus, name)
+    return _recording(frames[frames["bus"] == log.buses.names().index(chosen)], chosen, name)
+
+
+def _chosen(found: Sequence[str], bus: str | None, log: str) -> str:
+    """The bus that is asked for, or the only one that has samples. Raises LeverError."""
     if bus is not None and bus not in found:
         raise LeverError(f"{log}: no samples on bus {bus}; there are some on {', '.join(found)}")
     if bus is None and len(found) > 1:
         raise LeverError(f"{log}: samples on more than one bus: choose by --bus {' or --bus '.join(found)}")
-    chosen = bus or found[0]
-    return frames[frames["bus"] == names.index(chosen)], chosen
+    return bus or found[0]
 
 
 def _recording(frames: Array, bus: str, log: str) -> Recording:
@@ -87,5 +89,9 @@ def _recording(frames: Array, bus: str, log: str) -> Recording:
     samples, health = samples_of(received)
     if len(samples) < 2:
         raise LeverError(f"{log}: none of its samples is accepted: {health.corrupt} frames are corrupt (E2E)")
-    steps = np.diff(samples["time_us"]).astype(np.int32)
-    return Recording(samples, float(np.median(steps)) * 1e-6, bus, health)
+    return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, health)
+
+
+def _steps(samples: Array) -> Array:
+    """From each sample to the next [us]; less than half the range of time_us ahead is forward, all else back."""
+    return np.diff(samples["time_us"]).astype(np.int32)
