@@ -18,7 +18,7 @@ enum innovation_limits { INNOVATION_OUTPUTS = 2 }; /* theta [rad], theta_dot [ra
 
 /* What the estimator made of one sample. */
 typedef struct innovation {
-    double log_likelihood;           /* of the outputs, given all samples before: ln of their density [SI units] */
+    double log_likelihood;           /* ln of the density that was predicted for the outputs [SI units] */
     float value[INNOVATION_OUTPUTS]; /* measured minus predicted; 0 for an output that was not used */
     float sigma[INNOVATION_OUTPUTS]; /* its predicted standard deviation; 0 likewise */
     float nis;                       /* normalised innovation squared, chi-square with `size` degrees of freedom */

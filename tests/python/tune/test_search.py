@@ -35,8 +35,10 @@ def test_the_walk_of_the_parameters_is_found(simulate: Simulate) -> None:
     likelihood = Likelihood(recording.read([simulate(80.0, changing=True)]), held_out=0.0)
     found = found_in(likelihood, *NOISE, "m_p_walk", adaptation="fixed", **NOISE)
     for name, true in WALK.items():
-        assert found[name].low is not None
-        assert found[name].low < true < found[name].high, name
+        low, high = found[name].low, found[name].high
+        assert low is not None, name
+        assert high is not None, name
+        assert low < true < high, name
         assert found[name].verdict == "too small"
 
 
