@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ before the next one is sent. Prints how good the estimates were; with --out also
 
 With --interface lever (the default) the firmware runs inside this process. With socketcan or slcan it has to be running
 at the other end of the channel, with the settings that --settings alone prints; bus.log is the same to the byte but
-for the channel's name.
+for the channel's name. What python-can's interface can be told beyond its channel is given by --bus-option.
 """
 _EPILOG = """\
 examples:
@@ -39,11 +39,14 @@ examples:
   lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
   lever sim steady --settings > steady.settings; lever_can --can vcan0 --settings steady.settings &
   lever sim steady --interface socketcan --channel vcan0
+  lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
 
 Exit status: 0 when every sample was answered, the estimator never was in fault, and the limits of the scenario were
 kept; 1 when not, with one line on standard error.
 """
 _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
+_BUS_OPTIONS: dict[str, dict[str, Any]] = {"slcan": {"bitrate": 1_000_000, "sleep_after_open": 0.0}}
+"""Unless told otherwise: the bit rate of lever.dbc, and no two seconds for an Arduino to reset in."""
 _DEMO = "demo"
 _PRINT = ""  # --settings without a file
 
@@ -60,6 +63,13 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     sim.add_argument(
         "--channel", help="vcan0 for socketcan, a serial device for slcan (default: vcan0; slcan has none)"
+    )
+    sim.add_argument(
+        "--bus-option",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="option of python-can's interface, such as tty_baudrate=921600 for slcan; may be repeated",
     )
     sim.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     sim.add_argument(
@@ -103,7 +113,8 @@ def run(args: argparse.Namespace) -> int:
     channel = args.channel or _CHANNELS.get(args.interface)
     if channel is None:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
-    return _simulate(scenario, args.interface, channel, args.out, args.json, args.realtime)
+    bus_options = _bus_options(args.bus_option)
+    return _simulate(scenario, args.interface, channel, bus_options, args.out, args.json, args.realtime)
 
 
 def _from_file(path: str) -> list[str]:
@@ -121,7 +132,7 @@ def run_demo(args: argparse.Namespace) -> int:
     """`lever demo`."""
     from .scenario import load
 
-    return _simulate(load(_DEMO), "lever", "lever", args.out, args.json, realtime=False)
+    return _simulate(load(_DEMO), "lever", "lever", {}, args.out, args.json, realtime=False)
 
 
 def _list(json_file: str | None) -> int:
@@ -137,15 +148,34 @@ def _list(json_file: str | None) -> int:
     return 0
 
 
+def _bus_options(assignments: Sequence[str]) -> dict[str, Any]:
+    """KEY=VALUE each, with numbers and truth values as such."""
+    from can.util import cast_from_string
+
+    options = {}
+    for assignment in assignments:
+        key, equals, value = assignment.partition("=")
+        if not (key and equals):
+            raise LeverError(f"--bus-option {assignment}: expected KEY=VALUE, such as tty_baudrate=921600")
+        options[key] = cast_from_string(value)
+    return options
+
+
 def _simulate(
-    scenario: Scenario, interface: str, channel: str, out: Path | None, json_file: str | None, realtime: bool
+    scenario: Scenario,
+    interface: str,
+    channel: str,
+    bus_options: Mapping[str, Any],
+    out: Path | None,
+    json_file: str | None,
+    realtime: bool,
 ) -> int:
     from lever_cdkf.host_tools.progress import Progress
     from lever_cdkf.host_tools.tables import print_tables
 
     from .runner import simulate
 
-    with open_bus(scenario, interface, channel) as bus, Progress(scenario.name) as progress:
+    with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
         result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
     print_tables(_tables(result), json_file)
     print(result.summary["verdict"])
@@ -157,18 +187,20 @@ def _simulate(
     return 1
 
 
-def open_bus(scenario: Scenario, interface: str, channel: str) -> can.BusABC:
-    """The bus to the estimator. Raises LeverError."""
+def open_bus(
+    scenario: Scenario, interface: str, channel: str, bus_options: Mapping[str, Any] | None = None
+) -> can.BusABC:
+    """The bus to the estimator; `bus_options` are python-can's for the interface. Raises LeverError."""
     import can
 
+    options = {**_BUS_OPTIONS.get(interface, {}), **(bus_options or {})}
     if interface == "lever":
         from lever_cdkf.host_tools.bus import LeverBus
 
-        return LeverBus(channel, config=scenario.config)
-    options = {"sleep_after_open": 0.0} if interface == "slcan" else {}
+        return LeverBus(channel, config=scenario.config, **options)
     try:
-        return can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
-    except (can.CanError, OSError, ValueError) as error:
+        return can.Bus(interface=interface, channel=channel, **options)
+    except (can.CanError, OSError, ValueError, TypeError) as error:
         raise LeverError(f"cannot open {interface} channel {channel}: {error}; is it there and up?") from None
 
 

@@ -1,4 +1,4 @@
-/* lever_can: the estimator behind a SocketCAN interface. See options.c for its help. */
+/* lever_can: the estimator behind a SocketCAN interface or a serial line. See options.c for its help. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -8,40 +8,58 @@
 #include "port/linux/loop.h"
 #include "port/linux/options.h"
 #include "port/linux/settings.h"
+#include "port/linux/slcan_host.h"
+#include "port/linux/slcan_peer.h"
 #include "port/linux/socketcan.h"
 #include "port/linux/stop.h"
 
 enum { EXIT_GOOD = 0, EXIT_BAD_INTERFACE = 1, EXIT_BAD_USAGE = 2 };
 
 typedef struct session {
-    socketcan_t socketcan;
+    const options_t *options;
+    socketcan_t socketcan; /* of these three, the one that options->medium says */
+    slcan_host_t slcan_host;
+    slcan_peer_t slcan_peer;
+    transport_t transport;
     loop_t loop;
-    bool verbose;
 } session_t;
 
 static void print_bus_state(void *context, const char *words)
 {
     const session_t *session = context;
 
-    (void)fprintf(stderr, "lever_can: %s: %s\n", session->socketcan.interface, words);
+    (void)fprintf(stderr, "lever_can: %s: %s\n", session->options->interface, words);
 }
 
 static void print_event(void *context, enum loop_event event)
 {
     static const char *const modes[] = {"init", "align", "run", "coast", "frozen", "fault"};
     const session_t *session = context;
-    const char *interface = session->socketcan.interface;
+    const char *interface = session->options->interface;
 
     if (event == LOOP_EVENT_DOWN) {
         (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
-            session->socketcan.reason);
+            session->transport.reason(session->transport.self));
     } else if (event == LOOP_EVENT_UP) {
         (void)fprintf(stderr, "lever_can: %s: link restored\n", interface);
-    } else if (session->verbose) {
+    } else if (session->options->verbose) {
         (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", interface, modes[session->loop.mode],
             session->loop.totals.samples);
     } else {
         /* a change of mode interests only who asks for it */
+    }
+}
+
+/* What the medium itself has lost or refused. */
+static void print_losses(const session_t *session)
+{
+    if (session->options->medium == OPTIONS_MEDIUM_CAN) {
+        (void)printf("%" PRIu32 " overflowed", session->socketcan.overflow);
+    } else if (session->options->medium == OPTIONS_MEDIUM_SLCAN) {
+        (void)printf("%" PRIu32 " refused by the adapter", session->slcan_host.refused);
+    } else {
+        const slcan_counts_t *counts = &session->slcan_peer.slcan.counts;
+        (void)printf("%" PRIu32 " dropped, %" PRIu32 " lines refused", counts->dropped, counts->refused);
     }
 }
 
@@ -52,15 +70,72 @@ static void print_totals(const session_t *session, const lever_t *lever)
 
     lever_health(lever, &health);
     (void)printf("lever_can: %s: %" PRIu64 " frames in, %" PRIu64 " frames out, %" PRIu64 " samples, %" PRIu32
-                 " lost, %" PRIu32 " corrupt, %" PRIu32 " late, %" PRIu32 " overflowed, %u unsent, %" PRIu64
-                 " send retries, %" PRIu64 " outages\n",
-        session->socketcan.interface, totals->received, totals->sent, totals->samples, health.lost, health.corrupt,
-        health.late, session->socketcan.overflow, session->loop.has_unsent ? 1u : 0u, totals->retries, totals->outages);
+                 " lost, %" PRIu32 " corrupt, %" PRIu32 " late, ",
+        session->options->interface, totals->received, totals->sent, totals->samples, health.lost, health.corrupt,
+        health.late);
+    print_losses(session);
+    (void)printf(", %u unsent, %" PRIu64 " send retries, %" PRIu64 " outages\n", session->loop.has_unsent ? 1u : 0u,
+        totals->retries, totals->outages);
+}
+
+/* Opens the medium and fills in the transport, whose reason() says what is wrong if that fails. */
+static bool open_medium(session_t *session, int stop)
+{
+    const char *const interface = session->options->interface;
+    bool good = false;
+
+    switch (session->options->medium) {
+    case OPTIONS_MEDIUM_SLCAN:
+        good = slcan_host_open(&session->slcan_host, interface, stop);
+        session->transport = slcan_host_transport(&session->slcan_host);
+        break;
+    case OPTIONS_MEDIUM_PTY:
+        good = slcan_peer_open_pty(&session->slcan_peer, interface, stop);
+        session->transport = slcan_peer_transport(&session->slcan_peer);
+        break;
+    case OPTIONS_MEDIUM_SERIAL:
+        good = slcan_peer_open_device(&session->slcan_peer, interface, stop);
+        session->transport = slcan_peer_transport(&session->slcan_peer);
+        break;
+    case OPTIONS_MEDIUM_CAN:
+    case OPTIONS_MEDIUM_NONE:
+    default:
+        good = socketcan_open(&session->socketcan, interface, stop);
+        session->socketcan.on_bus_state = print_bus_state;
+        session->socketcan.context = session;
+        session->transport = socketcan_transport(&session->socketcan);
+        break;
+    }
+    return good;
+}
+
+static void close_medium(session_t *session)
+{
+    switch (session->options->medium) {
+    case OPTIONS_MEDIUM_SLCAN:
+        slcan_host_close(&session->slcan_host);
+        break;
+    case OPTIONS_MEDIUM_PTY:
+    case OPTIONS_MEDIUM_SERIAL:
+        slcan_peer_close(&session->slcan_peer);
+        break;
+    case OPTIONS_MEDIUM_CAN:
+    case OPTIONS_MEDIUM_NONE:
+    default:
+        socketcan_close(&session->socketcan);
+        break;
+    }
+}
+
+static void print_reason(const session_t *session)
+{
+    (void)fprintf(
+        stderr, "lever_can: %s: %s\n", session->options->interface, session->transport.reason(session->transport.self));
 }
 
 static int run(const options_t *options)
 {
-    session_t session = {.verbose = options->verbose};
+    session_t session = {.options = options};
     lever_memory_t memory;
     lever_t *lever = lever_init(&memory, &options->config);
     const int stop = stop_descriptor();
@@ -69,14 +144,12 @@ static int run(const options_t *options)
         (void)fprintf(stderr, "lever_can: cannot start: %s\n", strerror(errno));
         return EXIT_BAD_INTERFACE;
     }
-    if (!socketcan_open(&session.socketcan, options->interface, stop)) {
-        (void)fprintf(stderr, "lever_can: %s: %s\n", options->interface, session.socketcan.reason);
+    if (!open_medium(&session, stop)) {
+        print_reason(&session);
+        close_medium(&session);
         return EXIT_BAD_INTERFACE;
     }
-    session.socketcan.on_bus_state = print_bus_state;
-    session.socketcan.context = &session;
-    const transport_t transport = socketcan_transport(&session.socketcan);
-    loop_init(&session.loop, &transport, lever);
+    loop_init(&session.loop, &session.transport, lever);
     session.loop.on_event = print_event;
     session.loop.context = &session;
     if (options->verbose) {
@@ -87,10 +160,10 @@ static int run(const options_t *options)
 
     const bool good = loop_run(&session.loop);
     if (!good) {
-        (void)fprintf(stderr, "lever_can: %s: %s\n", options->interface, session.socketcan.reason);
+        print_reason(&session);
     }
     print_totals(&session, lever);
-    socketcan_close(&session.socketcan);
+    close_medium(&session);
     return good ? EXIT_GOOD : EXIT_BAD_INTERFACE;
 }
 

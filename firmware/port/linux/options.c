@@ -14,12 +14,22 @@
 static const char help[] =
     "lever_can: estimates a pilot's mass, damping and stiffness on the collective lever, on a CAN interface.\n"
     "\n"
-    "usage: lever_can --can INTERFACE [option]...\n"
+    "usage: lever_can (--can INTERFACE | --slcan DEVICE | --pty LINK | --serial DEVICE) [option]...\n"
     "\n"
     "It receives LEVER_SAMPLE (0x110), BASE_SAMPLE (0x111) and COMMAND (0x120), and answers each pair of samples with\n"
     "estimates, the last of which is STATE_ESTIMATE (0x210). All messages are in firmware/can/lever.dbc.\n"
     "\n"
+    "On a CAN bus:\n"
     "  --can INTERFACE      SocketCAN interface, for instance can0 or vcan0; it must be up\n"
+    "  --slcan DEVICE       SLCAN (LAWICEL) adapter on a serial device, for instance /dev/ttyUSB0 or "
+    "/dev/ttyACM0:1000000\n"
+    "                       (baud; default 115200); its channel is opened at 1 Mbit/s, and closed at the end\n"
+    "Without one, as an SLCAN adapter itself, with the estimator as all there is on its bus:\n"
+    "  --pty LINK           on a pseudo-terminal, to which LINK is made; a host opens LINK: slcand, python-can's "
+    "slcan\n"
+    "  --serial DEVICE      on a serial device, as for --slcan, with the host at the other end of the line\n"
+    "  A host that does not read is not waited for: what finds no room is dropped and counted.\n"
+    "\n"
     "  --settings FILE      read settings from FILE: one `name = value` a line, # starts a comment\n"
     "  --set NAME=VALUE     set one of the settings below; may be repeated\n"
     "  --model NAME         the same as --set model=NAME, and so for\n"
@@ -30,7 +40,7 @@ static const char help[] =
     "  --help, --version    print this, or the version, and exit\n"
     "\n"
     "Options take effect in the order given. SIGINT (Ctrl-C) or SIGTERM ends it with a line of totals and status 0.\n"
-    "If the interface goes down or away it waits for it and goes on with the estimate as it was.\n"
+    "If the interface goes down or away, or the host hangs up, it waits and goes on with the estimate as it was.\n"
     "Exit status 1: the interface cannot be used; 2: the command line or a settings file is wrong.\n"
     "\n"
     "A session on a virtual interface:\n"
@@ -40,10 +50,18 @@ static const char help[] =
     "    lever_can --can vcan0 --set theta_noise=0.002 &\n"
     "    candump -L vcan0 > session.log &             # watch or record everything on the bus\n"
     "    lever sim steady --interface socketcan --channel vcan0\n"
+    "\n"
+    "The same without a kernel that has CAN:\n"
+    "\n"
+    "    lever_can --pty lever0 --set theta_noise=0.002 &\n"
+    "    lever sim steady --interface slcan --channel lever0\n"
     "\n";
 
 static const struct option known[] = {
     {"can", required_argument, NULL, 'c'},
+    {"slcan", required_argument, NULL, 'l'},
+    {"pty", required_argument, NULL, 'p'},
+    {"serial", required_argument, NULL, 'r'},
     {"settings", required_argument, NULL, 'f'},
     {"set", required_argument, NULL, 's'},
     {"model", required_argument, NULL, '='},
@@ -76,13 +94,29 @@ static bool read_file(lever_config_t *config, const char *path, settings_error_t
     return good;
 }
 
+/* The last one counts, as with every option. */
+static void choose(options_t *options, enum options_medium medium, const char *interface)
+{
+    options->medium = medium;
+    options->interface = interface;
+}
+
 static bool read_option(options_t *options, int option, const char *name, const char *argument, settings_error_t *error)
 {
     bool good = true;
 
     switch (option) {
     case 'c':
-        options->interface = argument;
+        choose(options, OPTIONS_MEDIUM_CAN, argument);
+        break;
+    case 'l':
+        choose(options, OPTIONS_MEDIUM_SLCAN, argument);
+        break;
+    case 'p':
+        choose(options, OPTIONS_MEDIUM_PTY, argument);
+        break;
+    case 'r':
+        choose(options, OPTIONS_MEDIUM_SERIAL, argument);
         break;
     case 'f':
         good = read_file(&options->config, argument, error);

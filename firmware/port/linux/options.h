@@ -9,9 +9,18 @@
 
 enum options_action { OPTIONS_RUN = 0, OPTIONS_HELP = 1, OPTIONS_VERSION = 2 };
 
+enum options_medium {
+    OPTIONS_MEDIUM_NONE = 0,
+    OPTIONS_MEDIUM_CAN = 1,    /* SocketCAN interface */
+    OPTIONS_MEDIUM_SLCAN = 2,  /* serial device with an SLCAN adapter */
+    OPTIONS_MEDIUM_PTY = 3,    /* pseudo-terminal with an SLCAN host, who sees us as the adapter */
+    OPTIONS_MEDIUM_SERIAL = 4, /* serial device with such a host */
+};
+
 typedef struct options {
     enum options_action action;
-    const char *interface; /* of argv */
+    enum options_medium medium;
+    const char *interface; /* its name; of argv */
     bool verbose;
     lever_config_t config; /* checked */
 } options_t;

@@ -1,0 +1,57 @@
+#include "port/embedded/self_test.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "port/embedded/crc32.h"
+#include "port/embedded/golden.h"
+
+enum { INPUTS = sizeof golden_input / sizeof golden_input[0], FRAME_BYTES = 8 };
+
+/* Alignment cut short, so that a few samples reach the learning of the parameters; golden.py has the same. */
+static lever_t *start(lever_memory_t *memory, uint8_t estimator)
+{
+    lever_config_t config;
+
+    lever_config_default(&config);
+    config.estimator = estimator;
+    config.settings.align_time = GOLDEN_ALIGN_TIME;
+    return lever_init(memory, &config);
+}
+
+static uint32_t crc_of_frame(uint32_t crc, const lever_frame_t *frame)
+{
+    return crc32_update(crc32_update(crc, &frame->id, sizeof frame->id), frame->data, frame->length);
+}
+
+static uint32_t crc_of_run(lever_t *lever)
+{
+    uint32_t crc = 0u;
+    lever_frame_t frame;
+    lever_estimate_t estimate;
+
+    for (uint32_t i = 0u; i < (uint32_t)INPUTS; i++) {
+        frame.id = golden_id[i % 2u];
+        frame.length = FRAME_BYTES;
+        (void)memcpy(frame.data, golden_input[i], FRAME_BYTES);
+        if (lever_on_frame(lever, &frame) == LEVER_FRAME_SAMPLE) {
+            (void)lever_step(lever);
+            while (lever_next_frame(lever, &frame)) {
+                crc = crc_of_frame(crc, &frame);
+            }
+        }
+    }
+    lever_estimate(lever, &estimate);
+    return crc32_update(crc, &estimate, offsetof(lever_estimate_t, nis_size)); /* words only, up to here: no padding */
+}
+
+bool self_test(lever_memory_t *memory)
+{
+    bool good = true;
+
+    for (uint8_t estimator = 0u; estimator < (uint8_t)LEVER_ESTIMATOR_COUNT; estimator++) {
+        lever_t *lever = start(memory, estimator);
+        good = (lever != NULL) && (crc_of_run(lever) == golden_crc[estimator]) && good;
+    }
+    return good;
+}

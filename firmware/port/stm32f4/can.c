@@ -1,0 +1,239 @@
+#include "port/stm32f4/can.h"
+
+#include "can/messages.h"
+#include "port/embedded/ring.h"
+#include "port/stm32f4/bit_timing.h"
+#include "port/stm32f4/pins.h"
+#include "port/stm32f4/processor.h"
+#include "port/stm32f4/registers.h"
+#include "port/stm32f4/wait.h"
+
+#if !BIT_TIMING_IS_GOOD(CLOCK_PLL_APB1_HZ) || !BIT_TIMING_IS_GOOD(CLOCK_RAW_HZ)
+#error "no bit timing for 1 Mbit/s from the clock of CAN1"
+#endif
+
+enum {
+    FRAME_BYTES = sizeof(lever_frame_t),
+    RECEIVE_BYTES = 32 * FRAME_BYTES,  /* 16 samples */
+    TRANSMIT_BYTES = 16 * FRAME_BYTES, /* two steps with all their frames */
+    MODE_POLLS = 10000,
+    FUNCTION_CAN = 9, /* alternate function of PB8 and PB9: data sheet, table 9 */
+    PIN_RECEIVE = 8,
+    PIN_TRANSMIT = 9
+};
+
+static volatile uint8_t receive_bytes[RECEIVE_BYTES];
+static volatile uint8_t transmit_bytes[TRANSMIT_BYTES];
+static ring_t received = {.bytes = receive_bytes, .size = RECEIVE_BYTES};
+static ring_t waiting = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
+static volatile can_counts_t counts; /* each written by one interrupt, or with interrupts off */
+static volatile uint32_t sent;       /* frames, since the start */
+static volatile bool off;            /* the bus */
+
+/* --- start ------------------------------------------------------------------------------------------------------- */
+
+static void start_pins(void)
+{
+    rcc.AHB1ENR |= RCC_AHB1_GPIOB;
+    rcc.APB1ENR |= RCC_APB1_CAN1;
+    (void)rcc.APB1ENR; /* errata ES0182 2.1.13: a clock is there two cycles after its enabling */
+    pin_to_peripheral(&gpiob, PIN_RECEIVE, FUNCTION_CAN);
+    pin_to_peripheral(&gpiob, PIN_TRANSMIT, FUNCTION_CAN);
+}
+
+/* RM0090 32.7.4: a bank of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames match. */
+static uint32_t filter_word(uint32_t id, uint32_t next_id)
+{
+    return FIELD(next_id, 16 + 5) | FIELD(id, 5);
+}
+
+static void start_filter(void)
+{
+    can1.FMR |= CAN_FMR_FINIT;
+    can1.FA1R = 0u;
+    can1.FM1R = BIT(0); /* bank 0: a list ... */
+    can1.FS1R = 0u;     /* ... of 16-bit identifiers ... */
+    can1.FFA1R = 0u;    /* ... into FIFO 0 */
+    can1.FR[0][0] = filter_word(MESSAGE_LEVER_SAMPLE_ID, MESSAGE_BASE_SAMPLE_ID);
+    can1.FR[0][1] = filter_word(MESSAGE_COMMAND_ID, MESSAGE_COMMAND_ID); /* a list has no empty place */
+    can1.FA1R = BIT(0);
+    can1.FMR &= ~(uint32_t)CAN_FMR_FINIT;
+}
+
+void can_start(const clock_rates_t *rates)
+{
+    start_pins();
+    /* RM0090 32.4.1: out of sleep into initialisation mode */
+    can1.MCR = CAN_MCR_DBF | CAN_MCR_INRQ;
+    (void)wait_for(&can1.MSR, CAN_MSR_INAK, CAN_MSR_INAK, MODE_POLLS);
+    can1.MCR = CAN_MCR_DBF | CAN_MCR_INRQ | CAN_MCR_ABOM | CAN_MCR_RFLM | CAN_MCR_TXFP;
+    can1.BTR = rates->pll ? BIT_TIMING_BTR(CLOCK_PLL_APB1_HZ) : BIT_TIMING_BTR(CLOCK_RAW_HZ);
+    start_filter();
+    can1.IER = CAN_IER_TMEIE | CAN_IER_FMPIE0 | CAN_IER_FOVIE0 | CAN_IER_BOFIE | CAN_IER_ERRIE;
+    nvic.ISER[0] = BIT(INTERRUPT_CAN1_TX) | BIT(INTERRUPT_CAN1_RX0) | BIT(INTERRUPT_CAN1_SCE);
+    /* On the bus as soon as it has been idle for 11 bits, which on a dead bus may be never. */
+    can1.MCR = CAN_MCR_DBF | CAN_MCR_ABOM | CAN_MCR_RFLM | CAN_MCR_TXFP;
+    (void)wait_for(&can1.MSR, CAN_MSR_INAK, 0u, MODE_POLLS);
+}
+
+/* --- reception --------------------------------------------------------------------------------------------------- */
+
+static void read_mailbox(const can_mailbox_t *mailbox, lever_frame_t *frame)
+{
+    const uint32_t words[2] = {mailbox->DLR, mailbox->DHR};
+    const uint32_t length = mailbox->DTR & CAN_DTR_DLC;
+
+    frame->id = mailbox->IR >> CAN_IR_STID_LOWEST;
+    frame->length = (uint8_t)((length < 8u) ? length : 8u);
+    for (uint32_t i = 0u; i < 8u; i++) {
+        frame->data[i] = (uint8_t)(words[i / 4u] >> (8u * (i % 4u)));
+    }
+}
+
+/* RM0090 32.7.3. A mailbox that is being released still looks full: then the interrupt comes again. */
+void can_receive_interrupt(void)
+{
+    lever_frame_t frame;
+
+    if ((can1.RFR[0] & CAN_RFR_FOVR) != 0u) {
+        can1.RFR[0] = CAN_RFR_FOVR;
+        counts.overruns++;
+    }
+    if (((can1.RFR[0] & CAN_RFR_FMP) != 0u) && ((can1.RFR[0] & CAN_RFR_RFOM) == 0u)) {
+        read_mailbox(&can1.receive[0], &frame);
+        can1.RFR[0] = CAN_RFR_RFOM;
+        if (!ring_put(&received, &frame, FRAME_BYTES)) {
+            counts.overruns++;
+        }
+    }
+}
+
+bool can_receive(lever_frame_t *frame)
+{
+    return ring_get(&received, frame, FRAME_BYTES);
+}
+
+bool can_has_received(void)
+{
+    return ring_used(&received) != 0u;
+}
+
+/* --- transmission ------------------------------------------------------------------------------------------------ */
+
+static void write_mailbox(can_mailbox_t *mailbox, const lever_frame_t *frame)
+{
+    uint32_t words[2] = {0u, 0u};
+
+    for (uint32_t i = 0u; i < 8u; i++) {
+        words[i / 4u] |= (uint32_t)frame->data[i] << (8u * (i % 4u));
+    }
+    mailbox->IR = FIELD(frame->id, CAN_IR_STID_LOWEST);
+    mailbox->DTR = frame->length;
+    mailbox->DLR = words[0];
+    mailbox->DHR = words[1];
+    mailbox->IR |= CAN_IR_TXRQ;
+}
+
+/* Fills empty mailboxes (RM0090 32.7.1). From the interrupt, or with interrupts off. */
+static void fill_mailboxes(void)
+{
+    lever_frame_t frame;
+
+    for (uint32_t i = 0u; i < (uint32_t)CAN_MAILBOXES; i++) {
+        if (((can1.TSR & CAN_TSR_TME) != 0u) && ring_get(&waiting, &frame, FRAME_BYTES)) {
+            write_mailbox(&can1.transmit[(can1.TSR >> CAN_TSR_CODE_LOWEST) & 3u], &frame);
+        }
+    }
+}
+
+/* Takes back what is in mailboxes and ring; a frame on the bus at the moment is finished. With interrupts off. */
+static void drop_all(void)
+{
+    const uint32_t frames = ring_used(&waiting) / (uint32_t)FRAME_BYTES;
+
+    counts.dropped += frames;
+    ring_clear(&waiting);
+    can1.TSR = CAN_TSR_ABRQ;
+}
+
+/* A request has ended: with success, or because it was taken back. */
+void can_transmit_interrupt(void)
+{
+    const uint32_t status = can1.TSR;
+
+    for (uint32_t mailbox = 0u; mailbox < (uint32_t)CAN_MAILBOXES; mailbox++) {
+        if ((status & FIELD(CAN_TSR_RQCP0, 8u * mailbox)) != 0u) {
+            can1.TSR = FIELD(CAN_TSR_RQCP0, 8u * mailbox);
+            if ((status & FIELD(CAN_TSR_TXOK0, 8u * mailbox)) != 0u) {
+                sent++;
+            } else {
+                counts.dropped++;
+            }
+        }
+    }
+    fill_mailboxes();
+}
+
+void can_send(const lever_frame_t *frame)
+{
+    interrupts_off();
+    if (!off && ring_put(&waiting, frame, FRAME_BYTES)) {
+        fill_mailboxes();
+    } else {
+        counts.dropped++;
+    }
+    interrupts_on();
+}
+
+void can_poll(uint32_t now_ms)
+{
+    static uint32_t sent_before;
+    static uint32_t since_ms; /* nothing has waited, or something was sent */
+
+    interrupts_off();
+    if ((can1.ESR & CAN_ESR_BOFF) == 0u) {
+        off = false;
+    }
+    if ((sent != sent_before) || ((can1.TSR & CAN_TSR_TME) == CAN_TSR_TME)) {
+        sent_before = sent;
+        since_ms = now_ms;
+    } else if ((now_ms - since_ms) >= (uint32_t)CAN_STALE_MS) {
+        drop_all();
+        since_ms = now_ms;
+    } else {
+        /* not yet */
+    }
+    interrupts_on();
+}
+
+/* --- errors ------------------------------------------------------------------------------------------------------ */
+
+/* RM0090 32.7.6. Of the changes of the error state only bus-off asks for this interrupt. */
+void can_error_interrupt(void)
+{
+    can1.MSR = CAN_MSR_ERRI;
+    if (((can1.ESR & CAN_ESR_BOFF) != 0u) && !off) {
+        off = true;
+        counts.bus_offs++;
+        drop_all();
+    }
+}
+
+can_counts_t can_counts(void)
+{
+    const can_counts_t now = {.overruns = counts.overruns, .dropped = counts.dropped, .bus_offs = counts.bus_offs};
+
+    return now;
+}
+
+can_errors_t can_errors(void)
+{
+    const uint32_t esr = can1.ESR;
+    const can_errors_t now = {
+        .transmit = (uint8_t)(esr >> CAN_ESR_TEC_LOWEST),
+        .receive = (uint8_t)(esr >> CAN_ESR_REC_LOWEST),
+        .bus_off = (esr & CAN_ESR_BOFF) != 0u,
+    };
+
+    return now;
+}

@@ -1,0 +1,115 @@
+/* The estimator on an STM32F405: self tests, then the loop of port/embedded for ever. README.md says what is reported when. */
+#include <stddef.h>
+#include <string.h>
+
+#include "lever_cdkf.h"
+#include "port/embedded/loop.h"
+#include "port/embedded/port.h"
+#include "port/embedded/self_test.h"
+#include "port/stm32f4/clock.h"
+#include "port/stm32f4/fault.h"
+#include "port/stm32f4/processor.h"
+#include "port/stm32f4/rom.h"
+#include "port/stm32f4/tick.h"
+#include "port/stm32f4/transport.h"
+#include "port/stm32f4/watchdog.h"
+
+enum { SHOWN_MS = 1000 }; /* a loss is shown for so long, so that some HEALTH frame shows it */
+
+/* A count, and until when its last change is to be seen. */
+typedef struct loss {
+    uint32_t count;
+    uint32_t since_ms;
+    bool shown;
+} loss_t;
+
+static lever_memory_t memory;
+static uint8_t faults_at_start; /* of enum lever_platform_fault */
+static loss_t overruns;
+static loss_t dropped;
+
+/* --- port.h: what is not the transport's -------------------------------------------------------------------------- */
+
+static bool is_shown(loss_t *loss, uint32_t count, uint32_t now_ms)
+{
+    if (count != loss->count) {
+        loss->count = count;
+        loss->since_ms = now_ms;
+        loss->shown = true;
+    } else if ((now_ms - loss->since_ms) >= (uint32_t)SHOWN_MS) {
+        loss->shown = false;
+    } else {
+        /* as it was */
+    }
+    return loss->shown;
+}
+
+void port_status(lever_platform_t *status)
+{
+    const transport_status_t transport = transport_status();
+    const uint32_t now_ms = tick_ms();
+    uint32_t faults = faults_at_start;
+
+    faults |= transport.bus_off ? (uint32_t)LEVER_PLATFORM_BUS_OFF : 0u;
+    faults |= is_shown(&overruns, transport.overruns, now_ms) ? (uint32_t)LEVER_PLATFORM_OVERRUN : 0u;
+    faults |= is_shown(&dropped, transport.dropped, now_ms) ? (uint32_t)LEVER_PLATFORM_DROPPED : 0u;
+    (void)memset(status, 0, sizeof *status);
+    status->faults = (uint8_t)faults;
+    status->transmit_errors = transport.transmit_errors;
+    status->receive_errors = transport.receive_errors;
+    status->bus_offs = (uint8_t)transport.bus_offs;
+    status->overruns = (uint16_t)transport.overruns;
+    status->dropped = (uint16_t)transport.dropped;
+}
+
+/* Interrupts are off between the look and the sleep, so that none comes between them; it ends the sleep all the same. */
+void port_idle(void)
+{
+    watchdog_kick();
+    transport_poll(tick_ms());
+    interrupts_off();
+    if (!transport_has_received()) {
+        wait_for_interrupt();
+    }
+    interrupts_on();
+}
+
+/* --- start ------------------------------------------------------------------------------------------------------- */
+
+/* The one place where the configuration is made; COMMAND changes models and choices later. */
+static lever_t *configure(void)
+{
+    lever_config_t config;
+
+    lever_config_default(&config);
+    return lever_init(&memory, &config);
+}
+
+/* Nothing here stops the estimator: it says what is wrong, and who depends on it decides. */
+static uint8_t test_all(const clock_rates_t *rates)
+{
+    uint32_t faults = rates->crystal ? 0u : (uint32_t)LEVER_PLATFORM_CLOCK;
+
+    faults |= watchdog_has_reset() ? (uint32_t)LEVER_PLATFORM_WATCHDOG : 0u;
+    faults |= fault_has_reset() ? (uint32_t)LEVER_PLATFORM_HARD_FAULT : 0u;
+    watchdog_start();
+    faults |= rom_is_intact() ? 0u : (uint32_t)LEVER_PLATFORM_ROM;
+    watchdog_kick();
+    faults |= self_test(&memory) ? 0u : (uint32_t)LEVER_PLATFORM_SELF_TEST;
+    watchdog_tighten();
+    return (uint8_t)faults;
+}
+
+int main(void)
+{
+    const clock_rates_t rates = clock_start();
+
+    faults_at_start = test_all(&rates);
+    tick_start(rates.core_hz);
+    lever_t *lever = configure();
+    transport_start(&rates);
+    while (lever != NULL) {
+        embedded_turn(lever);
+    }
+    return 1; /* a configuration that is refused: the watchdog resets, and nothing is ever sent */
+}

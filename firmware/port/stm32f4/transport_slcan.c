@@ -1,0 +1,62 @@
+#include "port/embedded/port.h"
+#include "port/slcan/slcan.h"
+#include "port/stm32f4/tick.h"
+#include "port/stm32f4/transport.h"
+#include "port/stm32f4/usart.h"
+
+static slcan_t peer;
+
+static bool put(void *self, const char *text, uint32_t length)
+{
+    (void)self;
+    return usart_write(text, length);
+}
+
+void transport_start(const clock_rates_t *rates)
+{
+    static const slcan_sink_t sink = {.self = 0, .put = put};
+    static const slcan_identity_t identity = {.version = LEVER_SLCAN_VERSION, .serial = "F405"};
+
+    slcan_init(&peer, &sink, &identity);
+    usart_start(rates);
+}
+
+bool transport_has_received(void)
+{
+    return usart_has_received();
+}
+
+void transport_poll(uint32_t now_ms)
+{
+    (void)now_ms;
+}
+
+transport_status_t transport_status(void)
+{
+    const transport_status_t status = {.overruns = usart_overruns(), .dropped = peer.counts.dropped};
+
+    return status;
+}
+
+/* Only data frames with 11-bit identifiers are the estimator's; the others were good SLCAN, and end here. */
+bool port_receive(lever_frame_t *frame)
+{
+    uint8_t byte = 0u;
+    slcan_frame_t received;
+    bool found = false;
+
+    while (!found && usart_read(&byte)) {
+        if (slcan_take(&peer, byte, &received)) {
+            *frame = received.frame;
+            found = !received.extended && !received.remote;
+        }
+    }
+    return found;
+}
+
+void port_send(const lever_frame_t *frame)
+{
+    const slcan_frame_t sent = {.frame = *frame};
+
+    (void)slcan_send(&peer, &sent, tick_ms());
+}

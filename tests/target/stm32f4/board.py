@@ -1,0 +1,183 @@
+"""The image in QEMU's STM32F405 (machine netduinoplus2), with its USART1 as a socket and QEMU's debugger as another.
+
+QEMU has the core, flash, RAM, SysTick and USART1. The clock tree, the watchdog and bxCAN read as 0: nothing in them is
+ever ready.
+"""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from lever_cdkf.host_tools import codec
+
+ANSWER_TIME = 20.0
+"""Longest wait for an answer of the board [s], on a machine with much else to do."""
+MACHINE = ("qemu-system-arm", "-M", "netduinoplus2", "-icount", "shift=3,sleep=off", "-nographic", "-monitor", "none")
+
+
+def connect(path: Path) -> socket.socket:
+    end = time.monotonic() + ANSWER_TIME
+    while True:
+        line = socket.socket(socket.AF_UNIX)
+        try:
+            line.connect(str(path))
+        except OSError:
+            line.close()
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.02)
+        else:
+            line.settimeout(ANSWER_TIME)
+            return line
+
+
+class Debugger:
+    """The few packets of GDB's remote protocol that these tests need."""
+
+    def __init__(self, path: Path) -> None:
+        self._line = connect(path)
+        self.ask("qXfer:features:read:target.xml:0,1000")  # without which QEMU takes no register by number
+
+    def __enter__(self) -> Debugger:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._line.close()
+
+    def _read_packet(self) -> str:
+        text = b""
+        while b"#" not in text[:-2]:
+            text += self._line.recv(4096)
+        self._line.sendall(b"+")
+        return text[text.index(b"$") + 1 : text.rindex(b"#")].decode()
+
+    def ask(self, packet: str) -> str:
+        self._line.sendall(f"${packet}#{sum(packet.encode()) % 256:02x}".encode())
+        return self._read_packet()
+
+    def stop(self) -> None:
+        """Halts the core; also after go_on()."""
+        self._line.sendall(b"\x03")
+        self._read_packet()
+
+    def go_on(self) -> None:
+        self._line.sendall(b"$c#63")
+
+    def write_register(self, number: int, value: int) -> None:
+        """Of the core: 13 is the stack pointer, 15 the program counter."""
+        assert self.ask(f"P{number:x}={value.to_bytes(4, 'little').hex()}") == "OK"
+
+    def words(self, address: int, count: int) -> list[int]:
+        data = bytes.fromhex(self.ask(f"m{address:x},{4 * count:x}"))
+        return [int.from_bytes(data[4 * i : 4 * i + 4], "little") for i in range(count)]
+
+    def write_word(self, address: int, value: int) -> None:
+        assert self.ask(f"M{address:x},4:{value.to_bytes(4, 'little').hex()}") == "OK"
+
+
+class Board:
+    """The running image: USART1, as the host's end of SLCAN sees it, and a debugger."""
+
+    def __init__(self, line: socket.socket, debugger_path: Path) -> None:
+        self._line = line
+        self._debugger_path = debugger_path
+        self._received = b""
+
+    def debugger(self) -> Debugger:
+        """Halts the core, which then is the debugger's until it goes on."""
+        return Debugger(self._debugger_path)
+
+    def command(self, text: str) -> str:
+        """The answer to an SLCAN command, without its CR."""
+        self._line.sendall(text.encode() + b"\r")
+        return self._read_line()
+
+    def _read_line(self) -> str:
+        while b"\r" not in self._received:
+            more = self._line.recv(4096)
+            assert more, "QEMU has ended"
+            self._received += more
+        line, _, self._received = self._received.partition(b"\r")
+        return line.decode("latin-1")
+
+    def wait_for_answer(self) -> None:
+        """Waits until the image answers: USART1 is the last thing that it starts."""
+        self._line.settimeout(0.2)
+        end = time.monotonic() + ANSWER_TIME
+        answer = b""
+        while not answer.endswith(b"V1001\r"):
+            assert time.monotonic() < end, "the image does not answer"
+            self._line.sendall(b"\rV\r")
+            try:
+                answer += self._line.recv(4096)
+            except TimeoutError:
+                continue
+        self._line.settimeout(ANSWER_TIME)
+        while answer := self._rest():
+            pass
+
+    def _rest(self) -> bytes:
+        self._line.settimeout(0.3)
+        try:
+            return self._line.recv(4096)
+        except TimeoutError:
+            return b""
+        finally:
+            self._line.settimeout(ANSWER_TIME)
+
+    def platform_health(self) -> dict[str, object]:
+        """What PLATFORM_HEALTH says after some samples of a lever that rests."""
+        assert self.command("O") == ""
+        lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+        for k in range(300):
+            frames = ((0x110, lever_sample(k, 0.35, 0.0, 0.0)), (0x111, base_sample(k, 0.0, 1000 * k)))
+            for identifier, data in frames:
+                self._line.sendall(f"t{identifier:03X}8{data.hex()}\r".encode())
+            answers = list(self._answers())
+            for identifier, data in answers:
+                if (said := codec.decode(identifier, data))[0] == "PLATFORM_HEALTH":
+                    assert self.command("C") == ""
+                    return said[1]
+        raise AssertionError("no PLATFORM_HEALTH in 300 samples")
+
+    def _answers(self) -> Iterator[tuple[int, bytes]]:
+        """The frames of one step, the last of which is STATE_ESTIMATE."""
+        identifier = 0
+        while identifier != 0x210:
+            line = self._read_line()
+            if line not in ("z", ""):  # an acknowledgement
+                identifier = int(line[1:4], 16)
+                yield identifier, bytes.fromhex(line[5:])
+
+
+@contextmanager
+def running(image: Path, folder: Path) -> Iterator[Board]:
+    """Starts QEMU with an image (.elf or .bin) and ends it at the end."""
+    usart, debugger = folder / "usart", folder / "debugger"
+    process = subprocess.Popen(
+        [
+            *MACHINE,
+            *("-kernel", str(image)),
+            *("-serial", f"unix:{usart},server=on,wait=on"),
+            *("-chardev", f"socket,id=debugger,path={debugger},server=on,wait=off", "-gdb", "chardev:debugger"),
+        ],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        line = connect(usart)
+        try:
+            yield Board(line, debugger)
+        finally:
+            line.close()
+    finally:
+        process.kill()
+        process.wait()
+        usart.unlink(missing_ok=True)
+        debugger.unlink(missing_ok=True)
