@@ -193,15 +193,20 @@ def open_bus(
     """The bus to the estimator; `bus_options` are python-can's for the interface. Raises LeverError."""
     import can
 
+    named = channel
     options = {**_BUS_OPTIONS.get(interface, {}), **(bus_options or {})}
     if interface == "lever":
         from lever_cdkf.host_tools.bus import LeverBus
 
         return LeverBus(channel, config=scenario.config, **options)
+    if interface == "slcan":
+        from lever_cdkf.host_tools.protocol_ahead import read_ahead
+
+        channel = read_ahead(channel)
     try:
         return can.Bus(interface=interface, channel=channel, **options)
     except (can.CanError, OSError, ValueError, TypeError) as error:
-        raise LeverError(f"cannot open {interface} channel {channel}: {error}; is it there and up?") from None
+        raise LeverError(f"cannot open {interface} channel {named}: {error}; is it there and up?") from None
 
 
 def _tables(result: Result) -> Tables:
