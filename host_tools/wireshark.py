@@ -74,6 +74,8 @@ def _signals(message: Message) -> Iterator[Row]:
 
 def _values(message: Message) -> Iterator[Row]:
     for position, field in enumerate(_fields(message)):
-        choices = {} if isinstance(field, int) else field.choices or {}
+        if isinstance(field, int) or not field.choices:
+            continue
+        choices = field.choices
         for raw, name in sorted(choices.items()):
             yield _hex(message.frame_id), position, len(choices), f"{raw:016x}", f"{raw:016x}", str(name)

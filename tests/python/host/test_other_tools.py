@@ -63,7 +63,15 @@ def test_wireshark_reads_every_signal(log: Path, wireshark: dict[str, str]) -> N
 
 @pytest.mark.requires("tshark")
 def test_wireshark_shows_names_of_values_and_units(tmp_path: Path, wireshark: dict[str, str]) -> None:
-    values = {"model": "lever", "mode": "coast", "faults": 1, "lost": 0, "corrupt": 0, "late": 0, "excitation": 0.5}
+    values: dict[str, codec.Value] = {
+        "model": "lever",
+        "mode": "coast",
+        "faults": 1,
+        "lost": 0,
+        "corrupt": 0,
+        "late": 0,
+        "excitation": 0.5,
+    }
     (tmp_path / "x.log").write_text(f"(0.0) can0 214#{codec.encode('HEALTH', 3, values).hex().upper()}\n")
     command = ["tshark", "-C", "lever", "-r", str(tmp_path / "x.log"), "-V"]
     shown = subprocess.run(command, capture_output=True, text=True, check=True, env=wireshark).stdout
