@@ -26,7 +26,7 @@ import numpy as np
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 from .errors import LeverError
 
-BLOCK = 1 << 20
+BLOCK = 1 << 22
 """Bytes of text that are read at once."""
 _MESSAGES = 16384  # that are read at once through python-can
 _GZIP = b"\x1f\x8b"
