@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Rows
 from numpy.typing import NDArray
 
-from ..trace import COUNTS, ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
+from ..trace import COUNTS, ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields, recorded_name
 from .timeline import Timeline
 
 FloatArray = NDArray[np.float64]
-
-
-def recorded_name(column: str) -> str:
-    """The column of an estimate as the recording has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded of nis."""
-    for kind in ("_estimate", "_sigma"):
-        if kind in column:
-            return column.replace(kind, "_recorded" if kind == "_estimate" else "_recorded_sigma")
-    return f"{column}_recorded"
 
 
 class Columns:
@@ -69,11 +62,11 @@ class _Decoded:
         self._rows = rows
         self._slots = RECORDED if recorded else SLOTS
         self._messages: dict[str, dict[str, FloatArray]] = {}
+        self._held: dict[str, tuple[NDArray[np.intp], dict[str, FloatArray]]] = {}
 
     def fields(self, message: str) -> dict[str, FloatArray]:
         if message not in self._messages:
-            data = np.ascontiguousarray(self._rows["data"][:, self._slots[message]])
-            self._messages[message] = codec.decode_columns(message, data)
+            self._messages[message] = self._decode(message, slice(None))
         return self._messages[message]
 
     def at_samples(self, message: str, field: str) -> FloatArray:
@@ -85,9 +78,22 @@ class _Decoded:
         return np.where(there, fields[field], np.nan)
 
     def held(self, message: str, field: str) -> FloatArray:
-        """NaN before the first."""
-        there = (self._rows["known"] >> self._slots[message]) & 1 != 0
-        return np.where(there, self.fields(message)[field], np.nan)
+        """NaN before the first. Decodes only the rows with which the message came, and the first."""
+        if message not in self._held:
+            slot = self._slots[message]
+            fresh = (self._rows["fresh"] >> slot) & 1 != 0
+            fresh[0] = True
+            fields = self._decode(message, fresh)
+            if not (self._rows["known"][0] >> slot) & 1:
+                for values in fields.values():
+                    values[0] = np.nan
+            self._held[message] = np.cumsum(fresh) - 1, fields
+        place, fields = self._held[message]
+        return fields[field][place]
+
+    def _decode(self, message: str, which: Any) -> dict[str, FloatArray]:
+        data = np.ascontiguousarray(self._rows["data"][which, self._slots[message]])
+        return codec.decode_columns(message, data)
 
 
 def model_numbers(rows: Rows) -> Iterator[tuple[int, int]]:

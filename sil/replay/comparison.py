@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..quantities import DYNAMICS, quantities
-from ..trace import ESTIMATED, Trace
-from .columns import recorded_name
+from ..trace import ESTIMATED, Trace, recorded_name
 
 FloatArray = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""A replay: the frames of a recording through the firmware, in recorded order, and what comes out into what keeps it."""
+"""A replay: the frames of a recording through the firmware, in recorded order, and its answers into what keeps them."""
 
 from __future__ import annotations
 

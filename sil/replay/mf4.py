@@ -17,8 +17,7 @@ from lever_cdkf.host_tools import codec
 from numpy.typing import NDArray
 
 from ..quantities import quantities
-from ..trace import ESTIMATED, HEALTH, MEASURED, Trace
-from .columns import recorded_name
+from ..trace import ESTIMATED, HEALTH, MEASURED, Trace, recorded_name
 from .outputs import writing
 
 Signals = list[tuple[str, str, str]]
