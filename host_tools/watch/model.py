@@ -180,7 +180,9 @@ class Picture:
             self._count(_COUNTS, columns)
         elif name == "PLATFORM_HEALTH":
             seen = _any_bit(columns["faults"])
-            self._note(self._platform_faults, [n for bit, n in enum_names("lever_platform_fault").items() if seen & bit])
+            self._note(
+                self._platform_faults, [n for bit, n in enum_names("lever_platform_fault").items() if seen & bit]
+            )
             self._count(_PLATFORM_COUNTS, columns)
 
     def _follow_model(self, number: int) -> None:

@@ -26,8 +26,13 @@ MOST_WAITING = 65536
 LONGEST_PAUSE = 5.0
 """[s] A longer gap of a log is not waited for."""
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
-_IN_PROCESS = ("lever", "virtual")
-KEEP = {"model": "keep", "preload": "keep", "estimator": "keep", "adaptation": "keep", "dither_rms": math.inf}
+KEEP: dict[str, codec.Value] = {
+    "model": "keep",
+    "preload": "keep",
+    "estimator": "keep",
+    "adaptation": "keep",
+    "dither_rms": math.inf,
+}
 """A COMMAND that changes nothing; infinity saturates at the value that keeps the dither."""
 
 
@@ -200,12 +205,7 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) ->
     """A python-can bus. Raises LeverError."""
     import can
 
-    if interface in _IN_PROCESS:
-        raise LeverError(
-            f"interface {interface} is inside one process, so nothing else can be heard on it: give --scenario NAME, "
-            "or a bus such as --interface socketcan --channel vcan0"
-        )
-    given = {"sleep_after_open": 0.0} if interface == "slcan" else {}
+    given: dict[str, Any] = {"sleep_after_open": 0.0} if interface == "slcan" else {}
     given |= {} if channel is None else {"channel": channel}
     try:
         return can.Bus(interface=interface, **(given | dict(options)))

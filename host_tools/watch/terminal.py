@@ -6,7 +6,7 @@ import sys
 import time
 from typing import ClassVar
 
-from rich.console import Console, Group
+from rich.console import Console, Group, RenderableType
 from rich.rule import Rule
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
@@ -112,7 +112,7 @@ def print_once(source: Source, listen: float) -> Picture:
     else:
         _listen(source, picture, listen)
     console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPE_WIDTH)
-    parts = [
+    parts: list[RenderableType] = [
         panels.headline(picture, source),
         panels.condition(picture, source),
         Rule("estimates", align="left"),

@@ -49,6 +49,7 @@ examples:
 Ctrl-C ends it.
 """
 PORT = 8642
+_IN_PROCESS = ("lever", "virtual")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -138,24 +139,28 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
     config = Config() if settings is None else make_config(read_assignments(settings))
     if args.log is not None:
         return LogSource(args.log, args.channel), config
+    if args.interface in _IN_PROCESS:
+        raise LeverError(
+            f"interface {args.interface} is inside one process, with nobody else to be heard: give --scenario NAME, "
+            "or a bus such as --interface socketcan --channel vcan0"
+        )
     options = dict(_option(text) for text in args.option)
     if args.bitrate is not None:
         options["bitrate"] = args.bitrate
     return BusSource(args.interface, args.channel, options), config
 
 
-def _option(text: str) -> tuple[str, str | int | float | bool]:
+def _option(text: str) -> tuple[str, Any]:
+    """The key, and the value as JSON if it is (5, 0.5, true), otherwise as it is written."""
+    import json
+
     key, equals, value = text.partition("=")
     if not equals or not key:
         raise LeverError(f"--option {text}: must be KEY=VALUE, such as listen_only=true")
-    if value.lower() in ("true", "false"):
-        return key, value.lower() == "true"
-    for number in (int, float):
-        try:
-            return key, number(value)
-        except ValueError:
-            continue
-    return key, value
+    try:
+        return key, json.loads(value)
+    except ValueError:
+        return key, value
 
 
 def _seconds(text: str) -> float:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Mapping
 
 import can
+import numpy as np
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bus import LeverBus
 from lever_cdkf.host_tools.watch.sources import Source, as_frame, command_frame
 
 from .. import loop
 from ..scenario import Scenario
+from ..transfer import ComplexArray
+from ..truth import FloatArray, Truth
 
 
 class SimulationSource(Source):
@@ -25,10 +29,12 @@ class SimulationSource(Source):
         self.scenario = scenario
         self._bus = _HeardBus(self)
         self._commands = 0
+        self._truth: tuple[float, Truth] | None = None  # when the run began by the clock, and what is true in it
 
     def run(self) -> None:
         scenario = self.scenario
         while not self._stopping.is_set():
+            self._truth = time.monotonic(), scenario.truth(scenario.time())
             try:
                 loop.run(scenario, self._bus, realtime=True, progress=self._look_up)
             except _Stopped:
@@ -43,6 +49,18 @@ class SimulationSource(Source):
         identifier, data = command_frame(self._commands, values)
         self._commands += 1
         self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
+
+    def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
+        """What is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at
+        the frequencies [Hz]. None before the start."""
+        if self._truth is None:
+            return None
+        start, truth = self._truth
+        columns = {**truth.parameters, **vars(truth.dynamics)}
+        last = len(truth.rest) - 1
+        sample = min(last, int((time.monotonic() - start) / self.scenario.period))
+        values = {name: float(column[sample]) for name, column in columns.items()}
+        return values, truth.transfer(np.array([sample])).response(frequencies)[0]
 
     def hear(self, message: can.Message) -> None:
         """A frame that passes on the bus of the simulation."""
