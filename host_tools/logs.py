@@ -82,9 +82,9 @@ class Recording:
         return int(first["time_us"][0]), path, all_chunks()
 
     def _why_none(self, path: str) -> str:
-        if self.ends_early:
-            return f": {self.ends_early[-1].removeprefix(f'{path}: ')}"
-        return f"; {self.damaged} lines are something else: is it a log of candump -L?" if self.damaged else ""
+        if self.damaged:
+            return f"; {self.damaged} lines of it are something else: is it a log of candump -L?"
+        return f": {self.ends_early[-1].removeprefix(f'{path}: ')}" if self.ends_early else ""
 
     def _guarded(self, path: str, chunks: Iterator[Frames]) -> Iterator[Frames]:
         """The chunks; what breaks off after the first of them is noted, not raised."""
@@ -109,7 +109,7 @@ class Recording:
     def _candump(self, path: str) -> Iterator[Frames]:
         with _open_text(path) as (text, position):
             rest, skipping = b"", False
-            while block := text.read(BLOCK):
+            for block in _blocks(text):
                 self._done[path] = position()
                 if skipping:  # the rest of a line that is too long to be one
                     newline = block.find(b"\n")
@@ -141,12 +141,11 @@ class Recording:
                     if len(messages) == _MESSAGES:
                         yield self._frames(messages)
                         messages = []
-        except OSError as error:
-            if error.errno is not None:
+        except Exception as error:  # each format has its own, from struct.error to those of asammdf
+            if isinstance(error, OSError) and error.errno is not None:
                 raise
             self.ends_early.append(f"{path}: {_one_line(error)}")
-        except Exception as error:  # each format has its own, from struct.error to those of asammdf
-            self.ends_early.append(f"{path}: {_one_line(error)}")
+            _let_go(error)
         self._done[path] = _size(path)
         if messages:
             yield self._frames(messages)
@@ -180,6 +179,15 @@ def _flags(message: Any) -> int:
     )
 
 
+def _let_go(error: Exception) -> None:
+    """Ends what only the error still holds; asammdf complains then on standard error of files that it could not open."""
+    before, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        error.__traceback__ = error.__context__ = error.__cause__ = None
+    finally:
+        sys.unraisablehook = before
+
+
 def _one_line(error: Exception) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())
 
@@ -211,6 +219,28 @@ def _is_file(path: str) -> bool:
 
 def _size(path: str) -> int:
     return os.stat(path).st_size if path != "-" and _is_file(path) else 0
+
+
+def _blocks(text: Any) -> Iterator[bytes]:
+    """All of it; of a compressed file that is damaged all that comes before the damage, then its error."""
+    if not isinstance(text, gzip.GzipFile):
+        while block := text.read(BLOCK):
+            yield block
+        return
+    while True:
+        parts, size, broken = [], 0, None
+        try:
+            while size < BLOCK and (part := text.read1(BLOCK)):
+                parts.append(part)
+                size += len(part)
+        except (EOFError, OSError, zlib.error) as error:
+            broken = error
+        if parts:
+            yield b"".join(parts)
+        if broken is not None:
+            raise broken
+        if not parts:
+            return
 
 
 @contextmanager
