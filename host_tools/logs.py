@@ -11,6 +11,7 @@ are no frame are counted, as is a log that breaks off; one that has no frame at 
 
 from __future__ import annotations
 
+import gc
 import gzip
 import os
 import stat
@@ -135,7 +136,7 @@ class Recording:
 
         messages: list[can.Message] = []
         try:
-            with can.LogReader(path) as reader:
+            with _open_log(path) as reader:
                 for message in reader:
                     messages.append(message)
                     if len(messages) == _MESSAGES:
@@ -145,7 +146,6 @@ class Recording:
             if isinstance(error, OSError) and error.errno is not None:
                 raise
             self.ends_early.append(f"{path}: {_one_line(error)}")
-            _let_go(error)
         self._done[path] = _size(path)
         if messages:
             yield self._frames(messages)
@@ -179,17 +179,33 @@ def _flags(message: Any) -> int:
     )
 
 
-def _let_go(error: Exception) -> None:
-    """Ends what only the error still holds; asammdf complains then on standard error of files that it could not open."""
+def _open_log(path: str) -> Any:
+    """python-can's reader. Raises LogError, and OSError for what the system says."""
+    import can
+
+    with _unheard_deletions():
+        try:
+            return can.LogReader(path)
+        except Exception as error:  # each format has its own, from struct.error to those of asammdf
+            if isinstance(error, OSError) and error.errno is not None:
+                raise
+            reason = _one_line(error)
+        gc.collect()
+    raise LogError(reason)
+
+
+@contextmanager
+def _unheard_deletions() -> Iterator[None]:
+    """asammdf complains on standard error when a file that it could not open is deleted."""
     before, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
-        error.__traceback__ = error.__context__ = error.__cause__ = None
+        yield
     finally:
         sys.unraisablehook = before
 
 
 def _one_line(error: Exception) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
+    return " ".join((str(error) if isinstance(error, LogError) else f"{type(error).__name__}: {error}").split())
 
 
 # --- files ----------------------------------------------------------------------------------------------------------
