@@ -68,6 +68,12 @@ class Run:
         return told or next(seen, native.Config().choices["model"])
 
     @property
+    def recording(self) -> Mapping[str, Any]:
+        """What the summary tells of the log that was replayed; empty for a simulation."""
+        told: Mapping[str, Any] = self.summary.get("recording", {})
+        return told
+
+    @property
     def parameters(self) -> tuple[Quantity, ...]:
         """What the estimator's model has to be estimated."""
         return quantities.parameters(self.model)
