@@ -25,18 +25,20 @@ INNOVATION = struct_dtype("innovation_t")
 Array = NDArray[Any]
 
 
-def samples_of(frames: Array) -> tuple[Array, Health]:
-    """The samples (SAMPLE) that the firmware makes of received frames (FRAME), and its counts of what was wrong."""
+def samples_of(frames: Array) -> tuple[Array, dict[str, str], Health]:
+    """The samples (SAMPLE) that the firmware makes of received frames (FRAME), the choices (model, preload …) that
+    commands among them have made, and its counts of what was wrong."""
     samples = np.empty(len(frames), SAMPLE)
-    health = ffi.new("lever_health_t *")
+    config, health = Config(), ffi.new("lever_health_t *")
     with _one_at_a_time:
         count = _lib.innovation_samples(
             ffi.from_buffer("lever_frame_t[]", np.ascontiguousarray(frames)),
             len(frames),
             ffi.from_buffer("lever_sample_t[]", samples),
+            config.pointer,
             health,
         )
-    return samples[:count].copy(), health_of(health)
+    return samples[:count].copy(), config.choices, health_of(health)
 
 
 def innovations(config: Config, samples: Array) -> Array:

@@ -85,15 +85,14 @@ bool innovation_run(
     return lever != NULL;
 }
 
-uint32_t innovation_samples(
-    const lever_frame_t *frames, uint32_t count, lever_sample_t *samples, lever_health_t *health)
+uint32_t innovation_samples(const lever_frame_t *frames, uint32_t count, lever_sample_t *samples,
+    lever_config_t *config, lever_health_t *health)
 {
     static estimator_t estimator;
     static link_t link;
-    lever_config_t config;
     uint32_t taken = 0u;
-    lever_config_default(&config);
-    estimator_init(&estimator, &config);
+    lever_config_default(config);
+    estimator_init(&estimator, config);
     link_init(&link);
     for (uint32_t k = 0u; k < count; k++) {
         if (link_on_frame(&link, &estimator, &frames[k]) == LEVER_FRAME_SAMPLE) {
@@ -102,6 +101,7 @@ uint32_t innovation_samples(
             (void)link_step(&link, &estimator);
         }
     }
+    *config = estimator.config;
     estimator_health(&estimator, health);
     return taken;
 }

@@ -31,8 +31,8 @@ bool innovation_run(
     const struct lever_config *config, const struct lever_sample *samples, uint32_t count, innovation_t *innovations);
 
 /* The samples that the firmware makes of received frames, in their order and after all its checks, at most one a frame.
- * Returns how many; what commands ask for is not in them. `health` counts what was lost, corrupt or late. */
-uint32_t innovation_samples(
-    const struct lever_frame *frames, uint32_t count, struct lever_sample *samples, struct lever_health *health);
+ * Returns how many. `config` has the choices that commands among them have made, `health` what was lost, corrupt or late. */
+uint32_t innovation_samples(const struct lever_frame *frames, uint32_t count, struct lever_sample *samples,
+    struct lever_config *config, struct lever_health *health);
 
 #endif

@@ -60,7 +60,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--keep", metavar="NAME", action="append", default=[], help="a setting that is not touched; may be repeated"
     )
-    parser.add_argument("--bus", metavar="NAME", help="the bus in the log (default: the only one with samples)")
+    parser.add_argument(
+        "--channel", metavar="NAME", help="the bus with the samples (default: the only one that has any)"
+    )
     parser.add_argument("--start", metavar="S", type=float, default=0.0, help="first second used (default: 0)")
     parser.add_argument("--length", metavar="S", type=float, default=600.0, help="seconds used (default: %(default)g)")
     parser.add_argument(
@@ -83,8 +85,8 @@ def run(args: argparse.Namespace) -> int:
 
     before = _settings(args)
     with Progress("tune") as progress:
-        recording = read(args.log, args.bus, args.start, args.length, progress.show)
-        before = _with_period(before, recording)
+        recording = read(args.log, args.channel, args.start, args.length, progress.show)
+        before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
         search = Search(likelihood, before, progress.show)
         if not search.can_learn:
@@ -112,10 +114,18 @@ def _settings(args: argparse.Namespace) -> Assignments:
     return assignments
 
 
-def _with_period(assignments: Assignments, recording: Recording) -> Assignments:
-    """With the sample_period that the log has, if it is another than the settings'."""
+def _as_recorded(assignments: Assignments, recording: Recording) -> Assignments:
+    """With what the log chooses that was not chosen here, and with its sample_period."""
+    from lever_cdkf.host_tools.config import Config
     from lever_cdkf.host_tools.settings_file import make_config
 
+    usual = Config().choices
+    chosen = {
+        name: value for name, value in recording.choices.items() if value != usual[name] and name not in assignments
+    }
+    for name, value in chosen.items():
+        _note(f"by COMMAND in the log, {name} is {value}")
+    assignments = {**chosen, **assignments}
     set_to = make_config(assignments).settings["sample_period"]
     if abs(recording.period - set_to) <= 0.1 * set_to:
         return assignments
@@ -173,7 +183,7 @@ def _subtitle(args: argparse.Namespace, likelihood: Likelihood) -> str:
     wrong = {name: getattr(recording.health, name) for name in ("lost", "corrupt", "late")}
     counts = ", ".join(f"{count} {name}" for name, count in wrong.items() if count)
     return (
-        f"{', '.join(Path(log).name for log in args.log)}, bus {recording.bus}: tuned on {tuned:.0f} s, judged by the "
+        f"{', '.join(Path(log).name for log in args.log)}, {recording.bus}: tuned on {tuned:.0f} s, judged by the "
         f"{held:.0f} s after it{f' ({counts})' if counts else ''}; {likelihood.runs} runs of the filter."
     )
 

@@ -12,7 +12,7 @@ from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.estimator import Health
 from lever_cdkf.host_tools.innovations import FRAME, Array, samples_of
 
-_INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE")
+_SAMPLES = ("LEVER_SAMPLE", "BASE_SAMPLE")
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,8 @@ class Recording:
     period: float
     """Between two samples: the median [s]."""
     bus: str
+    choices: dict[str, str]
+    """Of model, preload, estimator and adaptation, by COMMAND in the log; the firmware's defaults without."""
     health: Health
     """Counts of what was lost, corrupt or late."""
 
@@ -41,21 +43,23 @@ class Recording:
 
 def read(
     paths: Sequence[str | os.PathLike[str]],
-    bus: str | None = None,
+    channel: str | None = None,
     start: float = 0.0,
     length: float = float("inf"),
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Recording:
-    """The samples on `bus` (if not given: the one bus that has any) from `start` on for `length`, both [s] of recorded
-    time. Raises LeverError."""
+    """The samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`, both [s] of
+    recorded time. Raises LeverError."""
     log = logs.Recording(paths)
-    identifiers = np.array([codec.message(name).frame_id for name in _INPUTS])
+    identifiers = np.array([codec.message(name).frame_id for name in _SAMPLES])
+    command = codec.message("COMMAND").frame_id
     begin: int | None = None
     pieces = []
     for chunk in log.chunks():
         begin = int(chunk["time_us"][0]) if begin is None else begin
         since = (chunk["time_us"] - begin) * 1e-6
-        wanted = np.isin(chunk["id"], identifiers) & (chunk["flags"] == 0) & (since >= start) & (since < start + length)
+        sampled = np.isin(chunk["id"], identifiers) & (since >= start)
+        wanted = (sampled | (chunk["id"] == command)) & (chunk["flags"] == 0) & (since < start + length)
         pieces.append(chunk[wanted])
         if progress is not None:
             progress(log.done, log.size, "reading the log")
@@ -69,27 +73,27 @@ def read(
             f"{name}: no BASE_SAMPLE ({base:#x}) from {start:g} s on, so no samples: `lever dbc` has the messages"
         )
     found = [log.buses.names()[index] for index in np.unique(frames["bus"][frames["id"] == base])]
-    chosen = _chosen(found, bus, name)
+    chosen = _chosen(found, channel, name)
     return _recording(frames[frames["bus"] == log.buses.names().index(chosen)], chosen, name)
 
 
-def _chosen(found: Sequence[str], bus: str | None, log: str) -> str:
+def _chosen(found: Sequence[str], channel: str | None, log: str) -> str:
     """The bus that is asked for, or the only one that has samples. Raises LeverError."""
-    if bus is not None and bus not in found:
-        raise LeverError(f"{log}: no samples on bus {bus}; there are some on {', '.join(found)}")
-    if bus is None and len(found) > 1:
-        raise LeverError(f"{log}: samples on more than one bus: choose by --bus {' or --bus '.join(found)}")
-    return bus or found[0]
+    if channel is not None and channel not in found:
+        raise LeverError(f"{log}: no samples on {channel}; there are some on {', '.join(found)}")
+    if channel is None and len(found) > 1:
+        raise LeverError(f"{log}: samples on more than one bus: choose by --channel {' or --channel '.join(found)}")
+    return channel or found[0]
 
 
 def _recording(frames: Array, bus: str, log: str) -> Recording:
     received = np.zeros(len(frames), FRAME)
     for field in ("id", "length", "data"):
         received[field] = frames[field]
-    samples, health = samples_of(received)
+    samples, choices, health = samples_of(received)
     if len(samples) < 2:
         raise LeverError(f"{log}: none of its samples is accepted: {health.corrupt} frames are corrupt (E2E)")
-    return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, health)
+    return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, choices, health)
 
 
 def _steps(samples: Array) -> Array:

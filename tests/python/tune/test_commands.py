@@ -95,6 +95,20 @@ def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
     assert read_assignments(tmp_path / "slow.settings")["sample_period"] == 0.01
 
 
+def test_choices_are_those_of_the_log(tmp_path: Path, lever: Run) -> None:
+    """A COMMAND in the log says which model was estimated, if nobody says otherwise."""
+    lever("sim", "linear_physical", "--set", "duration=25 s", "--out", tmp_path)
+    searched = ("m_walk", "c_walk", "k_walk", "m_p_walk", "c_p_walk", "k_p_walk", "walk_ceiling", "robbins_monro_time")
+    keep = [part for name in (*searched, *NOISE) for part in ("--keep", name)]
+    out = tmp_path / "x.settings"
+    _, _, err = lever("tune", tmp_path / "bus.log", "-o", out, *keep, "--held-out", "0")
+    assert "lever: tune: by COMMAND in the log, model is linear_physical" in err.splitlines()
+    assert read_assignments(out)["model"] == "linear_physical"
+    _, _, err = lever("tune", tmp_path / "bus.log", "-o", out, *keep, "--held-out", "0", "--set", "model=lever")
+    assert "by COMMAND in the log, model" not in err
+    assert read_assignments(out)["model"] == "lever"
+
+
 def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0") -> None:
     """candump's format: a lever that swings a little, with noise."""
     lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
@@ -114,7 +128,7 @@ def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0") 
         ("(0.0) can0 123#00\n", (), "no BASE_SAMPLE (0x111) from 0 s on, so no samples: `lever dbc` has the messages"),
         ("(0.0) can0 111#0000000000000000\n", (), "none of its samples is accepted: 1 frames are corrupt (E2E)"),
         (None, (), "too short to tune on: 2.0 s of samples; at least 20 s are needed"),
-        (None, ("--bus", "can7"), "no samples on bus can7; there are some on can0"),
+        (None, ("--channel", "can7"), "no samples on can7; there are some on can0"),
         (None, ("--held-out", "0.9"), "--held-out 0.9: must be from 0 to 0.8"),
         (None, ("--length", "0"), "length must be more than 0"),
         (None, ("--start", "100"), "no BASE_SAMPLE (0x111) from 100 s on"),
@@ -140,7 +154,7 @@ def test_two_buses_are_to_be_chosen_from(tmp_path: Path, lever: Run) -> None:
     for bus in ("can0", "can1"):
         write_log(tmp_path / f"{bus}.log", 100, bus=bus)
     status, _, err = lever("tune", tmp_path / "can0.log", tmp_path / "can1.log")
-    assert (status, "choose by --bus can0 or --bus can1" in err) == (2, True)
+    assert (status, "choose by --channel can0 or --channel can1" in err) == (2, True)
 
 
 def test_worse_on_the_part_held_out_writes_nothing(simulate: Simulate, tmp_path: Path, lever: Run) -> None:

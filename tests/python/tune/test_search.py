@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lever_cdkf.sil.tune import judgement, recording
 from lever_cdkf.sil.tune.likelihood import Likelihood
-from lever_cdkf.sil.tune.recording import Recording
 from lever_cdkf.sil.tune.search import Found, Search, groups
 from python.tune.conftest import NOISE, WALK, Simulate
 
@@ -73,7 +73,7 @@ def test_settings_that_only_fit_the_part_tuned_on_are_no_gain(steady_log: Path) 
     more = np.random.default_rng(1).standard_normal(late.sum()) * NOISE["theta_noise"] * 4.0
     samples = whole.samples.copy()
     samples["theta"][late] += more.astype(np.float32)
-    likelihood = Likelihood(Recording(samples, whole.period, whole.bus, whole.health))
+    likelihood = Likelihood(dataclasses.replace(whole, samples=samples))
     before = {**NOISE, "theta_noise": 1e-3, "noise_window": 0.0}
     found = found_in(likelihood, "theta_dot_noise", "m_p_walk", "c_p_walk", "k_p_walk", **before)
     assert found["theta_noise"].after == pytest.approx(NOISE["theta_noise"], rel=0.02)
