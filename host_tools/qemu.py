@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from .errors import LeverError
 
@@ -25,8 +25,8 @@ _BUILD = "build it with: cmake --preset stm32f4 && cmake --build --preset stm32f
 _SERIAL = "socket,id=usart1,mux=on,fd={},server=on,wait=off,nodelay=on"
 """The character device at the other end of USART1; {} is a listening socket. Its multiplexer has a buffer, from which
 the next byte comes as soon as one is read: three times as fast as without."""
-_ESCAPE = "0xff"
-"""The byte by which somebody on the line could command the multiplexer: none of SLCAN's."""
+_NO_ESCAPE = "0x100"
+"""In the place of the byte by which somebody on the line could command the multiplexer: none."""
 _INSTRUCTIONS_COUNT = ("-icount", "shift=3,sleep=off")
 """Each instruction takes 8 ns, and none is waited for: virtual time is the same in every run."""
 _START_S = 10.0
@@ -46,11 +46,11 @@ def running(image: Path, *, count_instructions: bool = False) -> Iterator[str]:
     The image has answered when the context begins. One at a time can open the channel. Raises QemuError.
     """
     check(image)
-    options = ["-display", "none", "-monitor", "none", "-serial", "chardev:usart1", "-echr", _ESCAPE]
+    options = ["-display", "none", "-monitor", "none", "-serial", "chardev:usart1", "-echr", _NO_ESCAPE]
     if count_instructions:
         options += _INSTRUCTIONS_COUNT
     with socket.create_server(("127.0.0.1", 0)) as listener, tempfile.TemporaryFile("w+", errors="replace") as said:
-        channel = f"socket://127.0.0.1:{listener.getsockname()[1]}"
+        address = listener.getsockname()
         options += ["-chardev", _SERIAL.format(listener.fileno())]
         command = [PROGRAM, "-machine", MACHINE, "-kernel", str(image), *options]
         with one_processor():
@@ -59,8 +59,8 @@ def running(image: Path, *, count_instructions: bool = False) -> Iterator[str]:
             )
         try:
             listener.close()
-            _wait_for_answer(process, said, channel, image)
-            yield channel
+            _wait_for_answer(process, said, address, image)
+            yield f"socket://{address[0]}:{address[1]}"
         finally:
             _stop(process)
 
@@ -99,33 +99,33 @@ def check(image: Path) -> None:
         )
 
 
-def _wait_for_answer(process: subprocess.Popen[bytes], said: IO[str], channel: str, image: Path) -> None:
-    """Asks for the version of the SLCAN peer until it is given, and leaves the line quiet."""
-    import serial
-
+def _wait_for_answer(process: subprocess.Popen[bytes], said: IO[str], address: tuple[str, int], image: Path) -> None:
+    """Returns when the SLCAN peer has told its version, and the line is quiet."""
     end = time.monotonic() + _START_S
-    with serial.serial_for_url(channel, timeout=_ASK_S) as line:
-        while not re.search(rb"V\d{4}\r", _ask(line)):
-            if process.poll() is not None:
-                said.seek(0)
-                raise QemuError(f"{PROGRAM} has ended: {said.read().strip() or 'it does not say why'}")
-            if time.monotonic() > end:
-                raise QemuError(
-                    f"{image} has not answered within {_START_S:g} s on USART1: is it the image for SLCAN, "
-                    "lever_stm32f4_slcan.elf?"
-                )
-        while line.read(4096):
-            pass
+    while not _answers(address):
+        if process.poll() is not None:
+            said.seek(0)
+            raise QemuError(f"{PROGRAM} has ended: {said.read().strip() or 'it does not say why'}")
+        if time.monotonic() > end:
+            raise QemuError(
+                f"{image} has not answered within {_START_S:g} s on USART1: is it the image for SLCAN, "
+                "lever_stm32f4_slcan.elf?"
+            )
 
 
-def _ask(line: Any) -> bytes:
-    """What comes after the SLCAN command V."""
+def _answers(address: tuple[str, int]) -> bool:
+    """Whether the SLCAN peer tells its version within a moment."""
+    heard = b""
     try:
-        line.write(b"\rV\r")
-        return bytes(line.read(4096))
+        with socket.create_connection(address, timeout=_ASK_S) as line:
+            line.sendall(b"\rV\r")
+            while chunk := line.recv(4096):  # until nothing more comes
+                heard += chunk
+    except TimeoutError:
+        pass
     except OSError:  # QEMU has ended
         time.sleep(_ASK_S)
-        return b""
+    return re.search(rb"V\d{4}\r", heard) is not None
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:

@@ -58,9 +58,9 @@ def run(args: argparse.Namespace) -> int:
         if command:
             with one_processor():
                 return _run_command([word.replace(_CHANNEL, channel) for word in command])
-        print(f"{args.image.name} answers on {channel} (Ctrl-C ends it); for instance:", flush=True)
-        print(f"  lever sim steady --interface slcan --channel {channel}", flush=True)
         try:
+            print(f"{args.image.name} answers on {channel} (Ctrl-C ends it); for instance:")
+            print(f"  lever sim steady --interface slcan --channel {channel}", flush=True)
             while True:
                 time.sleep(3600.0)
         except KeyboardInterrupt:

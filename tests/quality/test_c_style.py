@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -25,8 +26,23 @@ def clang_format(*files: Path) -> list[str | Path]:
     ]
 
 
-def clang_tidy(database: Path, file: Path) -> list[str | Path]:
-    return [tools.python_tool("clang-tidy"), "--quiet", f"--config-file={tools.ROOT}/.clang-tidy", "-p", database, file]
+def clang_tidy(database: Path, file: Path, *options: str) -> list[str | Path]:
+    configuration = f"--config-file={tools.ROOT}/.clang-tidy"
+    return [tools.python_tool("clang-tidy"), "--quiet", configuration, "-p", database, *options, file]
+
+
+def assert_tidy(database: Path, files: Iterable[Path], *options: str) -> None:
+    with ThreadPoolExecutor() as pool:
+        results = list(pool.map(lambda file: tools.run(clang_tidy(database, file, *options)), files))
+    failures = [result.stdout for result in results if result.returncode != 0]
+    if failures:
+        pytest.fail("\n".join(failures), pytrace=False)
+
+
+def compiled(database: Path, folder: Path) -> list[Path]:
+    """The C files under a folder that a build has compiled."""
+    entries = json.loads((database / "compile_commands.json").read_text())
+    return sorted({file for entry in entries if folder in (file := Path(entry["file"])).parents})
 
 
 def test_layout() -> None:
@@ -40,14 +56,21 @@ def test_layout_check_finds_a_seeded_violation(tmp_path: Path) -> None:
 
 
 def test_clang_tidy(build_dir: Path) -> None:
-    database = json.loads((build_dir / "compile_commands.json").read_text())
-    ours = sorted({file for entry in database if tools.FIRMWARE in (file := Path(entry["file"])).parents})
+    ours = compiled(build_dir, tools.FIRMWARE)
     assert set(tools.core_sources()) <= set(ours)
-    with ThreadPoolExecutor() as pool:
-        results = list(pool.map(lambda file: tools.run(clang_tidy(build_dir, file)), ours))
-    failures = [result.stdout for result in results if result.returncode != 0]
-    if failures:
-        pytest.fail("\n".join(failures), pytrace=False)
+    assert_tidy(build_dir, ours)
+
+
+@pytest.mark.requires("arm-none-eabi-gcc")
+def test_clang_tidy_of_the_image(build_dir: Path) -> None:
+    """clang speaks for the same processor, and reads the C library of the cross compiler."""
+    port = tools.FIRMWARE / "port/stm32f4"
+    ours = compiled(build_dir / "stm32f4", port)
+    assert ours == sorted(port.glob("*.c"))
+    sysroot = tools.run(["arm-none-eabi-gcc", "-print-sysroot"]).stdout.strip()
+    headers = (f"{sysroot}/include/newlib", f"{sysroot}/include", "/usr/include/newlib")
+    options = ("--target=thumbv7em-none-eabihf", *(f"-isystem{folder}" for folder in headers))
+    assert_tidy(build_dir / "stm32f4", ours, *(f"--extra-arg={option}" for option in options))
 
 
 def test_clang_tidy_finds_a_seeded_violation(tmp_path: Path) -> None:

@@ -17,6 +17,12 @@ MAY_INCLUDE = {
     "can": {"can", "model", "math"},
     "app": {"app", "filter", "can", "model", "math"},
 }
+PORT_MAY_INCLUDE = {
+    "linux": {"port/linux", "port/slcan", "can/messages.h"},
+    "slcan": {"port/slcan"},
+    "embedded": {"port/embedded"},
+    "stm32f4": {"port/stm32f4", "port/embedded", "port/slcan", "can/messages.h"},
+}
 SYSTEM_HEADERS = {"math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 LIBRARY_FUNCTIONS = {"memcpy", "memmove", "memset", "sqrtf"}
 C99 = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only")
@@ -57,6 +63,18 @@ def test_folder_includes_only_what_it_may(folder: str) -> None:
                 assert name in SYSTEM_HEADERS, f"{file}: <{name}>"
             elif name not in ("lever_cdkf.h", "lever_settings.def"):
                 assert name.split("/")[0] in MAY_INCLUDE[folder], f"{file}: {name}"
+
+
+@pytest.mark.parametrize("folder", sorted(path.name for path in (tools.FIRMWARE / "port").iterdir() if path.is_dir()))
+def test_port_includes_only_what_it_may(folder: str) -> None:
+    """Of the core the façade and the identifiers; only Linux has headers of a system."""
+    for file in sorted((tools.FIRMWARE / "port" / folder).glob("*.[ch]")):
+        includes = re.findall(r'^#include ([<"])([^">]+)[">]', file.read_text(encoding="utf-8"), re.MULTILINE)
+        for bracket, name in includes:
+            if bracket == "<":
+                assert folder == "linux" or name in SYSTEM_HEADERS, f"{file}: <{name}>"
+            elif name not in ("lever_cdkf.h", "lever_settings.def"):
+                assert {name, str(Path(name).parent)} & PORT_MAY_INCLUDE[folder], f"{file}: {name}"
 
 
 def test_no_double() -> None:

@@ -9,7 +9,7 @@ import pytest
 from quality import tools
 
 RUFF = tools.python_tool("ruff")
-FOLDERS = ("host_tools", "sil", "tests")
+FOLDERS = ("firmware", "host_tools", "sil", "tests")
 
 
 def test_layout() -> None:
@@ -35,4 +35,4 @@ def package_tree(build_dir: Path) -> Path:
 def test_types(package_tree: Path, build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MYPYPATH", f"{package_tree}:{tools.ROOT / 'tests'}")
     mypy = [tools.python_tool("mypy"), f"--config-file={tools.ROOT}/pyproject.toml", f"--cache-dir={build_dir}/mypy"]
-    tools.assert_silent([*mypy, "--explicit-package-bases", package_tree, "tests"])
+    tools.assert_silent([*mypy, "--explicit-package-bases", package_tree, "firmware", "tests"])

@@ -24,6 +24,9 @@ TIME_LIMIT = "120"
 
 VCAN = pytest.mark.requires("ip", "candump", "linux.uml")
 """Of a block that goes to a place with a vcan0."""
+IMAGE = pytest.mark.requires("arm-none-eabi-gcc", "openocd")
+"""Of a block that writes an image."""
+MARKS = {"tests/vcan": VCAN, "lever flash": IMAGE}
 
 
 def blocks(language: str) -> list[object]:
@@ -31,7 +34,7 @@ def blocks(language: str) -> list[object]:
         pytest.param(
             content,
             id=f"{readme.relative_to(tools.ROOT)}:{line}",
-            marks=[VCAN] if "tests/vcan" in content else [],
+            marks=[mark for words, mark in MARKS.items() if words in content],
         )
         for readme in READMES
         for line, content in readmes.blocks(readme, language).items()

@@ -56,9 +56,11 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
 class LeverCan:
     """The process lever_can, from when it is ready to the end of the context."""
 
-    def __init__(self, program: Path, interface: str, options: Sequence[str], folder: Path) -> None:
+    def __init__(
+        self, program: Path, interface: str, options: Sequence[str], folder: Path, medium: str = "can"
+    ) -> None:
         settings = [f"--set={name}={value}" for name, value in SETTINGS.items()]
-        command = [str(program), "--can", interface, *settings, *options]
+        command = [str(program), f"--{medium}", interface, *settings, *options]
         self._stdout = folder / "stdout"
         self._stderr = folder / "stderr"
         with self._stdout.open("wb") as stdout, self._stderr.open("wb") as stderr:
@@ -86,7 +88,7 @@ class LeverCan:
         status = self.process.wait(PATIENCE_S)
         assert status == 0, f"exit status {status}: {self.stderr}"
         last = self.stdout.splitlines()[-1]
-        assert re.fullmatch(r"lever_can: \w+: (\d+ [a-z ]+, )*\d+ [a-z ]+", last), last
+        assert re.fullmatch(r"lever_can: \S+: (\d+ [a-z ]+, )*\d+ [a-z ]+", last), last
         return {name: int(number) for number, name in re.findall(r"(\d+) ([a-z ]+)", last.split(": ", 2)[2])}
 
     def __enter__(self) -> LeverCan:

@@ -7,7 +7,7 @@
 #include "lever_cdkf.h"
 
 /* Feeds the frames of golden.h to an instance in `memory` with each kind of estimator, and compares all it sends and its last
- * estimate. True when every bit is the host's. Call it before `memory` gets its instance; about 1.2 million instructions. */
+ * estimate. True when every bit is the host's. Call it before `memory` gets its instance; about 2 million instructions. */
 bool self_test(lever_memory_t *memory);
 
 #endif

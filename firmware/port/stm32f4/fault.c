@@ -27,8 +27,7 @@ bool fault_has_reset(void)
 }
 
 /* The stack of the interrupted code is read only if it is in memory: one that has overflowed is not. */
-__attribute__((used, noreturn)) void fault_record(const uint32_t *frame);
-__attribute__((used, noreturn)) void fault_record(const uint32_t *frame)
+__attribute__((used, noreturn)) static void fault_record(const uint32_t *frame)
 {
     const uintptr_t stack = (uintptr_t)frame;
     const bool readable = (stack >= (uintptr_t)image_ram) &&
@@ -52,6 +51,7 @@ __attribute__((used, noreturn)) void fault_record(const uint32_t *frame)
 /* Hands on the stack pointer of what was interrupted, and goes on on a fresh stack: the old one may be the fault. */
 __attribute__((naked)) void fault_interrupt(void)
 {
+    /* NOLINTNEXTLINE(portability-no-assembler): C cannot read a stack pointer */
     __asm__ volatile("tst lr, #4\n\t"
                      "ite eq\n\t"
                      "mrseq r0, msp\n\t"

@@ -4,6 +4,8 @@
 
 #ifdef __arm__
 
+/* NOLINTBEGIN(portability-no-assembler): there is no other way to these four */
+
 static inline void interrupts_off(void)
 {
     __asm__ volatile("cpsid i" ::: "memory");
@@ -25,6 +27,8 @@ static inline void synchronise(void)
 {
     __asm__ volatile("dsb\n\tisb" ::: "memory");
 }
+
+/* NOLINTEND(portability-no-assembler) */
 
 #else /* on the host, where tests play the hardware */
 

@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-/* Whether the flash holds what was built. About 14 instructions a byte. */
+/* Whether the flash holds what was built. About 11 instructions a byte. */
 bool rom_is_intact(void);
 
 #endif

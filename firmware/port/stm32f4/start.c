@@ -18,6 +18,7 @@ extern uint32_t image_bss_end[];
 extern const uint32_t image_start[];
 
 int main(void);
+/* NOLINTNEXTLINE(misc-use-internal-linkage): image.ld makes it the entry point */
 __attribute__((noreturn)) void reset_interrupt(void);
 
 /* Exceptions are numbered from 1 on, interrupts from 16 on. */

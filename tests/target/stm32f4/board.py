@@ -41,6 +41,7 @@ class Debugger:
 
     def __init__(self, path: Path) -> None:
         self._line = connect(path)
+        self._received = b""
         self.ask("qXfer:features:read:target.xml:0,1000")  # without which QEMU takes no register by number
 
     def __enter__(self) -> Debugger:
@@ -50,20 +51,25 @@ class Debugger:
         self._line.close()
 
     def _read_packet(self) -> str:
-        text = b""
-        while b"#" not in text[:-2]:
-            text += self._line.recv(4096)
+        while b"#" not in self._received[:-2]:
+            self._received += self._line.recv(4096)
+        packet, _, rest = self._received.partition(b"#")
+        self._received = rest[2:]  # without the checksum
         self._line.sendall(b"+")
-        return text[text.index(b"$") + 1 : text.rindex(b"#")].decode()
+        return packet[packet.index(b"$") + 1 :].decode()
 
     def ask(self, packet: str) -> str:
+        """The answer to a packet; that the core has halted, which QEMU tells at any time, is not one."""
         self._line.sendall(f"${packet}#{sum(packet.encode()) % 256:02x}".encode())
-        return self._read_packet()
+        while (answer := self._read_packet()).startswith("T"):
+            pass
+        return answer
 
     def stop(self) -> None:
-        """Halts the core; also after go_on()."""
+        """Halts the core."""
         self._line.sendall(b"\x03")
-        self._read_packet()
+        while not self._read_packet().startswith("T"):
+            pass
 
     def go_on(self) -> None:
         self._line.sendall(b"$c#63")
@@ -75,9 +81,6 @@ class Debugger:
     def words(self, address: int, count: int) -> list[int]:
         data = bytes.fromhex(self.ask(f"m{address:x},{4 * count:x}"))
         return [int.from_bytes(data[4 * i : 4 * i + 4], "little") for i in range(count)]
-
-    def write_word(self, address: int, value: int) -> None:
-        assert self.ask(f"M{address:x},4:{value.to_bytes(4, 'little').hex()}") == "OK"
 
 
 class Board:
@@ -130,7 +133,7 @@ class Board:
         finally:
             self._line.settimeout(ANSWER_TIME)
 
-    def platform_health(self) -> dict[str, object]:
+    def platform_health(self) -> dict[str, float]:
         """What PLATFORM_HEALTH says after some samples of a lever that rests."""
         assert self.command("O") == ""
         lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")

@@ -1,0 +1,34 @@
+"""`lever sim` over a pseudo-terminal gives what it gives in one process, to the bit."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from vcan import rig
+
+LEVER = str(Path(sys.executable).with_name("lever"))
+SHORTENED = ("--set=duration=4 s", "--set=converged_after=1 s", "--set=limits={}")
+
+
+def lever_sim(*options: str) -> str:
+    result = subprocess.run([LEVER, "sim", "steady", *SHORTENED, *options], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_frames_and_estimates_are_those_of_a_run_in_one_process(build_dir: Path, tmp_path: Path) -> None:
+    link, settings = tmp_path / "lever0", tmp_path / "settings"
+    settings.write_text(lever_sim("--settings"))
+    over_line, in_process = tmp_path / "over_line", tmp_path / "in_process"
+    program = build_dir / "lever_can"
+    with rig.LeverCan(program, str(link), ["--settings", str(settings)], tmp_path, "pty") as process:
+        lever_sim("--interface=slcan", f"--channel={link}", "--bus-option=timeout=0.01", f"--out={over_line}")
+        totals = process.stop()
+    lever_sim(f"--out={in_process}")
+    log = (over_line / "bus.log").read_text()
+    assert log.replace(f" {link} ", " lever ") == (in_process / "bus.log").read_text()
+    assert (over_line / "trace.csv").read_bytes() == (in_process / "trace.csv").read_bytes()
+    assert totals["frames in"] + totals["frames out"] == log.count("\n")
+    assert totals["dropped"] == 0

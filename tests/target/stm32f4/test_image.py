@@ -1,0 +1,103 @@
+"""What can be told of the images without running them; and what the build says when it cannot make them."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import zlib
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools.firmware_image import flash_contents
+from target.stm32f4 import elf
+
+SOURCES = Path(__file__).resolve().parents[3]
+GOLDEN = SOURCES / "firmware/port/embedded/golden.py"
+HEAP_AND_IO = {"malloc", "free", "calloc", "realloc", "_sbrk", "printf", "puts", "fopen", "_write", "exit"}
+needs_compiler = pytest.mark.requires("arm-none-eabi-gcc")
+
+
+def test_golden_vector_is_that_of_the_host() -> None:
+    """golden.h, made anew, is the one that the images are built with."""
+    spec = importlib.util.spec_from_file_location("golden", GOLDEN)
+    assert spec is not None
+    assert spec.loader is not None
+    golden = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(golden)
+    same = golden.header() == GOLDEN.with_name("golden.h").read_text(encoding="utf-8")
+    assert same, f"the estimator computes other numbers now; if that is meant: build/venv/bin/python {GOLDEN}"
+
+
+@needs_compiler
+@pytest.mark.parametrize("transport", ["can", "slcan"])
+def test_forms_are_alike_and_end_with_their_crc(transport: str, can_image: Path) -> None:
+    image = can_image.with_name(f"lever_stm32f4_{transport}.elf")
+    flash = flash_contents(image)
+    assert flash == flash_contents(image.with_suffix(".hex")) == flash_contents(image.with_suffix(".bin"))
+    assert zlib.crc32(flash[:-4]) == int.from_bytes(flash[-4:], "little")
+    assert image.with_suffix(".map").is_file()
+
+
+@needs_compiler
+def test_starts_as_the_processor_expects(can_image: Path) -> None:
+    """PM0214 2.3.4: the stack's top, then where to begin, with the lowest bit set for Thumb."""
+    flash = elf.flash_bytes(can_image)
+    stack, reset = (int.from_bytes(flash[at : at + 4], "little") for at in (0, 4))
+    assert stack == elf.symbol(can_image, "image_stack_top") == 0x2000_0000 + 4096
+    assert reset == elf.symbol(can_image, "reset_interrupt") | 1
+
+
+@needs_compiler
+@pytest.mark.parametrize("transport", ["can", "slcan"])
+def test_no_heap_no_io_and_nothing_of_libc_but_two_functions(transport: str, can_image: Path) -> None:
+    image = can_image.with_name(f"lever_stm32f4_{transport}.elf")
+    names = {line.split()[-1] for line in elf.tool("nm", image).splitlines()}
+    assert not names & HEAP_AND_IO
+    members = re.findall(r"libc\.a\(lib_a-(\w+)\.o\)", image.with_suffix(".map").read_text())
+    assert set(members) == {"memcpy", "memset"}
+
+
+def configure(folder: Path, *options: str, path: str | None = None) -> subprocess.CompletedProcess[str]:
+    cmake = shutil.which("cmake")
+    assert cmake is not None
+    return subprocess.run(
+        [cmake, "--preset", "stm32f4", "-B", folder, *options],
+        cwd=SOURCES,
+        env={**os.environ, "PATH": path or os.environ["PATH"]},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_without_the_compiler_one_line_says_what_to_install(tmp_path: Path) -> None:
+    for tool in ("make", "cc"):
+        found = shutil.which(tool)
+        assert found is not None
+        (tmp_path / tool).symlink_to(found)
+    only_path = ("-D", "CMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF")
+    result = configure(tmp_path / "build", *only_path, path=str(tmp_path))
+    assert result.returncode != 0
+    assert "apt install gcc-arm-none-eabi libnewlib-arm-none-eabi" in " ".join(result.stderr.split())
+    assert result.stderr.count("CMake Error") == 1
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("option", "source", "says"),
+    [
+        ("LEVER_STM32_HSE_MHZ=3", "clock.c", "the crystal has 4 to 26 MHz"),
+        ("LEVER_STM32_BAUD=7000000", "usart.c", "not within 1 %"),
+    ],
+)
+def test_impossible_clock_does_not_compile(option: str, source: str, says: str) -> None:
+    flags = ("-std=c99", "-mcpu=cortex-m4", "-fsyntax-only", "-I", str(SOURCES / "firmware"), f"-D{option}")
+    command = ["arm-none-eabi-gcc", *flags, str(SOURCES / "firmware/port/stm32f4" / source)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode != 0
+    assert says in result.stderr
+    fine = [argument for argument in command if not argument.startswith("-D")]
+    assert subprocess.run(fine, capture_output=True, check=False).returncode == 0
