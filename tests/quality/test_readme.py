@@ -22,11 +22,12 @@ TIME_LIMIT = "120"
 """For one block [s]."""
 
 
-VCAN = pytest.mark.requires("ip", "candump", "linux.uml")
-"""Of a block that goes to a place with a vcan0."""
-IMAGE = pytest.mark.requires("arm-none-eabi-gcc", "openocd")
-"""Of a block that writes an image."""
-MARKS = {"tests/vcan": VCAN, "lever flash": IMAGE}
+NEEDED = {
+    "tests/vcan": pytest.mark.requires("ip", "candump", "linux.uml"),
+    "lever qemu": pytest.mark.requires("qemu-system-arm", "arm-none-eabi-gcc"),
+    "lever flash": pytest.mark.requires("arm-none-eabi-gcc", "openocd"),
+}
+"""By blocks with these words in them."""
 
 
 def blocks(language: str) -> list[object]:
@@ -34,7 +35,7 @@ def blocks(language: str) -> list[object]:
         pytest.param(
             content,
             id=f"{readme.relative_to(tools.ROOT)}:{line}",
-            marks=[mark for words, mark in MARKS.items() if words in content],
+            marks=[mark for words, mark in NEEDED.items() if words in content],
         )
         for readme in READMES
         for line, content in readmes.blocks(readme, language).items()

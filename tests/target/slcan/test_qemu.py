@@ -12,11 +12,16 @@ from pathlib import Path
 import can
 import pytest
 import serial
-from lever_cdkf.host_tools import cli, qemu
+from lever_cdkf.host_tools import cli, codec, qemu
 from lever_cdkf.host_tools.protocol_ahead import read_ahead
 from vcan import rig
 
 QEMU = pytest.mark.requires(qemu.PROGRAM)
+RESET: dict[str, float | str | None] = {
+    "request": "reset",
+    **dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep"),
+    "dither_rms": 0.0,
+}
 LEVER = str(Path(sys.executable).with_name("lever"))
 
 
@@ -59,12 +64,9 @@ def test_hosts_come_and_go(channel: str) -> None:
     for _ in range(3):
         with can.Bus(interface="slcan", channel=read_ahead(channel), sleep_after_open=0.0, bitrate=1_000_000) as bus:
             host = rig.Host(bus)
-            host.send((0x120, rig.codec.encode("COMMAND", 0, {"request": "reset", **KEEP})))
+            host.send((0x120, codec.encode("COMMAND", 0, RESET)))
             for _ in range(50):
                 assert host.is_answered()
-
-
-KEEP = {"model": "keep", "preload": "keep", "estimator": "keep", "adaptation": "keep", "dither_rms": 0.0}
 
 
 # --- the command --------------------------------------------------------------------------------------------------
