@@ -71,6 +71,12 @@ def fault_names(faults: int) -> tuple[str, ...]:
     return tuple(name for bit, name in enum_names("lever_fault").items() if faults & bit)
 
 
+def health_of(pointer: Any) -> Health:
+    """The content of a lever_health_t."""
+    values = {name: getattr(pointer, name) for name in Health._fields}
+    return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
+
+
 class Estimator:
     """An instance of the firmware. Any number may exist; each belongs to one thread at a time."""
 
@@ -140,8 +146,7 @@ class Estimator:
     def health(self) -> Health:
         """Mode, faults and counts after the last sample."""
         lib.lever_health(self.pointer, self._health)
-        values = {name: getattr(self._health, name) for name in Health._fields}
-        return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
+        return health_of(self._health)
 
     def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
         """Takes a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""

@@ -37,9 +37,14 @@ lib = load("lever_cdkf")
 
 @cache
 def enum_names(enum: str) -> dict[int, str]:
-    """Value to name of a façade enum, in lower case without prefix: enum_names("lever_mode") is {0: "init", …}."""
-    names = {value: name[len(enum) + 1 :].lower() for value, name in ffi.typeof(f"enum {enum}").elements.items()}
-    return {value: name for value, name in sorted(names.items()) if name != "count"}
+    """Value to name of a façade enum, in lower case without prefix: enum_names("lever_mode") is {0: "init", …}.
+
+    The prefix is the enum's name, or that without its last word (LEVER_PLATFORM_CLOCK of enum lever_platform_fault).
+    """
+    elements = {value: name.lower() for value, name in ffi.typeof(f"enum {enum}").elements.items()}
+    prefix = enum if all(name.startswith(f"{enum}_") for name in elements.values()) else enum.rpartition("_")[0]
+    names = {value: name.removeprefix(f"{prefix}_") for value, name in sorted(elements.items())}
+    return {value: name for value, name in names.items() if name != "count"}
 
 
 def struct_dtype(ctype: str) -> np.dtype[Any]:
@@ -63,5 +68,5 @@ def _scalar(kind: Any) -> str:
     """numpy's name of a number or enum."""
     if kind.cname == "_Bool":
         return "bool"
-    letter = "f" if kind.cname == "float" else "i" if kind.cname.startswith("int") else "u"
+    letter = "f" if kind.cname in ("float", "double") else "i" if kind.cname.startswith("int") else "u"
     return f"{letter}{ffi.sizeof(kind)}"

@@ -11,6 +11,7 @@ are no frame are counted, as is a log that breaks off; one that has no frame at 
 
 from __future__ import annotations
 
+import gc
 import gzip
 import os
 import stat
@@ -26,7 +27,7 @@ import numpy as np
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 from .errors import LeverError
 
-BLOCK = 1 << 20
+BLOCK = 1 << 22
 """Bytes of text that are read at once."""
 _MESSAGES = 16384  # that are read at once through python-can
 _GZIP = b"\x1f\x8b"
@@ -82,9 +83,9 @@ class Recording:
         return int(first["time_us"][0]), path, all_chunks()
 
     def _why_none(self, path: str) -> str:
-        if self.ends_early:
-            return f": {self.ends_early[-1].removeprefix(f'{path}: ')}"
-        return f"; {self.damaged} lines are something else: is it a log of candump -L?" if self.damaged else ""
+        if self.damaged:
+            return f"; {self.damaged} lines of it are something else: is it a log of candump -L?"
+        return f": {self.ends_early[-1].removeprefix(f'{path}: ')}" if self.ends_early else ""
 
     def _guarded(self, path: str, chunks: Iterator[Frames]) -> Iterator[Frames]:
         """The chunks; what breaks off after the first of them is noted, not raised."""
@@ -109,7 +110,7 @@ class Recording:
     def _candump(self, path: str) -> Iterator[Frames]:
         with _open_text(path) as (text, position):
             rest, skipping = b"", False
-            while block := text.read(BLOCK):
+            for block in _blocks(text):
                 self._done[path] = position()
                 if skipping:  # the rest of a line that is too long to be one
                     newline = block.find(b"\n")
@@ -135,17 +136,15 @@ class Recording:
 
         messages: list[can.Message] = []
         try:
-            with can.LogReader(path) as reader:
+            with _open_log(path) as reader:
                 for message in reader:
                     messages.append(message)
                     if len(messages) == _MESSAGES:
                         yield self._frames(messages)
                         messages = []
-        except OSError as error:
-            if error.errno is not None:
-                raise
-            self.ends_early.append(f"{path}: {_one_line(error)}")
         except Exception as error:  # each format has its own, from struct.error to those of asammdf
+            if isinstance(error, OSError) and error.errno is not None:
+                raise
             self.ends_early.append(f"{path}: {_one_line(error)}")
         self._done[path] = _size(path)
         if messages:
@@ -180,8 +179,33 @@ def _flags(message: Any) -> int:
     )
 
 
+def _open_log(path: str) -> Any:
+    """python-can's reader. Raises LogError, and OSError for what the system says."""
+    import can
+
+    with _unheard_deletions():
+        try:
+            return can.LogReader(path)
+        except Exception as error:  # each format has its own, from struct.error to those of asammdf
+            if isinstance(error, OSError) and error.errno is not None:
+                raise
+            reason = _one_line(error)
+        gc.collect()
+    raise LogError(reason)
+
+
+@contextmanager
+def _unheard_deletions() -> Iterator[None]:
+    """asammdf complains on standard error when a file that it could not open is deleted."""
+    before, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
 def _one_line(error: Exception) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
+    return " ".join((str(error) if isinstance(error, LogError) else f"{type(error).__name__}: {error}").split())
 
 
 # --- files ----------------------------------------------------------------------------------------------------------
@@ -213,11 +237,34 @@ def _size(path: str) -> int:
     return os.stat(path).st_size if path != "-" and _is_file(path) else 0
 
 
+def _blocks(text: Any) -> Iterator[bytes]:
+    """All of it; of a compressed file that is damaged all that comes before the damage, then its error."""
+    if not isinstance(text, gzip.GzipFile):
+        while block := text.read(BLOCK):
+            yield block
+        return
+    while True:
+        parts, size, broken = [], 0, None
+        try:
+            while size < BLOCK and (part := text.read1(BLOCK)):
+                parts.append(part)
+                size += len(part)
+        except (EOFError, OSError, zlib.error) as error:
+            broken = error
+        if parts:
+            yield b"".join(parts)
+        if broken is not None:
+            raise broken
+        if not parts:
+            return
+
+
 @contextmanager
 def _open_text(path: str) -> Iterator[tuple[Any, Callable[[], int]]]:
     """The bytes of a text that may be compressed, and a function that tells how many bytes of the file are read."""
     if path == "-":
-        yield open(sys.stdin.fileno(), "rb", buffering=0, closefd=False), lambda: 0
+        with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as file:
+            yield file, lambda: 0
         return
     with open(path, "rb", buffering=0) as file:
         if not _is_file(path):
