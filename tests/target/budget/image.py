@@ -122,7 +122,11 @@ def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED, process
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as lock:  # tests that run side by side build it too
         fcntl.flock(lock, fcntl.LOCK_EX)
-        _run(["cmake", "-S", str(SOURCE), "-B", str(folder), toolchain, *settings], "configuring the image")
+        configure = ["cmake", "-S", str(SOURCE), "-B", str(folder), toolchain, *settings]
+        try:
+            _run(configure, "configuring the image")
+        except LeverError:  # as after a change of the toolchain file, which CMake refuses to take over
+            _run([*configure, "--fresh"], "configuring the image")
         _run(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
     return folder / "budget.elf"
 
