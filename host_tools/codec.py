@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import cantools.database
 from cantools.database.can import Database, Message, Signal
+from e2e.crc import calculate_crc8_h2f
 from e2e.p02 import e2e_p02_check, e2e_p02_protect
 
 from .errors import CodecError
@@ -73,6 +74,26 @@ def data_ids(key: str | int) -> bytes:
 def check(identifier: int, data: bytes | bytearray) -> bool:
     """Whether length and CRC of a received frame are right."""
     return len(data) == message(identifier).length and e2e_p02_check(data, data_ids(identifier))
+
+
+@cache
+def _crc_table() -> NDArray[np.uint8]:
+    """The CRC register after a byte, by register xor byte; the library starts with 0xFF and inverts at the end."""
+    import numpy as np
+
+    return np.array([calculate_crc8_h2f(bytes([index ^ 0xFF])) ^ 0xFF for index in range(256)], dtype=np.uint8)
+
+
+def check_columns(name: str, data: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """check() of N frames of one message, data as (N, 8) bytes."""
+    import numpy as np
+
+    table, identifiers = _crc_table(), np.frombuffer(data_ids(name), dtype=np.uint8)
+    register = np.full(len(data), 0xFF, dtype=np.uint8)
+    for byte in range(1, data.shape[1]):
+        register = table[register ^ data[:, byte]]
+    right: NDArray[np.bool_] = table[register ^ identifiers[data[:, 1] & 15]] ^ 0xFF == data[:, 0]
+    return right
 
 
 # --- encoding --------------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .config import CHOICES, Config, choice_value
 from .errors import LeverError
-from .library import enum_names, ffi, lib
+from .library import enum_names, ffi, lib, struct_dtype
 
 if TYPE_CHECKING:
     import numpy as np
@@ -71,13 +71,20 @@ def fault_names(faults: int) -> tuple[str, ...]:
     return tuple(name for bit, name in enum_names("lever_fault").items() if faults & bit)
 
 
+def health_of(pointer: Any) -> Health:
+    """The content of a lever_health_t."""
+    values = {name: getattr(pointer, name) for name in Health._fields}
+    return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
+
+
 class Estimator:
     """An instance of the firmware. Any number may exist; each belongs to one thread at a time."""
 
     def __init__(self, config: Config | None = None) -> None:
         self._memory = ffi.new("lever_memory_t *")  # holds the instance, so it must live as long as this object
-        self._lever = lib.lever_init(self._memory, (config or Config()).pointer)
-        if self._lever == ffi.NULL:
+        self.pointer: Any = lib.lever_init(self._memory, (config or Config()).pointer)
+        """For calls of `lib`; valid as long as this object."""
+        if self.pointer == ffi.NULL:
             raise LeverError("the firmware refused its configuration: Config.pointer was changed after its check")
         self._sample = ffi.new("lever_sample_t *")
         self._estimate = ffi.new("lever_estimate_t *")
@@ -105,7 +112,7 @@ class Estimator:
         for name, value in (("theta", theta), ("theta_dot", theta_dot), ("tau_m", tau_m), ("z_ddot", z_ddot)):
             setattr(sample, name, 0.0 if value is None else value)
             setattr(sample, f"{name}_valid", value is not None)
-        return _MODES[lib.lever_update(self._lever, sample)]
+        return _MODES[lib.lever_update(self.pointer, sample)]
 
     def command(
         self,
@@ -125,12 +132,12 @@ class Estimator:
         command.request = choice_value("lever_request", "request", request)
         for what, name in zip(CHOICES, (model, preload, estimator, adaptation), strict=True):
             setattr(command, what, lib.LEVER_KEEP if name is None else choice_value(f"lever_{what}", what, name))
-        if not lib.lever_command(self._lever, command):
+        if not lib.lever_command(self.pointer, command):
             raise LeverError(f"the firmware refused the command {request!r}, dither_rms = {dither_rms} N m")
 
     def estimate(self) -> Estimate:
         """The estimate after the last sample."""
-        lib.lever_estimate(self._lever, self._estimate)
+        lib.lever_estimate(self.pointer, self._estimate)
         values = {name: getattr(self._estimate, name) for name in Estimate._fields}
         for name in ("parameter", "parameter_sigma", "parameter_correlation"):
             values[name] = tuple(values[name])
@@ -138,9 +145,8 @@ class Estimator:
 
     def health(self) -> Health:
         """Mode, faults and counts after the last sample."""
-        lib.lever_health(self._lever, self._health)
-        values = {name: getattr(self._health, name) for name in Health._fields}
-        return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
+        lib.lever_health(self.pointer, self._health)
+        return health_of(self._health)
 
     def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
         """Takes a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""
@@ -151,38 +157,18 @@ class Estimator:
         received.id = identifier
         received.length = length
         self._received_data[0:length] = data
-        return lib.lever_on_frame(self._lever, received)  # type: ignore[no-any-return]
+        return lib.lever_on_frame(self.pointer, received)  # type: ignore[no-any-return]
 
     def step(self) -> int:
         """Takes the sample that on_frame() has completed; returns the mode, a key of enum_names("lever_mode")."""
-        return lib.lever_step(self._lever)  # type: ignore[no-any-return]
+        return lib.lever_step(self.pointer)  # type: ignore[no-any-return]
 
     def next_frame(self) -> tuple[int, bytes] | None:
         """The next frame to send, as identifier and data; None when there is none left."""
         answer = self._answer
-        if not lib.lever_next_frame(self._lever, answer):
+        if not lib.lever_next_frame(self.pointer, answer):
             return None
         return answer.id, self._answer_data[0 : answer.length]
-
-
-def _dtype(ctype: str) -> np.dtype[Any]:
-    """The numpy dtype of a façade struct, padding included."""
-    import numpy as np
-
-    def scalar(kind: Any) -> str:
-        if kind.kind == "enum" or kind.cname == "_Bool":
-            return "bool" if kind.cname == "_Bool" else f"u{ffi.sizeof(kind)}"
-        return f"{'f' if kind.cname == 'float' else 'u'}{ffi.sizeof(kind)}"
-
-    struct = ffi.typeof(ctype)
-    names, formats, offsets = [], [], []
-    for name, field in struct.fields:
-        is_array = field.type.kind == "array"
-        base = scalar(field.type.item if is_array else field.type)
-        names.append(name)
-        formats.append((base, (field.type.length,)) if is_array else base)
-        offsets.append(field.offset)
-    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": ffi.sizeof(struct)})
 
 
 def run_samples(
@@ -200,7 +186,7 @@ def run_samples(
 
     estimator = Estimator(config)
     count = len(samples["time_us"])
-    taken = np.zeros(count, _dtype("lever_sample_t"))
+    taken = np.zeros(count, struct_dtype("lever_sample_t"))
     taken["time_us"] = np.asarray(samples["time_us"]).astype(np.int64)  # to 32 bits: wraps
     for name in ("theta", "theta_dot", "tau_m", "z_ddot"):
         if name in samples:
@@ -212,9 +198,9 @@ def run_samples(
     asked = np.arange(count) if at is None else np.asarray(at)
     if (len(asked) and not 0 <= asked[0] <= asked[-1] < count) or (np.diff(asked) <= 0).any():
         raise LeverError(f"at: the indices must rise from 0 to at most {count - 1}")
-    estimates = np.zeros(len(asked), _dtype("lever_estimate_t"))
-    healths = np.zeros(len(asked), _dtype("lever_health_t"))
-    lever = estimator._lever
+    estimates = np.zeros(len(asked), struct_dtype("lever_estimate_t"))
+    healths = np.zeros(len(asked), struct_dtype("lever_health_t"))
+    lever = estimator.pointer
     sample = ffi.from_buffer("lever_sample_t[]", taken)
     estimate = ffi.from_buffer("lever_estimate_t[]", estimates)
     health = ffi.from_buffer("lever_health_t[]", healths)

@@ -68,9 +68,14 @@ def make_config(assignments: Assignments) -> Config:
 
 def format_config(config: Config) -> str:
     """The text of a settings file that holds all of `config`."""
-    values: dict[str, str | float] = {**config.choices, **config.settings}
+    return format_assignments({**config.choices, **config.settings})
+
+
+def format_assignments(assignments: Assignments, notes: Mapping[str, str] | None = None) -> str:
+    """The text of a settings file that holds these; `notes` by name go into the comments."""
     comments = {what: f"one of {', '.join(enum_names(f'lever_{what}').values())}" for what in CHOICES}
     comments |= {row.name: f"[{row.unit}] {row.meaning}" for row in settings_table()}
-    assignments = {name: f"{name} = {value}" for name, value in values.items()}
-    width = max(len(assignment) for assignment in assignments.values())
-    return "".join(f"{assignments[name]:{width}}  # {comments[name]}\n" for name in values)
+    comments |= {name: f"{comments[name]}; {note}" for name, note in (notes or {}).items()}
+    lines = {name: f"{name} = {value}" for name, value in assignments.items()}
+    width = max((len(line) for line in lines.values()), default=0)
+    return "".join(f"{line:{width}}  # {comments[name]}\n" for name, line in lines.items())

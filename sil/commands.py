@@ -27,8 +27,8 @@ before the next one is sent. Prints how good the estimates were; with --out also
   report.html   all of it as one page for a browser
 
 With --interface lever (the default) the firmware runs inside this process. With socketcan or slcan it has to be running
-at the other end of the channel, with the settings that --settings prints; bus.log is the same to the byte but for the
-channel's name. What python-can's interface can be told beyond its channel is given by --bus-option.
+at the other end of the channel, with the settings that --settings alone prints; bus.log is the same to the byte but
+for the channel's name. What python-can's interface can be told beyond its channel is given by --bus-option.
 """
 _EPILOG = """\
 examples:
@@ -36,6 +36,7 @@ examples:
   lever sim steady --out out/steady
   lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
   lever sim my_own.toml
+  lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
   lever sim steady --settings > steady.settings; lever_can --can vcan0 --settings steady.settings &
   lever sim steady --interface socketcan --channel vcan0
   lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
@@ -47,6 +48,7 @@ _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
 _BUS_OPTIONS: dict[str, dict[str, Any]] = {"slcan": {"bitrate": 1_000_000, "sleep_after_open": 0.0}}
 """Unless told otherwise: the bit rate of lever.dbc, and no two seconds for an Arduino to reset in."""
 _DEMO = "demo"
+_PRINT = ""  # --settings without a file
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -76,7 +78,11 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     sim.add_argument("--seed", type=int, help="set the seed of all random numbers")
     sim.add_argument("--realtime", action="store_true", help="pace the samples by the clock")
     sim.add_argument(
-        "--settings", action="store_true", help="print the settings file that the firmware needs, and stop"
+        "--settings",
+        metavar="FILE",
+        nargs="?",
+        const=_PRINT,
+        help="use the estimator settings in FILE; without FILE: print a settings file with those of the run, and stop",
     )
     add_json_option(sim)
     sim.set_defaults(run=run)
@@ -96,9 +102,10 @@ def run(args: argparse.Namespace) -> int:
 
     if args.list:
         return _list(args.json)
-    overrides = args.set + ([] if args.seed is None else [f"seed={args.seed}"])
+    overrides = _from_file(args.settings) if args.settings not in (None, _PRINT) else []
+    overrides += args.set + ([] if args.seed is None else [f"seed={args.seed}"])
     scenario = load(args.scenario, overrides)
-    if args.settings:
+    if args.settings == _PRINT:
         from lever_cdkf.host_tools.settings_file import format_config
 
         sys.stdout.write(format_config(scenario.config))
@@ -108,6 +115,17 @@ def run(args: argparse.Namespace) -> int:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
     bus_options = _bus_options(args.bus_option)
     return _simulate(scenario, args.interface, channel, bus_options, args.out, args.json, args.realtime)
+
+
+def _from_file(path: str) -> list[str]:
+    """A settings file as overrides of a scenario. Raises LeverError."""
+    from lever_cdkf.host_tools.config import CHOICES, setting
+    from lever_cdkf.host_tools.settings_file import read_assignments
+
+    return [
+        f"estimator.{name}={value}" if name in CHOICES else f"settings.{name}={value} {setting(name).unit}"
+        for name, value in read_assignments(path).items()
+    ]
 
 
 def run_demo(args: argparse.Namespace) -> int:

@@ -44,6 +44,9 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+CONVERGED_AFTER = 15.0
+"""Time [s] from which on estimates are judged, unless a scenario says otherwise."""
+
 STREAMS = (
     "process", "theta", "theta_dot", "tau_m", "z_ddot", "m_p", "c_p", "k_p", "trim", "base", "torque", "dropout",
     "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t",
@@ -121,7 +124,7 @@ class Scenario:
     title: str = text()
     description: str = text("")
     duration: float = quantity("s", above=0.0, greatest=3600.0)
-    converged_after: float = quantity("s", 15.0, least=0.0)
+    converged_after: float = quantity("s", CONVERGED_AFTER, least=0.0)
     seed: int = whole(1)
     pilot: pilots.Pilot = item(pilots.read_pilot)
     base: tuple[excitation.Excitation, ...] = tables(excitation.read_excitation, "m/s^2")

@@ -15,6 +15,7 @@ from lever_cdkf.host_tools.native import enum_names
 from numpy.typing import NDArray
 
 from . import whiteness
+from .innovations import Innovations, freedom
 from .loop import Recording
 from .quantities import DYNAMICS, Quantity
 from .scenario import Scenario
@@ -22,9 +23,6 @@ from .trace import Trace
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-
-CHI_SQUARE_95 = {1: 3.841458820694124, 2: -2.0 * math.log(0.05)}
-"""Value that chi-square with so many degrees of freedom stays below with a probability of 95 %."""
 
 MOST_TRANSFERS = 50
 """How often, spread over the run, the transfer function of a truth is looked at for changes."""
@@ -141,20 +139,11 @@ def _nis(scenario: Scenario, trace: Trace) -> dict[str, Any]:
     `inside_95_percent` is the share of samples below their chi-square's 95 % value: 0.95 for a consistent filter.
     `mean_band_95` is where the mean would lie in 95 % of runs of a consistent filter.
     """
-    outputs = np.isfinite(trace["theta_measured_rad"]).astype(int) + np.isfinite(trace["theta_dot_measured_rad_s"])
-    used = judged_samples(scenario, trace["time_s"]) & (outputs > 0) & np.isfinite(trace["nis"])
-    if not used.any():
-        return {"mean": None, "expected": None, "mean_band_95": None, "inside_95_percent": None}
-    nis, freedom = trace["nis"][used], outputs[used]
-    expected = float(np.mean(freedom))
-    spread = 1.96 * math.sqrt(2.0 * expected / len(nis))
-    limit = np.where(freedom == 2, CHI_SQUARE_95[2], CHI_SQUARE_95[1])
-    return {
-        "mean": float(np.mean(nis)),
-        "expected": expected,
-        "mean_band_95": [expected - spread, expected + spread],
-        "inside_95_percent": float(np.mean(nis <= limit)),
-    }
+    outputs = freedom(trace["theta_measured_rad"], trace["theta_dot_measured_rad_s"])
+    judged = judged_samples(scenario, trace["time_s"])
+    innovations = Innovations()
+    innovations.add(trace["nis"][judged], outputs[judged])
+    return innovations.figures()
 
 
 def _whiteness(scenario: Scenario, trace: Trace) -> dict[str, Any] | None:
@@ -210,8 +199,8 @@ def _verdict(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
             _verdict_truth(summary),
             _verdict_limits(summary, quality),
             _verdict_sigma(quality),
-            _verdict_nis(summary["nis"]),
-            _verdict_whiteness(summary["whiteness"]),
+            verdict_nis(summary["nis"]),
+            verdict_whiteness(summary["whiteness"]),
         )
         if sentence
     )
@@ -258,7 +247,8 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
     return f"The stated uncertainty of {_words(worst)} is too small: ±2σ covers the truth only {percent}."
 
 
-def _verdict_nis(nis: dict[str, Any]) -> str:
+def verdict_nis(nis: dict[str, Any]) -> str:
+    """What NIS says, in a sentence."""
     if nis["mean"] is None:
         return ""
     ratio = nis["mean"] / nis["expected"]
@@ -267,7 +257,8 @@ def _verdict_nis(nis: dict[str, Any]) -> str:
     return f"Innovations are {size} the filter expects ({numbers})."
 
 
-def _verdict_whiteness(told: dict[str, Any] | None) -> str:
+def verdict_whiteness(told: dict[str, Any] | None) -> str:
+    """What the autocorrelation of the residual says, in a sentence."""
     if told is None:
         return ""
     size = f"correlation {told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"

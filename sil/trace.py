@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from lever_cdkf.host_tools import codec
@@ -26,18 +27,18 @@ WHOLE = ("mode", "faults", "lost", "corrupt", "late")
 """Columns of whole numbers."""
 
 # column of the trace, its message and field
-_MEASURED = (
+MEASURED = (
     ("theta_measured_rad", "LEVER_SAMPLE", "theta"),
     ("theta_dot_measured_rad_s", "LEVER_SAMPLE", "theta_dot"),
     ("z_ddot_measured_m_s2", "BASE_SAMPLE", "z_ddot"),
     ("tau_m_measured_N_m", "LEVER_SAMPLE", "tau_m"),
 )
-_ESTIMATED = (
+ESTIMATED = (
     ("theta_estimate_rad", "STATE_ESTIMATE", "theta"),
     ("theta_dot_estimate_rad_s", "STATE_ESTIMATE", "theta_dot"),
     ("nis", "STATE_ESTIMATE", "nis"),
 )
-_HEALTH = (
+HEALTH = (
     ("mode", "HEALTH", "mode"),
     ("faults", "HEALTH", "faults"),
     ("lost", "HEALTH", "lost"),
@@ -45,7 +46,7 @@ _HEALTH = (
     ("late", "HEALTH", "late"),
     ("excitation_rad_s", "HEALTH", "excitation"),
 )
-_COUNTS = ("lost", "corrupt", "late")  # eight bits that wrap
+COUNTS = ("lost", "corrupt", "late")  # eight bits that wrap
 
 
 def build(recording: Recording, frames: Frames) -> Trace:
@@ -54,22 +55,30 @@ def build(recording: Recording, frames: Frames) -> Trace:
     count = len(recording.inputs.time)
     decoded = _Decoded(frames, sample, count)
     trace = _truth(recording)
-    for column, message, field in _MEASURED:
+    for column, message, field in MEASURED:
         trace[column] = decoded.at_samples(message, field)
-    for column, message, field in _ESTIMATED:
+    for column, message, field in ESTIMATED:
         trace[column] = decoded.at_samples(message, field)
-    for column, message, field in (*_quantities(recording.scenario.config.choices["model"]), *_HEALTH):
+    for column, message, field in (*quantity_fields(recording.scenario.config.choices["model"]), *HEALTH):
         trace[column] = decoded.held(message, field)
     trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
     return trace
 
 
-def _quantities(model: str) -> Iterator[tuple[str, str, str]]:
+def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:
     """Column, message and field of all that the estimator says of the pilot."""
     for quantity in quantities(model):
         values, sigmas = ("PILOT_DYNAMICS",) * 2 if quantity in DYNAMICS else ("PILOT_PARAMETERS", "PILOT_SIGMA")
         yield quantity.column("estimate"), values, quantity.key
         yield quantity.column("sigma"), sigmas, f"{quantity.key}_sigma"
+
+
+def recorded_name(column: str) -> str:
+    """The column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded of nis."""
+    for kind in ("_estimate", "_sigma"):
+        if kind in column:
+            return column.replace(kind, "_recorded" if kind == "_estimate" else "_recorded_sigma")
+    return f"{column}_recorded"
 
 
 def _truth(recording: Recording) -> Trace:
@@ -114,17 +123,17 @@ class _Decoded:
         """
         sample, fields = self._message(message)
         values = fields[field]
-        if field in _COUNTS and len(values):
+        if field in COUNTS and len(values):
             values = np.unwrap(values, period=256.0) - values[0]
         last = np.searchsorted(sample, np.arange(self._count), side="right")
         return np.concatenate(((np.nan,), values))[last]
 
 
-def write_csv(trace: Trace, path: Path) -> None:
+def write_csv(trace: Trace, file: Path | BinaryIO, *, header: bool = True) -> None:
     """trace.csv with six decimals; NaN stands as `NaN`, a whole number that is not known yet as nothing."""
     import polars
 
     columns = {name: polars.Series(values) for name, values in trace.items()}
     for name in WHOLE:
         columns[name] = columns[name].fill_nan(None).cast(polars.Int64)
-    polars.DataFrame(columns).write_csv(path, float_precision=6)
+    polars.DataFrame(columns).write_csv(file, include_header=header, float_precision=6)

@@ -52,8 +52,17 @@ def residual(trace: Mapping[str, FloatArray]) -> FloatArray | None:
 
 def measure(values: FloatArray, period: float) -> Whiteness | None:
     """Of a residual at samples `period` [s] apart, NaN where there is none; None when it is too short to tell."""
-    size = max(1, round(AVERAGE / period))
-    averages = _averages(values, size)
+    size = average_size(period)
+    return of_averages(averages(values, size), size * period)
+
+
+def average_size(period: float) -> int:
+    """Samples in an average."""
+    return max(1, round(AVERAGE / period))
+
+
+def of_averages(averages: FloatArray, step: float) -> Whiteness | None:
+    """measure() from averages that are `step` [s] apart."""
     known = np.isfinite(averages)
     count = int(known.sum())
     if count < 4 * LAGS:
@@ -67,20 +76,20 @@ def measure(values: FloatArray, period: float) -> Whiteness | None:
     correlation = [product / pair / variance for product, pair in zip(products, pairs, strict=True)]
     largest = max(range(LAGS), key=lambda index: abs(correlation[index]))
     return Whiteness(
-        average_s=size * period,
+        average_s=step,
         autocorrelation=correlation,
         band_95=_ONE / math.sqrt(count),
         largest=correlation[largest],
-        largest_after_s=(largest + 1) * size * period,
+        largest_after_s=(largest + 1) * step,
         white=all(abs(r) <= max(COLOURED, _ANY / math.sqrt(pair)) for r, pair in zip(correlation, pairs, strict=True)),
     )
 
 
-def _averages(values: FloatArray, size: int) -> FloatArray:
+def averages(values: FloatArray, size: int) -> FloatArray:
     """Of `size` values each; NaN where more than half are."""
     rows = values[: len(values) // size * size].reshape(-1, size)
     known = np.isfinite(rows)
     count = known.sum(axis=1)
     total = np.where(known, rows, 0.0).sum(axis=1)
-    averages: FloatArray = np.where(2 * count >= size, total / np.maximum(count, 1), np.nan)
-    return averages
+    means: FloatArray = np.where(2 * count >= size, total / np.maximum(count, 1), np.nan)
+    return means

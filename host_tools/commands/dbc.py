@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..tables import Row, add_json_option
@@ -20,6 +21,8 @@ examples:
   lever dbc
   lever dbc --path                                        where the DBC is, for other tools:
   candump -L vcan0 | cantools decode "$(lever dbc --path)"
+  lever dbc --wireshark ~/.config/wireshark/profiles/lever
+  candump -L vcan0 > flight.log; wireshark -C lever flight.log
 """
 
 
@@ -32,6 +35,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     output = parser.add_mutually_exclusive_group()
     output.add_argument("--path", action="store_true", help="print only the path of the installed lever.dbc")
+    output.add_argument(
+        "--wireshark",
+        metavar="DIR",
+        type=Path,
+        help="write a Wireshark profile with all signals, which reads no DBC, into the folder DIR",
+    )
     add_json_option(output)
 
 
@@ -41,6 +50,12 @@ def run(args: argparse.Namespace) -> int:
 
     if args.path:
         print(native_file("lever.dbc"))
+        return 0
+    if args.wireshark is not None:
+        from ..wireshark import write_profile
+
+        write_profile(args.wireshark)
+        print(f"Written to {args.wireshark}: for wireshark -C {args.wireshark.name} if that is where its profiles are")
         return 0
 
     from ..codec import database

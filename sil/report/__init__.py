@@ -12,16 +12,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.files import write_text
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .run import Run
 
 
 def write_report(trace: Mapping[str, NDArray[Any]], summary: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
     """Writes the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
     of summary.json, or empty. Raises LeverError when `path` cannot be written."""
-    from .page import build  # here, so that importing this package stays quick
-    from .run import Run
+    from .run import Run  # here, so that importing this package stays quick
 
-    write_text(path, build(Run(trace, summary)))
+    write_page(Run(trace, summary), path)
+
+
+def write_page(run: Run, path: str | os.PathLike[str]) -> None:
+    """write_report() of a run that may have kept less than a whole trace."""
+    from .page import build
+
+    write_text(path, build(run))

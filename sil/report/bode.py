@@ -44,13 +44,13 @@ _TRANSFERS: Mapping[str, Callable[[Lever, Array, Array], Transfer]] = {
 }
 
 
-def slow_trim(time: Array, theta: Array, corner: float) -> Array:
+def slow_trim(time: Array, theta: Array, corner: float, longest_step: float = LONGEST_STEP) -> Array:
     """The estimator's own idea of the trim angle [rad]: the slow part of θ, held over gaps (NaN); corner [Hz]."""
     trim = np.empty(len(theta))
     known = theta[np.isfinite(theta)]
     level = Detrend(float(known[0]) if known.size else 0.0)
     for index, (gap, angle) in enumerate(zip(np.diff(time, prepend=time[0]).tolist(), theta.tolist(), strict=True)):
         if angle == angle:
-            level.step(angle, corner, min(gap, LONGEST_STEP))
+            level.step(angle, corner, min(gap, longest_step))
         trim[index] = level.level
     return trim

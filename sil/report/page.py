@@ -4,7 +4,7 @@ import html
 from importlib.resources import files
 
 from . import models, words
-from .charts import health, signals, tracking, transfer
+from .charts import comparison, health, signals, tracking, transfer
 from .document import document
 from .figure import Figure
 from .run import Run
@@ -38,12 +38,13 @@ def build(run: Run) -> str:
     page = Page()
     _explained(page, run)
     _estimates(page, run)
+    _comparison(page, run)
     _transfer(page, run)
     _signals(page, run)
     _health(page, run)
     _numbers(page, run)
     scenario = run.summary.get("scenario", {})
-    title = scenario.get("title") or scenario.get("name") or "recorded run"
+    title = scenario.get("title") or scenario.get("name") or ", ".join(run.recording.get("logs", ())) or "recorded run"
     links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
     body = (
         f'<header><h1>Lever CDKF: {html.escape(title)}</h1><p class="subtitle">{_subtitle(run)}</p></header>'
@@ -54,8 +55,8 @@ def build(run: Run) -> str:
 
 
 def _subtitle(run: Run) -> str:
-    description = html.escape(run.summary.get("scenario", {}).get("description") or "")
-    length = f"{len(run.time):,} samples in {run.end:.0f} s.".replace(",", "\u2009")
+    description = html.escape(run.summary.get("scenario", {}).get("description") or words.recorded(run))
+    length = f"{run.samples:,} samples in {run.end:.0f} s.".replace(",", "\u2009")
     return f"{description} {length}".strip()
 
 
@@ -102,14 +103,33 @@ def _estimates(page: Page, run: Run) -> None:
     )
 
 
+def _comparison(page: Page, run: Run) -> None:
+    page.section(
+        "comparison",
+        "Recorded estimates",
+        "Against the estimates in the log",
+        page.figure(
+            "figure-comparison",
+            comparison.recorded(run),
+            "The log holds estimates already, of the firmware that ran when it was recorded: wide line. Thin line: the "
+            "same samples through this firmware, with the settings below. Where only one is seen, they are equal.",
+        ),
+        words.comparison_table(run),
+    )
+
+
 def _transfer(page: Page, run: Run) -> None:
     maps = transfer.maps(run)
-    captions = {
-        "truth": "<strong>Truth.</strong> Brightness is how many degrees the lever moves for 1 m/s² of floor motion, "
-        "over time and frequency. The white line is the natural frequency.",
-        "estimate": "<strong>Estimate.</strong> The same of the estimated parameters, same colours: the closer it "
-        "looks to the truth, the better.",
-    }
+    meaning = (
+        "Brightness is how many degrees the lever moves for 1 m/s² of floor motion, over time and frequency. The white "
+        "line is the natural frequency."
+    )
+    captions = {"truth": f"<strong>Truth.</strong> {meaning}", "estimate": f"<strong>Estimate.</strong> {meaning}"}
+    if "truth" in maps:
+        captions["estimate"] = (
+            "<strong>Estimate.</strong> The same of the estimated parameters, same colours: the closer it looks to the "
+            "truth, the better."
+        )
     pair = "".join(page.figure(f"figure-map-{name}", figure, captions[name]) for name, figure in maps.items())
     page.section(
         "bode",
@@ -125,6 +145,8 @@ def _transfer(page: Page, run: Run) -> None:
 
 
 def _signals(page: Page, run: Run) -> None:
+    true = run.first_name("theta_true_rad", "theta_dot_true_rad_s")
+    lies = f"Estimate and {'measurement' if true is None else 'truth'} lie on each other unless something is wrong."
     page.section(
         "states",
         "States",
@@ -138,8 +160,7 @@ def _signals(page: Page, run: Run) -> None:
         page.figure(
             "figure-motion",
             signals.motion(run),
-            "The whole run: the range that angle and rate covered in each short stretch of time. Estimate and truth "
-            "lie on each other unless something is wrong.",
+            f"The whole run: the range that angle and rate covered in each short stretch of time. {lies}",
         ),
         page.figure(
             "figure-innovations",
@@ -182,7 +203,7 @@ def _health(page: Page, run: Run) -> None:
 
 
 def _numbers(page: Page, run: Run) -> None:
-    tables = (words.errors_table(run), words.run_table(run)) if run.summary else ()
+    tables = (words.errors_table(run), words.run_table(run), words.recording_table(run)) if run.summary else ()
     page.section("numbers", "Numbers", "All numbers", *tables)
     scenario = {key: value for key, value in run.summary.get("scenario", {}).items() if key != "description"}
     rows = [(html.escape(key), html.escape(value)) for key, value in words.flat(scenario)]

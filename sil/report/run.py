@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from lever_cdkf.host_tools import native
@@ -13,7 +13,17 @@ from .. import quantities, whiteness
 from ..oracle.lever import Lever
 from ..quantities import Quantity
 from ..transfer import Transfer
-from .series import Array, jumps
+from .bode import slow_trim
+from .series import Array, jumps, welch
+
+
+class Averages(NamedTuple):
+    """NIS over stretches of `seconds` [s]: mean time [s], sum of NIS, and how many outputs are in it."""
+
+    time: Array
+    total: Array
+    freedom: Array
+    seconds: float
 
 
 class Run:
@@ -33,7 +43,12 @@ class Run:
 
     def first_of(self, *names: str) -> Array | None:
         """The first of several columns that is there."""
-        return next((values for name in names if (values := self.column(name)) is not None), None)
+        name = self.first_name(*names)
+        return None if name is None else self.column(name)
+
+    def first_name(self, *names: str) -> str | None:
+        """Its name."""
+        return next((name for name in names if self.column(name) is not None), None)
 
     def truth(self, quantity: Quantity) -> Array | None:
         return self.column(quantity.column("true"))
@@ -51,6 +66,12 @@ class Run:
         seen = (model for model in models if quantities.parameters(model)[0].column("estimate") in self.trace)
         told: str | None = self.summary.get("estimator", {}).get("model")
         return told or next(seen, native.Config().choices["model"])
+
+    @property
+    def recording(self) -> Mapping[str, Any]:
+        """What the summary tells of the log that was replayed; empty for a simulation."""
+        told: Mapping[str, Any] = self.summary.get("recording", {})
+        return told
 
     @property
     def parameters(self) -> tuple[Quantity, ...]:
@@ -84,6 +105,46 @@ class Run:
             return None
         at = np.maximum(np.searchsorted(told["time_s"], time, side="right") - 1, 0)
         return Transfer(np.array(told["numerator"])[at], np.array(told["denominator"])[at])
+
+    # What takes every sample to tell; a run that has kept fewer overrides these.
+
+    @property
+    def samples(self) -> int:
+        """How many there were."""
+        return len(self.time)
+
+    def close_up(self, start: float, seconds: float) -> Mapping[str, Array]:
+        """Every column at every sample of a stretch [s]."""
+        inside = (self.time >= start) & (self.time <= start + seconds)
+        return {name: np.asarray(values)[inside] for name, values in self.trace.items()}
+
+    def innovations(self, seconds: float) -> Averages | None:
+        """Of stretches of about `seconds` [s]; None without NIS."""
+        nis = self.column("nis")
+        if nis is None:
+            return None
+        size = max(1, round(seconds / self.sample_period))
+        return nis_averages(self.time, nis, self._outputs(), size, seconds)
+
+    def spectrum(self, name: str) -> tuple[Array, Array]:
+        """Frequencies [Hz] and power spectral density of a column."""
+        return welch(np.asarray(self.trace[name], dtype=np.float64), self.sample_period)
+
+    @cached_property
+    def followed_trim(self) -> Array | None:
+        """The estimator's own idea of the trim angle [rad]."""
+        theta = self.first_of("theta_estimate_rad", "theta_measured_rad")
+        return None if theta is None else slow_trim(self.time, theta, self.settings["trim_corner"])
+
+    def _outputs(self) -> Array:
+        """How many outputs each sample had."""
+        names = ("theta_measured_rad", "theta_dot_measured_rad_s")
+        return sum(
+            (np.isfinite(self.trace[name]).astype(float) for name in names if name in self.trace),
+            start=np.full(len(self.time), float(sum(name not in self.trace for name in names))),
+        )
+
+    # ---
 
     @property
     def end(self) -> float:
@@ -120,3 +181,12 @@ class Run:
     @cached_property
     def lever(self) -> Lever:
         return Lever.from_settings(self.settings, self.summary.get("estimator", {}).get("preload", "trim"))
+
+
+def nis_averages(time: Array, nis: Array, outputs: Array, size: int, seconds: float) -> Averages:
+    """Over stretches of `size` samples each, which are `seconds` [s] long."""
+    used = np.where(np.isfinite(nis) & (nis > 0.0), outputs, 0.0)  # 0: nothing was compared in that sample
+    whole = len(nis) // size * size
+    freedom = used[:whole].reshape(-1, size).sum(axis=1)
+    total = np.where(used > 0.0, nis, 0.0)[:whole].reshape(-1, size).sum(axis=1)
+    return Averages(time[:whole].reshape(-1, size).mean(axis=1), total, freedom, seconds)

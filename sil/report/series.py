@@ -65,21 +65,57 @@ def runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
 
-def welch(values: Array, sample_period: float, seconds: float = 4.0) -> tuple[Array, Array]:
-    """Frequencies [Hz] and one-sided power spectral density [unit²/Hz]: the mean over half-overlapping Hann windows.
+class Welch:
+    """One-sided power spectral density [unit²/Hz] of samples as they come: the mean over half-overlapping Hann windows.
 
     P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967). As scipy.signal.welch, whose import alone would take longer
-    than the rest of the report. Gaps (NaN) count as the mean.
+    than the rest of the report. Gaps (NaN) count as the mean of their window.
     """
-    filled = np.nan_to_num(values - np.nanmean(values)) if np.isfinite(values).any() else np.zeros(len(values))
-    length = min(len(filled), round(seconds / sample_period))
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
-    segments = np.lib.stride_tricks.sliding_window_view(filled, length)[:: max(1, length // 2)]
-    detrended = segments - segments.mean(axis=1, keepdims=True)
-    spectrum = np.fft.rfft(detrended * window, axis=1)
-    power: Array = (np.abs(spectrum) ** 2).mean(axis=0) * (sample_period / float(window @ window))
-    power[1 : (length + 1) // 2] *= 2.0
-    return np.fft.rfftfreq(length, sample_period).astype(np.float64), power
+
+    def __init__(self, sample_period: float, seconds: float = 4.0) -> None:
+        self._period = sample_period
+        self._length = max(1, round(seconds / sample_period))
+        self._rest = np.zeros(0)
+        self._power = np.zeros(self._length // 2 + 1)
+        self._windows = 0
+
+    def add(self, values: Array) -> None:
+        """Further samples."""
+        joined, hop = np.concatenate((self._rest, values)), max(1, self._length // 2)
+        if len(joined) < self._length:
+            self._rest = joined
+            return
+        windows = np.lib.stride_tricks.sliding_window_view(joined, self._length)[::hop]
+        self._power = self._power + self._density(windows).sum(axis=0)
+        self._windows += len(windows)
+        self._rest = joined[len(windows) * hop :].copy()
+
+    def spectrum(self) -> tuple[Array, Array]:
+        """Frequencies [Hz] and density; of what there is, if that is shorter than a window."""
+        if self._windows:
+            length, power = self._length, self._power / self._windows
+        else:
+            length, power = len(self._rest), self._density(self._rest[np.newaxis])[0]
+        return np.fft.rfftfreq(length, self._period).astype(np.float64), power
+
+    def _density(self, windows: Array) -> Array:
+        length = windows.shape[1]
+        known = np.isfinite(windows)
+        mean = np.where(known, windows, 0.0).sum(axis=1, keepdims=True) / np.maximum(
+            known.sum(axis=1, keepdims=True), 1
+        )
+        detrended = np.where(known, windows - mean, 0.0)
+        shape = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+        power: Array = np.abs(np.fft.rfft(detrended * shape, axis=1)) ** 2 * (self._period / float(shape @ shape))
+        power[:, 1 : (length + 1) // 2] *= 2.0
+        return power
+
+
+def welch(values: Array, sample_period: float, seconds: float = 4.0) -> tuple[Array, Array]:
+    """Frequencies [Hz] and power spectral density of a whole column, by Welch."""
+    averaged = Welch(sample_period, seconds)
+    averaged.add(values)
+    return averaged.spectrum()
 
 
 def chi_square_band(freedom: Array) -> tuple[Array, Array]:

@@ -142,6 +142,53 @@ def _times(values: Sequence[float | None] | None) -> str:
     return ", ".join("never" if value is None else f"{value:.2f}" for value in values) if values else NOTHING
 
 
+def comparison_table(run: Run) -> str:
+    """Replayed minus recorded, signal by signal."""
+    told = run.summary.get("comparison") or {}
+    header = ("", "unit", "samples", "identical", "mean", "rms", "largest", "at [s]", "rms ÷ σ")
+    keys = ("unit", "samples", "identical_samples", "bias", "rms", "largest", "largest_at_s", "rms_in_sigma")
+    signals = told.get("signals", {}).items()
+    return table(header, [(name, *(number(each[key]) for key in keys)) for name, each in signals]) if signals else ""
+
+
+def recorded(run: Run) -> str:
+    """Where the samples come from, in a sentence; empty for a simulation."""
+    told = run.recording
+    if not told:
+        return ""
+    start = f" from {told['start']} on" if told["start"] else ""
+    return f"A log, replayed: bus {told['channel']}{start}."
+
+
+_RECORDING_FIGURES = (
+    ("frames", "frames in the log", ""),
+    ("damaged_lines", "damaged lines", ""),
+    ("refused", "frames that the estimator refused", ""),
+    ("repeated", "frames that repeat the one before", ""),
+    ("corrupt_recorded_answers", "corrupt recorded estimates", "frames"),
+    ("commands", "COMMAND frames", ""),
+    ("gaps", "gaps between samples", ""),
+    ("longest_gap_s", "longest gap", "s"),
+    ("late_samples", "samples not newer than the one before", ""),
+    ("clock_wraps", "wraps of the sample time", ""),
+    ("clock_restarts", "restarts of the sender's clock", ""),
+    ("recorder_clock_jumps", "jumps of the recorder's clock", ""),
+)
+
+
+def recording_table(run: Run) -> str:
+    """What was in the log."""
+    told = run.recording
+    if not told:
+        return ""
+    rows = [(label, number(told[key]), unit) for key, label, unit in _RECORDING_FIGURES]
+    rows += [
+        (f"left out: {kind.replace('_', ' ')}", number(count), "frames")
+        for kind, count in told["frames_left_out"].items()
+    ]
+    return table(("the log", "value", "unit"), rows)
+
+
 RUN_FIGURES = (
     ("samples", "samples", ""),
     ("lost", "lost", "frames"),

@@ -24,6 +24,7 @@ TIME_LIMIT = "120"
 
 NEEDED = {
     "tests/vcan": pytest.mark.requires("ip", "candump", "linux.uml"),
+    "tests/target": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
     "lever flash": pytest.mark.requires("arm-none-eabi-gcc", "openocd"),
     "lever qemu": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
 }

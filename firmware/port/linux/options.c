@@ -2,6 +2,8 @@
 
 #include "port/linux/options.h"
 
+#include "lever_build.h"
+
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
@@ -162,7 +164,7 @@ bool options_read(options_t *options, int argc, char *argv[], settings_error_t *
     int which = 0;
 
     (void)memset(options, 0, sizeof *options);
-    lever_config_default(&options->config);
+    lever_build_config(&options->config);
     opterr = 0;
     optind = 0; /* from the start, also when called again */
     for (int option = 0; option != -1;) {
@@ -184,7 +186,7 @@ void options_print_help(void)
 {
     lever_config_t config;
 
-    lever_config_default(&config);
+    lever_build_config(&config);
     (void)fputs(help, stdout);
     (void)puts("Settings, with their defaults:\n");
     settings_write(&config, stdout);

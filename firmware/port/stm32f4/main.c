@@ -2,6 +2,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "lever_build.h"
 #include "lever_cdkf.h"
 #include "port/embedded/loop.h"
 #include "port/embedded/port.h"
@@ -81,7 +82,7 @@ static lever_t *configure(void)
 {
     lever_config_t config;
 
-    lever_config_default(&config);
+    lever_build_config(&config);
     return lever_init(&memory, &config);
 }
 

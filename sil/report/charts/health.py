@@ -25,6 +25,7 @@ FAULT_WORDS = {
     "bound": "parameter at its bound",
     "recovered": "filter restarted",
     "change": "sudden change noticed",
+    "platform": "machine reports a fault",
 }
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...quantities import DYNAMICS
 from ..figure import Figure, Spec, axis, axis_range, band, dots, frequency_axis, line, time_axis
 from ..run import Run
-from ..series import Array, chi_square_band, envelope, packed, spread_indices, welch
+from ..series import Array, chi_square_band, envelope, packed, spread_indices
 
 DEGREES = 180.0 / np.pi
 STATES = (("theta", "_rad", "angle θ [deg]"), ("theta_dot", "_rad_s", "rate θ̇ [deg/s]"))
@@ -34,17 +34,17 @@ def detail(run: Run, seconds: float = 2.0, points: int = 1000) -> Figure | None:
     owners: list[int] = []
     starts = _stretches(run, seconds)
     for number, start in enumerate(starts.values()):
-        inside = np.flatnonzero((run.time >= start) & (run.time <= start + seconds))
-        inside = inside[spread_indices(len(inside), points)]
+        close = run.close_up(start, seconds)
+        chosen = spread_indices(len(close["time_s"]), points)
         for row, (key, suffix, _) in enumerate(STATES):
             for kind, draw in (("measured", dots), ("true", line), ("estimate", line)):
-                values = run.column(f"{key}_{kind}{suffix}")
-                if values is not None:
+                column = f"{key}_{kind}{suffix}"
+                if run.column(column) is not None:
                     name, more = _look(kind)
                     shown = {"visible": number == 0, "showlegend": row == 0}
                     colour = "measured" if kind == "measured" else name
-                    trace = draw(run.time[inside], DEGREES * values[inside], name, colour, row, **more, **shown)
-                    figure.traces.append(trace)
+                    x, y = close["time_s"][chosen], DEGREES * close[column][chosen]
+                    figure.traces.append(draw(x, y, name, colour, row, **more, **shown))
                     owners.append(number)
     if not figure.traces:
         return None
@@ -83,29 +83,20 @@ def _stretches(run: Run, seconds: float) -> dict[str, float]:
 
 def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
     """Normalised innovation squared per output, averaged over short stretches, and the band that chance alone gives."""
-    nis = run.column("nis")
-    if nis is None:
+    averages = run.innovations(seconds)
+    if averages is None or not (known := averages.freedom > 0).any():
         return None
-    outputs = sum(
-        np.isfinite(run.trace[name]).astype(float) if name in run.trace else np.ones(len(nis))
-        for name in ("theta_measured_rad", "theta_dot_measured_rad_s")
+    time, freedom, ratio = (
+        averages.time[known],
+        averages.freedom[known],
+        averages.total[known] / averages.freedom[known],
     )
-    used = np.where(np.isfinite(nis) & (nis > 0.0), outputs, 0.0)  # 0: nothing was compared in that sample
-    size = max(1, round(seconds / run.sample_period))
-    whole = len(nis) // size * size
-    freedom = used[:whole].reshape(-1, size).sum(axis=1)
-    total = np.where(used > 0.0, nis, 0.0)[:whole].reshape(-1, size).sum(axis=1)
-    time = run.time[:whole].reshape(-1, size).mean(axis=1)
-    known = freedom > 0
-    if not known.any():
-        return None
-    time, freedom, ratio = time[known], freedom[known], total[known] / freedom[known]
     low, high = chi_square_band(freedom)
     greatest = float(ratio.max())
     scale = {"type": "log"} if greatest > 10.0 else {"range": [0.0, max(2.0, 1.1 * greatest)]}
     figure = Figure([axis("NIS per output [1]", **scale)], time_axis(run.end), 280)
     figure.add(*band(time, low, high, "95 % of an honest filter", "chance-band"))
-    figure.add(dots(time, ratio, f"average over {seconds:g} s", "estimate"))
+    figure.add(dots(time, ratio, f"average over {averages.seconds:g} s", "estimate"))
     figure.mark(run.changes)
     return figure
 
@@ -156,17 +147,17 @@ def excitation(run: Run) -> Figure | None:
 
 def spectra(run: Run) -> Figure | None:
     """At which frequencies base and motor shake the lever."""
-    base = run.first_of("z_ddot_true_m_s2", "z_ddot_measured_m_s2")
-    torque = run.first_of("tau_m_true_N_m", "tau_m_measured_N_m")
-    if base is None or torque is None or len(run.time) < 16:
+    base = run.first_name("z_ddot_true_m_s2", "z_ddot_measured_m_s2")
+    torque = run.first_name("tau_m_true_N_m", "tau_m_measured_N_m")
+    if base is None or torque is None or run.samples < 16:
         return None
     titles = ("z̈ [m/s² per √Hz]", "τ<sub>m</sub> [N m per √Hz]")
     rows = [axis(title, type="log", dtick=1, exponentformat="power") for title in titles]
     figure = Figure(rows, frequency_axis(0.25, 50.0), 420, over_time=False)
-    for row, (values, name, colour) in enumerate(
+    for row, (column, name, colour) in enumerate(
         ((base, "base acceleration z̈", "base"), (torque, "motor torque τ<sub>m</sub>", "torque"))
     ):
-        frequency, power = welch(values, run.sample_period)
+        frequency, power = run.spectrum(column)
         shown = (frequency >= 0.25) & (frequency <= 50.0)
         amplitude = np.sqrt(power[shown])
         if amplitude.any():

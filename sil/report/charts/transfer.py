@@ -6,7 +6,7 @@ import numpy as np
 
 from ...quantities import DYNAMICS
 from .. import bode
-from ..bode import FREQUENCIES, slow_trim
+from ..bode import FREQUENCIES
 from ..figure import TICKS, Figure, Spec, axis, axis_range, frequency_axis, line, time_axis
 from ..run import Run
 from ..series import Array, packed, spread_indices
@@ -24,11 +24,10 @@ def _responses(run: Run, count: int) -> tuple[Array, dict[str, np.ndarray]]:
     known = run.first_of(*(quantity.column("estimate") for quantity in run.parameters))
     started = np.flatnonzero(np.isfinite(run.time if known is None else known))
     chosen = started[spread_indices(len(started), count)]
-    theta = run.first_of("theta_estimate_rad", "theta_measured_rad")
+    followed = run.followed_trim
     found: dict[str, np.ndarray] = {}
-    if theta is None:
+    if followed is None:
         return run.time[chosen], found
-    followed = slow_trim(run.time, theta, run.settings["trim_corner"])
     true_trim = run.column("trim_true_rad")
     if (other := run.true_transfer(run.time[chosen])) is not None:
         found["truth"] = DEGREES * other.response(FREQUENCIES)

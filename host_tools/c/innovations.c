@@ -1,0 +1,107 @@
+/* The likelihood by the prediction error decomposition (Schweppe 1965): the density of all samples is the product of what was
+ * predicted for each, given those before it. The prediction for a sample is normal about x, with the covariance
+ *     S_x S_x^T + T T^T + R
+ * of the belief in filter/dual.h and the noise of the outputs. Samples from which the parameters learn together (learn_period)
+ * count as if each were predicted by itself, as the firmware's own NIS has it; what they have in common is second order.
+ */
+#include "innovations.h"
+
+/* The seam: filter/dual.c with another name for one function, whose caller in app/ comes to the one below instead. */
+#define dual_update firmware_update
+#include "filter/dual.c"
+#undef dual_update
+
+#include "app/link.h"
+#include "lever_cdkf.h"
+
+#include <stddef.h>
+
+float dual_update(dual_t *dual, const measurement_t *measurement, bool learn);
+
+#define PARAMETERS ((uint32_t)MODEL_PARAMETERS)
+#define BOTH ((uint32_t)INNOVATION_OUTPUTS)
+#define LN_TURN 1.8378770664093453 /* ln 2 pi */
+
+static innovation_t *current; /* of the sample that the estimator is taking; NULL: nobody asks */
+
+static double squared(double x)
+{
+    return x * x;
+}
+
+/* Notes what is predicted for a sample. An output that was not measured has no innovation, and counts in units of its own, so
+ * that it has no part in determinants. */
+static void note_prediction(dual_t *dual, const measurement_t *measurement, innovation_t *innovation)
+{
+    const state_filter_t *state = &dual->state;
+    const float *t = parameter_filter_sensitivity(&dual->parameters);
+    const bool both = measurement->valid[0] && measurement->valid[1];
+    double a = squared(state->s[0]) + squared(state->output_noise[0]);
+    double b = (double)state->s[0] * (double)state->s[2];
+    double d = squared(state->s[2]) + squared(state->s[3]) + squared(state->output_noise[1]);
+    for (uint32_t j = 0u; j < PARAMETERS; j++) {
+        a += squared(t[j]);
+        b += (double)t[j] * (double)t[PARAMETERS + j];
+        d += squared(t[PARAMETERS + j]);
+    }
+    double nu[INNOVATION_OUTPUTS];
+    const double variance[INNOVATION_OUTPUTS] = {a, d};
+    for (uint32_t i = 0u; i < BOTH; i++) {
+        const bool valid = measurement->valid[i];
+        nu[i] = valid ? ((double)measurement->y[i] - (double)state->x[i]) : 0.0;
+        innovation->value[i] = (float)nu[i];
+        innovation->sigma[i] = valid ? (float)sqrt(variance[i]) : 0.0f;
+        innovation->size = (uint8_t)(innovation->size + (valid ? 1u : 0u));
+    }
+    a = measurement->valid[0] ? a : 1.0;
+    b = both ? b : 0.0;
+    d = measurement->valid[1] ? d : 1.0;
+    const double determinant = (a * d) - squared(b);
+    const double nis = ((d * squared(nu[0])) - (2.0 * b * nu[0] * nu[1]) + (a * squared(nu[1]))) / determinant;
+    innovation->nis = (float)nis;
+    innovation->log_likelihood = -0.5 * (nis + log(determinant) + (LN_TURN * (double)innovation->size));
+}
+
+float dual_update(dual_t *dual, const measurement_t *measurement, bool learn)
+{
+    if (current != NULL) {
+        note_prediction(dual, measurement, current);
+        current->learns = learn;
+    }
+    return firmware_update(dual, measurement, learn);
+}
+
+bool innovation_run(
+    const lever_config_t *config, const lever_sample_t *samples, uint32_t count, innovation_t *innovations)
+{
+    static lever_memory_t memory;
+    lever_t *lever = lever_init(&memory, config);
+    (void)memset(innovations, 0, (size_t)count * sizeof innovations[0]);
+    for (uint32_t k = 0u; (lever != NULL) && (k < count); k++) {
+        current = &innovations[k];
+        (void)lever_update(lever, &samples[k]);
+    }
+    current = NULL;
+    return lever != NULL;
+}
+
+uint32_t innovation_samples(const lever_frame_t *frames, uint32_t count, lever_sample_t *samples,
+    lever_config_t *config, lever_health_t *health)
+{
+    static estimator_t estimator;
+    static link_t link;
+    uint32_t taken = 0u;
+    lever_config_default(config);
+    estimator_init(&estimator, config);
+    link_init(&link);
+    for (uint32_t k = 0u; k < count; k++) {
+        if (link_on_frame(&link, &estimator, &frames[k]) == LEVER_FRAME_SAMPLE) {
+            samples[taken] = link.sample;
+            taken++;
+            (void)link_step(&link, &estimator);
+        }
+    }
+    *config = estimator.config;
+    estimator_health(&estimator, health);
+    return taken;
+}

@@ -1,0 +1,169 @@
+"""`lever record`."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import LeverError
+from ..tables import Row, add_json_option
+
+if TYPE_CHECKING:
+    from ..recorder import Recorder
+
+_DESCRIPTION = """\
+Records everything on a CAN bus, through any interface of python-can, into a log in the format of candump -L, for
+`lever replay`, `lever tune`, canplayer and the like. Frames that were lost before they came here are told from the E2E
+counters of the messages of lever.dbc, damaged ones from their CRC. Ctrl-C ends the recording.
+
+Until it has ended the log is called FILE.partial. What keeps that name broke off: the disk was full, the bus failed.
+"""
+_EPILOG = """\
+examples:
+  lever record --interface socketcan --channel can0
+  lever record --interface socketcan --channel can0 -o flight.log --duration 3600
+  lever record --interface slcan --channel /dev/ttyACM0 --bitrate 1000000 -o bench.log
+
+Exit status: 0 when FILE is complete (losses on the bus are told, but are no error), 2 when the recording broke off.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "record", help="record a CAN bus into a log, with losses counted", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    parser.add_argument(
+        "--interface", required=True, help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …"
+    )
+    parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
+    parser.add_argument("--bitrate", type=int, help="[bit/s] for interfaces that set it")
+    parser.add_argument(
+        "--option", metavar="KEY=VALUE", action="append", default=[], help="more for the interface; may be repeated"
+    )
+    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="the log (default: lever_DATE_TIME.log)")
+    parser.add_argument("--duration", metavar="SECONDS", type=_seconds, help="end after so long (default: at Ctrl-C)")
+    add_json_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..recorder import Recorder
+    from ..tables import print_tables
+    from ..watch.sources import open_bus
+
+    out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))
+    options = dict(_option(text) for text in args.option)
+    if args.bitrate is not None:
+        options["bitrate"] = args.bitrate
+    with open_bus(args.interface, args.channel, options) as bus, _stopping() as stopped:
+        recorder = Recorder(bus, out, args.channel or args.interface)
+        print(f"recording {bus.channel_info} into {out}; Ctrl-C ends", file=sys.stderr)
+        line = _Line()
+
+        def ended() -> bool:
+            return bool(stopped) or (args.duration is not None and recorder.elapsed >= args.duration)
+
+        try:
+            recorder.run(ended, line.show)
+        finally:
+            line.end()
+    print_tables({"recorded": _rows(recorder)}, args.json)
+    print(f"{out}: {_told(recorder)}")
+    return 0
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 < seconds < float("inf"):
+        raise ValueError
+    return seconds
+
+
+def _option(text: str) -> tuple[str, Any]:
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise LeverError(f"--option {text}: must be KEY=VALUE")
+    return key, int(value) if value.lstrip("-").isdigit() else value
+
+
+@contextmanager
+def _stopping() -> Iterator[list[int]]:
+    """A list that holds the signal, once Ctrl-C or SIGTERM has come."""
+    came: list[int] = []
+    before = {
+        number: signal.signal(number, lambda got, _: came.append(got)) for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield came
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class _Line:
+    """How it goes: one line that is written over on a terminal, a line now and then elsewhere."""
+
+    _BETWEEN_LINES = 30.0  # [s] where nobody looks
+
+    def __init__(self) -> None:
+        self._on_terminal = sys.stderr.isatty()
+        self._told = time.monotonic()
+        self._last = 0
+        self._at = 0.0
+
+    def show(self, recorder: Recorder) -> None:
+        rate = (recorder.frames - self._last) / max(recorder.elapsed - self._at, 1e-9)
+        self._last, self._at = recorder.frames, recorder.elapsed
+        text = f"{recorder.elapsed:.0f} s, {rate:.0f} frames/s, {_told(recorder)}"
+        if self._on_terminal:
+            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+        elif time.monotonic() - self._told >= self._BETWEEN_LINES:
+            self._told = time.monotonic()
+            print(f"lever: record: {text}", file=sys.stderr)
+
+    def end(self) -> None:
+        if self._on_terminal:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _told(recorder: Recorder) -> str:
+    told = [
+        f"{recorder.frames} frames",
+        f"{recorder.lost} lost",
+        f"{recorder.corrupt} corrupt",
+        f"{recorder.error_frames} error frames",
+        f"controller {recorder.bus_state}",
+    ]
+    if recorder.left_active:
+        told.append(f"not active {recorder.left_active} times")
+    if recorder.overflows:
+        told.append(f"{recorder.overflows} overflows of the controller")
+    return ", ".join(told)
+
+
+def _rows(recorder: Recorder) -> list[Row]:
+    rows: list[Row] = [
+        {
+            "message": each.name,
+            "id": f"{each.identifier:#05x}",
+            "frames": each.frames,
+            "rate [1/s]": each.frames / max(recorder.elapsed, 1e-9),
+            "lost": each.lost,
+            "repeated": each.repeated,
+            "corrupt": each.corrupt,
+        }
+        for each in recorder.messages.values()
+        if each.frames
+    ]
+    rest: Row = {
+        "message": "others",
+        "id": "",
+        "frames": recorder.others,
+        "rate [1/s]": recorder.others / recorder.elapsed,
+    }
+    return [*rows, {**rest, "lost": None, "repeated": None, "corrupt": None}]

@@ -1,0 +1,152 @@
+"""The picture of the estimator as tables of text, for a terminal or a file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.console import JustifyMethod
+from rich.table import Table
+from rich.text import Text
+
+from . import words
+from .model import STEP, Estimated, Picture
+from .sources import Source
+
+NOTHING = "–"
+_BLOCKS = "▁▂▃▄▅▆▇█"
+_TREND_MEAN = 1.0  # [s] of the means that a trend is the difference of
+_COLOURS = {"good": "green", "watch": "yellow", "bad": "bold red"}
+_UNIT = {"1": "", "N s/m": "N s/m", "1/s^2": "1/s²"}
+_COLUMNS: tuple[tuple[JustifyMethod, int], ...] = (
+    *(("left", 17), ("right", 8), ("right", 8)),
+    *(("left", 6), ("right", 6), ("right", 9)),
+)
+ESTIMATES_WIDTH = sum(width + 1 for _, width in _COLUMNS)
+"""Of estimates() without its sparkline."""
+
+
+def headline(picture: Picture, source: Source) -> Text:
+    """What is watched, since when, and how it stands."""
+    minutes, seconds = divmod(int(picture.now), 60)
+    model = f" · model {picture.model}" if picture.model else ""
+    return Text(f"{source.title}{model} · watching for {minutes}:{seconds:02d} min", style="bold", no_wrap=True)
+
+
+def condition(picture: Picture, source: Source) -> Text:
+    """One line on how it stands."""
+    if source.error is not None:
+        return Text(f"● {source.error}", style=_COLOURS["bad"], no_wrap=True, overflow="ellipsis")
+    if source.ended:
+        return Text("● the end: nothing more will come", style=_COLOURS["watch"], no_wrap=True)
+    level, text = words.condition(picture)
+    return Text(f"● {text}", style=_COLOURS[level], no_wrap=True, overflow="ellipsis")
+
+
+def estimates(picture: Picture, span: float, width: int) -> Table:
+    """Parameters and dynamics with sigma, and how they went in the last `span` seconds; `width` [characters]."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    for justify, column_width in _COLUMNS:
+        table.add_column(justify=justify, width=column_width, no_wrap=True)
+    sparkline_width = max(0, width - ESTIMATES_WIDTH)
+    table.add_column(width=sparkline_width, no_wrap=True)
+    titles = ("", "estimate", "± σ", "unit", "σ [%]", f"{span:.0f} s [%]", "trend" if sparkline_width > 5 else "")
+    table.add_row(*(Text(title, style="dim") for title in titles))
+    for entry in (*picture.parameters(), *picture.dynamics()):
+        recent = _recent(picture, entry.key, span)
+        table.add_row(
+            Text(entry.key, style="bold"),
+            Text(_number(entry.value), style="bold"),
+            f"± {_number(entry.sigma, 2)}",
+            _UNIT.get(entry.unit, entry.unit),
+            _number(100.0 * entry.sigma / abs(entry.value) if entry.value else math.nan, 2),
+            _change(entry, recent),
+            Text(sparkline(recent, entry.sigma, sparkline_width), style="cyan"),
+        )
+    if not picture.parameters():
+        table.add_row(Text("parameters", style="bold"), Text("none yet", style="dim"))
+    return table
+
+
+def sparkline(values: Sequence[float], least_range: float, width: int) -> str:
+    """The values as blocks, oldest left; a range smaller than `least_range` does not fill the height."""
+    if width < 1 or not values:
+        return ""
+    chosen = [values[min(len(values) - 1, int((k + 0.5) * len(values) / width))] for k in range(width)]
+    known = [value for value in chosen if math.isfinite(value)]
+    if not known:
+        return ""
+    low, high = min(known), max(known)
+    least = least_range if math.isfinite(least_range) else 0.0
+    half = max(high - low, least, 1e-12 * max(abs(low), abs(high)), 1e-30) / 2.0
+    bottom = (low + high) / 2.0 - half
+    steps = len(_BLOCKS) - 1
+    return "".join(_BLOCKS[round((v - bottom) / (2.0 * half) * steps)] if math.isfinite(v) else " " for v in chosen)
+
+
+def health(picture: Picture, source: Source) -> Table:
+    """Mode, faults in words, counts, and how well it can learn."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column()
+    told = words.faults(picture)
+    style = "yellow" if told else "green"
+    counts = picture.counts
+    table.add_row("mode", Text(picture.mode or NOTHING, style="bold"))
+    faults = "; ".join(told) or ("none" if picture.mode else NOTHING)
+    table.add_row("faults", Text(faults, style=style if picture.mode else "dim"))
+    table.add_row("it counts", f"{counts['lost']} lost, {counts['corrupt']} corrupt, {counts['late']} late")
+    table.add_row("excitation", f"{_number(picture.field('HEALTH', 'excitation'), 2)} rad/s")
+    table.add_row("dither", f"{picture.dither():.3f} N m rms" if picture.dither() > 0.0 else "off")
+    table.add_row("mean NIS", f"{_number(picture.nis())} (honest: 2)")
+    table.add_row("theta", f"{_number(math.degrees(picture.theta()))} deg")
+    if picture.is_fresh("PLATFORM_HEALTH"):
+        errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]
+        table.add_row("machine", f"TEC {errors[0]}, REC {errors[1]}, off the bus {counts['bus_offs']}")
+        table.add_row("", f"{counts['overruns']} overruns, {counts['dropped']} dropped")
+    others = [("other frames", picture.foreign), ("error frames", picture.error_frames), ("unseen", source.dropped)]
+    for name, count in others:
+        if count:
+            table.add_row(name, str(count))
+    return table
+
+
+def messages(picture: Picture) -> Table:
+    """Rates and losses of each message of the DBC."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    table.add_column(no_wrap=True)
+    for _ in range(4):
+        table.add_column(justify="right", no_wrap=True)
+    table.add_row(*(Text(title, style="dim") for title in ("message", "[1/s]", "lost", "corrupt", "again")))
+    for entry in picture.traffic.values():
+        there = entry.heard is not None or entry.corrupt > 0
+        cells = [f"{entry.rate:.0f}" if there and math.isfinite(entry.rate) else NOTHING]
+        cells += [str(n) if there else NOTHING for n in (entry.lost, entry.corrupt, entry.repeated)]
+        bad = entry.lost or entry.corrupt or entry.repeated
+        table.add_row(entry.name, *cells, style="yellow" if bad else "" if there else "dim")
+    return table
+
+
+def _number(value: float, digits: int = 4) -> str:
+    if not math.isfinite(value):
+        return NOTHING
+    if value == 0.0:
+        return "0"
+    decimals = min(5, max(0, digits - 1 - math.floor(math.log10(abs(value)))))
+    return f"{value:.{decimals}f}"
+
+
+def _recent(picture: Picture, key: str, span: float) -> list[float]:
+    column = picture.history.get(key, ())
+    return list(column)[-max(1, round(span / STEP)) :]
+
+
+def _change(entry: Estimated, recent: Sequence[float]) -> str:
+    """By how much it has changed [%], with an arrow where that is more than its sigma."""
+    few = max(1, round(_TREND_MEAN / STEP))
+    known = [value for value in recent if math.isfinite(value)]
+    if len(known) < 2 * few or not entry.value or not math.isfinite(entry.value):
+        return NOTHING
+    difference = sum(known[-few:]) / few - sum(known[:few]) / few
+    arrow = "→" if not abs(difference) > entry.sigma else "↗" if difference > 0.0 else "↘"
+    return f"{100.0 * difference / abs(entry.value):+.1f} {arrow}"

@@ -1,0 +1,214 @@
+"""Where the frames of a view come from: a bus, or a recorded log at the pace of its time stamps.
+
+A thread of the source takes frames as they come and does nothing else with them; they wait, at most MOST_WAITING, until
+the view takes them at its own rate. The view may therefore be as slow as it likes: the bus does not notice.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from .. import codec
+from ..errors import LeverError
+from .model import ERROR, FOREIGN, STEP, Frame, Picture
+
+if TYPE_CHECKING:
+    import can
+
+MOST_WAITING = 65536
+"""Frames: eight seconds of a full bus of 1 Mbit/s."""
+LONGEST_PAUSE = 5.0
+"""[s] A longer gap of a log is not waited for."""
+_LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
+KEEP: dict[str, codec.Value] = {
+    "model": "keep",
+    "preload": "keep",
+    "estimator": "keep",
+    "adaptation": "keep",
+    "dither_rms": math.inf,
+}
+"""A COMMAND that changes nothing; infinity saturates at the value that keeps the dither."""
+
+
+class Source(ABC):
+    """Frames from a thread that run() is, between start() and stop()."""
+
+    title = ""
+    """What is watched, for people."""
+    takes_commands = False
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        """Frames that nobody took in time."""
+        self.ended = False
+        """Whether no more will come, though nobody has called stop()."""
+        self.error: str | None = None
+        """Why not, when something went wrong."""
+        self._waiting: deque[Frame] = deque(maxlen=MOST_WAITING)
+        self._start = time.monotonic()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="lever frames", daemon=True)
+
+    @abstractmethod
+    def run(self) -> None:
+        """Puts frames until self._stopping is set or none are left. Raises what went wrong."""
+
+    def start(self) -> None:
+        self._start = time.monotonic()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ends the thread and releases what it used; may be called again."""
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=3.0)
+
+    @property
+    def now(self) -> float:
+        """[s] since start()."""
+        return time.monotonic() - self._start
+
+    def drain(self) -> list[Frame]:
+        """The frames that have come since the last call."""
+        return [self._waiting.popleft() for _ in range(len(self._waiting))]
+
+    def command(self, values: Mapping[str, codec.Value]) -> None:
+        """Sends a COMMAND: the fields of the message; those not given change nothing. Raises LeverError."""
+        raise LeverError(f"{self.title} takes no commands")
+
+    def _put(self, frame: Frame) -> None:
+        if len(self._waiting) == MOST_WAITING:
+            self.dropped += 1
+        self._waiting.append(frame)
+
+    def _run(self) -> None:
+        try:
+            self.run()
+        except Exception as error:  # whatever a bus or a reader comes up with is for the view to show, in one line
+            if not self._stopping.is_set():
+                self.error = " ".join(str(error).split()) or type(error).__name__
+        self.ended = not self._stopping.is_set()
+
+
+class BusSource(Source):
+    """Any python-can bus. Nothing is sent but by command()."""
+
+    takes_commands = True
+
+    def __init__(self, interface: str, channel: str | None, options: Mapping[str, Any] | None = None) -> None:
+        """Opens the bus. Raises LeverError."""
+        super().__init__()
+        self.title = interface if channel is None else f"{interface} {channel}"
+        self._bus = open_bus(interface, channel, options or {})
+        self._commands = 0
+
+    def run(self) -> None:
+        receive, put, stopping = self._bus.recv, self._put, self._stopping
+        while not stopping.is_set():
+            message = receive(_LISTEN)
+            if message is not None:
+                put(as_frame(message))
+
+    def stop(self) -> None:
+        super().stop()
+        self._bus.shutdown()
+
+    def command(self, values: Mapping[str, codec.Value]) -> None:
+        import can
+
+        frame = command_frame(self._commands, values)
+        self._commands += 1
+        try:
+            self._bus.send(can.Message(arbitration_id=frame[0], is_extended_id=False, data=frame[1]), timeout=0.5)
+        except can.CanError as error:
+            raise LeverError(f"{self.title} did not take the command: {error}") from None
+        self._put(frame)
+
+
+class LogSource(Source):
+    """A recorded log in any format that python-can reads; `channel` chooses among several in it."""
+
+    def __init__(self, path: str, channel: str | None = None) -> None:
+        """Opens the log. Raises LeverError."""
+        import can
+
+        super().__init__()
+        self.title = path
+        self._channel = channel
+        try:
+            self._reader = can.LogReader(path)
+        except (OSError, ValueError, ImportError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise LeverError(f"cannot read {path}: {reason}") from None
+
+    def run(self) -> None:
+        due = time.monotonic()
+        for pause, frame in self._frames():
+            due += pause
+            wait = due - time.monotonic()
+            if wait > 0.0 and self._stopping.wait(wait):
+                return
+            self._put(frame)
+
+    def read_into(self, picture: Picture) -> None:
+        """The whole log at once, as if it had been played to its end. Raises LeverError."""
+        now, due, batch = 0.0, STEP, list[Frame]()
+        for pause, frame in self._frames():
+            now += pause
+            if now >= due:
+                picture.take(batch, now)
+                due, batch = now + STEP, []
+            batch.append(frame)
+        picture.take(batch, now)
+
+    def _frames(self) -> Iterator[tuple[float, Frame]]:
+        """Each frame with the time after the one before it [s]; a clock that went back or jumped far counts as 0."""
+        last, any_yet = math.inf, False
+        try:
+            for message in self._reader:
+                if self._channel is not None and message.channel != self._channel:
+                    continue
+                pause = message.timestamp - last
+                last, any_yet = message.timestamp, True
+                yield (min(pause, LONGEST_PAUSE) if pause > 0.0 else 0.0), as_frame(message)
+        except Exception as error:  # a reader fails as its format has it: ValueError, struct.error, KeyError …
+            raise LeverError(f"{self.title}: not to be read any further: {error or type(error).__name__}") from None
+        finally:
+            self._reader.stop()
+        if not any_yet:
+            where = "" if self._channel is None else f" of channel {self._channel}"
+            raise LeverError(f"{self.title}: no CAN frame{where} in it")
+
+
+def as_frame(message: can.Message) -> Frame:
+    """What a view needs of a python-can message."""
+    if message.is_error_frame:
+        return ERROR, b""
+    if message.is_extended_id or message.is_remote_frame or message.is_fd:
+        return FOREIGN, b""
+    return message.arbitration_id, message.data
+
+
+def command_frame(counter: int, values: Mapping[str, codec.Value]) -> tuple[int, bytes]:
+    """A COMMAND that changes only `values`. Raises CodecError."""
+    data = codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
+    return codec.message("COMMAND").frame_id, data
+
+
+def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) -> can.BusABC:
+    """A python-can bus. Raises LeverError."""
+    import can
+
+    given: dict[str, Any] = {"sleep_after_open": 0.0} if interface == "slcan" else {}
+    given |= {} if channel is None else {"channel": channel}
+    try:
+        return can.Bus(interface=interface, **(given | dict(options)))
+    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
+        where = interface if channel is None else f"{interface} channel {channel}"
+        raise LeverError(f"cannot open {where}: {error}; is it there and up?") from None

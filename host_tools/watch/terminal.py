@@ -1,0 +1,136 @@
+"""The picture in a terminal: Textual redraws what has changed, ten times a second, which ssh carries easily."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import ClassVar
+
+from rich.console import Console, Group, RenderableType
+from rich.rule import Rule
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.widgets import Footer, Static
+
+from . import panels
+from .model import STEP, Picture
+from .sources import LogSource, Source
+
+SPANS = (30.0, 120.0, 300.0, 10.0)
+"""[s] that trends are shown over, in the order of the key."""
+_PIPE_WIDTH = 100
+
+
+class Monitor(App[None]):
+    """The view of a source, which it starts and stops; for `duration` [s], or until the user ends it."""
+
+    ENABLE_COMMAND_PALETTE = False
+    TITLE = "lever monitor"
+    CSS = """
+    Screen { layout: vertical; overflow: hidden; }
+    #headline, #condition { height: 1; padding: 0 1; }
+    #estimates { height: auto; }
+    .panel { border: round $primary; padding: 0 1; }
+    #lower { height: 1fr; }
+    #health { width: 1fr; height: 100%; overflow-y: auto; }
+    #messages { width: 46; height: 100%; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("q", "quit", "quit"),
+        Binding("space", "hold", "hold the picture"),
+        Binding("t", "span", "time span"),
+        Binding("c", "clear", "clear counts"),
+    ]
+
+    def __init__(self, source: Source, duration: float | None = None) -> None:
+        super().__init__()
+        self.source = source
+        self.picture = Picture()
+        self.held = False
+        self.span = SPANS[0]
+        self._duration = duration
+
+    def compose(self) -> ComposeResult:
+        yield Static(id="headline")
+        yield Static(id="condition")
+        yield Vertical(Static(id="estimates-table"), id="estimates", classes="panel")
+        with Horizontal(id="lower"):
+            yield Vertical(Static(id="health-table"), id="health", classes="panel")
+            yield Vertical(Static(id="messages-table"), id="messages", classes="panel")
+        yield Footer()
+
+    def on_mount(self) -> None:
+        for name in ("estimates", "health", "messages"):
+            self.query_one(f"#{name}").border_title = name
+        self.source.start()
+        self.set_interval(STEP, self.advance)
+        if self._duration is not None:
+            self.set_timer(self._duration, self.exit)
+
+    def on_unmount(self) -> None:
+        self.source.stop()
+
+    def advance(self) -> None:
+        """Takes what has come, also while the picture is held, and shows it."""
+        self.picture.take(self.source.drain(), self.source.now)
+        if not self.held:
+            self.draw()
+
+    def draw(self) -> None:
+        picture, source = self.picture, self.source
+        width = self.query_one("#estimates-table").size.width
+        for name, content in (
+            ("headline", panels.headline(picture, source)),
+            ("condition", panels.condition(picture, source)),
+            ("estimates-table", panels.estimates(picture, self.span, width)),
+            ("health-table", panels.health(picture, source)),
+            ("messages-table", panels.messages(picture)),
+        ):
+            self.query_one(f"#{name}", Static).update(content)
+
+    def action_hold(self) -> None:
+        """Stops or goes on redrawing; frames are counted meanwhile."""
+        self.held = not self.held
+        self.query_one("#estimates").border_title = "estimates (held: space goes on)" if self.held else "estimates"
+
+    def action_span(self) -> None:
+        """The next span of SPANS."""
+        self.span = SPANS[(SPANS.index(self.span) + 1) % len(SPANS)]
+        self.draw()
+
+    def action_clear(self) -> None:
+        self.picture.clear_counts()
+        self.draw()
+
+
+def print_once(source: Source, listen: float) -> Picture:
+    """Prints one picture as plain text: after listening for `listen` seconds, or of the whole of a log."""
+    picture = Picture()
+    if isinstance(source, LogSource):
+        source.read_into(picture)
+    else:
+        _listen(source, picture, listen)
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPE_WIDTH)
+    parts: list[RenderableType] = [
+        panels.headline(picture, source),
+        panels.condition(picture, source),
+        Rule("estimates", align="left"),
+        panels.estimates(picture, SPANS[0], console.width),
+        Rule("health", align="left"),
+        panels.health(picture, source),
+        Rule("messages", align="left"),
+        panels.messages(picture),
+    ]
+    console.print(Group(*parts))
+    return picture
+
+
+def _listen(source: Source, picture: Picture, listen: float) -> None:
+    source.start()
+    try:
+        while source.now < listen and not source.ended:
+            time.sleep(STEP)
+            picture.take(source.drain(), source.now)
+    finally:
+        source.stop()

@@ -1,0 +1,72 @@
+"""Modes and faults in words, for people who do not have the façade header open (which defines them)."""
+
+from __future__ import annotations
+
+from .model import Picture
+
+MODES = {
+    "init": "waits for the first sample",
+    "align": "averages the first samples; estimates are the first guess",
+    "run": "is estimating",
+    "coast": "has no usable theta or theta_dot: predicts, and grows uncertain",
+    "frozen": "holds the parameters, by command",
+    "fault": "was restarted too often; only a reset leaves this",
+}
+"""What the estimator does, by enum lever_mode."""
+
+FAULTS = {
+    "theta": "theta missing or invalid",
+    "theta_dot": "theta_dot missing or invalid",
+    "torque": "motor torque missing, taken as 0",
+    "base": "base acceleration invalid, last one held",
+    "gap": "samples were missing",
+    "communication": "frames corrupt, repeated or out of order",
+    "innovation": "innovations larger than predicted",
+    "excitation": "too little motion to learn from",
+    "bound": "a parameter rests on its bound",
+    "recovered": "the filter was restarted",
+    "change": "sudden change of the pilot, learning anew",
+    "platform": "the machine reports a fault of its own",
+}
+"""Conditions of the estimator, by enum lever_fault."""
+
+PLATFORM_FAULTS = {
+    "clock": "crystal did not start, clock less accurate",
+    "rom": "program memory has not its checksum",
+    "self_test": "self test at power-on failed",
+    "watchdog": "last reset was the watchdog's",
+    "hard_fault": "last reset was a hard fault's",
+    "bus_off": "CAN controller is off the bus",
+    "overrun": "received frames were lost in the machine",
+    "dropped": "frames to send were dropped",
+}
+"""Conditions of its machine, by enum lever_platform_fault."""
+
+SILENT_AFTER = 1.0
+"""[s] without a frame after which that is said."""
+
+
+def condition(picture: Picture) -> tuple[str, str]:
+    """How it stands in one line: ("good", "watch" or "bad", text)."""
+    silence = picture.silence()
+    if silence > SILENT_AFTER:
+        if silence != float("inf"):
+            return "bad", f"the estimator has said nothing for {silence:.0f} s: what is shown is old"
+        if picture.is_fresh("BASE_SAMPLE"):
+            return "bad", "samples pass, but no estimator answers: is the firmware running?"
+        if any(entry.frames for entry in picture.traffic.values()) or picture.foreign:
+            return "watch", "frames pass, but neither samples nor estimates"
+        return "watch", "no frame has come yet"
+    mode = picture.mode
+    if mode is None:
+        return "watch", "the estimator is there; no HEALTH from it yet"
+    level = {"run": "good", "fault": "bad"}.get(mode, "watch")
+    if level == "good" and (picture.faults() or picture.platform_faults()):
+        level = "watch"
+    return level, f"{mode}: the estimator {MODES.get(mode, 'is in a mode that this program does not know')}"
+
+
+def faults(picture: Picture) -> list[str]:
+    """The faults of the estimator and its machine, in words."""
+    told = [FAULTS.get(name, name) for name in picture.faults()]
+    return told + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in picture.platform_faults() or ()]

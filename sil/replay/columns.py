@@ -1,0 +1,105 @@
+"""Rows of the estimator's samples as columns of the trace, a piece of the recording at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Rows
+from numpy.typing import NDArray
+
+from ..trace import COUNTS, ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields, recorded_name
+from .timeline import Timeline
+
+FloatArray = NDArray[np.float64]
+
+
+class Columns:
+    """Keeps what goes on from piece to piece: time, held counts."""
+
+    def __init__(self, timeline: Timeline, model: str, with_recorded: bool) -> None:
+        self._timeline = timeline
+        self._fields = (*quantity_fields(model), *HEALTH)
+        self._with_recorded = with_recorded
+        self._compared = (*ESTIMATED, *quantity_fields(model), *(entry for entry in HEALTH if entry[0] == "mode"))
+        self._counts = dict.fromkeys(COUNTS, 0)
+
+    def of(self, rows: Rows) -> Trace:
+        """The columns of trace.csv without truth; with those of a recorded estimator, if there is one, at the end."""
+        decoded = _Decoded(rows)
+        trace: Trace = {"time_s": self._timeline.seconds(rows["time_us"], decoded.fields("BASE_SAMPLE")["time_us"])}
+        for column, message, field in (*MEASURED, *ESTIMATED):
+            trace[column] = decoded.at_samples(message, field)
+        for column, message, field in self._fields:
+            trace[column] = decoded.held(message, field)
+        for count in COUNTS:
+            trace[count] = self._unwrapped(count, trace[count])
+        trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
+        if self._with_recorded:
+            recorded = _Decoded(rows, recorded=True)
+            for column, message, field in self._compared:
+                values = recorded.at_samples if message == "STATE_ESTIMATE" else recorded.held
+                trace[recorded_name(column)] = values(message, field)
+        return trace
+
+    def _unwrapped(self, name: str, values: FloatArray) -> FloatArray:
+        """Beyond the eight bits of a count, which starts at 0 in an estimator that does."""
+        known = np.isfinite(values)
+        steps = np.diff(values[known], prepend=self._counts[name]) % 256.0
+        unwrapped = values.copy()
+        unwrapped[known] = self._counts[name] + np.cumsum(steps)
+        if known.any():
+            self._counts[name] = int(unwrapped[known][-1])
+        return unwrapped
+
+
+class _Decoded:
+    """The fields of each slot, decoded when first asked for."""
+
+    def __init__(self, rows: Rows, recorded: bool = False) -> None:
+        self._rows = rows
+        self._slots = RECORDED if recorded else SLOTS
+        self._messages: dict[str, dict[str, FloatArray]] = {}
+        self._held: dict[str, tuple[NDArray[np.intp], dict[str, FloatArray]]] = {}
+
+    def fields(self, message: str) -> dict[str, FloatArray]:
+        if message not in self._messages:
+            self._messages[message] = self._decode(message, slice(None))
+        return self._messages[message]
+
+    def at_samples(self, message: str, field: str) -> FloatArray:
+        """NaN where the message did not come with the sample, or said that the field is not valid."""
+        fields = self.fields(message)
+        there = (self._rows["fresh"] >> self._slots[message]) & 1 != 0
+        if f"{field}_valid" in fields:
+            there &= fields[f"{field}_valid"] != 0.0
+        return np.where(there, fields[field], np.nan)
+
+    def held(self, message: str, field: str) -> FloatArray:
+        """NaN before the first. Decodes only the rows with which the message came, and the first."""
+        if message not in self._held:
+            slot = self._slots[message]
+            fresh = (self._rows["fresh"] >> slot) & 1 != 0
+            fresh[0] = True
+            fields = self._decode(message, fresh)
+            if not (self._rows["known"][0] >> slot) & 1:
+                for values in fields.values():
+                    values[0] = np.nan
+            self._held[message] = np.cumsum(fresh) - 1, fields
+        place, fields = self._held[message]
+        return fields[field][place]
+
+    def _decode(self, message: str, which: Any) -> dict[str, FloatArray]:
+        data = np.ascontiguousarray(self._rows["data"][which, self._slots[message]])
+        return codec.decode_columns(message, data)
+
+
+def model_numbers(rows: Rows) -> Iterator[tuple[int, int]]:
+    """Row and number of the estimator's model, at the first row and wherever it changes."""
+    slot = SLOTS["PILOT_PARAMETERS"]
+    known = np.flatnonzero((rows["known"] >> slot) & 1)
+    numbers = rows["data"][known, slot, 1] >> 4
+    for index in np.flatnonzero(np.diff(numbers, prepend=255)):
+        yield int(known[index]), int(numbers[index])

@@ -1,0 +1,101 @@
+"""The samples in a log, as the firmware takes them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from lever_cdkf.host_tools import codec, logs
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.estimator import Health
+from lever_cdkf.host_tools.innovations import FRAME, Array, samples_of
+
+_SAMPLES = ("LEVER_SAMPLE", "BASE_SAMPLE")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Part of a log."""
+
+    samples: Array
+    """Of dtype innovations.SAMPLE."""
+    period: float
+    """Between two samples: the median [s]."""
+    bus: str
+    choices: dict[str, str]
+    """Of model, preload, estimator and adaptation, by COMMAND in the log; the firmware's defaults without."""
+    health: Health
+    """Counts of what was lost, corrupt or late."""
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last, gaps included [s]."""
+        return float(self.time[-1])
+
+    @property
+    def time(self) -> Array:
+        """Of each sample since the first [s]; time_us wraps, and goes on where its sender has started it anew."""
+        steps = _steps(self.samples) * 1e-6
+        return np.concatenate(([0.0], np.cumsum(np.where(steps > 0.0, steps, self.period))))
+
+
+def read(
+    paths: Sequence[str | os.PathLike[str]],
+    channel: str | None = None,
+    start: float = 0.0,
+    length: float = float("inf"),
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Recording:
+    """The samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`, both [s] of
+    recorded time. Raises LeverError."""
+    log = logs.Recording(paths)
+    identifiers = np.array([codec.message(name).frame_id for name in _SAMPLES])
+    command = codec.message("COMMAND").frame_id
+    begin: int | None = None
+    pieces = []
+    for chunk in log.chunks():
+        begin = int(chunk["time_us"][0]) if begin is None else begin
+        since = (chunk["time_us"] - begin) * 1e-6
+        sampled = np.isin(chunk["id"], identifiers) & (since >= start)
+        wanted = (sampled | (chunk["id"] == command)) & (chunk["flags"] == 0) & (since < start + length)
+        pieces.append(chunk[wanted])
+        if progress is not None:
+            progress(log.done, log.size, "reading the log")
+        if since[-1] > start + length:
+            break
+    name = ", ".join(os.fspath(path) for path in paths)
+    frames = np.concatenate(pieces)
+    base = codec.message("BASE_SAMPLE").frame_id
+    if not (frames["id"] == base).any():
+        raise LeverError(
+            f"{name}: no BASE_SAMPLE ({base:#x}) from {start:g} s on, so no samples: `lever dbc` has the messages"
+        )
+    found = [log.buses.names()[index] for index in np.unique(frames["bus"][frames["id"] == base])]
+    chosen = _chosen(found, channel, name)
+    return _recording(frames[frames["bus"] == log.buses.names().index(chosen)], chosen, name)
+
+
+def _chosen(found: Sequence[str], channel: str | None, log: str) -> str:
+    """The bus that is asked for, or the only one that has samples. Raises LeverError."""
+    if channel is not None and channel not in found:
+        raise LeverError(f"{log}: no samples on {channel}; there are some on {', '.join(found)}")
+    if channel is None and len(found) > 1:
+        raise LeverError(f"{log}: samples on more than one bus: choose by --channel {' or --channel '.join(found)}")
+    return channel or found[0]
+
+
+def _recording(frames: Array, bus: str, log: str) -> Recording:
+    received = np.zeros(len(frames), FRAME)
+    for field in ("id", "length", "data"):
+        received[field] = frames[field]
+    samples, choices, health = samples_of(received)
+    if len(samples) < 2:
+        raise LeverError(f"{log}: none of its samples is accepted: {health.corrupt} frames are corrupt (E2E)")
+    return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, choices, health)
+
+
+def _steps(samples: Array) -> Array:
+    """From each sample to the next [us]; less than half the range of time_us ahead is forward, all else back."""
+    return np.diff(samples["time_us"]).astype(np.int32)

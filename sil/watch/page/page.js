@@ -1,0 +1,211 @@
+// The page: what the server tells by the WebSocket is kept in `story` and drawn; what the user asks for goes back.
+
+import { drawBand, drawBode, drawMap, drawOther, forgetRanges } from "./charts.js";
+
+const PATIENCE = 1500; // [ms] without news after which the page says so
+const AGAIN = 1000; // [ms] between two attempts to connect
+const SURE = 3000; // [ms] for the second press of reset
+const DITHERS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1];
+const OTHERS = [
+  { key: "excitation", title: "excitation: rms of θ̇ [rad/s]", name: "base" },
+  { key: "dither", title: "dither of the motor, rms [N m]", name: "torque" },
+  { key: "nis", title: "mean normalised innovation squared (honest: 2)", name: "estimate" },
+];
+
+const story = { start: null, update: null };
+const element = (id) => document.getElementById(id);
+let socket, lastHeard = 0, drawn = true, charts = [];
+
+function connect() {
+  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
+  socket.onmessage = (event) => hear(JSON.parse(event.data));
+  socket.onclose = () => {
+    lost("The server is gone; this page tries to reach it again.");
+    setTimeout(connect, AGAIN);
+  };
+}
+
+function hear(message) {
+  lastHeard = performance.now();
+  if (message.start) begin(message.start);
+  if (message.update && story.start) goOn(message.update);
+  if (message.refused) answer(`Refused: ${message.refused}`, true);
+  if (message.sent) answer(`Sent: ${Object.entries(message.sent).map(([key, value]) => `${key} ${value}`).join(", ")}`);
+}
+
+function begin(start) {
+  const same = story.start?.model === start.model;
+  story.start = start;
+  story.update = null;
+  if (!same) forgetRanges();
+  document.title = `lever live: ${start.title}`;
+  element("title").textContent = start.title;
+  document.body.classList.toggle("of-simulation", start.simulated);
+  element("controls").hidden = !start.controls;
+  element("read-only").hidden = start.controls;
+  offer("dither", DITHERS.filter((rms) => rms <= start.dither_limit).map((rms) => [rms, rms ? `${rms} N m rms` : "off"]), "as it is");
+  offer("model", start.choices.model.map((name) => [name, name]), start.model ? null : "as it is", start.model);
+  offer("estimator", start.choices.estimator.map((name) => [name, name]), "as it is");
+  const rows = start.quantities.map((quantity) => {
+    const [letter, index] = quantity.symbol.split(/<\/?sub>/);
+    const name = cell("", "name");
+    name.append(letter, Object.assign(document.createElement("sub"), { textContent: index ?? "" }), ` ${quantity.name}`);
+    return row([name, cell("–", "value"), cell("", "sigma"), cell(quantity.unit === "1" ? "" : quantity.unit, "unit"), cell("", "truth simulated")]);
+  });
+  document.querySelector("#estimates tbody").replaceChildren(...rows);
+  charts = [
+    ...place("#bands .charts", start.quantities.map((quantity) => (canvas) => drawBand(canvas, story, quantity))),
+    ...place("#health .charts", OTHERS.map((other) => (canvas) => drawOther(canvas, story, other))),
+    () => drawBode(story),
+    () => drawMap(story),
+  ];
+  redraw();
+}
+
+function goOn(update) {
+  const { start } = story;
+  story.update = update;
+  start.rows.push(update.row);
+  while (start.rows.length > start.span / start.step) start.rows.shift();
+  if (update.map) start.map.push(update.map);
+  while (start.map.length > start.span / start.map_step) start.map.shift();
+  document.body.classList.toggle("stale", update.silence === null || update.silence > PATIENCE / 1000);
+  tellCondition(update.level, update.condition);
+  tellEstimates(update.row);
+  tellHealth(update);
+  tellMessages(update.messages);
+  for (const [request, mode] of [["run", "run"], ["freeze", "frozen"]])
+    document.querySelector(`[data-request=${request}]`).setAttribute("aria-pressed", update.mode === mode);
+  redraw();
+}
+
+// --- words ----------------------------------------------------------------------------------------------------------
+
+function tellCondition(level, text) {
+  const place = element("condition");
+  if (place.textContent !== text) place.textContent = text;
+  place.className = level;
+}
+
+function lost(text) {
+  document.body.classList.add("stale");
+  tellCondition("bad", text);
+}
+
+// A number with so many digits, without exponent; a dash for what is not known.
+function written(value, digits) {
+  if (value === null || value === undefined) return "–";
+  if (value === 0) return "0";
+  return value.toFixed(Math.min(5, Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(value))))));
+}
+
+function tellEstimates(values) {
+  document.querySelectorAll("#estimates tr").forEach((line, k) => {
+    const [value, sigma, truth] = values.slice(1 + 3 * k, 4 + 3 * k);
+    line.querySelector(".value").textContent = written(value, 4);
+    line.querySelector(".sigma").textContent = sigma === null ? "" : `± ${written(sigma, 2)}`;
+    line.querySelector(".truth").textContent = truth === null ? "" : `(${written(truth, 4)})`;
+  });
+}
+
+function tellHealth(update) {
+  const { counts, machine, faults } = update;
+  const lines = [
+    ["mode", update.mode ?? "–"],
+    ["faults", faults.length ? faults.join("; ") : "none", faults.length > 0],
+    ["estimator counts", `${counts.lost} lost, ${counts.corrupt} corrupt, ${counts.late} late`],
+    ["lever angle", `${written(update.theta, 4)} deg`],
+  ];
+  if (machine) {
+    lines.push(["bus controller", `TEC ${machine.transmit_errors}, REC ${machine.receive_errors}, off the bus ${machine.bus_offs} times`]);
+    lines.push(["machine", `${machine.overruns} frames overrun, ${machine.dropped} dropped`]);
+  }
+  if (update.foreign) lines.push(["other frames", update.foreign]);
+  if (update.error_frames) lines.push(["error frames", update.error_frames, true]);
+  if (update.unseen) lines.push(["not seen here", `${update.unseen} frames`, true]);
+  document.querySelector("#health dl").replaceChildren(...lines.flatMap(([term, text, bad]) => [
+    Object.assign(document.createElement("dt"), { textContent: term }),
+    Object.assign(document.createElement("dd"), { textContent: text, className: bad ? "bad" : "" }),
+  ]));
+}
+
+function tellMessages(messages) {
+  document.querySelector("#messages tbody").replaceChildren(...messages.map(([name, rate, ...counts]) => {
+    const silent = rate === null && !counts.some(Boolean);
+    const line = row([cell(name), cell(rate === null ? "–" : rate.toFixed(0)), ...counts.map((count) => cell(silent ? "–" : count))]);
+    line.className = silent ? "silent" : counts.some(Boolean) ? "bad" : "";
+    return line;
+  }));
+}
+
+function cell(text, name = "") { return Object.assign(document.createElement("td"), { textContent: text, className: name }); }
+
+function row(cells) {
+  const line = document.createElement("tr");
+  line.append(...cells);
+  return line;
+}
+
+// --- charts ---------------------------------------------------------------------------------------------------------
+
+function place(where, draws) {
+  const canvases = draws.map(() => document.createElement("canvas"));
+  document.querySelector(where).replaceChildren(...canvases);
+  return draws.map((draw, k) => () => draw(canvases[k]));
+}
+
+function redraw() {
+  if (!drawn) return;
+  drawn = false;
+  requestAnimationFrame(() => {
+    drawn = true;
+    if (story.start) charts.forEach((draw) => draw());
+  });
+}
+
+// --- controls -------------------------------------------------------------------------------------------------------
+
+function offer(id, options, keep, chosen = "") {
+  const all = keep === null ? options : [["", keep], ...options];
+  element(id).replaceChildren(...all.map(([value, text]) => Object.assign(document.createElement("option"), { value, textContent: text })));
+  element(id).value = chosen ?? "";
+}
+
+function ask(command) {
+  if (socket.readyState !== WebSocket.OPEN) return answer("Not sent: there is no connection.", true);
+  socket.send(JSON.stringify(command));
+  return undefined;
+}
+
+function answer(text, refused = false) {
+  element("answer").textContent = text;
+  element("answer").classList.toggle("refused", refused);
+}
+
+function requested(button) {
+  const { request } = button.dataset;
+  if (request === "reset" && !button.classList.contains("sure")) {
+    button.classList.add("sure");
+    button.textContent = "reset: sure?";
+    setTimeout(() => unsure(button), SURE);
+    return;
+  }
+  unsure(button);
+  ask({ request });
+}
+
+function unsure(button) {
+  button.classList.remove("sure");
+  button.textContent = button.dataset.request;
+}
+
+document.querySelectorAll("[data-request]").forEach((button) => button.addEventListener("click", () => requested(button)));
+element("dither").addEventListener("change", (event) => event.target.value && ask({ dither_rms: Number(event.target.value) }));
+for (const what of ["model", "estimator"])
+  element(what).addEventListener("change", (event) => event.target.value && ask({ [what]: event.target.value }));
+window.addEventListener("resize", redraw);
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+setInterval(() => {
+  if (lastHeard && performance.now() - lastHeard > PATIENCE) lost("Nothing has come from the server for a moment: what is shown is old.");
+}, 500);
+connect();

@@ -1,0 +1,71 @@
+"""Logs of simulated runs whose noise is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.sil import buslog, runner, scenario
+
+Simulate = Callable[..., Path]
+
+NOISE = {"theta_noise": 0.5e-3, "theta_dot_noise": 20e-3, "theta_dot_process_noise": 0.03}
+"""Of these runs: half, twice and three fifths of the firmware's defaults."""
+WALK = {"c_p_walk": 0.04, "k_p_walk": 0.06}
+"""Of those whose pilot changes [1/sqrt(s)]."""
+PILOT = {"c_p": "48 N s/m", "k_p": "1700 N/m"}
+CHANGING = {
+    name: f'{{ kind = "random_walk", first = "{PILOT[name]}", rate = "{WALK[f"{name}_walk"]} 1/sqrt(s)", '
+    f'least = "{least}", greatest = "{greatest}" }}'
+    for name, least, greatest in (("c_p", "15 N s/m", "140 N s/m"), ("k_p", "500 N/m", "3900 N/m"))
+}
+
+_SCENARIO = """
+title = "Known noise"
+duration = "{duration} s"
+converged_after = "5 s"
+[pilot]
+trim = "20 deg"
+m_p = "2.8 kg"
+c_p = {c_p}
+k_p = {k_p}
+process_noise = "{theta_dot_process_noise} rad/s/sqrt(s)"
+[[base]]
+kind = "noise"
+rms = "{base} g"
+low = "1 Hz"
+high = "10 Hz"
+[sensors]
+theta = {{ noise = "{theta_noise} rad" }}
+theta_dot = {{ noise = "{theta_dot_noise} rad/s" }}
+[[torque]]
+kind = "firmware"
+rms = "{torque} N m"
+"""
+
+
+@pytest.fixture(scope="session")
+def simulate(tmp_path_factory: pytest.TempPathFactory) -> Simulate:
+    """simulate(duration, changing=False, rest=False, **noise): the bus.log of a run of so many seconds."""
+
+    def run(duration: float, *, changing: bool = False, rest: bool = False, **noise: float) -> Path:
+        folder = tmp_path_factory.mktemp("log")
+        pilot = CHANGING if changing else {name: f'"{value}"' for name, value in PILOT.items()}
+        shaken = {"base": 0.0001, "torque": 0.0001} if rest else {"base": 0.1, "torque": 0.3}
+        (folder / "known.toml").write_text(_SCENARIO.format(duration=duration, **{**pilot, **shaken, **NOISE, **noise}))
+        loaded = scenario.load(str(folder / "known.toml"))
+        with LeverBus("lever", config=loaded.config) as bus:
+            frames = runner.simulate(loaded, bus).frames
+        log = folder / "bus.log"
+        log.write_bytes(b"".join(buslog.lines(frames, "vcan0")))
+        return log
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def steady_log(simulate: Simulate) -> Path:
+    """Forty seconds of a pilot who does not change."""
+    return simulate(40.0)

@@ -1,0 +1,174 @@
+"""`lever tune` as people use it: what it prints, the settings file that all else takes, what is wrong in a line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import cli, codec
+from lever_cdkf.host_tools.settings_file import make_config, read_assignments
+from python.tune.conftest import NOISE, Simulate
+
+Run = Callable[..., tuple[int, str, str]]
+FEW = ("--keep", "m_p_walk", "--keep", "c_p_walk", "--keep", "k_p_walk", "--keep", "walk_ceiling", "--keep")
+QUICK = (*FEW, "robbins_monro_time")
+
+
+@pytest.fixture
+def lever(capsys: pytest.CaptureFixture[str]) -> Run:
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        status = cli.main([str(argument) for argument in arguments])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def tuned(steady_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what a whole run of the command writes."""
+    out = tmp_path_factory.mktemp("tuned")
+    files = ["-o", str(out / "my.settings"), "--page", str(out / "tune.html"), "--json", str(out / "tune.json")]
+    assert cli.main(["tune", str(steady_log), *files]) == 0
+    return out
+
+
+def test_it_writes_a_settings_file_with_the_noise_of_the_log(tuned: Path) -> None:
+    text = (tuned / "my.settings").read_text()
+    found = read_assignments(tuned / "my.settings")
+    for name in ("theta_noise", "theta_dot_noise"):
+        assert found[name] == pytest.approx(NOISE[name], rel=0.02)
+    assert "[rad] standard deviation of a theta sample; was 0.001" in text
+    assert text.startswith("# lever tune ")
+    assert "noise_window" not in found, "it stays as the user had it"
+    assert make_config(found).settings["noise_window"] == 1.0
+
+
+def test_what_it_prints_says_before_and_after_with_units(tuned: Path) -> None:
+    tables = json.loads((tuned / "tune.json").read_text())
+    noise = {row["name"]: row for row in tables["settings"]}
+    assert noise["theta_noise"]["unit"] == "rad"
+    assert noise["theta_noise"]["before"] == 0.001
+    assert noise["theta_noise"]["95 % from"] < noise["theta_noise"]["after"] < noise["theta_noise"]["to"]
+    rows = {(row["part"], row["noise"]): row for row in tables["before and after"]}
+    assert set(rows) == {(part, noise) for part in ("tuned on", "held out") for noise in ("as set", "estimated")}
+    held = rows["held out", "as set"]
+    assert held["gain [nat]"] > 0.5
+    assert held["lnL after [nat]"] - held["lnL before [nat]"] == pytest.approx(held["gain [nat]"], abs=2e-4)
+    assert abs(held["NIS after"] - 1.0) < 0.02 < abs(held["NIS before"] - 1.0)
+
+
+def test_the_page_holds_the_same(tuned: Path) -> None:
+    page = (tuned / "tune.html").read_text()
+    for text in ("Lever CDKF: settings from a log", "theta_dot_process_noise", "What the log says", "held out"):
+        assert text in page
+    for figure in ("intervals", "sizes", "correlation"):
+        assert f'id="{figure}"' in page
+
+
+def test_sim_and_the_process_take_the_file(tuned: Path, lever: Run, build_dir: Path, tmp_path: Path) -> None:
+    """With it, innovations in the simulation are as large as the filter expects, noise not being estimated."""
+    file, out = tuned / "my.settings", tmp_path / "run"
+    run = ("--set", "duration=12 s", "--set", "converged_after=6 s", "--set", "settings.noise_window=0 s")
+    sensors = ("--set", "sensors.theta.noise=0.5 mrad", "--set", "sensors.theta_dot.noise=20 mrad/s")
+    lever("sim", "steady", "--settings", file, *run, *sensors, "--out", out)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["estimator"]["settings"]["theta_noise"] == read_assignments(file)["theta_noise"]
+    assert summary["nis"]["mean"] == pytest.approx(2.0, abs=0.15)
+    process = [str(build_dir / "lever_can"), "--settings", str(file), "--can", "no_such_can"]
+    said = subprocess.run(process, capture_output=True, text=True, check=False).stderr
+    assert "no_such_can" in said
+    assert "settings" not in said
+
+
+def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
+    log = tmp_path / "slow.log"
+    write_log(log, count=3000, period_us=10_000)
+    status, _, err = lever("tune", log, *QUICK, "-o", tmp_path / "slow.settings", "--held-out", "0")
+    assert (status, err.splitlines()[0]) == (
+        0,
+        "lever: tune: the log has a sample each 10 ms: sample_period becomes that (was 1 ms)",
+    )
+    assert read_assignments(tmp_path / "slow.settings")["sample_period"] == 0.01
+
+
+def test_choices_are_those_of_the_log(tmp_path: Path, lever: Run) -> None:
+    """A COMMAND in the log says which model was estimated, if nobody says otherwise."""
+    lever("sim", "linear_physical", "--set", "duration=25 s", "--out", tmp_path)
+    searched = ("m_walk", "c_walk", "k_walk", "m_p_walk", "c_p_walk", "k_p_walk", "walk_ceiling", "robbins_monro_time")
+    keep = [part for name in (*searched, *NOISE) for part in ("--keep", name)]
+    out = tmp_path / "x.settings"
+    _, _, err = lever("tune", tmp_path / "bus.log", "-o", out, *keep, "--held-out", "0")
+    assert "lever: tune: by COMMAND in the log, model is linear_physical" in err.splitlines()
+    assert read_assignments(out)["model"] == "linear_physical"
+    _, _, err = lever("tune", tmp_path / "bus.log", "-o", out, *keep, "--held-out", "0", "--set", "model=lever")
+    assert "by COMMAND in the log, model" not in err
+    assert read_assignments(out)["model"] == "lever"
+
+
+def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0") -> None:
+    """candump's format: a lever that swings a little, with noise."""
+    lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    noise = np.random.default_rng(1).standard_normal((count, 3)) * (1e-3, 1e-2, 1.0)
+    with path.open("w", encoding="ascii") as log:
+        for k, (theta, theta_dot, z_ddot) in enumerate(noise.tolist()):
+            time = k * period_us
+            lines = (0x110, lever_sample(k, 0.35 + theta, theta_dot, 0.0)), (0x111, base_sample(k, z_ddot, time))
+            for identifier, data in lines:
+                log.write(f"({time / 1e6:.6f}) {bus} {identifier:03X}#{data.hex().upper()}\n")
+
+
+@pytest.mark.parametrize(
+    ("content", "arguments", "line"),
+    [
+        ("", (), "holds no CAN frame"),
+        ("(0.0) can0 123#00\n", (), "no BASE_SAMPLE (0x111) from 0 s on, so no samples: `lever dbc` has the messages"),
+        ("(0.0) can0 111#0000000000000000\n", (), "none of its samples is accepted: 1 frames are corrupt (E2E)"),
+        (None, (), "too short to tune on: 2.0 s of samples; at least 20 s are needed"),
+        (None, ("--channel", "can7"), "no samples on can7; there are some on can0"),
+        (None, ("--held-out", "0.9"), "--held-out 0.9: must be from 0 to 0.8"),
+        (None, ("--length", "0"), "length must be more than 0"),
+        (None, ("--start", "100"), "no BASE_SAMPLE (0x111) from 100 s on"),
+        (None, ("--keep", "theta_nois"), "unknown setting 'theta_nois'; did you mean theta_noise?"),
+        (None, ("--set", "theta_noise=9"), "theta_noise = 9.0 is out of range"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(
+    content: str | None, arguments: tuple[str, ...], line: str, lever: Run, tmp_path: Path
+) -> None:
+    log, output = tmp_path / "x.log", tmp_path / "x.settings"
+    if content is None:
+        write_log(log, 2000)
+    else:
+        log.write_text(content)
+    status, out, err = lever("tune", log, "-o", output, *arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert line in err
+    assert not output.exists()
+
+
+def test_two_buses_are_to_be_chosen_from(tmp_path: Path, lever: Run) -> None:
+    for bus in ("can0", "can1"):
+        write_log(tmp_path / f"{bus}.log", 100, bus=bus)
+    status, _, err = lever("tune", tmp_path / "can0.log", tmp_path / "can1.log")
+    assert (status, "choose by --channel can0 or --channel can1" in err) == (2, True)
+
+
+def test_worse_on_the_part_held_out_writes_nothing(simulate: Simulate, tmp_path: Path, lever: Run) -> None:
+    """Two runs on end, the second with three times the noise: told by exit status, and no file."""
+    quiet, loud = (simulate(20.0, theta_noise=noise).read_text().splitlines() for noise in (0.5e-3, 3e-3))
+    log, output = tmp_path / "two.log", tmp_path / "two.settings"
+    log.write_text("\n".join(quiet) + "\n" + "\n".join(_shifted(line, 20.0) for line in loud) + "\n")
+    quickly = (*QUICK, "--keep", "theta_dot_noise", "--keep", "theta_dot_process_noise")
+    status, _, err = lever("tune", log, "-o", output, *quickly, "--set", "noise_window=0", "--held-out", "0.62")
+    assert (status, output.exists()) == (1, False)
+    assert "do worse on the part held out" in err
+
+
+def _shifted(line: str, seconds: float) -> str:
+    """A line of candump's, recorded later."""
+    time, _, rest = line.removeprefix("(").partition(")")
+    return f"({float(time) + seconds:.6f}){rest}"

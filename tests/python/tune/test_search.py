@@ -1,0 +1,111 @@
+"""What is found in logs of which the truth is known, and what is said where a log does not tell."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.sil.tune import judgement, recording
+from lever_cdkf.sil.tune.likelihood import Likelihood
+from lever_cdkf.sil.tune.search import Found, Search, groups
+from python.tune.conftest import NOISE, WALK, Simulate
+
+
+def found_in(likelihood: Likelihood, *kept: str, **settings: float | str) -> dict[str, Found]:
+    return {entry.name: entry for entry in Search(likelihood, settings).run(groups(settings, kept))}
+
+
+@pytest.mark.parametrize("wrong", [1.0, 8.0])
+def test_noise_is_found_wherever_the_search_starts(steady_log: Path, wrong: float) -> None:
+    """Measurement noise within 2 %; process noise, of which the trim filter takes some, within 12 %."""
+    likelihood = Likelihood(recording.read([steady_log]))
+    start = {"theta_noise": 1e-3 * wrong, "theta_dot_noise": 1e-2 / wrong, "theta_dot_process_noise": 0.05 * wrong}
+    walks = ("m_p_walk", "c_p_walk", "k_p_walk", "walk_ceiling", "robbins_monro_time")
+    found = found_in(likelihood, *walks, **start)
+    assert list(found) == list(NOISE)
+    for name, share in zip(NOISE, (0.02, 0.02, 0.12), strict=True):
+        assert found[name].after == pytest.approx(NOISE[name], rel=share), name
+        assert found[name].low is not None
+        assert found[name].high is not None
+
+
+def test_the_walk_of_the_parameters_is_found(simulate: Simulate) -> None:
+    likelihood = Likelihood(recording.read([simulate(80.0, changing=True)]), held_out=0.0)
+    found = found_in(likelihood, *NOISE, "m_p_walk", adaptation="fixed", **NOISE)
+    for name, true in WALK.items():
+        low, high = found[name].low, found[name].high
+        assert low is not None, name
+        assert high is not None, name
+        assert low < true < high, name
+        assert found[name].verdict == "too small"
+
+
+def test_what_does_not_change_gets_the_greatest_walk_that_is_not_contradicted(steady_log: Path) -> None:
+    likelihood = Likelihood(recording.read([steady_log]))
+    found = found_in(likelihood, *NOISE, "m_p_walk", "c_p_walk", adaptation="fixed", k_p_walk=0.2, **NOISE)
+    stiffness = found["k_p_walk"]
+    assert stiffness.low is None
+    assert stiffness.best < stiffness.after < 0.03
+    assert stiffness.after == stiffness.high
+
+
+def test_part_that_is_not_tuned_on_shows_the_improvement(steady_log: Path) -> None:
+    likelihood = Likelihood(recording.read([steady_log]))
+    assert not (likelihood.tuned_on & likelihood.judged_by).any()
+    fits = judgement.fits(likelihood, {}, NOISE)
+    parts = {(before.noise, before.part): (before, after) for before, after in judgement.pairs(fits)}
+    before, after = parts["as set", "held out"]
+    gained = judgement.gain(before, after)
+    assert gained.is_clear
+    assert gained.mean > 0.5
+    assert not judgement.is_worse(fits)
+    assert after.nis == pytest.approx(1.0, abs=0.02)
+    assert before.nis > 1.5
+    assert "better with noise as set" in judgement.verdict(fits, 3)
+
+
+def test_settings_that_only_fit_the_part_tuned_on_are_no_gain(steady_log: Path) -> None:
+    """The angle's noise is four times as large in the part held out: the log is not of one kind."""
+    whole = recording.read([steady_log])
+    late = whole.time > 0.8 * whole.duration
+    more = np.random.default_rng(1).standard_normal(late.sum()) * NOISE["theta_noise"] * 4.0
+    samples = whole.samples.copy()
+    samples["theta"][late] += more.astype(np.float32)
+    likelihood = Likelihood(dataclasses.replace(whole, samples=samples))
+    before = {**NOISE, "theta_noise": 1e-3, "noise_window": 0.0}
+    found = found_in(likelihood, "theta_dot_noise", "m_p_walk", "c_p_walk", "k_p_walk", **before)
+    assert found["theta_noise"].after == pytest.approx(NOISE["theta_noise"], rel=0.02)
+    fits = judgement.fits(likelihood, before, {**before, "theta_noise": found["theta_noise"].after})
+    assert judgement.is_worse(fits)
+    assert "worse" in judgement.verdict(fits, 1)
+
+
+def test_at_rest_only_noise_is_looked_for(simulate: Simulate) -> None:
+    at_rest = simulate(25.0, rest=True, theta_dot_process_noise=0.0)
+    search = Search(Likelihood(recording.read([at_rest])), {})
+    assert not search.can_learn
+    assert [entry.name for entry in search.run(groups({}, list(NOISE)[1:]))] == ["theta_noise"]
+
+
+def test_what_is_off_or_kept_is_not_looked_for() -> None:
+    wanted = groups({"theta_dot_process_noise": 0.0, "adaptation": "fixed", "model": "linear_black_box"}, ["a22_walk"])
+    assert wanted == {"noise": ("theta_noise", "theta_dot_noise"), "walk": ("a21_walk", "b21_walk")}
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "after", "verdict"),
+    [
+        (0.5, 2.0, 1.0, "kept: not contradicted"),
+        (None, None, 1.0, "kept: the log does not tell"),
+        (None, 2.0, 1.0, "kept: not contradicted"),
+        (1.5, 4.0, 3.0, "too small"),
+        (1.5, None, 3.0, "too small"),
+        (0.1, 0.4, 3.0, "too small"),
+        (None, 0.8, 0.8, "too large: the greatest not contradicted"),
+    ],
+)
+def test_decision(low: float | None, high: float | None, after: float, verdict: str) -> None:
+    found = Found("theta_noise", before=1.0, best=3.0, low=low, high=high)
+    assert (found.after, found.verdict) == (after, verdict)

@@ -1,0 +1,115 @@
+"""LEVER_SETTINGS_FILE: a settings file becomes what the ports of a build start with, or ends its configuration."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools.config import Config, settings_table
+from lever_cdkf.host_tools.settings_file import format_config
+from quality import tools
+
+pytestmark = pytest.mark.requires("cmake")
+SCRIPT = """
+include("{firmware}/settings.cmake")
+lever_write_build_header("{settings}" "{header}")
+"""
+PROGRAM = """
+#include "lever_build.h"
+#include <stdio.h>
+int main(void)
+{
+    lever_config_t config;
+    lever_build_config(&config);
+    (void)printf("%d %d %d %d", config.model, config.preload, config.estimator, config.adaptation);
+    for (unsigned i = 0u; i < sizeof config.settings / sizeof(float); i++) {
+        (void)printf(" %.9g", (double)((const float *)(const void *)&config.settings)[i]);
+    }
+    return lever_config_check(&config) != NULL;
+}
+"""
+
+
+def configure(settings: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """CMake's script that writes lever_build.h into a folder, for a settings file with that text."""
+    (folder / "my.settings").write_text(settings, encoding="utf-8")
+    script = SCRIPT.format(firmware=tools.FIRMWARE, settings=folder / "my.settings", header=folder / "lever_build.h")
+    (folder / "script.cmake").write_text(script)
+    return subprocess.run(["cmake", "-P", folder / "script.cmake"], capture_output=True, text=True, check=False)
+
+
+def other_than_default() -> Config:
+    """Every setting and choice, none at its default."""
+    middle = {
+        row.name: 0.5 * (row.default + (row.least if row.default == row.greatest else row.greatest))
+        for row in settings_table()
+    }
+    return Config("linear_black_box", "fixed", "joint", "forgetting", settings=middle)
+
+
+@pytest.mark.requires("cc|gcc|clang")
+def test_a_build_starts_with_the_values_of_the_file(tmp_path: Path, build_dir: Path) -> None:
+    config = other_than_default()
+    done = configure(format_config(config), tmp_path)
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "show.c").write_text(PROGRAM)
+    library = build_dir / "firmware/liblever_cdkf.a"
+    compiler = [tools.first_installed("cc|gcc|clang"), "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
+    tools.run(
+        [*compiler, "-I", tmp_path, "-I", tools.FIRMWARE, tmp_path / "show.c", library, "-lm", "-o", tmp_path / "show"]
+    )
+    shown = tools.run([tmp_path / "show"]).stdout.split()
+    pointer = config.pointer
+    assert shown[:4] == [str(getattr(pointer, what)) for what in ("model", "preload", "estimator", "adaptation")]
+    assert [float(value) for value in shown[4:]] == [
+        pytest.approx(getattr(pointer.settings, row.name), rel=1e-8) for row in settings_table()
+    ]
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("theta_noise = 9", "my.settings:2: theta_noise = 9 is out of range: from 1.0e-7 to 0.2 rad"),
+        ("theta_noise = 1e-8", "theta_noise = 1e-8 is out of range"),
+        ("m_p = 3 kg", "my.settings:2: m_p = 3kg is not a number (give it in kg, without the unit)"),
+        ("m_p = 1e-3.5", "is not a number"),
+        ("m_p = nan", "is not a number"),
+        ("theta_nois = 1", "my.settings:2: unknown setting theta_nois; `lever settings` lists them all"),
+        ("theta_noise 1", "my.settings:2: theta_noise1 is not understood: write name = value"),
+        ("model = levers", "my.settings:2: model = levers is not known; `lever settings` lists what is"),
+        ("adaptation = count", "adaptation = count is not known"),
+        ("[settings]", "my.settings: is not a settings file: write name = value"),
+        ("m_p = 3; k_p = 4", "is not a settings file"),
+    ],
+)
+def test_what_is_wrong_ends_the_configuration_with_its_place(line: str, told: str, tmp_path: Path) -> None:
+    done = configure(f'# [; "\n{line}\n', tmp_path)
+    assert done.returncode != 0
+    assert told in " ".join(done.stderr.split())
+    assert not (tmp_path / "lever_build.h").exists()
+
+
+def test_without_a_file_the_defaults_stay(tmp_path: Path) -> None:
+    done = configure("\n# nothing\r\n\n", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "config->" not in (tmp_path / "lever_build.h").read_text()
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    (tmp_path / "script.cmake").write_text(SCRIPT.format(firmware=tools.FIRMWARE, settings="/no/such", header="/no/h"))
+    done = subprocess.run(["cmake", "-P", tmp_path / "script.cmake"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "LEVER_SETTINGS_FILE: there is no file /no/such" in " ".join(done.stderr.split())
+
+
+def test_the_ports_start_with_them() -> None:
+    """Where a port makes its configuration it asks for that of the build; only the self test, whose answers are fixed,
+    does not."""
+    ports = tools.FIRMWARE / "port"
+    makers = {str(file.relative_to(ports)) for file in ports.rglob("*.c") if "lever_build_config(" in file.read_text()}
+    others = {
+        str(file.relative_to(ports)) for file in ports.rglob("*.c") if "lever_config_default(" in file.read_text()
+    }
+    assert makers == {"linux/options.c", "stm32f4/main.c"}
+    assert others == {"embedded/self_test.c"}

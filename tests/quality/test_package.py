@@ -1,0 +1,92 @@
+"""The core as an installed CMake package: another project finds it, builds with it, and computes the same bits."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.native import run_samples
+from quality import tools
+
+PROJECT = Path(__file__).with_name("package")
+TOOLCHAIN = tools.FIRMWARE / "port/stm32f4/toolchain.cmake"
+
+
+def install(folder: Path, *settings: str | Path) -> Path:
+    """Configures, builds and installs the core of this tree; the prefix."""
+    build, prefix = folder / "build", folder / "prefix"
+    options = ["-DLEVER_TESTS=OFF", "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_INSTALL_LIBDIR=lib", *settings]
+    tools.assert_silent(["cmake", "-S", tools.ROOT, "-B", build, *options])
+    tools.assert_silent(["cmake", "--build", build, "--parallel", "2", "--target", "lever_cdkf"])
+    tools.assert_silent(["cmake", "--install", build, "--prefix", prefix])
+    return prefix
+
+
+def configure(prefix: Path, folder: Path, *settings: str | Path) -> list[str | Path]:
+    return [
+        "cmake",
+        "-S",
+        PROJECT,
+        "-B",
+        folder,
+        f"-Dlever_cdkf_ROOT={prefix}",
+        "-DCMAKE_BUILD_TYPE=Release",
+        *settings,
+    ]
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return install(tmp_path_factory.mktemp("installed"))
+
+
+def test_what_is_installed(prefix: Path) -> None:
+    """The library, its manual, the contract, and what find_package reads; nothing of Python's or of the inside."""
+    files = {str(file.relative_to(prefix)) for file in prefix.rglob("*") if file.is_file()}
+    package = "lib/cmake/lever_cdkf/lever_cdkfConfig"
+    described = {f"{package}.cmake", f"{package}-release.cmake", f"{package}Version.cmake"}
+    headers = {"include/lever_cdkf.h", "include/lever_settings.def"}
+    assert files == {"lib/liblever_cdkf.a", "share/lever_cdkf/lever.dbc", *headers, *described}
+    for name in ("lever_cdkf.h", "lever_settings.def"):
+        assert (prefix / "include" / name).read_bytes() == (tools.FIRMWARE / name).read_bytes()
+
+
+def test_another_project_computes_the_same(prefix: Path, tmp_path: Path) -> None:
+    tools.assert_silent(configure(prefix, tmp_path))
+    tools.assert_silent(["cmake", "--build", tmp_path])
+    printed = tools.run([tmp_path / "package"]).stdout.split()
+
+    phase = np.arange(1000) % 333 - 166
+    swing = (phase * (166 - abs(phase))).astype(np.float32) / np.float32(6889.0)
+    theta = np.float32(0.35) + np.float32(0.0625) * swing
+    still = np.zeros(1000)
+    samples = {"time_us": np.arange(1000) * 1000, "theta": theta, "tau_m": still, "z_ddot": still}
+    estimate = run_samples(None, samples, np.array([999]))
+    expected = [estimate[name].view(np.uint32)[0] for name in ("theta", "natural_frequency")]
+    assert printed == [f"{bits:08x}" for bits in expected]
+    assert abs(float(estimate["theta"][0]) - float(theta[-1])) < 0.01
+
+
+def test_another_version_is_refused(prefix: Path, tmp_path: Path) -> None:
+    """Until version 1, every minor version may differ."""
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(other LANGUAGES C)\nfind_package(lever_cdkf 0.0 REQUIRED)\n"
+    )
+    result = tools.run(["cmake", "-S", tmp_path, "-B", tmp_path / "build", f"-Dlever_cdkf_ROOT={prefix}"])
+    assert result.returncode != 0
+    assert re.search(r'compatible with requested\s+version "0.0"', result.stdout)
+
+
+@pytest.mark.requires("arm-none-eabi-gcc")
+def test_the_package_of_a_microcontroller(tmp_path: Path) -> None:
+    """Cross-compiled, installed, found by a cross-compiled project: all of it is code of a Cortex-M4F with its FPU."""
+    prefix = install(tmp_path, f"-DCMAKE_TOOLCHAIN_FILE={TOOLCHAIN}")
+    flags = "-DCMAKE_EXE_LINKER_FLAGS=--specs=nosys.specs"
+    cross = (f"-DCMAKE_TOOLCHAIN_FILE={TOOLCHAIN}", f"-DCMAKE_FIND_ROOT_PATH={prefix}", flags)
+    tools.assert_silent(configure(prefix, tmp_path / "project", *cross))
+    tools.assert_silent(["cmake", "--build", tmp_path / "project"])
+    attributes = tools.run(["arm-none-eabi-readelf", "--arch-specific", tmp_path / "project/package"]).stdout
+    for expected in ("Tag_CPU_arch: v7E-M", "Tag_FP_arch: VFPv4-D16", "Tag_ABI_VFP_args: VFP registers"):
+        assert expected in attributes

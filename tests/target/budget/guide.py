@@ -1,0 +1,92 @@
+"""The numbers in firmware/port/PORTING.md: written there by `budget-accept`, and held to by test_guide.py."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from lever_cdkf.host_tools.files import write_text
+from lever_cdkf.host_tools.library import ffi
+
+from .image import ESTIMATORS, FIRMWARE
+from .port_sizes import FUNCTIONS, TRANSPORTS, Size
+from .recording import MODELS
+
+GUIDE = FIRMWARE / "port/PORTING.md"
+_SECTION = r"(<!-- {name}: [^\n]* -->\n)(.*?)(<!-- /{name} -->)"
+
+Values = dict[str, float]
+"""Golden values by their path."""
+
+
+def section(name: str) -> str:
+    """What stands in the guide between <!-- name: … --> and <!-- /name -->."""
+    return _find(GUIDE.read_text(encoding="utf-8"), name)[2].strip() + "\n"
+
+
+def update(sections: dict[str, str]) -> None:
+    """Writes sections into the guide."""
+    text = GUIDE.read_text(encoding="utf-8")
+    for name, content in sections.items():
+        begin, end = _find(text, name).span(2)
+        text = f"{text[:begin]}\n{content}\n{text[end:]}"
+    write_text(GUIDE, text)
+
+
+def _find(text: str, name: str) -> re.Match[str]:
+    found = re.search(_SECTION.format(name=name), text, re.DOTALL)
+    assert found is not None, f"{GUIDE}: no section {name}"
+    return found
+
+
+def instructions(values: Values) -> str:
+    """The table of instructions a sample."""
+    lines = ["| | mean | worst, running | worst, first 2 s |", "|---|---|---|---|"]
+    for estimator in ESTIMATORS:
+        for model in MODELS:
+            what = f"`lever_update()`, {estimator}, `{model}`"
+            lines += [_counts(what, f"instructions.{estimator}.{model}", values)]
+    for estimator in ESTIMATORS:
+        case = f"instructions.tick.{estimator}.lever"
+        lines.append(_counts(f"the whole turn for a sample, {estimator}, `lever`", case, values))
+    for estimator in ESTIMATORS:
+        most = values[f"instructions_after_gap.{estimator}"]
+        lines.append(f"| `lever_update()`, {estimator}, `lever`, first sample after a gap | | {most:,.0f} | |")
+    return "\n".join(lines) + "\n"
+
+
+def _counts(what: str, case: str, values: Values) -> str:
+    numbers = (f"{values[f'{case}.{each}']:,.0f}" for each in ("mean", "worst", "start_up_worst"))
+    return f"| {what} | {' | '.join(numbers)} |"
+
+
+def memory(values: Values) -> str:
+    """The table of flash, RAM and stack."""
+    room, used = values["memory_bytes"], values["instance_bytes"]
+    rows = {
+        "flash: code of the core, all of it": values["text_bytes"],
+        "flash: its constants, of which the texts of the settings are most": values["rodata_bytes"],
+        "RAM: variables of the core": values["data_bytes"] + values["bss_bytes"],
+        f"RAM: `lever_memory_t`, for each instance ({used:g} of them used)": room,
+        "stack: `lever_config_t` of who calls `lever_init()`": ffi.sizeof("lever_config_t"),
+    }
+    stack = {name.removeprefix("stack."): bytes_ for name, bytes_ in values.items() if name.startswith("stack.")}
+    for name in ("lever_on_frame", "lever_step", "lever_next_frame", "lever_update", "lever_estimate", "lever_init"):
+        rows[f"stack: `{name}()`, with all it calls"] = stack[name]
+    lines = ["| | bytes |", "|---|---|", *(f"| {what} | {bytes_:,.0f} |" for what, bytes_ in rows.items())]
+    return "\n".join(lines) + "\n"
+
+
+def port(sizes: dict[str, dict[str, Size]]) -> str:
+    """The table of the four functions, from of_port() of each transport."""
+    lines = ["| | on bxCAN | as SLCAN over a USART |", "|---|---|---|"]
+    for name in (*FUNCTIONS, "all"):
+        cells = (f"{size.bytes:,} bytes, {size.lines} lines" for size in (sizes[each][name] for each in TRANSPORTS))
+        what = "the whole port: interrupts, start-up, clocks, self tests" if name == "all" else f"`{name}()`"
+        lines.append(f"| {what} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def port_image(images: Path, transport: str) -> Path:
+    """The image of a transport in the folder where they were built."""
+    return images / f"lever_stm32f4_{transport}.elf"

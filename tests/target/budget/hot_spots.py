@@ -1,0 +1,174 @@
+"""`budget profile`: where the instructions of a step go, by function, source line and kind of instruction."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+from collections import Counter
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.tables import Row, Tables, print_tables
+
+from . import image
+from .recording import record
+from .trace import Instruction, Trace, disassemble, functions, trace
+
+
+def run(args: argparse.Namespace) -> int:
+    """The command. Raises LeverError."""
+    recording = record(args.model)
+    first, last = _window(args.window, len(recording.samples))
+    elf = image.build(args.build, args.firmware, args.flags)
+    traced = trace(elf, recording, args.model, args.estimator, args.form, first, last)
+    chosen = _choose(traced, args.worst, args.learning)
+    instructions, operations = traced.instructions[chosen], traced.operations[chosen]
+    print(
+        f"{args.estimator} {args.model} {args.form}: {len(chosen)} samples from {(first + chosen[0]) * 1e-3:.3f} s on, "
+        f"mean {instructions.mean():.1f} instructions and {operations.mean():.1f} floating-point operations, "
+        f"{instructions.min()} to {instructions.max()} instructions"
+    )
+    print_tables(tables(elf, [traced.executed[i] for i in chosen], args.lines), args.json)
+    return 0
+
+
+def _window(text: str, count: int) -> tuple[int, int]:
+    """First and last sample of "FROM:TO" in seconds, at 1 kHz. Raises LeverError."""
+    try:
+        first, end = (round(1000.0 * float(time)) for time in text.split(":"))
+    except ValueError:
+        raise LeverError(f"--window {text}: two times in seconds are needed, such as 2:3") from None
+    if not 0 <= first < end <= count:
+        raise LeverError(f"--window {text}: must lie in the recording, 0:{count * 1e-3:g}")
+    return first, end - 1
+
+
+def _choose(traced: Trace, worst: bool, learning: str | None) -> list[int]:
+    """Indices of the samples that are looked at. Raises LeverError when there is none."""
+    instructions = traced.instructions
+    many = instructions > 1.1 * np.median(instructions)
+    wanted = np.full(len(instructions), True) if learning is None else many == (learning == "with")
+    chosen = [int(i) for i in np.flatnonzero(wanted)]
+    if not chosen:
+        raise LeverError("no sample of the window is of that kind")
+    return [max(chosen, key=lambda i: int(instructions[i]))] if worst else chosen
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A function, or one that was inlined, and a line of it."""
+
+    function: str
+    file: str
+    line: int
+
+
+def _frames(elf: Path, addresses: list[int]) -> dict[int, list[Frame]]:
+    """The frames of each address, innermost first; more than one where functions were inlined."""
+    command = [image.tool("addr2line"), "--inlines", "--functions", "--addresses", f"--exe={elf}"]
+    asked = "\n".join(map(hex, addresses))
+    output = subprocess.run(command, input=asked, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+    found: dict[int, list[Frame]] = {}
+    frames: list[Frame] = []
+    lines = iter(output)
+    for text in lines:
+        if text.startswith("0x"):
+            frames = found.setdefault(int(text, 16), [])
+            continue
+        file, _, line = next(lines).partition(" (")[0].rpartition(":")
+        frames.append(Frame(text, file, int(line) if line.isdigit() else 0))
+    return found
+
+
+def _kind(instruction: Instruction) -> str:
+    name = instruction.mnemonic.split(".")[0]
+    if instruction.operations:
+        division = name.startswith(("vdiv", "vsqrt"))
+        return "float: divide, square root" if division else "float: add, subtract, multiply"
+    if name.startswith(("vldr", "vstr", "vldm", "vstm", "vpush", "vpop")):
+        return "float: load, store"
+    if name.startswith(("vcmp", "vmrs")):
+        return "float: compare"
+    if name.startswith("v"):
+        return "float: move, convert, sign"
+    if name.startswith(("ldr", "ldm", "pop")):
+        return "load"
+    if name.startswith(("str", "stm", "push")):
+        return "store"
+    if name.startswith(("b", "cb", "tb")) and not name.startswith(("bic", "bfi", "bfc")):
+        return "branch, call"
+    if name.startswith("it"):
+        return "condition (it)"
+    return "integer"
+
+
+@cache
+def _text(file: str) -> tuple[str, ...]:
+    path = Path(file)
+    return tuple(path.read_text(encoding="utf-8").splitlines()) if path.is_file() else ()
+
+
+def _source(file: str, line: int) -> str:
+    lines = _text(file)
+    return lines[line - 1].strip()[:80] if 0 < line <= len(lines) else ""
+
+
+def _place(file: str) -> str:
+    """The last two parts of a path: filter/dual.c."""
+    return "/".join(file.split("/")[-2:])
+
+
+def tables(elf: Path, executed: list[Counter[int]], lines: int) -> Tables:
+    """Instructions and floating-point operations, as means over the samples; `lines` of the source, the busiest."""
+    steps = len(executed)
+    total: Counter[int] = Counter()
+    for seen in executed:
+        total.update(seen)
+    code = disassemble(elf)
+    frames = _frames(elf, sorted(total))
+    symbols = functions(elf)
+    by: dict[str, dict[str, list[float]]] = {"function": {}, "inlined": {}, "inclusive": {}, "line": {}, "kind": {}}
+
+    def add(table: str, key: str, times: int, operations: int) -> None:
+        entry = by[table].setdefault(key, [0.0, 0.0])
+        entry[0] += times / steps
+        entry[1] += times * operations / steps
+
+    for address, times in total.items():
+        instruction = code[address]
+        operations = instruction.operations
+        symbol = next((name for begin, size, name in symbols if begin <= address < begin + size), "?")
+        stack = frames[address]
+        add("function", f"{symbol} ({_place(stack[-1].file)})", times, operations)
+        add("inlined", f"{stack[0].function} ({_place(stack[0].file)})", times, operations)
+        for function in {frame.function for frame in stack}:
+            add("inclusive", function, times, operations)
+        inner = stack[0]
+        add("line", f"{_place(inner.file)}:{inner.line}  {_source(inner.file, inner.line)}", times, operations)
+        add("kind", _kind(instruction), times, operations)
+    whole = sum(total.values()) / steps
+    titles = {
+        "function": "By function (what was inlined into it included, what it calls not)",
+        "inclusive": "By function, itself wherever it was inlined and what was inlined into it",
+        "inlined": "By function, itself only",
+        "line": f"By source line, the busiest {lines}",
+        "kind": "By kind of instruction",
+    }
+    return {title: _rows(by[name], whole, lines if name == "line" else None) for name, title in titles.items()}
+
+
+def _rows(entries: dict[str, list[float]], whole: float, most: int | None) -> list[Row]:
+    ordered = sorted(entries.items(), key=lambda entry: -entry[1][0])[:most]
+    return [
+        {
+            "instructions a step": round(instructions, 1),
+            "share [%]": round(100.0 * instructions / whole, 1),
+            "float operations": round(operations, 1),
+            "where": name,
+        }
+        for name, (instructions, operations) in ordered
+        if instructions >= 0.05
+    ]

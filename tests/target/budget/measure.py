@@ -1,0 +1,170 @@
+"""The measurements put together: what budget.json holds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lever_cdkf.host_tools.library import enum_names
+from numpy.typing import NDArray
+
+from . import image, sizes, stack, trace
+from .image import ESTIMATORS, FORMS, Run
+from .recording import MODELS, Recording, record
+
+START_UP_S = 2.0
+"""Until then the estimator starts up: it aligns, the dither fades in, caution_time passes. Counted by itself."""
+TRACED = (2048, 2347)
+"""First and last sample whose floating-point operations are counted: thirty learning periods in steady running."""
+
+GAP_S = (10.0, 10.4)
+"""Where samples are left out, to see what the first one after a gap takes; less than gap_limit."""
+
+Case = tuple[str, str, str]
+"""Estimator, model, and one of FORMS."""
+Tell = Callable[[int, int, str], None]
+"""Told what is done, of how much, and what comes now."""
+
+
+def _silent(done: int, total: int, what: str) -> None:
+    """Nobody wants to know."""
+
+
+_RUNNING = next(code for code, name in enum_names("lever_mode").items() if name == "run")
+_FACADE = re.compile(r"^[a-z_][\w ]*[ *](lever_\w+)\(", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Count:
+    """Instructions a sample over a recording: in mode run after START_UP_S, and before that."""
+
+    mean: float
+    median: float
+    worst: int
+    worst_s: float
+    """When [s]."""
+    start_up_worst: int
+
+    @staticmethod
+    def of(run: Run, time: NDArray[np.float64]) -> Count:
+        """Of a run over samples at the times [s]."""
+        steady = (run.mode == _RUNNING) & (time >= START_UP_S)
+        counted = run.instructions[steady]
+        return Count(
+            mean=round(float(counted.mean()), 1),
+            median=float(np.median(counted)),
+            worst=int(counted.max()),
+            worst_s=float(time[steady][counted.argmax()]),
+            start_up_worst=int(run.instructions[time < START_UP_S].max()),
+        )
+
+
+def sample_times(recording: Recording) -> NDArray[np.float64]:
+    """Of a recording [s]."""
+    return recording.samples["time_us"].astype(np.float64) * 1e-6
+
+
+def facade(firmware: Path) -> list[str]:
+    """The functions of lever_cdkf.h."""
+    return _FACADE.findall((firmware / "lever_cdkf.h").read_text(encoding="utf-8"))
+
+
+def run_all(elf: Path, tell: Tell = _silent) -> dict[Case, Run]:
+    """The image in QEMU, over every case. Raises LeverError."""
+    cases = [(estimator, model, form) for form in FORMS for estimator in ESTIMATORS for model in MODELS]
+    runs = {}
+    for done, (estimator, model, form) in enumerate(cases):
+        tell(done, len(cases), f"{estimator} {model} {form} in QEMU")
+        runs[estimator, model, form] = image.run(elf, record(model), model, estimator, form)
+    return runs
+
+
+def budget(elf: Path, firmware: Path, runs: dict[Case, Run], tell: Tell = _silent) -> dict[str, Any]:
+    """What budget.json holds, of the runs of an image of this firmware. Raises LeverError."""
+    return {
+        "processor": "Cortex-M4F, as QEMU's netduinoplus2 has it",
+        "compiler": image.compiler(),
+        "calibration": _calibration(runs),
+        "instructions": _instructions(runs),
+        "instructions_after_gap": _after_gap(elf),
+        "floating_point_operations": _operations(elf, tell),
+        **_bytes(elf),
+        **_stack(elf, firmware, runs),
+    }
+
+
+def _instructions(runs: dict[Case, Run]) -> dict[str, Any]:
+    instructions: dict[str, Any] = {}
+    for (estimator, model, form), run in runs.items():
+        place = instructions.setdefault("tick", {}) if form == "tick" else instructions
+        place.setdefault(estimator, {})[model] = vars(Count.of(run, sample_times(record(model))))
+    return instructions
+
+
+def _after_gap(elf: Path) -> dict[str, int]:
+    """The dearest call there is: the first sample after a gap, lever model."""
+    cut, first = record("lever").without(GAP_S), round(GAP_S[0] * 1e3)
+    runs = {estimator: image.run(elf, cut, "lever", estimator, "update") for estimator in ESTIMATORS}
+    return {estimator: int(run.instructions[first]) for estimator, run in runs.items()}
+
+
+def _operations(elf: Path, tell: Tell) -> dict[str, Any]:
+    """Of lever_update(), executed in the samples TRACED: the floor under its instructions, and how far that is away."""
+    operations: dict[str, Any] = {}
+    cases = [(estimator, model) for estimator in ESTIMATORS for model in MODELS]
+    for done, (estimator, model) in enumerate(cases):
+        tell(done, len(cases), f"{estimator} {model} in Unicorn")
+        found = trace.trace(elf, record(model), model, estimator, "update", *TRACED)
+        mean = float(found.operations.mean())
+        operations.setdefault(estimator, {})[model] = {
+            "mean": round(mean, 1),
+            "worst": int(found.operations.max()),
+            "instructions_per_operation": round(float(found.instructions.mean()) / mean, 3),
+        }
+    return operations
+
+
+def _calibration(runs: dict[Case, Run]) -> dict[str, float]:
+    """Of all runs the one that is off most; image.run() has refused what is not right."""
+    worst = max(runs.values(), key=lambda run: abs(run.loop_measured - run.loop_instructions))
+    return {
+        "loop_instructions": worst.loop_instructions,
+        "loop_measured": round(worst.loop_measured, 2),
+        "overhead_subtracted": worst.overhead,
+    }
+
+
+def _bytes(elf: Path) -> dict[str, Any]:
+    library, instance = sizes.of_library(elf), sizes.of_instance(elf)
+    return {
+        "text_bytes": library["text"],
+        "rodata_bytes": library["rodata"],
+        "data_bytes": library["data"],
+        "bss_bytes": library["bss"],
+        "instance_bytes": instance["lever"],
+        "memory_bytes": instance["lever_memory"],
+        "files": sizes.of_files(elf),
+    }
+
+
+def _stack(elf: Path, firmware: Path, runs: dict[Case, Run]) -> dict[str, Any]:
+    """The worst case by the call graph, and what was seen to be written in all runs."""
+    chains = stack.worst_case(elf, facade(firmware))
+    painted = {"lever_update": 0, "tick": 0, **dict.fromkeys(image.CALLED_ONCE, 0)}
+    for (_, _, form), run in runs.items():
+        name = "lever_update" if form == "update" else "tick"
+        for function, found in ((name, int(run.stack.max())), *run.calls_stack.items()):
+            painted[function] = max(painted[function], found)
+    return {
+        "stack_bytes": max(chain.bytes for chain in chains.values()),
+        "stack_painted_bytes": max(painted.values()),
+        "stack": {
+            name: {"bytes": chain.bytes, "chain": [f"{function} {frame}" for function, frame in chain.chain]}
+            for name, chain in chains.items()
+        },
+        "stack_painted": painted,
+    }

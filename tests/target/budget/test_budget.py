@@ -1,0 +1,110 @@
+"""What the estimator costs on a Cortex-M4F stays within the limits it was given, and near what was accepted last."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+from target.budget import golden
+
+pytestmark = pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm")
+
+
+def test_limits_hold(budget: dict[str, Any]) -> None:
+    beyond = golden.beyond_limits(budget)
+    assert not beyond, "\n".join(beyond)
+
+
+def test_nothing_is_dearer_than_what_was_accepted(budget: dict[str, Any]) -> None:
+    accepted = golden.load()
+    if not golden.is_comparable(budget, accepted):
+        pytest.skip(f"the golden values are of {accepted['compiler']}, and this is {budget['compiler']}")
+    worse = golden.regressions(budget, accepted)
+    assert not worse, "\n".join(worse)
+
+
+def test_the_floor(budget: dict[str, Any]) -> None:
+    """Executed floating-point operations are a part of the instructions, and not a small one."""
+    for estimator in ("dual", "joint"):
+        for model, operations in budget["floating_point_operations"][estimator].items():
+            assert 1.0 < operations["instructions_per_operation"] < 5.0, (estimator, model)
+            assert operations["mean"] <= operations["worst"]
+
+
+def test_a_gap_is_bounded(budget: dict[str, Any]) -> None:
+    """One call predicts at most 16 times: lever_cdkf.h."""
+    for estimator, most in budget["instructions_after_gap"].items():
+        entry = budget["instructions"][estimator]["lever"]
+        assert entry["worst"] < most < 16 * entry["mean"]
+
+
+# --- the checks bite: values changed by hand ---
+
+
+@pytest.fixture
+def accepted(budget: dict[str, Any]) -> dict[str, Any]:
+    """The budget itself as golden values."""
+    return {"compiler": budget["compiler"], "values": golden.numbers(budget)}
+
+
+def test_a_budget_compares_with_itself(budget: dict[str, Any], accepted: dict[str, Any]) -> None:
+    assert golden.is_comparable(budget, accepted)
+    assert golden.regressions(budget, accepted) == []
+    assert golden.improvements(budget, accepted) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["instructions.joint.linear_physical.worst", "instructions.tick.dual.lever.mean", "stack_bytes"]
+)
+def test_a_regression_is_told_from_noise(budget: dict[str, Any], accepted: dict[str, Any], name: str) -> None:
+    accepted["values"][name] /= 1.019
+    assert golden.regressions(budget, accepted) == []
+    accepted["values"][name] /= 1.004
+    (line,) = golden.regressions(budget, accepted)
+    assert line.startswith(
+        f"{name}: {accepted['values'][name]:g} before, {golden.numbers(budget)[name]:g} now (+2.3 %)"
+    )
+    assert golden.ACCEPT in line
+
+
+def test_an_improvement_is_told(budget: dict[str, Any], accepted: dict[str, Any]) -> None:
+    accepted["values"]["text_bytes"] *= 1.03
+    assert golden.regressions(budget, accepted) == []
+    (line,) = golden.improvements(budget, accepted)
+    assert line.startswith("text_bytes: ")
+
+
+def test_a_value_cannot_come_or_go_unnoticed(budget: dict[str, Any], accepted: dict[str, Any]) -> None:
+    del accepted["values"]["instance_bytes"]
+    accepted["values"]["instructions.dual.other.mean"] = 1.0
+    gone, new = golden.regressions(budget, accepted)
+    assert new.startswith("instructions.dual.other.mean: gone") or gone.startswith("instructions.dual.other.mean: gone")
+    assert new.startswith("instance_bytes: new") or gone.startswith("instance_bytes: new")
+
+
+def test_each_limit_is_looked_at(budget: dict[str, Any]) -> None:
+    for name, limit in golden.LIMITS.items():
+        changed = copy.deepcopy(budget)
+        place = changed
+        *path, last = name.split(".")
+        for key in path:
+            place = place[key]
+        place[last] = limit
+        assert not [line for line in golden.beyond_limits(changed) if line.startswith(f"{name} is")]
+        place[last] = limit + 1
+        assert [line for line in golden.beyond_limits(changed) if line.startswith(f"{name} is {limit + 1:g}")]
+
+
+def test_the_ratio_is_looked_at(budget: dict[str, Any]) -> None:
+    changed = copy.deepcopy(budget)
+    for models in (
+        *(changed["instructions"][each] for each in ("dual", "joint")),
+        *changed["instructions"]["tick"].values(),
+    ):
+        for entry in models.values():
+            entry["worst"] = entry["mean"] * 1.0999
+    assert not [line for line in golden.beyond_limits(changed) if "times the mean" in line]
+    changed["instructions"]["tick"]["joint"]["lever"]["worst"] *= 1.001
+    (line,) = [line for line in golden.beyond_limits(changed) if "times the mean" in line]
+    assert line.startswith("instructions.tick.joint.lever: worst is 1.10 times the mean")

@@ -1,0 +1,181 @@
+"""The measurement itself: the image computes what the host computes, its clock counts instructions, stack is found."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.library import enum_names, ffi, lib
+from target.budget import image, measure, stack, trace
+from target.budget.recording import MODELS, record
+
+pytestmark = pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm")
+FAULTS = {name: bit for bit, name in enum_names("lever_fault").items()}
+Runs = dict[measure.Case, image.Run]
+CASES = [(estimator, model) for estimator in image.ESTIMATORS for model in MODELS]
+
+
+def estimate_on_host(model: str, estimator: str) -> bytes:
+    """lever_estimate_t after the last sample, from the library of this machine."""
+    recording = record(model)
+    scenario = recording.scenario
+    config = Config(**{**scenario.config.choices, "model": model, "estimator": estimator}, settings=scenario.settings)
+    memory = ffi.new("lever_memory_t *")
+    lever = lib.lever_init(memory, config.pointer)
+    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), lib.LEVER_KEEP)
+    assert lib.lever_command(lever, ffi.new("lever_command_t *", {**keep, "dither_rms": recording.dither_rms}))
+    samples = ffi.from_buffer("lever_sample_t[]", recording.samples)
+    assert len(samples) == len(recording.samples)
+    for i in range(len(samples)):
+        lib.lever_update(lever, samples + i)
+    estimate = ffi.new("lever_estimate_t *")
+    lib.lever_estimate(lever, estimate)
+    return bytes(ffi.buffer(estimate))
+
+
+@pytest.mark.parametrize(("estimator", "model"), CASES)
+def test_the_image_computes_what_the_host_computes(runs: Runs, estimator: str, model: str) -> None:
+    """To the bit, from samples and from frames."""
+    fields = [name for name, _ in ffi.typeof("lever_estimate_t").fields]
+    host = ffi.from_buffer("lever_estimate_t *", estimate_on_host(model, estimator))
+    for form in image.FORMS:
+        target = ffi.from_buffer("lever_estimate_t *", runs[estimator, model, form].estimate)
+        for name in fields:
+            values = [getattr(each, name) for each in (host, target)]
+            if ffi.typeof("lever_estimate_t").fields[fields.index(name)][1].type.kind == "array":
+                values = [list(value) for value in values]
+            assert values[0] == values[1], (form, name)
+
+
+def test_a_processor_without_fpu_computes_the_same(runs: Runs, tmp_path: Path) -> None:
+    """And takes about twenty times the instructions: PORTING.md."""
+    elf = image.build(tmp_path, processor="-mcpu=cortex-m4 -mthumb -mfloat-abi=soft")
+    soft, hard = image.run(elf, record("lever"), "lever", "dual", "update"), runs["dual", "lever", "update"]
+    assert soft.estimate == hard.estimate
+    assert 15.0 < soft.instructions.mean() / hard.instructions.mean() < 25.0
+
+
+@pytest.mark.parametrize(("estimator", "model"), CASES)
+def test_the_recording_makes_the_estimator_work(runs: Runs, estimator: str, model: str) -> None:
+    """It aligns, runs, learns from sample to sample, notices the change at 6 s, and publishes."""
+    run, time = runs[estimator, model, "tick"], measure.sample_times(record(model))
+    modes = [enum_names("lever_mode")[code] for code in run.mode]
+    assert modes[0] == "align"
+    assert set(modes[1000:]) == {"run"}
+    changes = time[(run.faults & FAULTS["change"]) != 0]
+    assert 6.0 < changes[changes > 3.0][0] < 8.0
+    assert not (run.faults & (FAULTS["recovered"] | FAULTS["communication"] | FAULTS["excitation"])).any()
+    each = 1 + int(model != "linear_black_box")  # STATE_ESTIMATE, and MOTOR_COMMAND where there is a motor
+    assert run.frames[2000:].sum() == 10000 * each + 500 * 5  # every 20 ms the divided ones
+    assert run.frames.max() <= 7  # PORTING.md
+
+
+def test_qemu_and_unicorn_count_the_same(elf: Path, runs: Runs) -> None:
+    """But for the one instruction by which a clock of 1.344 ticks an instruction can be off."""
+    for form in image.FORMS:
+        traced = trace.trace(elf, record("lever"), "lever", "joint", form, 6100, 6299)
+        counted = runs["joint", "lever", form].instructions[6100:6300]
+        assert np.abs(traced.instructions - counted).max() <= 1
+        assert counted.max() > 1.3 * counted.min()  # steps that learn, and others
+
+
+def test_the_clock_is_calibrated_in_every_run(runs: Runs) -> None:
+    for run in runs.values():
+        assert run.loop_instructions == 200000
+        assert abs(run.loop_measured - 200000) <= 1.0
+        assert run.overhead <= 2
+
+
+def test_a_wrong_clock_is_refused() -> None:
+    words = [1, 268801 + 135, 100000, *(0 for _ in image.CALLED_ONCE)]
+    with pytest.raises(LeverError, match="timed as 200100"):
+        image._read(np.array(words, "<u4").tobytes() + bytes(ffi.sizeof("lever_estimate_t")), 0)
+
+
+# --- stack ---
+
+
+def test_no_call_wrote_more_stack_than_was_computed(elf: Path, runs: Runs) -> None:
+    computed = {name: chain.bytes for name, chain in stack.worst_case(elf, measure.facade(image.FIRMWARE)).items()}
+    assert set(image.CALLED_ONCE) < set(computed)
+    tick = max(computed[name] for name in ("lever_on_frame", "lever_step", "lever_next_frame"))
+    for (_, _, form), run in runs.items():
+        most = tick if form == "tick" else computed["lever_update"]
+        assert 0.8 * most < run.stack.max() <= most
+        for name, seen in run.calls_stack.items():
+            assert seen <= computed[name], name
+
+
+def graph_of(tmp_path: Path, source: str) -> stack.CallGraph:
+    """The call graph of a file that is as if it were filter/it.c."""
+    folder = tmp_path / "filter"
+    folder.mkdir()
+    (folder / "it.c").write_text(source)
+    target = folder / "it.c.obj"
+    flags = (
+        "-mcpu=cortex-m4",
+        "-mthumb",
+        "-O1",
+        "-fno-inline",
+        "-fno-optimize-sibling-calls",
+        "-fcallgraph-info=su,da",
+    )
+    subprocess.run([image.tool("gcc"), *flags, "-c", str(folder / "it.c"), "-o", str(target)], check=True)
+    return stack.CallGraph({"filter/it.c": target}, target)
+
+
+def test_the_call_graph_follows_a_pointer_to_the_deepest(tmp_path: Path) -> None:
+    graph = graph_of(
+        tmp_path,
+        """
+        void use(volatile char *x);
+        static void small(void) { volatile char x[16]; x[0] = 0; }
+        static void large(void) { volatile char x[400]; x[0] = 0; }
+        void (*const table[2])(void) = {small, large};
+        void top(int i) { table[i](); }
+        """,
+    )
+    deepest = graph.deepest("top")
+    assert [name for name, _ in deepest.chain] == ["top", "filter/it.c:large"]
+    assert 400 < deepest.bytes < 430
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("int top(int n) { return n ? top(n - 1) * 3 + 1 : 0; }", "circle: top > top"),
+        ("void use(char *x); void top(int n) { char x[n]; use(x); }", "top: its stack frame has no bound"),
+        ("void top(void (*f)(void)) { f(); }", "calls through a pointer"),
+        ("void elsewhere(void); void top(void) { elsewhere(); elsewhere(); }", "elsewhere is called"),
+    ],
+    ids=["recursion", "no bound", "pointer", "unknown"],
+)
+def test_what_cannot_be_bounded_is_refused(tmp_path: Path, source: str, message: str) -> None:
+    with pytest.raises(LeverError, match=message):
+        graph_of(tmp_path, source).deepest("top")
+
+
+# --- a dearer firmware is noticed ---
+
+
+def test_a_dearer_firmware_is_noticed(elf: Path, runs: Runs, tmp_path: Path) -> None:
+    """A buffer of 1600 bytes that is filled in each step, in a copy of the firmware."""
+    firmware = tmp_path / "firmware"
+    shutil.copytree(image.FIRMWARE, firmware)
+    source = firmware / "app/estimator.c"
+    text = source.read_text(encoding="utf-8")
+    before, brace, _ = text.partition("enum lever_mode estimator_update(")[2].partition("{")
+    waste = "volatile float waste[400]; for (uint32_t i = 0u; i < 400u; i++) { waste[i] = 1.0f; }"
+    source.write_text(text.replace(f"{before}{brace}", f"{before}{brace}{waste}", 1), encoding="utf-8")
+    dearer = image.build(tmp_path / "build", firmware)
+    run, was = image.run(dearer, record("lever"), "lever", "dual", "update"), runs["dual", "lever", "update"]
+    assert run.instructions[-1] >= was.instructions[-1] + 600
+    assert run.stack.max() >= was.stack.max() + 1000
+    deepest, before_that = (stack.worst_case(each, ["lever_update"])["lever_update"].bytes for each in (dearer, elf))
+    assert deepest >= before_that + 1000
+    assert run.estimate == was.estimate
