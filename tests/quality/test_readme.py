@@ -26,6 +26,7 @@ NEEDED = {
     "tests/vcan": pytest.mark.requires("ip", "candump", "linux.uml"),
     "lever qemu": pytest.mark.requires("qemu-system-arm", "arm-none-eabi-gcc"),
     "lever flash": pytest.mark.requires("arm-none-eabi-gcc", "openocd"),
+    "tshark": pytest.mark.requires("tshark"),
 }
 """By blocks with these words in them."""
 
