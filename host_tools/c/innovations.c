@@ -6,17 +6,17 @@
  */
 #include "innovations.h"
 
-/* The seam: filter/dual.c with another name for one function, whose caller in app/ comes to the one below instead. */
-#define dual_update firmware_update
-#include "filter/dual.c"
-#undef dual_update
-
 #include "app/link.h"
+#include "filter/dual.h"
 #include "lever_cdkf.h"
 
+#include <math.h>
 #include <stddef.h>
+#include <string.h>
 
-float dual_update(dual_t *dual, const measurement_t *measurement, bool learn);
+/* The seam: dual_update() of filter/dual.c, which is built with this name here (CMakeLists.txt), so that its caller in app/ comes
+ * to the one below instead. */
+float firmware_update(dual_t *dual, const measurement_t *measurement, bool learn);
 
 #define PARAMETERS ((uint32_t)MODEL_PARAMETERS)
 #define BOTH ((uint32_t)INNOVATION_OUTPUTS)
@@ -29,6 +29,11 @@ static double squared(double x)
     return x * x;
 }
 
+static double squared_of(float x)
+{
+    return squared((double)x);
+}
+
 /* Notes what is predicted for a sample. An output that was not measured has no innovation, and counts in units of its own, so
  * that it has no part in determinants. */
 static void note_prediction(dual_t *dual, const measurement_t *measurement, innovation_t *innovation)
@@ -36,13 +41,13 @@ static void note_prediction(dual_t *dual, const measurement_t *measurement, inno
     const state_filter_t *state = &dual->state;
     const float *t = parameter_filter_sensitivity(&dual->parameters);
     const bool both = measurement->valid[0] && measurement->valid[1];
-    double a = squared(state->s[0]) + squared(state->output_noise[0]);
+    double a = squared_of(state->s[0]) + squared_of(state->output_noise[0]);
     double b = (double)state->s[0] * (double)state->s[2];
-    double d = squared(state->s[2]) + squared(state->s[3]) + squared(state->output_noise[1]);
+    double d = squared_of(state->s[2]) + squared_of(state->s[3]) + squared_of(state->output_noise[1]);
     for (uint32_t j = 0u; j < PARAMETERS; j++) {
-        a += squared(t[j]);
+        a += squared_of(t[j]);
         b += (double)t[j] * (double)t[PARAMETERS + j];
-        d += squared(t[PARAMETERS + j]);
+        d += squared_of(t[PARAMETERS + j]);
     }
     double nu[INNOVATION_OUTPUTS];
     const double variance[INNOVATION_OUTPUTS] = {a, d};

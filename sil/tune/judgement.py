@@ -15,7 +15,7 @@ from .likelihood import Likelihood, noise_as_set
 
 _BLOCK = 0.5
 """Gains are averaged over so long [s] before their error is told from their scatter: they are not quite white."""
-_CLEAR = 2.0  # standard errors
+_CLEAR = 3.0  # standard errors; they are of few blocks
 
 
 @dataclass(frozen=True)

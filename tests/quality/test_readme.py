@@ -27,6 +27,7 @@ NEEDED = {
     "tests/target": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
     "lever flash": pytest.mark.requires("arm-none-eabi-gcc", "openocd"),
     "lever qemu": pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm"),
+    "tshark": pytest.mark.requires("tshark"),
 }
 """By blocks with these words in them."""
 
