@@ -96,7 +96,9 @@ class Browser:
             self.complaints.append(told["entry"]["text"])
 
     def open(self, url: str) -> None:
-        self.ask("Page.navigate", url=url)
+        """Opens a page and waits until it is there with all that belongs to it."""
+        assert "errorText" not in self.ask("Page.navigate", url=url)
+        self.wait(f"location.href == {json.dumps(url)} && document.readyState == 'complete'")
 
     def run(self, script: str) -> Any:
         """The value of a JavaScript expression in the page."""
