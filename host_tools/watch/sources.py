@@ -7,11 +7,13 @@ the view takes them at its own rate. The view may therefore be as slow as it lik
 from __future__ import annotations
 
 import math
+import socket
 import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from .. import codec
@@ -25,6 +27,7 @@ MOST_WAITING = 65536
 """Frames: eight seconds of a full bus of 1 Mbit/s."""
 LONGEST_PAUSE = 5.0
 """[s] A longer gap of a log is not waited for."""
+_RECEIVE_BUFFER = 1 << 22  # [bytes]
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
 KEEP: dict[str, codec.Value] = {
     "model": "keep",
@@ -106,6 +109,7 @@ class BusSource(Source):
         super().__init__()
         self.title = interface if channel is None else f"{interface} {channel}"
         self._bus = open_bus(interface, channel, options or {})
+        _widen(self._bus)
         self._commands = 0
 
     def run(self) -> None:
@@ -184,6 +188,14 @@ class LogSource(Source):
         if not any_yet:
             where = "" if self._channel is None else f" of channel {self._channel}"
             raise LeverError(f"{self.title}: no CAN frame{where} in it")
+
+
+def _widen(bus: can.BusABC) -> None:
+    """Asks for as large a receive buffer as the kernel gives, where the bus has a socket: for when others run."""
+    own = getattr(bus, "socket", None)
+    if isinstance(own, socket.socket):
+        with suppress(OSError):
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
 
 
 def as_frame(message: can.Message) -> Frame:
