@@ -45,13 +45,18 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
+        try:
+            self._loop.run_until_complete(self._detach())
+        finally:
+            self._loop.close()
+            self._process.terminate()
+            self._process.wait(timeout=10)
+            shutil.rmtree(self._profile, ignore_errors=True)
+
+    async def _detach(self) -> None:
         if self._socket is not None:
             self._socket.close()
-            self._loop.run_until_complete(asyncio.sleep(0.05))
-        self._process.terminate()
-        self._process.wait(timeout=10)
-        self._loop.close()
-        shutil.rmtree(self._profile, ignore_errors=True)
+            await self._socket.read_message()
 
     def _attach(self) -> None:
         endpoint = Path(self._profile) / "DevToolsActivePort"

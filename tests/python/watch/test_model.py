@@ -14,6 +14,7 @@ from lever_cdkf.host_tools.config import Config, model_parameters
 from lever_cdkf.host_tools.library import enum_names, ffi, lib
 from lever_cdkf.host_tools.watch import model, words
 from lever_cdkf.host_tools.watch.model import Frame, Picture
+from lever_cdkf.host_tools.watch.sources import command_frame
 from python.watch.conftest import Flight
 
 
@@ -52,8 +53,7 @@ def test_dither_is_measured_over_a_window(flight: Flight) -> None:
     picture = Picture()
     watch(picture, flight, 0.5)
     assert picture.dither() == 0.0
-    everything = {"model": "keep", "preload": "keep", "estimator": "keep", "adaptation": "keep"}
-    flight.send(0x120, codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **everything}))
+    flight.send(*command_frame(0, {"dither_rms": 0.3}))
     squares = []
     for _ in range(60):
         frames = flight.frames(100)
@@ -182,9 +182,7 @@ def test_what_was_taken_away_is_counted_as_lost(flight: Flight) -> None:
 
 def test_commands_of_several_senders_are_no_losses() -> None:
     picture = Picture()
-    everything = {"model": "keep", "preload": "keep", "estimator": "keep", "adaptation": "keep"}
-    values = {"request": "none", "dither_rms": 20.0, **everything}
-    picture.take([(0x120, codec.encode("COMMAND", counter, values)) for counter in (3, 11, 4, 4)], 0.0)
+    picture.take([command_frame(counter, {}) for counter in (3, 11, 4, 4)], 0.0)
     entry = picture.traffic["COMMAND"]
     assert (entry.frames, entry.lost, entry.repeated) == (4, 0, 0)
 
