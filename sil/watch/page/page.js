@@ -206,6 +206,6 @@ for (const what of ["model", "estimator"])
 window.addEventListener("resize", redraw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 setInterval(() => {
-  if (lastHeard && performance.now() - lastHeard > PATIENCE) lost("Nothing has come from the server for a moment: what is shown is old.");
+  if (socket.readyState === WebSocket.OPEN && performance.now() - lastHeard > PATIENCE) lost("Nothing has come from the server for a moment: what is shown is old.");
 }, 500);
 connect();

@@ -126,7 +126,8 @@ def test_health_of_the_machine(flight: Flight) -> None:
     assert picture.counts["overruns"] == 12  # beyond the eight bits of the frame
     assert picture.field("PLATFORM_HEALTH", "transmit_errors") == 96
     assert "platform" in picture.faults()
-    assert "machine: received frames were lost in the machine" in words.faults(picture)
+    assert "machine: received frames lost" in words.faults(picture)
+    assert words.FAULTS["platform"] not in words.faults(picture)  # which is told in more detail
 
 
 # --- counts ----------------------------------------------------------------------------------------------------------

@@ -67,7 +67,7 @@ def test_a_session(desktop: Browser, start_lever: Start, tmp_path: Path) -> None
     process = start_lever("live", "--scenario", "steady", "--port", "0")
     url = address(process)
     desktop.open(url)
-    desktop.wait(f"{CONDITION}.startsWith('run: ')")
+    desktop.wait(f"{CONDITION}.startsWith('run')")
     shown = estimates(desktop)
     assert list(shown) == ["mp mass", "cp damping", "kp stiffness", "fn natural frequency", "ζ damping ratio"]
     value, sigma, unit, truth = shown["kp stiffness"]
@@ -111,7 +111,7 @@ def test_it_says_that_the_server_is_gone_and_finds_it_again(desktop: Browser, st
     process = start_lever("live", "--scenario", "steady", "--port", "0")
     url = address(process)
     desktop.open(url)
-    desktop.wait(f"{CONDITION}.startsWith('run: ')")
+    desktop.wait(f"{CONDITION}.startsWith('run')")
     assert not desktop.run("document.body.classList.contains('stale')")
     end(process)
     desktop.wait(f"{CONDITION} == 'The server is gone; this page tries to reach it again.'")
@@ -120,7 +120,7 @@ def test_it_says_that_the_server_is_gone_and_finds_it_again(desktop: Browser, st
     assert desktop.run("document.getElementById('answer').textContent") == "Not sent: there is no connection."
     again = start_lever("live", "--scenario", "steady", "--port", url.rsplit(":", 1)[1].rstrip("/"))
     address(again)
-    desktop.wait(f"{CONDITION}.startsWith('run: ')")
+    desktop.wait(f"{CONDITION}.startsWith('run')")
     assert not desktop.run("document.body.classList.contains('stale')")
     end(again)
 
@@ -128,7 +128,7 @@ def test_it_says_that_the_server_is_gone_and_finds_it_again(desktop: Browser, st
 def test_a_server_that_hangs_is_told(desktop: Browser, start_lever: Start) -> None:
     process = start_lever("live", "--scenario", "steady", "--port", "0")
     desktop.open(address(process))
-    desktop.wait(f"{CONDITION}.startsWith('run: ')")
+    desktop.wait(f"{CONDITION}.startsWith('run')")
     process.send_signal(signal.SIGSTOP)
     desktop.wait(f"{CONDITION}.startsWith('Nothing has come from the server')")
     assert desktop.run("document.body.classList.contains('stale')")
@@ -161,7 +161,7 @@ def test_on_a_phone(dark: bool, start_lever: Start, tmp_path: Path) -> None:
     process = start_lever("live", "--scenario", "steady", "--port", "0")
     with Browser(390, 844, dark=dark, phone=True) as phone:
         phone.open(address(process))
-        phone.wait(f"{CONDITION}.startsWith('run: ')")
+        phone.wait(f"{CONDITION}.startsWith('run')")
         sizes = phone.run("(({scrollWidth, clientWidth}) => [scrollWidth, clientWidth])(document.documentElement)")
         assert sizes == [390, 390]  # nothing to be scrolled sideways
         targets: list[dict[str, Any]] = phone.run(
