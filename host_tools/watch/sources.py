@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import socket
+import sys
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -17,6 +18,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from .. import codec
+from ..buses import open_bus
 from ..errors import LeverError
 from .model import ERROR, FOREIGN, STEP, Frame, Picture
 
@@ -28,6 +30,7 @@ MOST_WAITING = 65536
 LONGEST_PAUSE = 5.0
 """[s] A longer gap of a log is not waited for."""
 _RECEIVE_BUFFER = 1 << 22  # [bytes]
+_SWITCH_INTERVAL = 5e-4  # [s] after which drawing gives way to receiving; Python's own is ten times that
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
 KEEP: dict[str, codec.Value] = {
     "model": "keep",
@@ -63,6 +66,8 @@ class Source(ABC):
         """Puts frames until self._stopping is set or none are left. Raises what went wrong."""
 
     def start(self) -> None:
+        self._switch_interval = sys.getswitchinterval()
+        sys.setswitchinterval(_SWITCH_INTERVAL)
         self._start = time.monotonic()
         self._thread.start()
 
@@ -71,6 +76,7 @@ class Source(ABC):
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join(timeout=3.0)
+            sys.setswitchinterval(self._switch_interval)
 
     @property
     def now(self) -> float:
@@ -211,16 +217,3 @@ def command_frame(counter: int, values: Mapping[str, codec.Value]) -> tuple[int,
     """A COMMAND that changes only `values`. Raises CodecError."""
     data = codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
     return codec.message("COMMAND").frame_id, data
-
-
-def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) -> can.BusABC:
-    """A python-can bus. Raises LeverError."""
-    import can
-
-    given: dict[str, Any] = {"sleep_after_open": 0.0} if interface == "slcan" else {}
-    given |= {} if channel is None else {"channel": channel}
-    try:
-        return can.Bus(interface=interface, **(given | dict(options)))
-    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
-        where = interface if channel is None else f"{interface} channel {channel}"
-        raise LeverError(f"cannot open {where}: {error}; is it there and up?") from None

@@ -107,7 +107,8 @@ class Server:
             name = urlsplit(f"//{header}").hostname or ""
         except ValueError:
             return False
-        return name in {"localhost", self.host.lower(), socket.gethostname().lower()} - {""} or _is_address(name)
+        own = socket.gethostname().lower()
+        return name in {"localhost", self.host.lower(), own, f"{own}.local"} - {""} or _is_address(name)
 
 
 class _Guarded(tornado.web.RequestHandler):
@@ -118,7 +119,9 @@ class _Guarded(tornado.web.RequestHandler):
 
     def prepare(self) -> None:
         if not self.server.is_host(self.request.headers.get("Host", "")):
-            raise tornado.web.HTTPError(421, "Host is not a name of this server")
+            raise tornado.web.HTTPError(
+                421, reason="not a name of this server: use its address, or start it with --host"
+            )
 
     def set_default_headers(self) -> None:
         self.clear_header("Server")
@@ -153,7 +156,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
         super().prepare()
         origin = self.request.headers.get("Origin")
         if origin is not None and urlsplit(origin).netloc.lower() != self.request.headers["Host"].lower():
-            raise tornado.web.HTTPError(403, "Origin is another page")
+            raise tornado.web.HTTPError(403, reason="another page may not ask this server")
 
     def check_origin(self, origin: str) -> bool:
         """prepare() has done so."""

@@ -181,7 +181,7 @@ def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
         (["--once", "--scenario", "none"], "no scenario 'none'; there are "),
         (["--once", "--interface", "lever"], "interface lever is inside one process, with nobody else to be heard: "),
         (["--once", "--interface", "socketcan", "--channel", "no0"], "cannot open socketcan channel no0: "),
-        (["--once", "--interface", "slcan", "--option", "x"], "--option x: must be KEY=VALUE"),
+        (["--once", "--interface", "slcan", "--bus-option", "x"], "--bus-option x: must be KEY=VALUE"),
         (["--duration", "soon"], "'soon' is not a number of seconds above 0"),
     ],
 )
