@@ -33,7 +33,7 @@ class Monitor(App[None]):
     #estimates { height: auto; }
     .panel { border: round $primary; padding: 0 1; }
     #lower { height: 1fr; }
-    #health { width: 1fr; height: 100%; overflow-y: auto; }
+    #health { width: 1fr; height: 100%; overflow-y: auto; scrollbar-size-vertical: 1; }
     #messages { width: 46; height: 100%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
