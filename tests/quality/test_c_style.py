@@ -41,7 +41,8 @@ def test_layout_check_finds_a_seeded_violation(tmp_path: Path) -> None:
 
 def test_clang_tidy(build_dir: Path) -> None:
     database = json.loads((build_dir / "compile_commands.json").read_text())
-    ours = sorted({file for entry in database if tools.FIRMWARE in (file := Path(entry["file"])).parents})
+    folders = {tools.FIRMWARE, tools.ROOT / "host_tools"}
+    ours = sorted({file for entry in database if folders & set((file := Path(entry["file"])).parents)})
     assert set(tools.core_sources()) <= set(ours)
     with ThreadPoolExecutor() as pool:
         results = list(pool.map(lambda file: tools.run(clang_tidy(build_dir, file)), ours))

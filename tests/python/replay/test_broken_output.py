@@ -47,17 +47,17 @@ def test_a_full_disk_is_one_line_and_no_file(size: int, session: Session, tmp_pa
 def test_ctrl_c_leaves_nothing(session: Session, tmp_path: Path) -> None:
     pipe, out = tmp_path / "endless", tmp_path / "out"
     os.mkfifo(pipe)
-    with subprocess.Popen([LEVER, "replay", str(pipe), "-o", str(out)], stderr=subprocess.PIPE, text=True) as process:
-        with pipe.open("wb") as file:
-            file.write(session.log.read_bytes())
-            file.flush()
-            end = time.monotonic() + 30.0
-            while not list(out.glob(".replay.*/bus.log")):
-                assert time.monotonic() < end
-                time.sleep(0.02)
-            assert not any((out / name).exists() for name in FILES)
-            process.send_signal(signal.SIGINT)
-            assert process.wait(30.0) == 130
+    command = [LEVER, "replay", str(pipe), "-o", str(out)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as process, pipe.open("wb") as file:
+        file.write(session.log.read_bytes())
+        file.flush()
+        end = time.monotonic() + 30.0
+        while not list(out.glob(".replay.*/bus.log")):
+            assert time.monotonic() < end
+            time.sleep(0.02)
+        assert not any((out / name).exists() for name in FILES)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30.0) == 130
     assert list(out.iterdir()) == []
 
 

@@ -147,7 +147,7 @@ def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path) -> None:
-    """<linux/can/error.h>: of class 4, the controller's, byte 1 has the conditions; 0x40 is bus off, 0x100 restarted."""
+    """<linux/can/error.h>: byte 1 of class 4 has the controller's conditions; 0x40 is bus off, 0x100 restarted."""
 
     class SocketcanBus(can.BusABC):
         channel_info = "a bus in a test"
