@@ -1,20 +1,24 @@
 """How fast an hour is replayed, and in how much memory: `cmake --build build --target replay_benchmark`.
 
 Makes a log of an hour at 1 kHz (7.2 million frames) out of a simulated minute, replays it with `lever replay` on one
-core, once for all files and once for the estimates alone, and feeds the first minutes of it to the estimator frame by
-frame by python-can, on the same core. Prints times, their ratio and the largest memory. Takes two minutes and 2 GB of
-disk.
+core, without files and with all of them, and feeds the first minutes of it to the estimator frame by frame by python-can,
+on the same core, likewise without files and with two of them. Prints times, the largest memory, and the ratio of
+processor times. Takes two minutes and 2 GB of disk.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
+import itertools
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import can
@@ -74,15 +78,38 @@ def lever(*arguments: str | Path) -> tuple[float, float, float]:
     return time.perf_counter() - start, float(processor), float(kilobytes) / 1024
 
 
-def frame_by_frame(log: Path, frames: int) -> tuple[float, float]:
-    """Wall and processor time [s] that python-can's reader and bus take for the first frames, and nothing else done."""
+def frame_by_frame(log: Path, frames: int, folder: Path | None) -> tuple[float, float]:
+    """Wall and processor time [s] that python-can's reader and bus take for the first frames; nothing is done with the
+    answers, or with `folder` they are written into a log and, decoded, into a table with a row for each sample."""
     start, used = time.perf_counter(), time.process_time()
-    with can.LogReader(log) as reader, LeverBus("lever") as bus:
-        for message, _ in zip(reader, range(frames), strict=False):
+    with ExitStack() as stack:
+        reader = stack.enter_context(can.LogReader(log))
+        bus = stack.enter_context(LeverBus("lever"))
+        keep = stack.enter_context(_files(folder)) if folder is not None else None
+        for message in itertools.islice(reader, frames):
             bus.send(message)
-            while bus.recv(0.0) is not None:
-                pass
+            if keep is not None:
+                keep(message)
+            while (answer := bus.recv(0.0)) is not None:
+                if keep is not None:
+                    keep(answer)
     return time.perf_counter() - start, time.process_time() - used
+
+
+@contextmanager
+def _files(folder: Path) -> Iterator[Callable[[can.Message], None]]:
+    """bus.log by python-can and trace.csv by the standard library, as a script would write them."""
+    with can.CanutilsLogWriter(folder / "bus.log") as log, (folder / "trace.csv").open("w", newline="") as file:
+        table, row = csv.writer(file), dict[str, float]()
+
+        def keep(message: can.Message) -> None:
+            log.on_message_received(message)
+            name, fields = codec.decode(message.arbitration_id, message.data)
+            row.update({f"{name}.{field}": value for field, value in fields.items()})
+            if name == "STATE_ESTIMATE":
+                table.writerow([f"{value:.6f}" for value in row.values()])
+
+        yield keep
 
 
 def main() -> int:
@@ -101,16 +128,25 @@ def main() -> int:
                 file.write(bulk.format_lines(shifted(minute, number), "can0").data)
         everything = lever("replay", log, "-o", folder / "out")
         estimates = lever("replay", log)
-        wall, cpu = (value * minutes / by_frame for value in frame_by_frame(log, by_frame * len(minute)))
+        count = by_frame * len(minute)
+        plain = [value * minutes / by_frame for value in frame_by_frame(log, count, None)]
+        with_files = [value * minutes / by_frame for value in frame_by_frame(log, count, folder)]
     finally:
         shutil.rmtree(folder)
     rows: list[Row] = [
-        {"what": what, "wall time [s]": w, "processor time [s]": c, "times faster [1]": cpu / c, "memory [MB]": m}
-        for what, (w, c, m) in {
-            "lever replay -o DIR (five files)": everything,
-            "lever replay (estimates only)": estimates,
-            f"python-can frame by frame (from {by_frame} min)": (wall, cpu, None),
-        }.items()
+        {
+            "what": what,
+            "wall time [s]": wall,
+            "processor time [s]": processor,
+            "memory [MB]": memory,
+            "ratio [1]": ratio,
+        }
+        for what, (wall, processor, memory), ratio in (
+            ("lever replay", estimates, 1.0),
+            (f"python-can frame by frame (from {by_frame} min)", (*plain, None), plain[1] / estimates[1]),
+            ("lever replay -o DIR (five files)", everything, 1.0),
+            ("python-can frame by frame, bus.log and trace.csv", (*with_files, None), with_files[1] / everything[1]),
+        )
     ]
     print_tables({f"{minutes} min at 1 kHz, {minutes * len(minute):,} frames, one core": rows})
     return 0
