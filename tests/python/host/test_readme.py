@@ -20,7 +20,7 @@ def blocks(root: Path, language: str) -> list[str]:
 
 
 def test_python(root: Path, tmp_path: Path) -> None:
-    with_bus, without = blocks(root, "python")
+    with_bus, without, _ = blocks(root, "python")
     done = subprocess.run([sys.executable, "-c", with_bus], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "0.199 s STATE_ESTIMATE {" in done.stdout
