@@ -132,7 +132,7 @@ def test_a_host_that_never_reads_is_not_waited_for(start: Start, link: Path) -> 
         tty.setraw(line.fileno())
         for first in range(0, len(flood), 1000):
             line.write(flood[first : first + 1000])
-        rig.wait_until(lambda: bytes_read(process) == before + len(flood), "all is read")
+        rig.wait_until(lambda: bytes_read(process) == before + len(flood) and is_waiting(process), "all is taken")
         totals = process.stop()
     assert totals["samples"] == 4000
     assert totals["dropped"] > 0
@@ -142,6 +142,11 @@ def test_a_host_that_never_reads_is_not_waited_for(start: Start, link: Path) -> 
 def bytes_read(process: rig.LeverCan) -> int:
     """By the process, since it started."""
     return int(Path(f"/proc/{process.process.pid}/io").read_text().split()[1])
+
+
+def is_waiting(process: rig.LeverCan) -> bool:
+    """Whether it has nothing to do."""
+    return Path(f"/proc/{process.process.pid}/stat").read_text().rpartition(") ")[2].startswith("S")
 
 
 def test_noise_is_answered_and_does_not_disturb(start: Start, link: Path) -> None:
