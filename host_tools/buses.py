@@ -16,9 +16,11 @@ _DEFAULTS: Mapping[str, Mapping[str, Any]] = {"slcan": {"bitrate": 1_000_000, "s
 _IN_PROCESS = ("lever", "virtual")
 
 
-def add_bus_options(parser: argparse.ArgumentParser) -> None:
-    """--interface, --channel, --bitrate and --bus-option, for chosen_bus()."""
-    parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …")
+def add_bus_options(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
+    """--interface, --channel, --bitrate and --bus-option, for open_bus() and chosen_options()."""
+    parser.add_argument(
+        "--interface", required=required, help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …"
+    )
     parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
     parser.add_argument("--bitrate", metavar="RATE", type=int, help="[bit/s] for interfaces that set it")
     parser.add_argument(
@@ -56,7 +58,11 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) ->
     """A python-can bus. Raises LeverError."""
     import can
 
-    given = {**_DEFAULTS.get(interface, {}), **({} if channel is None else {"channel": channel}), **options}
+    from .protocol_ahead import read_ahead
+
+    given = {**_DEFAULTS.get(interface, {}), **options}
+    if channel is not None:
+        given["channel"] = read_ahead(channel) if interface == "slcan" else channel
     try:
         return can.Bus(interface=interface, **given)
     except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.host_tools import buses
+from lever_cdkf.host_tools.buses import add_bus_options, chosen_options
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
@@ -26,9 +28,9 @@ before the next one is sent. Prints how good the estimates were; with --out also
   summary.json  errors, coverage, times to converge, innovations, counts, and a verdict
   report.html   all of it as one page for a browser
 
-With --interface lever (the default) the firmware runs inside this process. With socketcan or slcan it has to be running
-at the other end of the channel, with the settings that --settings alone prints; bus.log is the same to the byte but
-for the channel's name. What python-can's interface can be told beyond its channel is given by --bus-option.
+With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel is
+vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints;
+bus.log is the same to the byte but for the channel's name.
 """
 _EPILOG = """\
 examples:
@@ -45,8 +47,6 @@ Exit status: 0 when every sample was answered, the estimator never was in fault,
 kept; 1 when not, with one line on standard error.
 """
 _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
-_BUS_OPTIONS: dict[str, dict[str, Any]] = {"slcan": {"bitrate": 1_000_000, "sleep_after_open": 0.0}}
-"""Unless told otherwise: the bit rate of lever.dbc, and no two seconds for an Arduino to reset in."""
 _DEMO = "demo"
 _PRINT = ""  # --settings without a file
 
@@ -58,19 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     what = sim.add_mutually_exclusive_group(required=True)
     what.add_argument("scenario", nargs="?", metavar="SCENARIO", help="a name of --list, or the path of a .toml file")
     what.add_argument("--list", action="store_true", help="print the scenarios that come with the package")
-    sim.add_argument(
-        "--interface", choices=("lever", "socketcan", "slcan"), default="lever", help="default: %(default)s"
-    )
-    sim.add_argument(
-        "--channel", help="vcan0 for socketcan, a serial device for slcan (default: vcan0; slcan has none)"
-    )
-    sim.add_argument(
-        "--bus-option",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        help="option of python-can's interface, such as tty_baudrate=921600 for slcan; may be repeated",
-    )
+    add_bus_options(sim)
     sim.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     sim.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
@@ -85,7 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         help="use the estimator settings in FILE; without FILE: print a settings file with those of the run, and stop",
     )
     add_json_option(sim)
-    sim.set_defaults(run=run)
+    sim.set_defaults(run=run, interface="lever")
     demo = subparsers.add_parser(
         "demo",
         help="simulate a tiring, then startled pilot and write a report",
@@ -113,8 +101,7 @@ def run(args: argparse.Namespace) -> int:
     channel = args.channel or _CHANNELS.get(args.interface)
     if channel is None:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
-    bus_options = _bus_options(args.bus_option)
-    return _simulate(scenario, args.interface, channel, bus_options, args.out, args.json, args.realtime)
+    return _simulate(scenario, args.interface, channel, chosen_options(args), args.out, args.json, args.realtime)
 
 
 def _from_file(path: str) -> list[str]:
@@ -148,19 +135,6 @@ def _list(json_file: str | None) -> int:
     return 0
 
 
-def _bus_options(assignments: Sequence[str]) -> dict[str, Any]:
-    """KEY=VALUE each, with numbers and truth values as such."""
-    from can.util import cast_from_string
-
-    options = {}
-    for assignment in assignments:
-        key, equals, value = assignment.partition("=")
-        if not (key and equals):
-            raise LeverError(f"--bus-option {assignment}: expected KEY=VALUE, such as tty_baudrate=921600")
-        options[key] = cast_from_string(value)
-    return options
-
-
 def _simulate(
     scenario: Scenario,
     interface: str,
@@ -191,22 +165,11 @@ def open_bus(
     scenario: Scenario, interface: str, channel: str, bus_options: Mapping[str, Any] | None = None
 ) -> can.BusABC:
     """The bus to the estimator; `bus_options` are python-can's for the interface. Raises LeverError."""
-    import can
-
-    named = channel
-    options = {**_BUS_OPTIONS.get(interface, {}), **(bus_options or {})}
     if interface == "lever":
         from lever_cdkf.host_tools.bus import LeverBus
 
-        return LeverBus(channel, config=scenario.config, **options)
-    if interface == "slcan":
-        from lever_cdkf.host_tools.protocol_ahead import read_ahead
-
-        channel = read_ahead(channel)
-    try:
-        return can.Bus(interface=interface, channel=channel, **options)
-    except (can.CanError, OSError, ValueError, TypeError) as error:
-        raise LeverError(f"cannot open {interface} channel {named}: {error}; is it there and up?") from None
+        return LeverBus(channel, config=scenario.config, **(bus_options or {}))
+    return buses.open_bus(interface, channel, bus_options or {})
 
 
 def _tables(result: Result) -> Tables:

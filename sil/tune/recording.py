@@ -11,6 +11,7 @@ from lever_cdkf.host_tools import codec, logs
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.estimator import Health
 from lever_cdkf.host_tools.innovations import FRAME, Array, samples_of
+from lever_cdkf.host_tools.traffic import Traffic
 
 _SAMPLES = ("LEVER_SAMPLE", "BASE_SAMPLE")
 
@@ -50,40 +51,28 @@ def read(
 ) -> Recording:
     """The samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`, both [s] of
     recorded time. Raises LeverError."""
-    log = logs.Recording(paths)
+    traffic = Traffic(logs.Recording(paths), channel)
+    log = traffic.recording
     identifiers = np.array([codec.message(name).frame_id for name in _SAMPLES])
     command = codec.message("COMMAND").frame_id
-    begin: int | None = None
     pieces = []
-    for chunk in log.chunks():
-        begin = int(chunk["time_us"][0]) if begin is None else begin
-        since = (chunk["time_us"] - begin) * 1e-6
+    for chunk in traffic.chunks():
+        since = (chunk["time_us"] - traffic.first_us) * 1e-6
         sampled = np.isin(chunk["id"], identifiers) & (since >= start)
-        wanted = (sampled | (chunk["id"] == command)) & (chunk["flags"] == 0) & (since < start + length)
-        pieces.append(chunk[wanted])
+        pieces.append(chunk[(sampled | (chunk["id"] == command)) & (since < start + length)])
         if progress is not None:
             progress(log.done, log.size, "reading the log")
-        if since[-1] > start + length:
+        if len(since) and since[-1] > start + length:
             break
-    name = ", ".join(os.fspath(path) for path in paths)
+    name = ", ".join(log.paths)
+    if channel is None and traffic.other_samples:
+        buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
+        raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
     frames = np.concatenate(pieces)
     base = codec.message("BASE_SAMPLE").frame_id
     if not (frames["id"] == base).any():
-        raise LeverError(
-            f"{name}: no BASE_SAMPLE ({base:#x}) from {start:g} s on, so no samples: `lever dbc` has the messages"
-        )
-    found = [log.buses.names()[index] for index in np.unique(frames["bus"][frames["id"] == base])]
-    chosen = _chosen(found, channel, name)
-    return _recording(frames[frames["bus"] == log.buses.names().index(chosen)], chosen, name)
-
-
-def _chosen(found: Sequence[str], channel: str | None, log: str) -> str:
-    """The bus that is asked for, or the only one that has samples. Raises LeverError."""
-    if channel is not None and channel not in found:
-        raise LeverError(f"{log}: no samples on {channel}; there are some on {', '.join(found)}")
-    if channel is None and len(found) > 1:
-        raise LeverError(f"{log}: samples on more than one bus: choose by --channel {' or --channel '.join(found)}")
-    return channel or found[0]
+        raise LeverError(f"{name}: no BASE_SAMPLE ({base:#x}) from {start:g} s on, so no samples")
+    return _recording(frames, str(traffic.channel), name)
 
 
 def _recording(frames: Array, bus: str, log: str) -> Recording:

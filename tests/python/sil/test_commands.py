@@ -98,7 +98,7 @@ def test_settings_prints_a_settings_file_for_the_firmware(lever: Run, tmp_path: 
             ("sim", "steady", "--interface", "slcan", "--channel", "/dev/nothing"),
             "cannot open slcan channel /dev/nothing",
         ),
-        (("sim", "steady", "--bus-option", "settings"), "--bus-option settings: expected KEY=VALUE"),
+        (("sim", "steady", "--bus-option", "settings"), "--bus-option settings: must be KEY=VALUE"),
         (("sim", "steady", "--bus-option", "speed=1"), "interface 'lever' has no option speed"),
         (("sim", "steady", "--interface", "socketcan", "--channel", "nocan7"), "cannot open socketcan channel nocan7"),
         (("sim", "steady", *SHORT, "--out", "/dev/null/x"), "cannot make the folder /dev/null/x"),
