@@ -28,8 +28,8 @@ before the next one is sent. Prints how good the estimates were; with --out also
   summary.json  errors, coverage, times to converge, innovations, counts, and a verdict
   report.html   all of it as one page for a browser
 
-With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel is
-vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints;
+With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
+is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints;
 bus.log is the same to the byte but for the channel's name.
 """
 _EPILOG = """\

@@ -125,8 +125,8 @@ def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0") 
     ("content", "arguments", "line"),
     [
         ("", (), "holds no CAN frame"),
-        ("(0.0) can0 123#00\n", (), "1 frames, but no sample (0x111 BASE_SAMPLE) in them; its buses: can0"),
-        ("(0.0) can0 111#0000000000000000\n", (), "1 frames, but no sample (0x111 BASE_SAMPLE) in them; its buses: can0"),
+        ("(0.0) can0 123#00\n", (), "but no sample (0x111 BASE_SAMPLE) in them; its buses: can0"),
+        ("(0.0) can0 111#0000000000000000\n", (), "but no sample (0x111 BASE_SAMPLE) in them; its buses: can0"),
         (None, (), "too short to tune on: 2.0 s of samples; at least 20 s are needed"),
         (None, ("--channel", "can7"), "but no sample (0x111 BASE_SAMPLE) on bus can7 in them; its buses: can0"),
         (None, ("--held-out", "0.9"), "--held-out 0.9: must be from 0 to 0.8"),

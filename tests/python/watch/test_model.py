@@ -117,7 +117,7 @@ def test_health_of_the_machine(flight: Flight) -> None:
     picture = Picture()
     watch(picture, flight, 0.3)
     assert picture.platform_faults() is None
-    lever = flight.bus.estimator._lever
+    lever = flight.bus.estimator.pointer
     for overruns in (250, 262):
         report = {"faults": lib.LEVER_PLATFORM_OVERRUN, "transmit_errors": 96, "receive_errors": 3, "bus_offs": 1}
         lib.lever_platform(lever, ffi.new("lever_platform_t *", {**report, "overruns": overruns}))
