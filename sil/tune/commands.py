@@ -104,6 +104,9 @@ def _settings(args: argparse.Namespace) -> Assignments:
 
     if not 0.0 <= args.held_out <= 0.8:
         raise LeverError(f"--held-out {args.held_out:g}: must be from 0 to 0.8")
+    for path in (args.output, args.page):  # before a search whose result could then not be kept
+        if path is not None and not path.parent.is_dir():
+            raise LeverError(f"cannot write {path}: there is no folder {path.parent}")
     if args.start < 0.0 or not args.length > 0.0:
         raise LeverError(f"--start {args.start:g} --length {args.length:g}: seconds, and length must be more than 0")
     assignments = read_assignments(args.settings) if args.settings is not None else {}

@@ -132,6 +132,7 @@ def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0") 
         (None, ("--held-out", "0.9"), "--held-out 0.9: must be from 0 to 0.8"),
         (None, ("--length", "0"), "length must be more than 0"),
         (None, ("--start", "100"), "no BASE_SAMPLE (0x111) from 100 s on, so no samples"),
+        (None, ("--page", "/no/such/x.html"), "cannot write /no/such/x.html: there is no folder /no/such"),
         (None, ("--keep", "theta_nois"), "unknown setting 'theta_nois'; did you mean theta_noise?"),
         (None, ("--set", "theta_noise=9"), "theta_noise = 9.0 is out of range"),
     ],
