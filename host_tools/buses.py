@@ -16,11 +16,9 @@ _DEFAULTS: Mapping[str, Mapping[str, Any]] = {"slcan": {"bitrate": 1_000_000, "s
 _IN_PROCESS = ("lever", "virtual")
 
 
-def add_bus_options(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
+def add_bus_options(parser: argparse.ArgumentParser) -> None:
     """--interface, --channel, --bitrate and --bus-option, for open_bus() and chosen_options()."""
-    parser.add_argument(
-        "--interface", required=required, help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …"
-    )
+    parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …")
     parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
     parser.add_argument("--bitrate", metavar="RATE", type=int, help="[bit/s] for interfaces that set it")
     parser.add_argument(

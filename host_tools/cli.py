@@ -31,6 +31,7 @@ a first session:
   lever demo                              simulate a pilot, estimate, and write a report to open in a browser
   lever sim --list                        all scenarios; `lever sim NAME` runs one
   lever live --scenario demo              watch it in a browser while it runs; `lever monitor` does so in the terminal
+  lever replay session.log                the same estimator on a recorded log; `lever record` makes one
   lever settings                          every tunable number of the estimator with unit, default and range
   lever dbc                               the CAN messages
 

@@ -86,10 +86,7 @@ class Recorder:
         """Lets frames wait while this process has no turn: a socket holds but a tenth of a second otherwise."""
         opened = getattr(self._bus, "socket", None)
         if isinstance(opened, socket.socket):
-            for option in (
-                _SO_RCVBUFFORCE,
-                socket.SO_RCVBUF,
-            ):  # the first takes a privilege, the second what is allowed
+            for option in (_SO_RCVBUFFORCE, socket.SO_RCVBUF):  # the first takes a privilege
                 with suppress(OSError):
                     opened.setsockopt(socket.SOL_SOCKET, option, _ROOM)
                     return

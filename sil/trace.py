@@ -77,14 +77,6 @@ def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:
         yield quantity.column("sigma"), sigmas, f"{quantity.key}_sigma"
 
 
-def recorded_name(column: str) -> str:
-    """The column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded of nis."""
-    for kind in ("_estimate", "_sigma"):
-        if kind in column:
-            return column.replace(kind, "_recorded" if kind == "_estimate" else "_recorded_sigma")
-    return f"{column}_recorded"
-
-
 def _truth(recording: Recording) -> Trace:
     inputs = recording.inputs
     values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}

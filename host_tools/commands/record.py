@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..buses import add_bus_options, chosen_options, open_bus
+from ..errors import LeverError
 from ..tables import Row, add_json_option
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
         "record", help="record a CAN bus into a log, with losses counted", description=_DESCRIPTION, epilog=_EPILOG
     )
-    add_bus_options(parser, required=True)
+    add_bus_options(parser)
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="the log (default: lever_DATE_TIME.log)")
     parser.add_argument("--duration", metavar="SECONDS", type=_seconds, help="end after so long (default: at Ctrl-C)")
     add_json_option(parser)
@@ -49,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
     from ..tables import print_tables
 
     out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))
+    if args.interface is None:
+        raise LeverError("record what? give a bus such as --interface socketcan --channel can0")
     with open_bus(args.interface, args.channel, chosen_options(args)) as bus, _stopping() as stopped:
         recorder = Recorder(bus, out, args.channel or args.interface)
         print(f"recording {bus.channel_info} into {out}; Ctrl-C ends", file=sys.stderr)

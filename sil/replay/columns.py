@@ -10,7 +10,8 @@ from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Rows
 from numpy.typing import NDArray
 
-from ..trace import COUNTS, ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields, recorded_name
+from ..quantities import recorded_name
+from ..trace import COUNTS, ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
 from .timeline import Timeline
 
 FloatArray = NDArray[np.float64]

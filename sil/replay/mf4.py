@@ -17,8 +17,8 @@ from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.later import allow
 from numpy.typing import NDArray
 
-from ..quantities import quantities
-from ..trace import ESTIMATED, HEALTH, MEASURED, Trace, recorded_name
+from ..quantities import quantities, recorded_name
+from ..trace import ESTIMATED, HEALTH, MEASURED, Trace
 from .outputs import writing
 
 Signals = list[tuple[str, str, str]]

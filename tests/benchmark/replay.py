@@ -1,9 +1,9 @@
 """How fast an hour is replayed, and in how much memory: `cmake --build build --target replay_benchmark`.
 
 Makes a log of an hour at 1 kHz (7.2 million frames) out of a simulated minute, replays it with `lever replay` on one
-core, without files and with all of them, and feeds the first minutes of it to the estimator frame by frame by python-
-can, on the same core, likewise without files and with two of them. Prints times, the largest memory, and the ratio of
-processor times. Takes two minutes and 2 GB of disk.
+core, without files and with all of them, and feeds the first minutes of it to the estimator frame by frame by
+python-can, on the same core, likewise without files and with two of them. Prints times, the largest memory, and the
+ratio of processor times. Takes two minutes and 2 GB of disk.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ def test_answers_are_those_of_the_bus(at_once: int, spoilt_log: Path, session: S
     expected, health = one_by_one(spoilt_log, session)
     feeder = Feeder(Estimator(session.config), at_once)
     traffic = Traffic(Recording([spoilt_log]), "lever")
-    fed = np.concatenate([out for frames in traffic.chunks() for out, _ in feeder.feed(frames)])
+    fed = np.concatenate([out.copy() for frames in traffic.chunks() for out, _ in feeder.feed(frames)])
     answers = fed[fed["flags"] == bulk.ANSWER]
     assert [(int(frame["id"]), frame["data"].tobytes()) for frame in answers] == expected
     assert feeder.estimator.health() == health
