@@ -6,6 +6,7 @@ bulk_frame_t and bulk_row_t in c/bulk.h, which says what they mean.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,13 +111,12 @@ class Feeder:
         """Frames that the estimator did not accept."""
         return int(self._feeder.refused)
 
-    def feed(self, frames: Frames) -> list[tuple[Frames, Rows]]:
-        """Feeds frames of one bus, all classic data frames with 11-bit identifiers, and returns pieces of
+    def feed(self, frames: Frames) -> Iterator[tuple[Frames, Rows]]:
+        """Feeds frames of one bus, all classic data frames with 11-bit identifiers, and gives pieces of
 
-        - the frames fed, each sample followed by its answers (flag ANSWER), and
+        - the frames fed, each sample followed by its answers (flag ANSWER), valid until the next piece, and
         - the rows of the samples that are complete with it; the last one is kept back until flush().
         """
-        pieces = []
         source = ffi.from_buffer("bulk_frame_t[]", np.ascontiguousarray(frames))
         done = 0
         while done < len(frames):
@@ -126,8 +126,7 @@ class Feeder:
                 self._feeder, lever, source + done, left, out, len(self._out), rows, len(self._rows), self._fed
             )
             done += self._fed.taken
-            pieces.append((self._out[: self._fed.out].copy(), self._rows[: self._fed.rows].copy()))
-        return pieces
+            yield self._out[: self._fed.out], self._rows[: self._fed.rows].copy()
 
     def flush(self) -> Rows:
         """The row of the last sample, if there was one."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from .errors import LeverError
+from .later import allow, put_off
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has
@@ -29,6 +30,8 @@ _EPILOG = """\
 a first session:
   lever demo                              simulate a pilot, estimate, and write a report to open in a browser
   lever sim --list                        all scenarios; `lever sim NAME` runs one
+  lever live --scenario demo              watch it in a browser while it runs; `lever monitor` does so in the terminal
+  lever replay session.log                the same estimator on a recorded log; `lever record` makes one
   lever settings                          every tunable number of the estimator with unit, default and range
   lever dbc                               the CAN messages
 
@@ -50,6 +53,7 @@ class Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command line and returns its exit status: 0 only when all went well."""
+    put_off(sys.argv[1:] if argv is None else argv)
     try:
         try:
             args = _parser().parse_args(argv)
@@ -68,6 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(f"lever: error: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    finally:
+        allow()
 
 
 def _expected() -> tuple[type[Exception], ...]:

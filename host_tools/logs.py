@@ -125,8 +125,7 @@ class Recording:
             if rest:
                 parsed = parse(rest + b"\n", self.buses)
                 self.damaged += parsed.damaged
-                if parsed.damaged:
-                    self.ends_early.append(f"{path}: the last line is cut off")
+                self.ends_early.append(f"{path}: its last line has no end")
                 yield parsed.frames
 
     # --- everything else, through python-can --------------------------------------------------------------------------

@@ -71,6 +71,14 @@ def quantities(model: str) -> tuple[Quantity, ...]:
     return parameters(model) + DYNAMICS
 
 
+def recorded_name(column: str) -> str:
+    """The column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded of nis."""
+    for kind in ("_estimate", "_sigma"):
+        if kind in column:
+            return column.replace(kind, "_recorded" if kind == "_estimate" else "_recorded_sigma")
+    return f"{column}_recorded"
+
+
 def _symbol(name: str) -> str:
     """m_p as m with index p, a21 as a with index 21."""
     letter, index = name[0], name[1:].removeprefix("_")

@@ -9,8 +9,9 @@ The columns of the parameters are those of the estimator's model; their truth is
 from __future__ import annotations
 
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from lever_cdkf.host_tools import codec
@@ -19,6 +20,9 @@ from numpy.typing import NDArray
 from .buslog import Frames
 from .loop import Recording
 from .quantities import DYNAMICS, quantities
+
+if TYPE_CHECKING:
+    import polars
 
 FloatArray = NDArray[np.float64]
 Trace = dict[str, FloatArray]
@@ -73,14 +77,6 @@ def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:
         yield quantity.column("sigma"), sigmas, f"{quantity.key}_sigma"
 
 
-def recorded_name(column: str) -> str:
-    """The column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded of nis."""
-    for kind in ("_estimate", "_sigma"):
-        if kind in column:
-            return column.replace(kind, "_recorded" if kind == "_estimate" else "_recorded_sigma")
-    return f"{column}_recorded"
-
-
 def _truth(recording: Recording) -> Trace:
     inputs = recording.inputs
     values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}
@@ -129,11 +125,32 @@ class _Decoded:
         return np.concatenate(((np.nan,), values))[last]
 
 
-def write_csv(trace: Trace, file: Path | BinaryIO, *, header: bool = True) -> None:
+def write_csv(trace: Trace, path: Path) -> None:
     """trace.csv with six decimals; NaN stands as `NaN`, a whole number that is not known yet as nothing."""
+    _frame(trace).write_csv(path, float_precision=6)
+
+
+def write_csv_rows(trace: Trace, file: BinaryIO, held: list[tuple[list[str], NDArray[np.bool_]]]) -> None:
+    """The same rows without the header, in half the time: `held` are neighbouring columns that change only at certain
+    rows; the text of them is made there and repeated."""
+    import polars
+
+    columns: dict[str, object] = dict(trace)
+    for names, changed in held:
+        changed[0] = True
+        text = BytesIO()
+        _frame({name: trace[name][changed] for name in names}).write_csv(text, include_header=False, float_precision=6)
+        lines = polars.Series(text.getvalue().decode("ascii").splitlines())
+        columns[names[0]] = lines.gather(np.cumsum(changed) - 1)
+        for name in names[1:]:
+            del columns[name]
+    polars.DataFrame(columns).write_csv(file, include_header=False, float_precision=6, quote_style="never")
+
+
+def _frame(trace: Trace) -> polars.DataFrame:
     import polars
 
     columns = {name: polars.Series(values) for name, values in trace.items()}
-    for name in WHOLE:
+    for name in columns.keys() & set(WHOLE):
         columns[name] = columns[name].fill_nan(None).cast(polars.Int64)
-    polars.DataFrame(columns).write_csv(file, include_header=header, float_precision=6)
+    return polars.DataFrame(columns)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..buses import add_bus_options, chosen_options, open_bus
 from ..errors import LeverError
 from ..tables import Row, add_json_option
 
@@ -38,14 +39,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
         "record", help="record a CAN bus into a log, with losses counted", description=_DESCRIPTION, epilog=_EPILOG
     )
-    parser.add_argument(
-        "--interface", required=True, help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …"
-    )
-    parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
-    parser.add_argument("--bitrate", type=int, help="[bit/s] for interfaces that set it")
-    parser.add_argument(
-        "--option", metavar="KEY=VALUE", action="append", default=[], help="more for the interface; may be repeated"
-    )
+    add_bus_options(parser)
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="the log (default: lever_DATE_TIME.log)")
     parser.add_argument("--duration", metavar="SECONDS", type=_seconds, help="end after so long (default: at Ctrl-C)")
     add_json_option(parser)
@@ -54,13 +48,11 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 def run(args: argparse.Namespace) -> int:
     from ..recorder import Recorder
     from ..tables import print_tables
-    from ..watch.sources import open_bus
 
     out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))
-    options = dict(_option(text) for text in args.option)
-    if args.bitrate is not None:
-        options["bitrate"] = args.bitrate
-    with open_bus(args.interface, args.channel, options) as bus, _stopping() as stopped:
+    if args.interface is None:
+        raise LeverError("record what? give a bus such as --interface socketcan --channel can0")
+    with open_bus(args.interface, args.channel, chosen_options(args)) as bus, _stopping() as stopped:
         recorder = Recorder(bus, out, args.channel or args.interface)
         print(f"recording {bus.channel_info} into {out}; Ctrl-C ends", file=sys.stderr)
         line = _Line()
@@ -82,13 +74,6 @@ def _seconds(text: str) -> float:
     if not 0.0 < seconds < float("inf"):
         raise ValueError
     return seconds
-
-
-def _option(text: str) -> tuple[str, Any]:
-    key, equals, value = text.partition("=")
-    if not equals or not key:
-        raise LeverError(f"--option {text}: must be KEY=VALUE")
-    return key, int(value) if value.lstrip("-").isdigit() else value
 
 
 @contextmanager

@@ -93,17 +93,17 @@ def health(picture: Picture, source: Source) -> Table:
     style = "yellow" if told else "green"
     counts = picture.counts
     table.add_row("mode", Text(picture.mode or NOTHING, style="bold"))
-    faults = "; ".join(told) or ("none" if picture.mode else NOTHING)
-    table.add_row("faults", Text(faults, style=style if picture.mode else "dim"))
-    table.add_row("it counts", f"{counts['lost']} lost, {counts['corrupt']} corrupt, {counts['late']} late")
+    table.add_row("counts", f"{counts['lost']} lost, {counts['corrupt']} corrupt, {counts['late']} late")
     table.add_row("excitation", f"{_number(picture.field('HEALTH', 'excitation'), 2)} rad/s")
     table.add_row("dither", f"{picture.dither():.3f} N m rms" if picture.dither() > 0.0 else "off")
     table.add_row("mean NIS", f"{_number(picture.nis())} (honest: 2)")
     table.add_row("theta", f"{_number(math.degrees(picture.theta()))} deg")
     if picture.is_fresh("PLATFORM_HEALTH"):
         errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]
-        table.add_row("machine", f"TEC {errors[0]}, REC {errors[1]}, off the bus {counts['bus_offs']}")
-        table.add_row("", f"{counts['overruns']} overruns, {counts['dropped']} dropped")
+        table.add_row("TEC, REC", f"{errors[0]}, {errors[1]}; off bus {counts['bus_offs']}")
+        table.add_row("machine", f"{counts['overruns']} lost, {counts['dropped']} dropped")
+    faults = "; ".join(told) or ("none" if picture.mode else NOTHING)
+    table.add_row("faults", Text(faults, style=style if picture.mode else "dim"))
     others = [("other frames", picture.foreign), ("error frames", picture.error_frames), ("unseen", source.dropped)]
     for name, count in others:
         if count:

@@ -7,14 +7,18 @@ the view takes them at its own rate. The view may therefore be as slow as it lik
 from __future__ import annotations
 
 import math
+import socket
+import sys
 import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from .. import codec
+from ..buses import open_bus
 from ..errors import LeverError
 from .model import ERROR, FOREIGN, STEP, Frame, Picture
 
@@ -25,6 +29,8 @@ MOST_WAITING = 65536
 """Frames: eight seconds of a full bus of 1 Mbit/s."""
 LONGEST_PAUSE = 5.0
 """[s] A longer gap of a log is not waited for."""
+_RECEIVE_BUFFER = 1 << 22  # [bytes]
+_SWITCH_INTERVAL = 5e-4  # [s] after which drawing gives way to receiving; Python's own is ten times that
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
 KEEP: dict[str, codec.Value] = {
     "model": "keep",
@@ -60,6 +66,8 @@ class Source(ABC):
         """Puts frames until self._stopping is set or none are left. Raises what went wrong."""
 
     def start(self) -> None:
+        self._switch_interval = sys.getswitchinterval()
+        sys.setswitchinterval(_SWITCH_INTERVAL)
         self._start = time.monotonic()
         self._thread.start()
 
@@ -68,6 +76,7 @@ class Source(ABC):
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join(timeout=3.0)
+            sys.setswitchinterval(self._switch_interval)
 
     @property
     def now(self) -> float:
@@ -106,6 +115,7 @@ class BusSource(Source):
         super().__init__()
         self.title = interface if channel is None else f"{interface} {channel}"
         self._bus = open_bus(interface, channel, options or {})
+        _widen(self._bus)
         self._commands = 0
 
     def run(self) -> None:
@@ -186,6 +196,14 @@ class LogSource(Source):
             raise LeverError(f"{self.title}: no CAN frame{where} in it")
 
 
+def _widen(bus: can.BusABC) -> None:
+    """Asks for as large a receive buffer as the kernel gives, where the bus has a socket: for when others run."""
+    own = getattr(bus, "socket", None)
+    if isinstance(own, socket.socket):
+        with suppress(OSError):
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+
+
 def as_frame(message: can.Message) -> Frame:
     """What a view needs of a python-can message."""
     if message.is_error_frame:
@@ -199,16 +217,3 @@ def command_frame(counter: int, values: Mapping[str, codec.Value]) -> tuple[int,
     """A COMMAND that changes only `values`. Raises CodecError."""
     data = codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
     return codec.message("COMMAND").frame_id, data
-
-
-def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) -> can.BusABC:
-    """A python-can bus. Raises LeverError."""
-    import can
-
-    given: dict[str, Any] = {"sleep_after_open": 0.0} if interface == "slcan" else {}
-    given |= {} if channel is None else {"channel": channel}
-    try:
-        return can.Bus(interface=interface, **(given | dict(options)))
-    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
-        where = interface if channel is None else f"{interface} channel {channel}"
-        raise LeverError(f"cannot open {where}: {error}; is it there and up?") from None

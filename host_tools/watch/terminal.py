@@ -33,7 +33,7 @@ class Monitor(App[None]):
     #estimates { height: auto; }
     .panel { border: round $primary; padding: 0 1; }
     #lower { height: 1fr; }
-    #health { width: 1fr; height: 100%; overflow-y: auto; }
+    #health { width: 1fr; height: 100%; overflow-y: auto; scrollbar-size-vertical: 1; }
     #messages { width: 46; height: 100%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -50,19 +50,19 @@ class Monitor(App[None]):
         self.held = False
         self.span = SPANS[0]
         self._duration = duration
+        self._lines = {name: Static(id=name) for name in ("headline", "condition")}
+        self._tables = {name: Static() for name in ("estimates", "health", "messages")}
+        self._panels = {name: Vertical(table, id=name, classes="panel") for name, table in self._tables.items()}
 
     def compose(self) -> ComposeResult:
-        yield Static(id="headline")
-        yield Static(id="condition")
-        yield Vertical(Static(id="estimates-table"), id="estimates", classes="panel")
-        with Horizontal(id="lower"):
-            yield Vertical(Static(id="health-table"), id="health", classes="panel")
-            yield Vertical(Static(id="messages-table"), id="messages", classes="panel")
+        yield from self._lines.values()
+        yield self._panels["estimates"]
+        yield Horizontal(self._panels["health"], self._panels["messages"], id="lower")
         yield Footer()
 
     def on_mount(self) -> None:
-        for name in ("estimates", "health", "messages"):
-            self.query_one(f"#{name}").border_title = name
+        for name, panel in self._panels.items():
+            panel.border_title = name
         self.source.start()
         self.set_interval(STEP, self.advance)
         if self._duration is not None:
@@ -78,21 +78,17 @@ class Monitor(App[None]):
             self.draw()
 
     def draw(self) -> None:
-        picture, source = self.picture, self.source
-        width = self.query_one("#estimates-table").size.width
-        for name, content in (
-            ("headline", panels.headline(picture, source)),
-            ("condition", panels.condition(picture, source)),
-            ("estimates-table", panels.estimates(picture, self.span, width)),
-            ("health-table", panels.health(picture, source)),
-            ("messages-table", panels.messages(picture)),
-        ):
-            self.query_one(f"#{name}", Static).update(content)
+        picture, source, tables = self.picture, self.source, self._tables
+        self._lines["headline"].update(panels.headline(picture, source))
+        self._lines["condition"].update(panels.condition(picture, source))
+        tables["estimates"].update(panels.estimates(picture, self.span, tables["estimates"].size.width))
+        tables["health"].update(panels.health(picture, source))
+        tables["messages"].update(panels.messages(picture))
 
     def action_hold(self) -> None:
         """Stops or goes on redrawing; frames are counted meanwhile."""
         self.held = not self.held
-        self.query_one("#estimates").border_title = "estimates (held: space goes on)" if self.held else "estimates"
+        self._panels["estimates"].border_title = "estimates (held: space goes on)" if self.held else "estimates"
 
     def action_span(self) -> None:
         """The next span of SPANS."""

@@ -16,8 +16,9 @@ _EVENTS = ("COMMAND",)  # may have several senders, each with its own counter
 class Traffic:
     """One message of lever.dbc as it passes. Counts are since the start or clear().
 
-    A loss is told by a gap in the counter, so of 16 frames lost in a row none is seen, and of more than 16 the rest of
-    their number divided by 16; a corrupt frame is counted as that, not as lost.
+    A loss is told by a gap in the counter, which counts to 16: of up to 14 frames lost in a row all are seen, 15 look
+    like a repetition, and of more only the rest of their number divided by 16. A corrupt frame is counted as that, not
+    as lost.
     """
 
     def __init__(self, name: str) -> None:
@@ -66,6 +67,8 @@ class Traffic:
         """To be called now and then, whether or not a frame has come."""
         if not self._marks or now - self._marks[-1][0] >= 0.99 * _MARK_PERIOD:
             self._marks.append((now, self._total))
+        while len(self._marks) > 2 and now - self._marks[0][0] > 1.01 * RATE_WINDOW:
+            self._marks.popleft()
 
     @property
     def rate(self) -> float:

@@ -31,14 +31,14 @@ FAULTS = {
 """Conditions of the estimator, by enum lever_fault."""
 
 PLATFORM_FAULTS = {
-    "clock": "crystal did not start, clock less accurate",
-    "rom": "program memory has not its checksum",
-    "self_test": "self test at power-on failed",
-    "watchdog": "last reset was the watchdog's",
-    "hard_fault": "last reset was a hard fault's",
-    "bus_off": "CAN controller is off the bus",
-    "overrun": "received frames were lost in the machine",
-    "dropped": "frames to send were dropped",
+    "clock": "crystal did not start",
+    "rom": "program memory is damaged",
+    "self_test": "self test failed",
+    "watchdog": "reset by the watchdog",
+    "hard_fault": "reset by a hard fault",
+    "bus_off": "off the bus",
+    "overrun": "received frames lost",
+    "dropped": "frames to send dropped",
 }
 """Conditions of its machine, by enum lever_platform_fault."""
 
@@ -61,12 +61,14 @@ def condition(picture: Picture) -> tuple[str, str]:
     if mode is None:
         return "watch", "the estimator is there; no HEALTH from it yet"
     level = {"run": "good", "fault": "bad"}.get(mode, "watch")
-    if level == "good" and (picture.faults() or picture.platform_faults()):
-        level = "watch"
+    if level == "good" and (told := faults(picture)):
+        return "watch", f"{mode}, but: {'; '.join(told)}"
     return level, f"{mode}: the estimator {MODES.get(mode, 'is in a mode that this program does not know')}"
 
 
 def faults(picture: Picture) -> list[str]:
     """The faults of the estimator and its machine, in words."""
-    told = [FAULTS.get(name, name) for name in picture.faults()]
-    return told + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in picture.platform_faults() or ()]
+    machine = picture.platform_faults()
+    named = [name for name in picture.faults() if not (machine and name == "platform")]
+    told = [FAULTS.get(name, name) for name in named]
+    return told + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in machine or ()]

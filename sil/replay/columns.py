@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,17 @@ from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Rows
 from numpy.typing import NDArray
 
-from ..trace import COUNTS, ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields, recorded_name
+from ..quantities import recorded_name
+from ..trace import COUNTS, ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
 from .timeline import Timeline
 
 FloatArray = NDArray[np.float64]
+
+Continued = Callable[[str, FloatArray], FloatArray]
+"""From the name and values of a field to values that go on from the piece before."""
+
+_HELD = ("PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH")
+"""Messages that come at a divided rate."""
 
 
 class Columns:
@@ -33,9 +40,7 @@ class Columns:
         for column, message, field in (*MEASURED, *ESTIMATED):
             trace[column] = decoded.at_samples(message, field)
         for column, message, field in self._fields:
-            trace[column] = decoded.held(message, field)
-        for count in COUNTS:
-            trace[count] = self._unwrapped(count, trace[count])
+            trace[column] = decoded.held(message, field, self._unwrapped if field in COUNTS else None)
         trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
         if self._with_recorded:
             recorded = _Decoded(rows, recorded=True)
@@ -44,15 +49,28 @@ class Columns:
                 trace[recorded_name(column)] = values(message, field)
         return trace
 
+    def held(self, rows: Rows) -> list[tuple[list[str], NDArray[np.bool_]]]:
+        """The columns that are held from one message to the next, and the rows with one."""
+        held = [([name for name, _, _ in self._fields], _any_fresh(rows, SLOTS))]
+        if self._with_recorded:
+            names = [recorded_name(name) for name, message, _ in self._compared if message in _HELD]
+            held.append((names, _any_fresh(rows, RECORDED)))
+        return held
+
     def _unwrapped(self, name: str, values: FloatArray) -> FloatArray:
         """Beyond the eight bits of a count, which starts at 0 in an estimator that does."""
         known = np.isfinite(values)
         steps = np.diff(values[known], prepend=self._counts[name]) % 256.0
-        unwrapped = values.copy()
-        unwrapped[known] = self._counts[name] + np.cumsum(steps)
+        values[known] = self._counts[name] + np.cumsum(steps)
         if known.any():
-            self._counts[name] = int(unwrapped[known][-1])
-        return unwrapped
+            self._counts[name] = int(values[known][-1])
+        return values
+
+
+def _any_fresh(rows: Rows, slots: Mapping[str, int]) -> NDArray[np.bool_]:
+    mask = sum(1 << slots[name] for name in _HELD)
+    fresh: NDArray[np.bool_] = rows["fresh"] & mask != 0
+    return fresh
 
 
 class _Decoded:
@@ -71,14 +89,17 @@ class _Decoded:
 
     def at_samples(self, message: str, field: str) -> FloatArray:
         """NaN where the message did not come with the sample, or said that the field is not valid."""
-        fields = self.fields(message)
         there = (self._rows["fresh"] >> self._slots[message]) & 1 != 0
+        if not there.any():
+            return np.full(len(there), np.nan)
+        fields = self.fields(message)
         if f"{field}_valid" in fields:
             there &= fields[f"{field}_valid"] != 0.0
         return np.where(there, fields[field], np.nan)
 
-    def held(self, message: str, field: str) -> FloatArray:
-        """NaN before the first. Decodes only the rows with which the message came, and the first."""
+    def held(self, message: str, field: str, continued: Continued | None = None) -> FloatArray:
+        """NaN before the first. Decodes only the rows with which the message came, and the first; what `continued`
+        makes of the values there is held."""
         if message not in self._held:
             slot = self._slots[message]
             fresh = (self._rows["fresh"] >> slot) & 1 != 0
@@ -89,7 +110,8 @@ class _Decoded:
                     values[0] = np.nan
             self._held[message] = np.cumsum(fresh) - 1, fields
         place, fields = self._held[message]
-        return fields[field][place]
+        values = fields[field] if continued is None else continued(field, fields[field])
+        return values[place]
 
     def _decode(self, message: str, which: Any) -> dict[str, FloatArray]:
         data = np.ascontiguousarray(self._rows["data"][which, self._slots[message]])
@@ -97,9 +119,9 @@ class _Decoded:
 
 
 def model_numbers(rows: Rows) -> Iterator[tuple[int, int]]:
-    """Row and number of the estimator's model, at the first row and wherever it changes."""
+    """Row and number of the estimator's model, where it is first told and wherever it changes."""
     slot = SLOTS["PILOT_PARAMETERS"]
-    known = np.flatnonzero((rows["known"] >> slot) & 1)
-    numbers = rows["data"][known, slot, 1] >> 4
+    fresh = np.flatnonzero((rows["fresh"] >> slot) & 1)
+    numbers = rows["data"][fresh, slot, 1] >> 4
     for index in np.flatnonzero(np.diff(numbers, prepend=255)):
-        yield int(known[index]), int(numbers[index])
+        yield int(fresh[index]), int(numbers[index])

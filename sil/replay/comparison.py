@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantities import DYNAMICS, quantities
-from ..trace import ESTIMATED, Trace, recorded_name
+from ..quantities import DYNAMICS, quantities, recorded_name
+from ..trace import ESTIMATED, Trace
 
 FloatArray = NDArray[np.float64]
 

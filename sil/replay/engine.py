@@ -123,6 +123,8 @@ class _Replay:
         trace = self._columns.of(rows)
         for sink in self._sinks:
             sink.add(trace)
+        if self._csv is not None:
+            self._csv.add(trace, self._columns.held(rows))
         if self._mf4 is not None:
             published = (rows["fresh"] >> SLOTS["PILOT_PARAMETERS"]) & 1 != 0
             recorded = (rows["fresh"] >> RECORDED["PILOT_PARAMETERS"]) & 1 != 0
@@ -136,13 +138,13 @@ class _Replay:
         self._started_us = int(rows["time_us"][0])
         self.figures = Figures(self._options.config, self.model)
         self.kept = Kept(self._options.config.settings["sample_period"])
-        self._sinks = [self.figures, self.kept]
+        self._sinks = [self.figures]
         self._comparison = Comparison(self.model) if with_recorded else None
         if self._comparison is not None:
             self._sinks.append(self._comparison)
         if self._outputs is not None:
+            self._sinks.append(self.kept)
             self._csv = TraceCsv(self._outputs.path("trace.csv"))
-            self._sinks.append(self._csv)
             self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
         return Columns(self._timeline, self.model, with_recorded)
 
@@ -155,7 +157,7 @@ class _Replay:
         summary: dict[str, Any] = {
             "recording": self._recording(),
             "estimator": {**choices, "settings": self._options.config.settings},
-            "samples": self.kept.samples,
+            "samples": self._timeline.clocks.samples,
             **self.figures.summary(),
             "comparison": compared,
         }

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.later import allow
 from numpy.typing import NDArray
 
-from ..quantities import quantities
-from ..trace import ESTIMATED, HEALTH, MEASURED, Trace, recorded_name
+from ..quantities import quantities, recorded_name
+from ..trace import ESTIMATED, HEALTH, MEASURED, Trace
 from .outputs import writing
 
 Signals = list[tuple[str, str, str]]
@@ -51,6 +52,7 @@ class Mf4:
 
     def __init__(self, path: Path, model: str, start_us: int, with_recorded: bool) -> None:
         """`start_us`: absolute time of the first sample [us since 1970], as far as the recording knows it."""
+        allow()
         from asammdf import MDF
 
         self._path = path

@@ -30,6 +30,8 @@ class Kept:
     def __init__(self, sample_period: float) -> None:
         self.sample_period = sample_period
         self.samples = 0
+        self.end = 0.0
+        """Time of the last sample [s]."""
         self.stretches = Stretches()
         self.ends = Ends(_CLOSE_UP)
         self.spectra = {name: Welch(sample_period) for name in _SPECTRA}
@@ -39,6 +41,7 @@ class Kept:
     def add(self, trace: Trace) -> None:
         """Further samples."""
         self.samples += len(trace["time_s"])
+        self.end = float(trace["time_s"][-1])
         self.stretches.add(trace)
         self.ends.add(trace)
         outputs = freedom(trace["theta_measured_rad"], trace["theta_dot_measured_rad_s"]).astype(np.float64)
@@ -57,6 +60,10 @@ class RecordedRun(Run):
     @property
     def samples(self) -> int:
         return self._kept.samples
+
+    @property
+    def end(self) -> float:
+        return self._kept.end
 
     @cached_property
     def sample_period(self) -> float:

@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.host_tools.buses import add_bus_options, check_others_can_be_heard, chosen_options
 from lever_cdkf.host_tools.errors import LeverError
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ keys: q quits, space holds the picture, t changes the time span of the trends, c
 
 examples:
   lever monitor --interface socketcan --channel can0
-  lever monitor --interface slcan --channel /dev/ttyACM0 --bitrate 1000000
+  lever monitor --interface slcan --channel /dev/ttyACM0
   lever monitor --scenario demo
   lever monitor session.log
   lever monitor session.log --once                   the picture at the end of the log, as text
@@ -49,7 +50,6 @@ examples:
 Ctrl-C ends it.
 """
 PORT = 8642
-_IN_PROCESS = ("lever", "virtual")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -78,14 +78,14 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def _add_source(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("log", nargs="?", metavar="LOG", help="a recorded log, in any format that python-can reads")
-    parser.add_argument("--scenario", metavar="NAME", help="simulate a scenario of `lever sim --list` or a .toml file")
-    parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …")
-    parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it; of LOG: only this one")
-    parser.add_argument("--bitrate", type=int, help="[bit/s] for interfaces that set it")
     parser.add_argument(
-        "--option", metavar="KEY=VALUE", action="append", default=[], help="more for the interface; may be repeated"
+        "log",
+        nargs="?",
+        metavar="LOG",
+        help="a recorded log that python-can reads; with --channel, only that one's frames",
     )
+    parser.add_argument("--scenario", metavar="NAME", help="simulate a scenario of `lever sim --list` or a .toml file")
+    add_bus_options(parser)
 
 
 def run_monitor(args: argparse.Namespace) -> int:
@@ -139,28 +139,8 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
     config = Config() if settings is None else make_config(read_assignments(settings))
     if args.log is not None:
         return LogSource(args.log, args.channel), config
-    if args.interface in _IN_PROCESS:
-        raise LeverError(
-            f"interface {args.interface} is inside one process, with nobody else to be heard: give --scenario NAME, "
-            "or a bus such as --interface socketcan --channel vcan0"
-        )
-    options = dict(_option(text) for text in args.option)
-    if args.bitrate is not None:
-        options["bitrate"] = args.bitrate
-    return BusSource(args.interface, args.channel, options), config
-
-
-def _option(text: str) -> tuple[str, Any]:
-    """The key, and the value as JSON if it is (5, 0.5, true), otherwise as it is written."""
-    import json
-
-    key, equals, value = text.partition("=")
-    if not equals or not key:
-        raise LeverError(f"--option {text}: must be KEY=VALUE, such as listen_only=true")
-    try:
-        return key, json.loads(value)
-    except ValueError:
-        return key, value
+    check_others_can_be_heard(args.interface)
+    return BusSource(args.interface, args.channel, chosen_options(args)), config
 
 
 def _seconds(text: str) -> float:

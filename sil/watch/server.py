@@ -23,7 +23,6 @@ from urllib.parse import urlsplit
 
 import tornado.httpserver
 import tornado.ioloop
-import tornado.netutil
 import tornado.web
 import tornado.websocket
 from lever_cdkf.host_tools.config import Config
@@ -53,19 +52,19 @@ _HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-_LARGEST_MESSAGE = 4096  # [bytes] from a page
+_LARGEST_MESSAGE = 512  # [bytes] from a page
 _MOST_BEHIND = 50  # messages a page may fail to take in a row before it is let go; it connects again
 
 
 class Server:
-    """The page of a source at a port; host "" is every address."""
+    """The page of a source at a port of the address `host`."""
 
     def __init__(self, source: Source, config: Config, *, host: str, port: int, read_only: bool) -> None:
         """Takes the port. Raises LeverError."""
         self.source, self.config, self.host = source, config, host
         self.state = State(source, config, read_only=read_only)
-        self.sockets = _bind(host, port)
-        self.port: int = self.sockets[0].getsockname()[1]
+        self.socket = _bind(host, port)
+        self.port: int = self.socket.getsockname()[1]
         self.pages: set[Channel] = set()
 
     @property
@@ -82,7 +81,7 @@ class Server:
             websocket_max_message_size=_LARGEST_MESSAGE,
         )
         web = tornado.httpserver.HTTPServer(application, max_body_size=_LARGEST_MESSAGE)
-        web.add_sockets(self.sockets)
+        web.add_socket(self.socket)
         self.source.start()
         clock = tornado.ioloop.PeriodicCallback(self.advance, 1000.0 * STEP)
         clock.start()
@@ -108,7 +107,8 @@ class Server:
             name = urlsplit(f"//{header}").hostname or ""
         except ValueError:
             return False
-        return name in {"localhost", self.host.lower(), socket.gethostname().lower()} - {""} or _is_address(name)
+        own = socket.gethostname().lower()
+        return name in {"localhost", self.host.lower(), own, f"{own}.local"} - {""} or _is_address(name)
 
 
 class _Guarded(tornado.web.RequestHandler):
@@ -119,7 +119,9 @@ class _Guarded(tornado.web.RequestHandler):
 
     def prepare(self) -> None:
         if not self.server.is_host(self.request.headers.get("Host", "")):
-            raise tornado.web.HTTPError(421, "Host is not a name of this server")
+            raise tornado.web.HTTPError(
+                421, reason="not a name of this server: use its address, or start it with --host"
+            )
 
     def set_default_headers(self) -> None:
         self.clear_header("Server")
@@ -154,7 +156,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
         super().prepare()
         origin = self.request.headers.get("Origin")
         if origin is not None and urlsplit(origin).netloc.lower() != self.request.headers["Host"].lower():
-            raise tornado.web.HTTPError(403, "Origin is another page")
+            raise tornado.web.HTTPError(403, reason="another page may not ask this server")
 
     def check_origin(self, origin: str) -> bool:
         """prepare() has done so."""
@@ -211,11 +213,10 @@ def serve(
     except LeverError:
         source.stop()
         raise
-    if not all(_is_loopback(each.getsockname()[0]) for each in server.sockets):
+    if not ipaddress.ip_address(server.socket.getsockname()[0].partition("%")[0]).is_loopback:
         what = "see the estimator" if not server.state.controls else "see and command the estimator"
         print(f"lever: warning: anybody who reaches port {server.port} can {what}: no password", file=sys.stderr)
     logging.getLogger("tornado").setLevel(logging.ERROR)
-    print(f"{source.title}: open {server.address} (Ctrl-C ends)", flush=True)
     interrupted = asyncio.run(_until_stopped(server, duration))
     if interrupted:
         raise KeyboardInterrupt
@@ -236,17 +237,21 @@ async def _until_stopped(server: Server, duration: float | None) -> bool:
             loop.add_signal_handler(number, end)
     if duration is not None:
         loop.call_later(duration, stop.set)
+    print(f"{server.source.title}: open {server.address} (Ctrl-C ends)", flush=True)
     await server.run(stop)
     return bool(interrupted)
 
 
-def _bind(host: str, port: int) -> list[socket.socket]:
+def _bind(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return tornado.netutil.bind_sockets(port, host or None)
+        bound = socket.create_server((host, port), family=family)
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
-            raise LeverError(f"port {port} of {host or 'this computer'} is in use: give another --port, or 0") from None
+            raise LeverError(f"port {port} of {host} is in use: give another --port, or 0") from None
         raise LeverError(f"cannot listen at {host} port {port}: {error.strerror or error}") from None
+    bound.setblocking(False)
+    return bound
 
 
 def _is_address(name: str) -> bool:
@@ -255,7 +260,3 @@ def _is_address(name: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _is_loopback(name: str) -> bool:
-    return ipaddress.ip_address(name.partition("%")[0]).is_loopback

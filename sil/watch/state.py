@@ -26,6 +26,7 @@ MAP_STEP = 0.5
 MAP_FREQUENCIES: FloatArray = FREQUENCIES[::2]
 OTHERS = ("nis", "excitation", "dither")
 _DIGITS = 4
+_DECIMALS = 5  # of curves, which are finite
 
 
 class State:
@@ -38,7 +39,7 @@ class State:
         self._geometry = Geometry(config)
         self._dither_limit = config.settings["dither_limit"]
         self._rows: deque[list[float]] = deque(maxlen=round(SPAN / STEP))
-        self._map: deque[tuple[float, list[float]]] = deque(maxlen=round(SPAN / MAP_STEP))
+        self._map: deque[tuple[float, FloatArray]] = deque(maxlen=round(SPAN / MAP_STEP))
         self._model: str | None = None
 
     def advance(self) -> list[str]:
@@ -59,7 +60,7 @@ class State:
         update["bode"] = None if response is None else _bode(response)
         update["truth"] = None if truth is None else np.degrees(np.abs(truth[1]))
         if not self._map or picture.now - self._map[-1][0] >= 0.99 * MAP_STEP:
-            self._map.append((picture.now, [] if response is None else list(response.magnitude[::2])))
+            self._map.append((picture.now, np.zeros(0) if response is None else response.magnitude[::2]))
             update["map"] = self._map[-1]
         return [*messages, _json({"update": update})]
 
@@ -167,6 +168,8 @@ def _plain(value: Any) -> Any:
         return value
     if isinstance(value, float):
         return _short(value)
+    if isinstance(value, np.ndarray):
+        return np.round(value, _DECIMALS).tolist()
     if isinstance(value, Iterable):
         return [_plain(each) for each in value]
     raise TypeError(f"{type(value)} is nothing for the page")

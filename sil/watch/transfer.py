@@ -1,8 +1,8 @@
 """θ/z̈ of the estimated model at this moment, with the band that the estimator's standard deviations make of it.
 
 Every model of the firmware answers the base by  θ/z̈ = b / (s² + 2 ζ ω s + ω²).  Frames carry the standard deviations
-of ω and ζ, which are what is known well, and those of the parameters, from which that of the gain b follows; they do not
-carry the correlations between them, so the three count as independent.
+of ω and ζ, which are what is known well, and those of the parameters, from which that of the gain b follows; they do
+not carry the correlations between them, so the three count as independent.
 """
 
 from __future__ import annotations

@@ -8,11 +8,14 @@ that begin with cmake or ctest (they are what runs this) and sudo (not a test's 
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 import readmes
-from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.sil import scenario
+from lever_cdkf.sil.runner import simulate
 from quality import tools
 
 FOLDERS = ("firmware", "host_tools", "sil", "tests")
@@ -44,23 +47,24 @@ def blocks(language: str) -> list[object]:
 
 
 @pytest.fixture
-def scratch(tmp_path: Path, build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def scratch(tmp_path: Path, build_dir: Path, recording: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for entry in tools.ROOT.iterdir():
         if entry.name != "build" and not entry.name.startswith("."):
             (tmp_path / entry.name).symlink_to(entry)
     (tmp_path / "build").symlink_to(build_dir)
-    write_recording(tmp_path / "session.log")
+    shutil.copy(recording, tmp_path / "session.log")
     monkeypatch.setenv("PATH", f"{build_dir}/venv/bin:{os.environ['PATH']}")
     return tmp_path
 
 
-def write_recording(file: Path) -> None:
-    """candump's format: 50 samples of a lever at rest."""
-    lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    with file.open("w", encoding="ascii") as log:
-        for k in range(50):
-            for identifier, data in ((0x110, lever_sample(k, 0.35, 0.0, 0.0)), (0x111, base_sample(k, 0.0, 1000 * k))):
-                log.write(f"({k / 1000:.6f}) vcan0 {identifier:03X}#{data.hex().upper()}\n")
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A few seconds of a simulation, estimates included, as candump would have recorded them."""
+    steady = scenario.load("steady", ["duration=4 s", "converged_after=2 s", "limits={}"])
+    folder = tmp_path_factory.mktemp("recording")
+    with LeverBus("vcan0", config=steady.config) as bus:
+        simulate(steady, bus, folder, channel="vcan0")
+    return folder / "bus.log"
 
 
 @pytest.mark.parametrize("script", blocks("sh"))

@@ -23,7 +23,7 @@ def core_sources() -> list[Path]:
 
 def c_files() -> list[Path]:
     """Every C file and header of the project."""
-    folders = (FIRMWARE, ROOT / "tests")
+    folders = (FIRMWARE, ROOT / "host_tools", ROOT / "tests")
     return [file for folder in folders for suffix in "ch" for file in sorted(folder.rglob(f"*.{suffix}"))]
 
 

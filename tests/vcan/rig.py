@@ -22,6 +22,10 @@ PATIENCE_S = 10.0
 INTERFACE = "vcan9"
 """Of all tests, each of which makes its own."""
 
+MARKER = "7FF#"
+ROOM_BYTES = 1 << 26
+"""For all frames of a run: seen on one busy processor, candump had no turn for seconds, and lost frames."""
+
 Frame = tuple[int, bytes]
 """Identifier and data."""
 
@@ -51,6 +55,32 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
     while not condition():
         assert time.monotonic() < end, f"not within {PATIENCE_S:g} s: {what}"
         time.sleep(0.002)
+
+
+@contextmanager
+def candump(interface: str, log: Path) -> Iterator[None]:
+    """Records the interface in `log`, from the marker that it starts with to the marker that it ends with."""
+
+    def sees_marker(markers: int) -> bool:
+        subprocess.run(["cansend", interface, MARKER], check=True)
+        return log.read_text().count(MARKER) >= markers
+
+    with log.open("wb") as file:
+        recorder = subprocess.Popen(["candump", "-L", "-r", str(ROOM_BYTES), interface], stdout=file)
+    try:
+        wait_until(lambda: sees_marker(1), "candump records")
+        before = log.read_text().count(MARKER)
+        yield
+        wait_until(lambda: sees_marker(before + 1), "candump has recorded everything")
+    finally:
+        recorder.send_signal(signal.SIGTERM)
+        recorder.wait(PATIENCE_S)
+
+
+def frames(log: Path) -> list[str]:
+    """Identifiers and data of a log in candump's format, in order, without the markers."""
+    written = [line.split()[2] for line in log.read_text().splitlines()]
+    return [frame for frame in written if frame != MARKER]
 
 
 class LeverCan:

@@ -5,11 +5,8 @@ Everything is compared with a run in one process (`--interface lever`), and must
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,9 +26,6 @@ SHORTENED = {
         "sensors.dropout.4.end": "3.1 s",
     },
 }
-MARKER = "7FF#"
-ROOM_BYTES = 1 << 26
-"""For all frames of a run: seen on one busy processor, candump had no turn for seconds, and lost frames."""
 
 
 def lever_sim(scenario: str, *options: str) -> str:
@@ -48,32 +42,6 @@ def settings_file(scenario: str, folder: Path) -> str:
     path = folder / "settings"
     path.write_text(lever_sim(scenario, "--settings"))
     return str(path)
-
-
-@contextmanager
-def candump(interface: str, log: Path) -> Iterator[None]:
-    """Records the interface in `log`, from the marker that it starts with to the marker that it ends with."""
-
-    def sees_marker(markers: int) -> bool:
-        subprocess.run(["cansend", interface, MARKER], check=True)
-        return log.read_text().count(MARKER) >= markers
-
-    with log.open("wb") as file:
-        recorder = subprocess.Popen(["candump", "-L", "-r", str(ROOM_BYTES), interface], stdout=file)
-    try:
-        rig.wait_until(lambda: sees_marker(1), "candump records")
-        before = log.read_text().count(MARKER)
-        yield
-        rig.wait_until(lambda: sees_marker(before + 1), "candump has recorded everything")
-    finally:
-        recorder.send_signal(signal.SIGTERM)
-        recorder.wait(rig.PATIENCE_S)
-
-
-def frames(log: Path) -> list[str]:
-    """Identifiers and data of a log in candump's format, in order, without the markers."""
-    written = [line.split()[2] for line in log.read_text().splitlines()]
-    return [frame for frame in written if frame != MARKER]
 
 
 @dataclass(frozen=True)
@@ -95,7 +63,7 @@ def runs(request: pytest.FixtureRequest, build_dir: Path, tmp_path_factory: pyte
     over_can, in_process, recorded = folder / "over_can", folder / "in_process", folder / "candump.log"
     options = ["--settings", settings_file(scenario, folder)]
     with rig.new_interface() as interface, rig.LeverCan(build_dir / "lever_can", interface, options, folder) as process:
-        with candump(interface, recorded):
+        with rig.candump(interface, recorded):
             lever_sim(scenario, "--interface=socketcan", f"--channel={interface}", f"--out={over_can}")
         totals = process.stop()
     lever_sim(scenario, f"--out={in_process}")
@@ -104,8 +72,8 @@ def runs(request: pytest.FixtureRequest, build_dir: Path, tmp_path_factory: pyte
 
 @pytest.mark.requires("candump", "cansend")
 def test_candump_records_the_frames_of_the_run(runs: Runs) -> None:
-    recorded = frames(runs.candump)
-    assert recorded == frames(runs.over_can / "bus.log")
+    recorded = rig.frames(runs.candump)
+    assert recorded == rig.frames(runs.over_can / "bus.log")
     assert len(recorded) == runs.totals["frames in"] + runs.totals["frames out"]
     assert not [name for name in ("overflowed", "unsent", "outages", "corrupt") if runs.totals[name]]
 

@@ -1,7 +1,6 @@
 """Estimates that a replayed log holds already, under those of the replay."""
 
-from ...quantities import Quantity
-from ...trace import recorded_name
+from ...quantities import Quantity, recorded_name
 from ..figure import Figure, Spec, axis, axis_range, line, time_axis
 from ..run import Run
 from ..series import spread_indices

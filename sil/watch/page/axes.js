@@ -51,7 +51,7 @@ export class Axes {
     pen.strokeStyle = colour("grid");
     pen.lineWidth = 1;
     pen.textAlign = "right";
-    const yTicks = y.ticks ?? (y.log ? logTicks(y.low, y.high, 7) : ticks(y.low, y.high, Math.max(3, box.height / 38)));
+    const yTicks = y.ticks ?? (y.log ? logTicks(y.low, y.high, 7) : ticks(y.low, y.high, Math.max(4, box.height / 38)));
     for (const value of yTicks) {
       const at = this.atY(value);
       this.#rule(box.left, at, box.left + box.width, at);

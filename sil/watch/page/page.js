@@ -54,8 +54,8 @@ function begin(start) {
   });
   document.querySelector("#estimates tbody").replaceChildren(...rows);
   charts = [
-    ...place("#bands .charts", start.quantities.map((quantity) => (canvas) => drawBand(canvas, story, quantity))),
-    ...place("#health .charts", OTHERS.map((other) => (canvas) => drawOther(canvas, story, other))),
+    ...place("#bands .charts", start.quantities.map((quantity) => [quantity.name, (canvas) => drawBand(canvas, story, quantity)])),
+    ...place("#health .charts", OTHERS.map((other) => [other.title, (canvas) => drawOther(canvas, story, other)])),
     () => drawBode(story),
     () => drawMap(story),
   ];
@@ -148,10 +148,10 @@ function row(cells) {
 
 // --- charts ---------------------------------------------------------------------------------------------------------
 
-function place(where, draws) {
-  const canvases = draws.map(() => document.createElement("canvas"));
+function place(where, named) {
+  const canvases = named.map(([name]) => Object.assign(document.createElement("canvas"), { role: "img", ariaLabel: `${name} over time` }));
   document.querySelector(where).replaceChildren(...canvases);
-  return draws.map((draw, k) => () => draw(canvases[k]));
+  return named.map(([, draw], k) => () => draw(canvases[k]));
 }
 
 function redraw() {
@@ -206,6 +206,6 @@ for (const what of ["model", "estimator"])
 window.addEventListener("resize", redraw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 setInterval(() => {
-  if (lastHeard && performance.now() - lastHeard > PATIENCE) lost("Nothing has come from the server for a moment: what is shown is old.");
+  if (socket.readyState === WebSocket.OPEN && performance.now() - lastHeard > PATIENCE) lost("Nothing has come from the server for a moment: what is shown is old.");
 }, 500);
 connect();

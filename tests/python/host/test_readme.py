@@ -20,7 +20,7 @@ def blocks(root: Path, language: str) -> list[str]:
 
 
 def test_python(root: Path, tmp_path: Path) -> None:
-    with_bus, without = blocks(root, "python")
+    with_bus, without, _ = blocks(root, "python")
     done = subprocess.run([sys.executable, "-c", with_bus], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "0.199 s STATE_ESTIMATE {" in done.stdout
@@ -41,7 +41,7 @@ def test_shell(
         for identifier, data in samples(0, 1)[0]:
             writer.on_message_received(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
     commands = "".join(blocks(root, "sh")).splitlines()
-    assert len(commands) == 7
+    assert len(commands) == 10
     for command in commands:
         done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False, cwd=tmp_path)
         assert done.returncode == 0, f"{command}: {done.stderr}"

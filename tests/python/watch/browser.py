@@ -45,13 +45,18 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
+        try:
+            self._loop.run_until_complete(self._detach())
+        finally:
+            self._loop.close()
+            self._process.terminate()
+            self._process.wait(timeout=10)
+            shutil.rmtree(self._profile, ignore_errors=True)
+
+    async def _detach(self) -> None:
         if self._socket is not None:
             self._socket.close()
-            self._loop.run_until_complete(asyncio.sleep(0.05))
-        self._process.terminate()
-        self._process.wait(timeout=10)
-        self._loop.close()
-        shutil.rmtree(self._profile, ignore_errors=True)
+            await self._socket.read_message()
 
     def _attach(self) -> None:
         endpoint = Path(self._profile) / "DevToolsActivePort"
@@ -96,7 +101,9 @@ class Browser:
             self.complaints.append(told["entry"]["text"])
 
     def open(self, url: str) -> None:
-        self.ask("Page.navigate", url=url)
+        """Opens a page and waits until it is there with all that belongs to it."""
+        assert "errorText" not in self.ask("Page.navigate", url=url)
+        self.wait(f"location.href == {json.dumps(url)} && document.readyState == 'complete'")
 
     def run(self, script: str) -> Any:
         """The value of a JavaScript expression in the page."""

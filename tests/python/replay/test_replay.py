@@ -1,0 +1,264 @@
+"""`lever replay`: the estimates of a simulation again, bit for bit, whatever else is in its log; and every file."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import can
+import numpy as np
+import polars
+import pytest
+from asammdf import MDF
+from lever_cdkf.host_tools import cli, codec
+from lever_cdkf.sil.replay import reduction
+from lever_cdkf.sil.replay.outputs import FILES
+
+from ..report.reading import figures, read
+from .conftest import Session, simulated
+
+Summary = dict[str, Any]
+
+
+def replayed(out: Path, *arguments: str | Path) -> Summary:
+    """`lever replay … -o out`, which must do; returns its summary."""
+    assert cli.main(["replay", *map(str, arguments), "-o", str(out)]) == 0
+    summary: Summary = json.loads((out / "summary.json").read_text())
+    return summary
+
+
+def settings_of(session: Session, folder: Path) -> Path:
+    """The settings file that the simulation's firmware had."""
+    path = folder / "session.settings"
+    values = session.config.choices | session.config.settings
+    path.write_text("".join(f"{name} = {value}\n" for name, value in values.items()))
+    return path
+
+
+@pytest.fixture(scope="module")
+def replay(session: Session, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+    out = tmp_path_factory.mktemp("replay") / "out"
+    return out, replayed(out, session.log)
+
+
+def estimates(log: Path) -> list[tuple[str, str]]:
+    """Identifier and data of the estimator's frames in a log."""
+    frames = [line.split()[2].split("#") for line in log.read_text().splitlines()]
+    return [(identifier, data) for identifier, data in frames if identifier[0] == "2"]
+
+
+# --- the same again --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["steady", "sensor_dropout", "linear_physical", "linear_black_box", "fixed_preload"])
+def test_the_log_of_a_simulation_is_reproduced_to_the_byte(name: str, tmp_path: Path) -> None:
+    session = simulated(name, tmp_path / "sim")
+    summary = replayed(tmp_path / "out", session.log, "--settings", settings_of(session, tmp_path))
+    assert (tmp_path / "out/bus.log").read_bytes() == session.log.read_bytes()
+    assert summary["comparison"]["identical"] is True
+    assert all(told["samples"] > 0 for told in summary["comparison"]["signals"].values())
+    assert "reproduced bit for bit" in summary["verdict"]
+
+
+def test_the_trace_is_that_of_the_simulation_without_the_truth(session: Session, replay: tuple[Path, Summary]) -> None:
+    simulation = polars.read_csv(session.folder / "trace.csv", infer_schema=False)
+    again = polars.read_csv(replay[0] / "trace.csv", infer_schema=False)
+    expected = [name for name in simulation.columns if "_true" not in name]
+    assert [name for name in again.columns if "_recorded" not in name] == expected
+    for name in expected:
+        assert again[name].equals(simulation[name]), name
+    for name in ("k_p", "natural_frequency"):
+        column = next(column for column in again.columns if column.startswith(f"{name}_recorded"))
+        assert again[column].equals(simulation[column.replace("recorded", "estimate")]), name
+
+
+def test_two_replays_are_equal_in_every_file(session: Session, replay: tuple[Path, Summary], tmp_path: Path) -> None:
+    replayed(tmp_path / "again", session.log)
+    for name in FILES:
+        first, second = ((folder / name).read_bytes() for folder in (replay[0], tmp_path / "again"))
+        assert hashlib.sha256(first).digest() == hashlib.sha256(second).digest(), name
+    assert sorted(path.name for path in replay[0].iterdir()) == sorted(FILES)
+
+
+def test_replaying_a_replay_changes_nothing(replay: tuple[Path, Summary], tmp_path: Path) -> None:
+    replayed(tmp_path / "again", replay[0] / "bus.log")
+    assert (tmp_path / "again/bus.log").read_bytes() == (replay[0] / "bus.log").read_bytes()
+
+
+@pytest.mark.parametrize("suffix", ["blf", "asc", "mf4", "trc", "csv", "log.gz"])
+def test_any_format_gives_the_same_estimates(suffix: str, session: Session, tmp_path: Path) -> None:
+    path = tmp_path / f"session.{suffix}"
+    with can.LogReader(session.log) as reader, can.Logger(path) as logger:
+        for message in reader:
+            logger.on_message_received(message)
+    summary = replayed(tmp_path / "out", path)
+    assert summary["comparison"]["identical"] is True
+    assert estimates(tmp_path / "out/bus.log") == estimates(session.log)
+
+
+# --- what else is in a log -------------------------------------------------------------------------------------------
+
+
+def test_other_traffic_and_doubled_frames_change_no_estimate(session: Session, tmp_path: Path) -> None:
+    messy: list[str] = []
+    for index, line in enumerate(session.lines):
+        time, _, frame, direction = line.split()
+        messy += [f"{time} can7 {frame}", line, f"{time} lever 18FEF100#0102030405060708", f"{time} lever 700#01"]
+        messy += ["damaged"] if index % 100 == 7 else []
+        messy += [line] if index % 50 == 8 and direction == "T" else []
+        messy += [f"{time} lever 20000004#0004000000000000"] if index % 1000 == 9 else []
+    log = tmp_path / "messy.log"
+    log.write_text("".join(f"{line}\n" for line in messy))
+    summary = replayed(tmp_path / "out", log, "--channel", "lever")
+    told, count = summary["recording"], len(session.lines)
+    left_out = {"other_buses": count, "other_identifiers": count, "extended": count, "error": -(-(count - 9) // 1000)}
+    assert told["frames_left_out"] == left_out
+    assert told["damaged_lines"] == -(-(count - 7) // 100)
+    assert told["repeated"] == len(messy) - 4 * count - told["damaged_lines"] - left_out["error"] > 50
+    assert told["other_buses_with_samples"] == ["can7"]
+    assert told["refused"] == told["repeated"]
+    assert 0 <= told["refused"] - summary["late"] <= 1  # what HEALTH said last
+    parameters = [(i, d) for i, d in estimates(tmp_path / "out/bus.log") if i in ("210", "211", "212", "213")]
+    assert parameters == [(i, d) for i, d in estimates(session.log) if i in ("210", "211", "212", "213")]
+
+
+def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
+    lines = session.lines
+    first = next(i for i, line in enumerate(lines) if line.startswith("(2.000000)"))
+    later = next(i for i, line in enumerate(lines) if line.startswith("(2.700000)"))
+    log = tmp_path / "gap.log"
+    log.write_text("".join(f"{line}\n" for line in [*lines[:first], *lines[later:]]))
+    summary = replayed(tmp_path / "out", log)
+    assert summary["recording"]["gaps"] == 1
+    assert summary["recording"]["longest_gap_s"] == pytest.approx(0.701)
+    assert summary["samples"] == 6000 - 700
+    assert "the longest gap 0.701 s" in summary["verdict"]
+    twice = tmp_path / "twice.log"
+    shifted = [f"({float(line[1 : line.index(')')]) + 60.0:.6f}){line[line.index(')') + 1 :]}" for line in lines]
+    twice.write_text("".join(f"{line}\n" for line in [*lines, *shifted]))
+    summary = replayed(tmp_path / "out", twice)
+    assert summary["recording"]["clock_restarts"] == 1
+    assert summary["samples"] == 12000
+    with (tmp_path / "out/trace.csv").open() as file:
+        time = [float(row["time_s"]) for row in csv.DictReader(file)]
+    assert time[6000] == pytest.approx(60.0, abs=1e-3)
+    assert time == sorted(time)
+
+
+def test_the_rotated_pieces_of_a_log_are_one(session: Session, tmp_path: Path) -> None:
+    pieces = [tmp_path / f"{name}.log" for name in "ca"]
+    lines = session.lines
+    for piece, part in zip(pieces, (lines[:9000], lines[9000:]), strict=True):
+        piece.write_text("".join(f"{line}\n" for line in part))
+    summary = replayed(tmp_path / "out", *reversed(pieces))
+    assert summary["recording"]["logs"] == ["c.log", "a.log"]
+    assert (tmp_path / "out/bus.log").read_bytes() == session.log.read_bytes()
+
+
+# --- other settings --------------------------------------------------------------------------------------------------
+
+
+def test_other_settings_give_other_estimates_and_are_compared(session: Session, tmp_path: Path) -> None:
+    summary = replayed(tmp_path / "out", session.log, "--set", "k_p_walk=0.2")
+    told = summary["comparison"]
+    assert told["identical"] is False
+    with (tmp_path / "out/trace.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    for key, unit in (("k_p", "_N_m"), ("m_p", "_kg"), ("natural_frequency", "_Hz"), ("damping_ratio", "")):
+        difference = columns[f"{key}_estimate{unit}"] - columns[f"{key}_recorded{unit}"]
+        signal = told["signals"][key]
+        assert signal["samples"] == len(rows)
+        assert signal["identical_samples"] == int(np.sum(difference == 0.0)) < len(rows)
+        assert signal["rms"] == pytest.approx(math.sqrt(np.mean(difference**2)), rel=1e-6)
+        assert signal["bias"] == pytest.approx(np.mean(difference), rel=1e-6, abs=1e-12)
+        assert abs(signal["largest"]) == pytest.approx(np.max(np.abs(difference)), abs=1e-9)
+        in_sigma = difference / columns[f"{key}_sigma{unit}"]
+        assert signal["rms_in_sigma"] == pytest.approx(math.sqrt(np.mean(in_sigma**2)), rel=1e-6)
+    assert "Against the estimates that were recorded with the log" in summary["verdict"]
+
+
+def test_a_choice_made_here_wins_over_the_commands_in_the_log(session: Session, tmp_path: Path) -> None:
+    summary = replayed(tmp_path / "out", session.log, "--model", "linear_physical", "--estimator", "joint")
+    assert summary["estimator"]["model"] == "linear_physical"
+    assert summary["estimator"]["estimator"] == "joint"
+    assert list(summary["estimates"]) == ["m", "c", "k", "natural_frequency", "damping_ratio"]
+    assert summary["recording"]["commands"] == summary["recording"]["commands_changed"] == 1
+    command = (tmp_path / "out/bus.log").read_text().split()[2]
+    fields = codec.decode(0x120, bytes.fromhex(command.split("#")[1]))[1]
+    assert (fields["model"], fields["estimator"], fields["adaptation"], fields["request"]) == (15, 15, 2, 3)
+    assert summary["comparison"]["signals"]["theta"]["samples"] == 6000
+    assert summary["comparison"]["signals"]["m"]["samples"] == 0
+
+
+def test_settings_that_the_firmware_refuses_are_one_line(
+    session: Session, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for bad in (["--set", "m_p=1000"], ["--model", "elastic"], ["--set", "k_q=1"], ["--settings", "absent"]):
+        assert cli.main(["replay", str(session.log), *bad, "-o", str(tmp_path / "out")]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+# --- the files -------------------------------------------------------------------------------------------------------
+
+
+def test_mf4_holds_the_signals_of_the_trace(session: Session, replay: tuple[Path, Summary]) -> None:
+    trace = session.result.trace
+    with MDF(replay[0] / "signals.mf4") as file:
+        for name, unit, column in (
+            ("theta_measured", "rad", "theta_measured_rad"),
+            ("z_ddot_measured", "m/s^2", "z_ddot_measured_m_s2"),
+            ("theta_dot_estimate", "rad/s", "theta_dot_estimate_rad_s"),
+        ):
+            signal = file.get(name)
+            assert signal.unit == unit
+            np.testing.assert_allclose(signal.samples, trace[column], rtol=1e-6)
+            np.testing.assert_allclose(signal.timestamps, trace["time_s"], atol=1e-9)
+        signal = file.get("k_p_estimate")
+        assert signal.unit == "N/m"
+        at = np.rint(signal.timestamps * 1e3).astype(int)
+        assert len(at) == 6000 / 20  # publish_period is 20 ms
+        np.testing.assert_allclose(signal.samples, trace["k_p_estimate_N_m"][at], rtol=1e-6)
+
+
+def test_the_summary_says_what_the_simulations_does(session: Session, replay: tuple[Path, Summary]) -> None:
+    told, simulation, trace = replay[1], session.result.summary, session.result.trace
+    assert told["samples"] == simulation["samples"]
+    assert told["modes_s"] == simulation["modes_s"]
+    assert told["estimator"] == simulation["estimator"]
+    for key, column in (("k_p", "k_p_estimate_N_m"), ("damping_ratio", "damping_ratio_estimate")):
+        assert told["estimates"][key]["last"] == trace[column][-1]
+        assert told["estimates"][key]["greatest"] == np.nanmax(trace[column])
+    assert told["nis"]["mean"] is None  # shorter than what it takes to converge
+
+
+def test_a_long_log_is_reduced_for_the_page_and_nowhere_else(
+    session: Session, replay: tuple[Path, Summary], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reduction.Stretches.__init__, "__defaults__", (256,))
+    assert replayed(tmp_path / "out", session.log) == replay[1]
+    assert (tmp_path / "out/trace.csv").read_bytes() == (replay[0] / "trace.csv").read_bytes()
+    short, whole = (figures(read(folder / "report.html")) for folder in (tmp_path / "out", replay[0]))
+    assert list(short) == list(whole)
+    assert len(json.dumps(short["figure-motion"])) < 0.6 * len(json.dumps(whole["figure-motion"]))
+    assert short["figure-detail"] == whole["figure-detail"]
+    assert short["figure-spectra"] == whole["figure-spectra"]
+
+
+def test_the_page_has_all_but_truth(replay: tuple[Path, Summary]) -> None:
+    page = read(replay[0] / "report.html")
+    names = page.ids("section")
+    assert names == [
+        *("explained", "parameters", "dynamics", "comparison", "bode", "states", "excitation", "health", "numbers"),
+        "made",
+    ]
+    curves = {trace["name"] for figure in figures(page).values() for trace in figure["data"]}
+    assert {"recorded", "replayed", "measured", "estimate"} <= curves
+    assert "truth" not in curves
+    cells = {row[0]: row[1:] for table in page.tables for row in table}
+    assert cells["theta"][1:3] == ["6\u2009000", "6\u2009000"]

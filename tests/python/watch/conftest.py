@@ -1,0 +1,92 @@
+"""What the tests of the live views share: frames of an estimator that sees a swinging lever."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import pytest
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.watch.model import Frame
+from lever_cdkf.host_tools.watch.sources import as_frame
+
+LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
+
+
+class Flight:
+    """An estimator on a bus, fed with a swinging lever at 1 kHz."""
+
+    def __init__(self, config: Config | None = None) -> None:
+        self.bus = LeverBus("flight", config=config, receive_own_messages=True)
+        self.sample = 0
+        self._lever, self._base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+
+    def messages(self, count: int) -> list[can.Message]:
+        """All that passes on the bus during `count` more samples."""
+        for k in range(self.sample, self.sample + count):
+            phase = 2.0 * math.pi * 3.0 * k * 1e-3
+            theta, theta_dot = 0.35 + 0.02 * math.sin(phase), 0.02 * 6.0 * math.pi * math.cos(phase)
+            self.send(0x110, self._lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase)))
+            self.send(0x111, self._base(k, 0.8 * math.sin(phase + 1.0), 1000 * k))
+        self.sample += count
+        return list(iter(self.bus.recv, None))
+
+    def frames(self, count: int) -> list[Frame]:
+        return [as_frame(message) for message in self.messages(count)]
+
+    def send(self, identifier: int, data: bytes) -> None:
+        self.bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
+
+
+@pytest.fixture
+def make_flight() -> Iterator[Callable[..., Flight]]:
+    """Flight, whose bus is shut down after the test."""
+    made: list[Flight] = []
+
+    def make(config: Config | None = None) -> Flight:
+        made.append(Flight(config))
+        return made[-1]
+
+    yield make
+    for flight in made:
+        flight.bus.shutdown()
+
+
+@pytest.fixture
+def flight(make_flight: Callable[..., Flight]) -> Flight:
+    """With the firmware's defaults."""
+    return make_flight()
+
+
+@pytest.fixture
+def log(flight: Flight, tmp_path: Path) -> Path:
+    """A recording of 600 ms."""
+    path = tmp_path / "flight.log"
+    with can.CanutilsLogWriter(path, channel="can0") as writer:
+        for message in flight.messages(600):
+            message.channel = None
+            writer.on_message_received(message)
+    return path
+
+
+@pytest.fixture
+def start_lever() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts the command `lever`, which is ended after the test if it has not ended by itself."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(*arguments: str) -> subprocess.Popen[str]:
+        pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        started.append(subprocess.Popen([*LEVER, *arguments], text=True, **pipes))  # type: ignore[call-overload]
+        return started[-1]
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()

@@ -1,0 +1,249 @@
+"""The picture: what it shows is what the estimator knows, and what it counts is what was lost."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+import sys
+from collections.abc import Callable
+
+import pytest
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.config import Config, model_parameters
+from lever_cdkf.host_tools.library import enum_names, ffi, lib
+from lever_cdkf.host_tools.watch import model, words
+from lever_cdkf.host_tools.watch.model import Frame, Picture
+from lever_cdkf.host_tools.watch.sources import command_frame
+from python.watch.conftest import Flight
+
+
+def watch(picture: Picture, flight: Flight, seconds: float) -> None:
+    """Takes what passes in `seconds` of flight, a tenth of a second at a time."""
+    for _ in range(round(10 * seconds)):
+        frames = flight.frames(100)
+        picture.take(frames, flight.sample * 1e-3)
+
+
+# --- values ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", enum_names("lever_model").values())
+def test_shows_what_the_estimator_knows(name: str, make_flight: Callable[..., Flight]) -> None:
+    picture, flight = Picture(), make_flight(Config(model=name, settings={"publish_period": 1e-3}))
+    watch(picture, flight, 1.0)
+    estimate, health = flight.bus.estimator.estimate(), flight.bus.estimator.health()
+    assert picture.model == name
+    assert [(entry.key, entry.unit) for entry in picture.parameters()] == list(model_parameters(name))
+    for index, entry in enumerate(picture.parameters()):
+        signal = codec.message("PILOT_PARAMETERS").get_signal_by_name(entry.key)
+        assert entry.value == pytest.approx(estimate.parameter[index], abs=0.51 * float(signal.scale))
+        assert entry.sigma == pytest.approx(estimate.parameter_sigma[index], rel=0.01, abs=0.02)
+    frequency, damping = picture.dynamics()
+    assert frequency.value == pytest.approx(estimate.natural_frequency, abs=0.0006)
+    assert damping.value == pytest.approx(estimate.damping_ratio, abs=0.0002)
+    assert frequency.sigma == pytest.approx(estimate.natural_frequency_sigma, abs=0.0011)
+    assert damping.sigma == pytest.approx(estimate.damping_ratio_sigma, abs=0.0006)
+    assert picture.mode == health.mode
+    assert picture.field("HEALTH", "excitation") == pytest.approx(health.excitation, abs=0.003)
+    assert picture.theta() == pytest.approx(0.35, abs=0.002)
+
+
+def test_dither_is_measured_over_a_window(flight: Flight) -> None:
+    picture = Picture()
+    watch(picture, flight, 0.5)
+    assert picture.dither() == 0.0
+    flight.send(*command_frame(0, {"dither_rms": 0.3}))
+    squares = []
+    for _ in range(60):
+        frames = flight.frames(100)
+        picture.take(frames, flight.sample * 1e-3)
+        squares += [codec.decode(0x215, data)[1]["dither"] ** 2 for identifier, data in frames if identifier == 0x215]
+    expected = math.sqrt(sum(squares[-2000:]) / 2000)
+    assert picture.dither() == pytest.approx(expected, rel=0.05)
+    assert 0.2 < expected < 0.4
+
+
+def test_nothing_is_known_before_the_first_frame() -> None:
+    picture = Picture()
+    picture.take([], 0.0)
+    assert picture.parameters() == []
+    assert all(math.isnan(entry.value) and math.isnan(entry.sigma) for entry in picture.dynamics())
+    assert picture.mode is None
+    assert picture.silence() == math.inf
+    assert words.condition(picture) == ("watch", "no frame has come yet")
+
+
+def test_what_is_old_is_not_shown_as_present(flight: Flight) -> None:
+    picture = Picture()
+    watch(picture, flight, 1.0)
+    assert words.condition(picture)[0] in ("good", "watch")
+    picture.take([], 1.0 + model.STALE_AFTER + 0.5)
+    assert picture.silence() == pytest.approx(2.5)
+    assert all(math.isnan(entry.value) for entry in (*picture.parameters(), *picture.dynamics()))
+    assert picture.mode is None
+    assert picture.faults() == []
+    assert words.condition(picture) == ("bad", "the estimator has said nothing for 2 s: what is shown is old")
+    assert math.isnan(picture.history["k_p"][-1])
+
+
+def test_samples_without_an_estimator_are_told(flight: Flight) -> None:
+    picture = Picture()
+    picture.take([frame for frame in flight.frames(100) if frame[0] < 0x200], 0.1)
+    assert words.condition(picture)[1] == "samples pass, but no estimator answers: is the firmware running?"
+
+
+def test_faults_are_named_and_held_long_enough_to_be_read(flight: Flight) -> None:
+    picture = Picture()
+    watch(picture, flight, 1.0)
+    assert "gap" not in picture.faults()
+    flight.sample += 40  # as many samples are missing
+    watch(picture, flight, 0.1)
+    assert "gap" in picture.faults()
+    assert "samples were missing" in words.faults(picture)
+    watch(picture, flight, 1.5)
+    assert "gap" in picture.faults()
+    watch(picture, flight, 1.0)
+    assert "gap" not in picture.faults()
+
+
+def test_every_mode_and_fault_of_the_firmware_has_words() -> None:
+    assert list(words.MODES) == list(enum_names("lever_mode").values())
+    assert list(words.FAULTS) == list(enum_names("lever_fault").values())
+    assert list(words.PLATFORM_FAULTS) == list(enum_names("lever_platform_fault").values())
+
+
+def test_health_of_the_machine(flight: Flight) -> None:
+    picture = Picture()
+    watch(picture, flight, 0.3)
+    assert picture.platform_faults() is None
+    lever = flight.bus.estimator._lever
+    for overruns in (250, 262):
+        report = {"faults": lib.LEVER_PLATFORM_OVERRUN, "transmit_errors": 96, "receive_errors": 3, "bus_offs": 1}
+        lib.lever_platform(lever, ffi.new("lever_platform_t *", {**report, "overruns": overruns}))
+        watch(picture, flight, 0.3)
+    assert picture.platform_faults() == ["overrun"]
+    assert picture.counts["overruns"] == 12  # beyond the eight bits of the frame
+    assert picture.field("PLATFORM_HEALTH", "transmit_errors") == 96
+    assert "platform" in picture.faults()
+    assert "machine: received frames lost" in words.faults(picture)
+    assert words.FAULTS["platform"] not in words.faults(picture)  # which is told in more detail
+
+
+# --- counts ----------------------------------------------------------------------------------------------------------
+
+
+def test_rates_are_frames_a_second(flight: Flight) -> None:
+    picture = Picture()
+    watch(picture, flight, 4.0)
+    rates = {name: entry.rate for name, entry in picture.traffic.items() if entry.heard is not None}
+    assert rates.pop("LEVER_SAMPLE") == pytest.approx(1000)
+    assert rates.pop("BASE_SAMPLE") == pytest.approx(1000)
+    assert rates.pop("STATE_ESTIMATE") == pytest.approx(1000)
+    assert set(rates) >= {"PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH"}
+    assert all(rate == pytest.approx(50) for rate in rates.values())  # publish_period
+    picture.take([], 6.1)
+    picture.take([], 8.2)
+    assert all(entry.rate == 0.0 for entry in picture.traffic.values() if entry.heard is not None)
+
+
+def test_what_was_taken_away_is_counted_as_lost(flight: Flight) -> None:
+    """Frames are removed in runs of up to 14, damaged, and doubled at random, with some good ones between."""
+    chance, picture = random.Random(5), Picture()
+    frames = [frame for frame in flight.frames(4000) if frame[0] == 0x210]
+    passing, lost, corrupt, repeated = frames[:3], 0, 0, 0
+    place = 3
+    while place < len(frames) - 20:
+        identifier, data = frames[place]
+        what = chance.choice(("lose", "damage", "repeat", "pass"))
+        if what == "lose":
+            run = chance.randint(1, 14)
+            lost += run
+            place += run
+        elif what == "damage":
+            damaged = bytearray(data)
+            damaged[chance.randrange(8)] ^= 1 << chance.randrange(8)
+            passing.append((identifier, damaged))
+            corrupt += 1
+            place += 1
+        elif what == "repeat":
+            passing += [frames[place]] * 2
+            repeated += 1
+            place += 1
+        passing += frames[place : place + 3]
+        place += 3
+    for begin in range(0, len(passing), 97):
+        picture.take(passing[begin : begin + 97], begin * 1e-3)
+    entry = picture.traffic["STATE_ESTIMATE"]
+    assert min(lost, corrupt, repeated) > 50
+    assert (entry.lost, entry.corrupt, entry.repeated, entry.frames) == (lost, corrupt, repeated, len(passing))
+    picture.clear_counts()
+    assert (entry.lost, entry.corrupt, entry.repeated, entry.frames) == (0, 0, 0, 0)
+
+
+def test_commands_of_several_senders_are_no_losses() -> None:
+    picture = Picture()
+    picture.take([command_frame(counter, {}) for counter in (3, 11, 4, 4)], 0.0)
+    entry = picture.traffic["COMMAND"]
+    assert (entry.frames, entry.lost, entry.repeated) == (4, 0, 0)
+
+
+def test_counts_of_the_estimator_go_on_beyond_eight_bits(flight: Flight) -> None:
+    picture = Picture()
+    watch(picture, flight, 0.1)
+    spoilt = bytes(8)
+    for _ in range(7):
+        for _ in range(100):
+            flight.send(0x110, spoilt)
+        watch(picture, flight, 0.1)
+    assert flight.bus.estimator.health().corrupt == 700
+    assert picture.counts["corrupt"] == 700
+
+
+def test_other_traffic_is_counted_and_harmless(flight: Flight) -> None:
+    picture = Picture()
+    frames: list[Frame] = [(0x123, b"\1\2"), (model.FOREIGN, b""), (model.ERROR, b""), (0x210, b"\1"), (0x210, b"")]
+    picture.take([*flight.frames(10), *frames], 0.0)
+    assert (picture.foreign, picture.error_frames) == (2, 1)
+    assert picture.traffic["STATE_ESTIMATE"].corrupt == 2
+    assert not math.isnan(picture.parameters()[0].value)
+
+
+# --- history ---------------------------------------------------------------------------------------------------------
+
+
+def test_history_has_a_row_a_step_and_is_bounded(flight: Flight) -> None:
+    picture, frames = Picture(), flight.frames(50)
+    for k in range(2 * model.ROWS * 3):
+        picture.take(frames if k % 100 == 0 else [], k * model.STEP / 3)
+    lengths = {len(column) for column in picture.history.values()}
+    assert lengths == {model.ROWS}
+    times = list(picture.history["time"])
+    steps = [after - before for before, after in itertools.pairwise(times)]
+    assert steps == pytest.approx([model.STEP] * len(steps))
+
+
+def test_memory_does_not_grow(flight: Flight) -> None:
+    picture, frames = Picture(), flight.frames(100)
+
+    def held() -> int:
+        columns = sum(sys.getsizeof(column) for column in picture.history.values())
+        marks = sum(sys.getsizeof(entry._marks) for entry in picture.traffic.values())
+        return columns + marks + sum(len(window._batches) for window in picture._windows.values())
+
+    sizes = []
+    for k in range(200):
+        picture.take(frames, k * 10.0)
+        sizes.append(held())
+    assert len(picture.traffic["STATE_ESTIMATE"]._marks) <= 21
+    assert max(sizes[100:]) <= 2 * max(sizes[:50])
+    assert all(len(window._batches) <= 1 for window in picture._windows.values())
+
+
+def test_another_model_starts_another_history(make_flight: Callable[..., Flight]) -> None:
+    picture, first, second = Picture(), make_flight(), make_flight(Config(model="linear_black_box"))
+    watch(picture, first, 0.5)
+    picture.take(second.frames(100), 0.6)
+    assert {"a21", "a21_sigma"} <= picture.history.keys()
+    assert "k_p" not in picture.history
+    assert len(picture.history["time"]) == 1

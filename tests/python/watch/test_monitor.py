@@ -1,0 +1,221 @@
+"""`lever monitor`: in Textual's own test driver, in a real terminal, and as text."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import shlex
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.watch import panels
+from lever_cdkf.host_tools.watch.model import Frame
+from lever_cdkf.host_tools.watch.sources import Source
+from lever_cdkf.host_tools.watch.terminal import SPANS, Monitor
+from python.watch.conftest import LEVER, Flight
+from rich.segment import Segment
+
+
+class Fed(Source):
+    """A source that a test feeds by hand, with its own clock."""
+
+    title = "a test"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.time = 0.0
+
+    def run(self) -> None:
+        self._stopping.wait()
+
+    @property
+    def now(self) -> float:
+        return self.time
+
+    def feed(self, frames: list[Frame], now: float) -> None:
+        for frame in frames:
+            self._put(frame)
+        self.time = now
+
+
+def screen(app: Monitor) -> list[str]:
+    """What the terminal shows, by lines."""
+    lines = app.screen._compositor.render_strips()
+    return ["".join(segment.text for segment in Segment.strip_styles(strip)) for strip in lines]
+
+
+def fly(app: Monitor, source: Fed, flight: Flight, steps: int) -> None:
+    """So many tenths of a second, each shown."""
+    for _ in range(steps):
+        frames = flight.frames(100)
+        source.feed(frames, flight.sample * 1e-3)
+        app.advance()
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+def test_everything_fits_on_the_screen(size: tuple[int, int], flight: Flight) -> None:
+    async def drive() -> None:
+        source = Fed()
+        app = Monitor(source)
+        async with app.run_test(size=size) as pilot:
+            fly(app, source, flight, 40)
+            await pilot.pause()
+            lines = screen(app)
+        text = "\n".join(lines)
+        assert [len(line) for line in lines] == [size[0]] * size[1]
+        assert "a test · model lever" in lines[0]
+        assert lines[1].startswith(" ● run")
+        estimate = flight.bus.estimator.estimate()
+        for name, value in (("m_p", estimate.parameter[0]), ("k_p", estimate.parameter[2])):
+            row = re.search(rf"│ {name} +([\d.]+) +± ([\d.]+) ", text)
+            assert row is not None
+            assert float(row[1]) == pytest.approx(value, rel=0.1)  # which is up to 20 ms newer
+        assert re.search(r"natural_frequency +\d\.\d\d\d +± 0\.\d+ Hz .*[▁▂▃▄▅▆▇█]{5}", text)
+        assert re.search(r"LEVER_SAMPLE +1000 +0 +0 +0 ", text)
+        assert re.search(r"HEALTH +50 +0 +0 +0 ", text)
+        assert re.search(r"PLATFORM_HEALTH +– +– +– +– ", text)
+        for label in ("mode +run", "excitation +0.[0-9]+ rad/s", "dither +off", "mean NIS", "theta +20.0"):
+            assert re.search(label, text), label
+        for key in ("q quit", "space hold the picture", "t time span", "c clear counts"):
+            assert key in lines[-1], lines[-1]
+
+    asyncio.run(drive())
+
+
+def test_keys(flight: Flight) -> None:
+    async def drive() -> None:
+        source = Fed()
+        app = Monitor(source)
+        async with app.run_test(size=(80, 24)) as pilot:
+            fly(app, source, flight, 20)
+            flight.sample += 3  # lost
+            fly(app, source, flight, 5)
+            await pilot.pause()
+            assert re.search(r"LEVER_SAMPLE +\d+ +3 ", "\n".join(screen(app)))
+            await pilot.press("space")
+            held = "\n".join(screen(app))
+            assert "held: space goes on" in held
+            fly(app, source, flight, 20)
+            await pilot.pause()
+            assert "\n".join(screen(app)) == held
+            await pilot.press("space", "c")
+            fly(app, source, flight, 1)
+            await pilot.pause()
+            assert re.search(r"LEVER_SAMPLE +\d+ +0 ", "\n".join(screen(app)))
+            assert "30 s [%]" in "\n".join(screen(app))
+            await pilot.press("t")
+            assert f"{SPANS[1]:.0f} s [%]" in "\n".join(screen(app))
+            await pilot.press("q")
+        assert app.return_code == 0
+        assert not source._thread.is_alive()
+
+    asyncio.run(drive())
+
+
+def test_before_the_first_estimate_and_after_the_last(flight: Flight) -> None:
+    async def drive() -> None:
+        source = Fed()
+        app = Monitor(source)
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.advance()
+            await pilot.pause()
+            text = "\n".join(screen(app))
+            assert "no frame has come yet" in text
+            assert re.search(r"parameters +none yet", text)
+            fly(app, source, flight, 10)
+            source.time += 5.0
+            app.advance()
+            await pilot.pause()
+            text = "\n".join(screen(app))
+            assert "the estimator has said nothing for 5 s: what is shown is old" in text
+            assert re.search(r"m_p +– +± – ", text)
+            source.error = "Network is down"
+            app.advance()
+            await pilot.pause()
+            assert "● Network is down" in "\n".join(screen(app))
+
+    asyncio.run(drive())
+
+
+def test_sparkline() -> None:
+    assert panels.sparkline([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], 0.0, 8) == "▁▂▃▄▅▆▇█"
+    assert panels.sparkline([1.0, float("nan"), 2.0], 0.0, 3) == "▁ █"
+    assert set(panels.sparkline([1.0, 1.01, 0.99, 1.0], 1.0, 4)) <= set("▄▅")  # within sigma: flat
+    assert len(panels.sparkline(list(range(1000)), 0.0, 20)) == 20
+    assert panels.sparkline([], 0.0, 5) == panels.sparkline([float("nan")], 0.0, 5) == ""
+
+
+# --- as a command ----------------------------------------------------------------------------------------------------
+
+
+def test_once(log: Path, flight: Flight, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["monitor", "--once", str(log)]) == 0
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    assert "\x1b" not in shown.out
+    row = re.search(r"^k_p +([\d.]+) +± ([\d.]+) N/m", shown.out, re.MULTILINE)
+    assert row is not None
+    assert float(row[1]) == pytest.approx(flight.bus.estimator.estimate().parameter[2], rel=0.02)
+    assert re.search(r"^STATE_ESTIMATE +1000 +0 +0 +0$", shown.out, re.MULTILINE)
+
+
+def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["monitor", "--scenario", "steady", "--once", "--duration", "3"]) == 0
+    assert re.search(r"^simulation of steady · model lever · watching for 0:0[234] min$", capsys.readouterr().out, re.M)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ([], "this is not a terminal: `lever monitor --once` prints one picture as text"),
+        (
+            ["--once"],
+            "nothing to watch: give a LOG, --scenario NAME, or --interface and --channel of a bus, one of them",
+        ),
+        (["--once", "a.log", "--scenario", "demo"], "log and scenario at once: give a LOG, "),
+        (["--once", "no.log"], "cannot read no.log: No such file or directory"),
+        (["--once", "--scenario", "none"], "no scenario 'none'; there are "),
+        (["--once", "--interface", "lever"], "interface lever is inside one process, with nobody else to be heard: "),
+        (["--once", "--interface", "socketcan", "--channel", "no0"], "cannot open socketcan channel no0: "),
+        (["--once", "--interface", "slcan", "--bus-option", "x"], "--bus-option x: must be KEY=VALUE"),
+        (["--duration", "soon"], "'soon' is not a number of seconds above 0"),
+    ],
+)
+def test_bad_input_is_one_line(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["monitor", *arguments]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("lever: error: ")
+    assert text in shown.err
+    assert shown.err.count("\n") == 1
+
+
+@pytest.mark.requires("tmux")
+def test_in_a_real_terminal(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    server = ["tmux", "-L", f"lever-{tmp_path.name}", "-f", "/dev/null"]
+
+    def tmux(*arguments: str) -> str:
+        return subprocess.run([*server, *arguments], capture_output=True, text=True, check=True).stdout
+
+    def wait(condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + 30.0
+        while not condition():
+            assert time.monotonic() < deadline, tmux("capture-pane", "-p")
+            time.sleep(0.2)
+
+    status = tmp_path / "status"
+    command = f"{shlex.join([*LEVER, 'monitor', '--scenario', 'steady'])}; echo $? > {status}"
+    request.addfinalizer(lambda: subprocess.run([*server, "kill-server"], capture_output=True, check=False))
+    tmux("new-session", "-d", "-x", "80", "-y", "24", command)
+    wait(lambda: "● run" in tmux("capture-pane", "-p"))
+    lines = tmux("capture-pane", "-p").splitlines()
+    assert len(lines) == 24
+    assert "q quit" in lines[-1]
+    assert any(re.search(r"m_p +\d\.\d\d\d", line) for line in lines)
+    tmux("send-keys", "q")
+    wait(status.exists)
+    wait(lambda: status.read_text() == "0\n")

@@ -1,0 +1,177 @@
+"""The live page in headless Chromium, as its users see and touch it."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lever_cdkf.sil.report import picture
+from python.watch.browser import Browser
+
+pytestmark = pytest.mark.requires("|".join(picture.BROWSERS))
+
+Start = Callable[..., "subprocess.Popen[str]"]
+CONDITION = "document.getElementById('condition').textContent"
+
+
+def address(process: subprocess.Popen[str]) -> str:
+    """Of the page, which the command prints first."""
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    found = re.search(r"http://\S+/", line)
+    assert found, line
+    return found[0]
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=20)[1] == ""
+
+
+def estimates(browser: Browser) -> dict[str, list[str]]:
+    """Value, sigma, unit and truth by the name that the page shows."""
+    rows: list[list[str]] = browser.run(
+        "Array.from(document.querySelectorAll('#estimates tr'), row => Array.from(row.cells, cell => cell.textContent))"
+    )
+    return {name: rest for name, *rest in rows}
+
+
+def drawn(browser: Browser, canvas: str) -> int:
+    """How many colours a canvas shows."""
+    script = """(() => {
+      const canvas = document.querySelector(%s), pen = canvas.getContext('2d');
+      const data = new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer);
+      return new Set(data).size; })()"""
+    return int(browser.run(script % json.dumps(canvas)))
+
+
+def choose(browser: Browser, selector: str, value: str) -> None:
+    """As if the user had chosen it from the list."""
+    script = "(() => { const e = document.querySelector(%s); e.value = %s; e.dispatchEvent(new Event('change')); })()"
+    browser.run(script % (json.dumps(selector), json.dumps(value)))
+
+
+@pytest.fixture(scope="module")
+def desktop() -> Iterator[Browser]:
+    with Browser() as browser:
+        yield browser
+
+
+def test_a_session(desktop: Browser, start_lever: Start, tmp_path: Path) -> None:
+    process = start_lever("live", "--scenario", "steady", "--port", "0")
+    url = address(process)
+    desktop.open(url)
+    desktop.wait(f"{CONDITION}.startsWith('run')")
+    shown = estimates(desktop)
+    assert list(shown) == ["mp mass", "cp damping", "kp stiffness", "fn natural frequency", "ζ damping ratio"]
+    value, sigma, unit, truth = shown["kp stiffness"]
+    assert 500 < float(value) < 5000
+    assert re.fullmatch(r"± \d+", sigma)
+    assert (unit, truth) == ("N/m", "(2100)")  # steady.toml
+    desktop.wait("document.querySelectorAll('#messages tr').length == 11")
+    desktop.wait("Array.from(document.querySelectorAll('#messages td'), e => Number(e.textContent)).some(n => n > 900)")
+    for canvas in ("#magnitude", "#phase", "#magnitude-map", "#bands canvas", "#health canvas"):
+        assert drawn(desktop, canvas) > 20, canvas
+
+    assert desktop.run("document.querySelector('[data-request=run]').ariaPressed") == "true"
+    desktop.click("[data-request=freeze]")
+    desktop.wait("document.querySelector('[data-request=freeze]').ariaPressed == 'true'")
+    assert desktop.run(CONDITION) == "frozen: the estimator holds the parameters, by command"
+    frozen = estimates(desktop)["kp stiffness"][0]
+    desktop.run("new Promise(done => setTimeout(done, 500))")
+    assert estimates(desktop)["kp stiffness"][0] == frozen
+    desktop.click("[data-request=run]")
+    desktop.wait("document.querySelector('[data-request=run]').ariaPressed == 'true'")
+
+    desktop.click("[data-request=reset]")
+    assert desktop.run("document.querySelector('[data-request=reset]').textContent") == "reset: sure?"
+    assert desktop.run("document.getElementById('answer').textContent") == "Sent: request run"
+    desktop.click("[data-request=reset]")
+    desktop.wait("document.getElementById('answer').textContent == 'Sent: request reset'")
+    choose(desktop, "#dither", "0.5")
+    desktop.wait("document.getElementById('answer').textContent == 'Sent: dither_rms 0.5'")
+    choose(desktop, "#model", "linear_physical")
+    desktop.wait("document.querySelector('#estimates td').textContent == 'm mass'")
+    assert estimates(desktop)["m mass"][3] == ""  # the pilot is not of this model: no truth
+
+    origins = desktop.run("performance.getEntriesByType('resource').map(e => new URL(e.name).origin)")
+    assert set(origins) == {url.rstrip("/")}
+    assert desktop.complaints == []
+    desktop.screenshot(tmp_path / "session.png")
+    end(process)
+
+
+def test_it_says_that_the_server_is_gone_and_finds_it_again(desktop: Browser, start_lever: Start) -> None:
+    process = start_lever("live", "--scenario", "steady", "--port", "0")
+    url = address(process)
+    desktop.open(url)
+    desktop.wait(f"{CONDITION}.startsWith('run')")
+    assert not desktop.run("document.body.classList.contains('stale')")
+    end(process)
+    desktop.wait(f"{CONDITION} == 'The server is gone; this page tries to reach it again.'")
+    assert desktop.run("document.body.classList.contains('stale')")
+    desktop.click("[data-request=freeze]")
+    assert desktop.run("document.getElementById('answer').textContent") == "Not sent: there is no connection."
+    again = start_lever("live", "--scenario", "steady", "--port", url.rsplit(":", 1)[1].rstrip("/"))
+    address(again)
+    desktop.wait(f"{CONDITION}.startsWith('run')")
+    assert not desktop.run("document.body.classList.contains('stale')")
+    end(again)
+
+
+def test_a_server_that_hangs_is_told(desktop: Browser, start_lever: Start) -> None:
+    process = start_lever("live", "--scenario", "steady", "--port", "0")
+    desktop.open(address(process))
+    desktop.wait(f"{CONDITION}.startsWith('run')")
+    process.send_signal(signal.SIGSTOP)
+    desktop.wait(f"{CONDITION}.startsWith('Nothing has come from the server')")
+    assert desktop.run("document.body.classList.contains('stale')")
+    process.send_signal(signal.SIGCONT)
+    desktop.wait("!document.body.classList.contains('stale')")
+    end(process)
+
+
+def test_before_the_first_frame_and_read_only(desktop: Browser, start_lever: Start, log: Path) -> None:
+    """A log of which the first seconds are silent, and nothing of which may be commanded."""
+    lines = log.read_text().splitlines(keepends=True)
+    late = [line.replace("(0.", "(103.").replace("(0 ", "(103 ") for line in lines]
+    log.write_text("(100.000000) can0 123#00 R\n" + "".join(late))
+    process = start_lever("live", str(log), "--port", "0")
+    desktop.open(address(process))
+    desktop.complaints.clear()  # those of the last page
+    desktop.wait(f"{CONDITION} == 'frames pass, but neither samples nor estimates'")
+    assert all(cells[0] == "–" for cells in estimates(desktop).values())
+    assert desktop.run("document.getElementById('controls').hidden")
+    assert not desktop.run("document.getElementById('read-only').hidden")
+    assert not desktop.run("document.querySelector('.simulated').checkVisibility()")
+    desktop.wait(f"{CONDITION} == 'the end: nothing more will come'")
+    assert "mp mass" in estimates(desktop)
+    assert desktop.complaints == []
+    end(process)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_on_a_phone(dark: bool, start_lever: Start, tmp_path: Path) -> None:
+    process = start_lever("live", "--scenario", "steady", "--port", "0")
+    with Browser(390, 844, dark=dark, phone=True) as phone:
+        phone.open(address(process))
+        phone.wait(f"{CONDITION}.startsWith('run')")
+        sizes = phone.run("(({scrollWidth, clientWidth}) => [scrollWidth, clientWidth])(document.documentElement)")
+        assert sizes == [390, 390]  # nothing to be scrolled sideways
+        targets: list[dict[str, Any]] = phone.run(
+            "Array.from(document.querySelectorAll('button, select'), e => e.getBoundingClientRect().toJSON())"
+        )
+        assert all(each["height"] >= 40 and each["right"] <= 390 for each in targets)
+        background = phone.run("getComputedStyle(document.body).backgroundColor")
+        assert (background == "rgb(255, 255, 255)") is not dark
+        phone.click("[data-request=freeze]")
+        phone.wait(f"{CONDITION}.startsWith('frozen: ')")
+        phone.screenshot(tmp_path / "phone.png")
+        assert phone.complaints == []
+    end(process)

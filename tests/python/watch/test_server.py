@@ -1,0 +1,422 @@
+"""The server of the live page: whom it lets in, what it tells, and what it passes on to the estimator."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import re
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from typing import Any
+
+import pytest
+from lever_cdkf.host_tools import cli, codec
+from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.watch.sources import KEEP, Source
+from lever_cdkf.sil.watch.server import Server
+from lever_cdkf.sil.watch.state import State, command_of
+from python.watch.conftest import Flight
+from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
+from tornado.websocket import websocket_connect
+
+
+class FlightSource(Source):
+    """A flight that goes on by a tenth of a second each time it is asked, and obeys commands."""
+
+    title = "a flight"
+    takes_commands = True
+
+    def __init__(self, flight: Flight) -> None:
+        super().__init__()
+        self.flight = flight
+        self.commanded: list[dict[str, codec.Value]] = []
+
+    def run(self) -> None:
+        self._stopping.wait()
+
+    def drain(self) -> list[tuple[int, bytes | bytearray]]:
+        return self.flight.frames(100)
+
+    @property
+    def now(self) -> float:
+        return self.flight.sample * 1e-3
+
+    def command(self, values: Any) -> None:
+        self.commanded.append(dict(values))
+        self.flight.send(0x120, codec.encode("COMMAND", 0, {"request": "none", **KEEP, **values}))
+
+
+Story = Callable[[Server], Awaitable[None]]
+
+
+@pytest.fixture
+def on_server(flight: Flight) -> Callable[..., FlightSource]:
+    """Runs a story against a server in this process; returns its source."""
+
+    def run(story: Story, *, host: str = "127.0.0.1", read_only: bool = False) -> FlightSource:
+        source = FlightSource(flight)
+        server = Server(source, Config(), host=host, port=0, read_only=read_only)
+
+        async def drive() -> None:
+            stop = asyncio.Event()
+            task = asyncio.create_task(server.run(stop))
+            try:
+                await asyncio.wait_for(story(server), 30.0)
+            finally:
+                stop.set()
+                await task
+
+        asyncio.run(drive())
+        return source
+
+    return run
+
+
+async def fetch(server: Server, path: str = "", method: str = "GET", **headers: str) -> HTTPResponse:
+    """The answer, whatever its status."""
+    body = "freeze" if method == "POST" else None
+    request = HTTPRequest(f"{server.address}{path}", method, headers, body, allow_nonstandard_methods=True)
+    response: HTTPResponse = await AsyncHTTPClient().fetch(request, raise_error=False)
+    return response
+
+
+async def status_of_socket(server: Server, **headers: str) -> int:
+    """101 when a WebSocket is opened, else the status that refuses it."""
+    url = server.address.replace("http", "ws") + "socket"
+    try:
+        connection = await websocket_connect(HTTPRequest(url, headers=headers))
+    except HTTPClientError as error:
+        return error.code
+    connection.close()
+    return 101
+
+
+class Visitor:
+    """A page's end of the WebSocket."""
+
+    def __init__(self, server: Server) -> None:
+        self._server = server
+
+    async def __aenter__(self) -> Visitor:
+        self._connection = await websocket_connect(self._server.address.replace("http", "ws") + "socket")
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._connection.close()
+
+    async def ask(self, message: str) -> None:
+        await self._connection.write_message(message)
+
+    async def hear(self, kind: str) -> Any:
+        """The content of the next message of a kind."""
+        while True:
+            text = await self._connection.read_message()
+            assert text is not None, "closed"
+            message = json.loads(text, parse_constant=pytest.fail)  # NaN and Infinity are no JSON
+            if kind in message:
+                return message[kind]
+
+
+# --- who is let in ---------------------------------------------------------------------------------------------------
+
+
+def test_a_host_of_another_name_is_turned_away(on_server: Callable[..., FlightSource]) -> None:
+    """DNS rebinding: the browser connects to this computer, but names the attacker's site."""
+
+    async def story(server: Server) -> None:
+        for host in (
+            "evil.example",
+            f"evil.example:{server.port}",
+            "127.0.0.1.evil.example",
+            "localhost.evil",
+            "",
+            "[",
+        ):
+            assert (await fetch(server, Host=host)).code in (400, 421), host
+            assert await status_of_socket(server, Host=host, Origin=f"http://{host}") in (400, 421), host
+        for host in ("127.0.0.1", f"localhost:{server.port}", "localhost:9999", "[::1]:80", "192.168.1.7"):
+            assert (await fetch(server, Host=host)).code == 200, host
+
+    on_server(story)
+
+
+def test_pages_of_others_get_no_socket(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        own = f"127.0.0.1:{server.port}"
+        others = ("http://evil.example", "null", "file://", f"http://127.0.0.1:{server.port + 1}", f"http://{own}.evil")
+        for origin in (*others, "http://localhost", f"http://evil@127.0.0.1:{server.port}"):
+            assert await status_of_socket(server, Origin=origin) == 403, origin
+            sneaky = {"Origin": origin, "Sec-Fetch-Site": "same-origin"}
+            assert await status_of_socket(server, **sneaky) == 403, origin
+        assert await status_of_socket(server, Origin=f"http://{own}") == 101
+        assert await status_of_socket(server, Host="localhost:7", Origin="http://localhost:7") == 101  # a tunnel
+        assert await status_of_socket(server) == 101  # no browser
+
+    on_server(story)
+
+
+def test_a_post_from_anywhere_does_nothing(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        for path in ("", "socket", "command"):
+            for method in ("POST", "PUT", "DELETE", "PATCH", "OPTIONS"):
+                response = await fetch(server, path, method, Origin="http://evil.example")
+                assert response.code in (400, 403, 404, 405), (path, method)
+                assert "Access-Control-Allow-Origin" not in response.headers
+
+    assert on_server(story).commanded == []
+
+
+def test_the_page_cannot_be_framed_and_fetches_nothing_from_elsewhere(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        for path in ("", "page.js", "axes.js", "charts.js", "page.css", "colours.css"):
+            response = await fetch(server, path)
+            assert response.code == 200
+            policy = response.headers["Content-Security-Policy"]
+            assert "default-src 'none'" in policy
+            assert "frame-ancestors 'none'" in policy
+            assert response.headers["X-Frame-Options"] == "DENY"
+            assert response.headers["X-Content-Type-Options"] == "nosniff"
+            assert not re.search(rb"https?://", response.body)
+        for path in ("../server.py", "%2e%2e/server.py", "page", "page.html/", "server.py"):
+            assert (await fetch(server, path)).code in (400, 404), path
+
+    on_server(story)
+
+
+# --- what is told ----------------------------------------------------------------------------------------------------
+
+
+def test_a_page_hears_the_estimates_as_they_come(on_server: Callable[..., FlightSource], flight: Flight) -> None:
+    async def story(server: Server) -> None:
+        async with Visitor(server) as visitor:
+            start = await visitor.hear("start")
+            assert start["title"] == "a flight"
+            start = await visitor.hear("start")  # once more, now that the model is known
+            assert [quantity["key"] for quantity in start["quantities"]][:3] == ["m_p", "c_p", "k_p"]
+            times = []
+            for _ in range(5):
+                update = await visitor.hear("update")
+                times.append(update["row"][0])
+                assert len(update["row"]) == 1 + 3 * len(start["quantities"]) + len(start["others"])
+            assert times == pytest.approx([times[0] + 0.1 * k for k in range(5)])
+            assert update["row"][1] == pytest.approx(flight.bus.estimator.estimate().parameter[0], rel=0.2)
+            assert len(update["bode"]["magnitude"]) == len(start["frequencies"])
+            low, middle, high = (update["bode"][name][60] for name in ("low", "magnitude", "high"))
+            assert low < middle < high
+            assert update["mode"] in ("align", "run")
+            assert ["STATE_ESTIMATE", pytest.approx(1000), 0, 0, 0] in update["messages"]
+            assert update["truth"] is None
+        async with Visitor(server) as late:
+            rows = (await late.hear("start"))["rows"]
+            assert len(rows) >= 5
+
+    begin = time.monotonic()
+    on_server(story)
+    assert time.monotonic() - begin < 10.0
+
+
+def test_before_the_first_estimate_nothing_is_made_up(flight: Flight) -> None:
+    class Silent(FlightSource):
+        def drain(self) -> list[tuple[int, bytes | bytearray]]:
+            return []
+
+    state = State(Silent(flight), Config())
+    start = json.loads(state.start(), parse_constant=pytest.fail)["start"]
+    assert start["model"] is None
+    (message,) = state.advance()
+    update = json.loads(message, parse_constant=pytest.fail)["update"]
+    assert update["bode"] is None
+    assert update["silence"] is None
+    assert update["mode"] is None
+    assert set(update["row"][1:7]) == {None}
+    assert (update["level"], update["condition"]) == ("watch", "no frame has come yet")
+
+
+def test_the_past_that_is_kept_is_bounded(flight: Flight) -> None:
+    state = State(FlightSource(flight), Config())
+    for _ in range(3):
+        state.advance()
+    frames = flight.frames(100)
+    flight.frames = lambda count: frames  # type: ignore[method-assign]
+    for k in range(700):
+        flight.sample = 1000 + 100 * k
+        state.advance()
+    assert len(state._rows) == 600
+    assert len(state._map) == 120
+    assert len(state.start()) < 300_000
+
+
+def test_a_page_that_does_not_read_piles_nothing_up(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        with socket.create_connection(("127.0.0.1", server.port)) as deaf:
+            deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            own = f"127.0.0.1:{server.port}"
+            deaf.sendall(
+                f"GET /socket HTTP/1.1\r\nHost: {own}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+            )
+            while not server.pages:
+                await asyncio.sleep(0.01)
+            (page,) = server.pages
+            sent, tell = [], page.tell
+            page.tell = lambda message: (sent.append(message), tell(message))[1]  # type: ignore[method-assign, func-returns-value]
+            for _ in range(200):
+                page.update(["x" * 100_000])
+                await asyncio.sleep(0)
+            assert 1 <= len(sent) < 100  # what the kernel's buffers take, and no more
+
+    on_server(story)
+
+
+# --- what is asked for -----------------------------------------------------------------------------------------------
+
+
+def test_commands_reach_the_estimator(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        async with Visitor(server) as visitor:
+            await visitor.ask('{"request": "freeze"}')
+            assert await visitor.hear("sent") == {"request": "freeze"}
+            while (await visitor.hear("update"))["mode"] != "frozen":
+                pass
+            await visitor.ask('{"request": "run", "dither_rms": 0.3}')
+            while (await visitor.hear("update"))["mode"] != "run":
+                pass
+            while (await visitor.hear("update"))["row"][-1] < 0.1:  # the dither fades in
+                pass
+            await visitor.ask('{"model": "linear_black_box", "estimator": "joint"}')
+            while (start := await visitor.hear("start"))["model"] != "linear_black_box":
+                pass
+            assert [quantity["key"] for quantity in start["quantities"]][:3] == ["a21", "a22", "b21"]
+
+    on_server(story)
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        ("freeze", "Expecting value"),
+        ("[]", "a command is an object"),
+        ("{}", "a command is an object"),
+        ("7", "a command is an object"),
+        ('{"request": "explode"}', "request must be one of none, run, freeze, reset"),
+        ('{"request": ["freeze"]}', "request must be one of"),
+        ('{"model": 3}', "model must be one of lever, "),
+        ('{"dither_rms": 1e9}', "dither_rms must be a number from 0 to 1.5 N m"),
+        ('{"dither_rms": -0.1}', "dither_rms must be a number from 0 to 1.5 N m"),
+        ('{"dither_rms": NaN}', "dither_rms must be a number from 0 to 1.5 N m"),
+        ('{"dither_rms": true}', "dither_rms must be a number from 0 to 1.5 N m"),
+        ('{"dither_rms": "0.1"}', "dither_rms must be a number from 0 to 1.5 N m"),
+        ('{"counter": 1}', "a command has no 'counter'"),
+    ],
+)
+def test_a_command_that_makes_no_sense_is_refused(message: str, text: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(text)):
+        command_of(json.loads(message), Config())
+
+
+def test_what_is_refused_is_told_and_changes_nothing(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        async with Visitor(server) as visitor:
+            for message in ("{", '{"request": "explode"}', "[" * 500):
+                await visitor.ask(message)
+                assert await visitor.hear("refused")
+            await visitor.hear("update")
+            await visitor.ask("x" * 10_000)  # too long: the connection ends, the server does not
+            with pytest.raises(AssertionError, match="closed"):
+                await visitor.hear("refused")
+        async with Visitor(server) as visitor:
+            await visitor.hear("update")
+
+    assert on_server(story).commanded == []
+
+
+def test_read_only_sends_nothing(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        async with Visitor(server) as visitor:
+            assert (await visitor.hear("start"))["controls"] is False
+            await visitor.ask('{"request": "freeze"}')
+            assert await visitor.hear("refused") == "this page only shows: no commands"
+
+    assert on_server(story, read_only=True).commanded == []
+
+
+# --- as a command ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    """A port that somebody else has."""
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        yield other.getsockname()[1]
+
+
+def test_a_port_in_use_is_one_line(taken: int, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["live", "--scenario", "steady", "--port", str(taken)]) == 2
+    text = f"lever: error: port {taken} of 127.0.0.1 is in use: give another --port, or 0\n"
+    assert capsys.readouterr() == ("", text)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--scenario", "steady", "--host", "203.0.113.1"], "cannot listen at 203.0.113.1 port 8642: "),
+        (["--scenario", "steady", "--port", "x"], "'x' is not a port from 0 to 65535"),
+        (["--scenario", "steady", "--settings", "x"], "--settings goes with a bus or a log"),
+        ([], "nothing to watch"),
+    ],
+)
+def test_bad_input_is_one_line(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["live", *arguments]) == 2
+    shown = capsys.readouterr()
+    assert text in shown.err
+    assert shown.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ends_cleanly_when_interrupted(number: int, start_lever: Callable[..., subprocess.Popen[str]]) -> None:
+    process = start_lever("live", "--scenario", "steady", "--port", "0")
+    assert process.stdout is not None
+    assert re.fullmatch(
+        r"simulation of steady: open http://127\.0\.0\.1:\d+/ \(Ctrl-C ends\)\n", process.stdout.readline()
+    )
+    process.send_signal(number)
+    assert process.communicate(timeout=20) == ("", "")
+    assert process.returncode == 130
+
+
+def test_a_duration(capsys: pytest.CaptureFixture[str]) -> None:
+    before = threading.active_count()
+    assert cli.main(["live", "--scenario", "steady", "--port", "0", "--duration", "0.3"]) == 0
+    assert capsys.readouterr().err == ""
+    assert threading.active_count() == before
+
+
+def test_an_open_port_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
+    quick = ["--scenario", "steady", "--port", "0", "--duration", "0.1", "--host", "0.0.0.0"]
+    assert cli.main(["live", *quick]) == 0
+    assert re.search(
+        r"warning: anybody who reaches port \d+ can see and command the estimator", capsys.readouterr().err
+    )
+    assert cli.main(["live", *quick, "--read-only"]) == 0
+    assert re.search(r"warning: anybody who reaches port \d+ can see the estimator", capsys.readouterr().err)
+
+
+def test_a_source_that_fails_is_told_at_the_end(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "garbage.log"
+    path.write_text("nothing of the kind\n")
+    assert cli.main(["live", str(path), "--port", "0", "--duration", "0.5"]) == 2
+    assert "garbage.log: not to be read any further: " in capsys.readouterr().err
+
+
+def test_times_keep_their_resolution() -> None:
+    from lever_cdkf.sil.watch.state import _short
+
+    assert _short(12345.678) == 12345.68
+    assert _short(0.00123456) == 0.001235
+    assert _short(math.inf) is None
+    assert _short(math.nan) is None

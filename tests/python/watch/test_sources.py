@@ -1,0 +1,237 @@
+"""Sources: frames come as they came on the bus or in the log, and the bus does not notice who watches."""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import pytest
+from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.watch import sources
+from lever_cdkf.host_tools.watch.model import ERROR, FOREIGN, Frame, Picture
+from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
+from lever_cdkf.sil.scenario import load
+from lever_cdkf.sil.watch.simulation import SimulationSource
+from lever_cdkf.sil.watch.transfer import FREQUENCIES
+from python.watch.conftest import Flight
+
+
+def wait_for(source: Source, count: int, patience: float = 10.0) -> list[Frame]:
+    """The frames of a source until there are `count`."""
+    frames: list[Frame] = []
+    deadline = time.monotonic() + patience
+    while len(frames) < count:
+        assert time.monotonic() < deadline, f"{len(frames)} of {count} frames; {source.error}"
+        frames += source.drain()
+        time.sleep(0.01)
+    return frames
+
+
+@pytest.fixture
+def other_end() -> Iterator[can.BusABC]:
+    """Another one on the virtual bus `watched`."""
+    with can.Bus(interface="virtual", channel="watched") as bus:
+        yield bus
+
+
+@pytest.fixture
+def on_bus(other_end: can.BusABC) -> Iterator[BusSource]:
+    source = BusSource("virtual", "watched")
+    source.start()
+    yield source
+    source.stop()
+
+
+# --- a bus -----------------------------------------------------------------------------------------------------------
+
+
+def test_takes_what_passes_and_sends_nothing(other_end: can.BusABC, on_bus: BusSource, flight: Flight) -> None:
+    sent = flight.messages(50)
+    for message in sent:
+        other_end.send(message)
+    frames = wait_for(on_bus, len(sent))
+    assert [(identifier, bytes(data)) for identifier, data in frames] == [
+        (message.arbitration_id, bytes(message.data)) for message in sent
+    ]
+    assert other_end.recv(0.1) is None
+
+
+def test_what_is_no_classic_data_frame_is_marked(other_end: can.BusABC, on_bus: BusSource) -> None:
+    other_end.send(can.Message(arbitration_id=0x210, is_extended_id=True, data=bytes(8)))
+    other_end.send(can.Message(arbitration_id=0x210, is_extended_id=False, is_remote_frame=True, dlc=8))
+    other_end.send(can.Message(arbitration_id=0x210, is_extended_id=False, is_fd=True, data=bytes(12)))
+    other_end.send(can.Message(is_error_frame=True))
+    assert [identifier for identifier, _ in wait_for(on_bus, 4)] == [FOREIGN, FOREIGN, FOREIGN, ERROR]
+
+
+def test_a_view_that_never_looks_neither_slows_the_bus_nor_fills_memory(
+    other_end: can.BusABC, on_bus: BusSource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sources, "MOST_WAITING", 1000)
+    on_bus._waiting = type(on_bus._waiting)(maxlen=1000)
+    message = can.Message(arbitration_id=0x210, is_extended_id=False, data=bytes(8))
+    begin = time.monotonic()
+    for _ in range(8000):  # a second of a full bus
+        other_end.send(message)
+    while on_bus.dropped < 7000:
+        assert time.monotonic() - begin < 10.0
+        time.sleep(0.01)
+    assert len(on_bus.drain()) == 1000
+    assert on_bus.dropped == 7000
+
+
+def test_a_bus_that_breaks_is_an_error_in_one_line(on_bus: BusSource, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(_timeout: float) -> can.Message | None:
+        raise can.CanOperationError("Network is down\n[Errno 100]")
+
+    monkeypatch.setattr(on_bus._bus, "recv", broken)
+    other = BusSource("virtual", "watched")
+    monkeypatch.setattr(other._bus, "recv", broken)
+    other.start()
+    other._thread.join(5.0)
+    assert (other.ended, other.error) == (True, "Network is down [Errno 100]")
+    other.stop()
+
+
+@pytest.mark.parametrize(
+    ("interface", "channel", "text"),
+    [
+        ("nothing", "x", "cannot open nothing channel x: "),
+        ("socketcan", "no_such0", "cannot open socketcan channel no_such0: "),
+        ("slcan", "/dev/no_such", "cannot open slcan channel /dev/no_such: "),
+        ("slcan", None, "cannot open slcan: "),
+    ],
+)
+def test_a_bus_that_is_not_there(interface: str, channel: str | None, text: str) -> None:
+    with pytest.raises(LeverError, match=text):
+        BusSource(interface, channel)
+
+
+def test_a_command_goes_out_protected_and_is_shown(other_end: can.BusABC, on_bus: BusSource) -> None:
+    on_bus.command({"request": "freeze"})
+    on_bus.command({"dither_rms": 0.3})
+    received = [other_end.recv(1.0), other_end.recv(1.0)]
+    decoded = [codec.decode(message.arbitration_id, message.data)[1] for message in received if message is not None]
+    assert [values["counter"] for values in decoded] == [0, 1]
+    assert [values["request"] for values in decoded] == [2, 0]
+    assert [values["dither_rms"] for values in decoded] == [65.535, pytest.approx(0.3)]  # the first keeps it
+    assert all(values[what] == 15 for values in decoded for what in ("model", "preload", "estimator", "adaptation"))
+    assert [identifier for identifier, _ in on_bus.drain()] == [0x120, 0x120]
+
+
+# --- a log -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_log_is_played_at_its_pace(log: Path, flight: Flight) -> None:
+    source = LogSource(str(log))
+    begin = time.monotonic()
+    source.start()
+    while not source.ended:
+        assert time.monotonic() - begin < 10.0
+        time.sleep(0.01)
+    assert time.monotonic() - begin >= 0.59
+    assert source.error is None
+    frames, picture = source.drain(), Picture()
+    with can.LogReader(log) as reader:
+        assert [(identifier, bytes(data)) for identifier, data in frames] == [
+            (message.arbitration_id, bytes(message.data)) for message in reader
+        ]
+    picture.take(frames, 0.6)
+    assert picture.parameters()[0].value == pytest.approx(flight.bus.estimator.estimate().parameter[0], rel=0.01)
+
+
+def test_a_log_is_read_at_once_with_the_same_result(log: Path) -> None:
+    picture, whole = Picture(), Picture()
+    LogSource(str(log)).read_into(picture)
+    assert picture.now == pytest.approx(0.599)
+    assert picture.traffic["STATE_ESTIMATE"].rate == pytest.approx(1000, rel=0.02)
+    with can.LogReader(log) as reader:
+        whole.take([(message.arbitration_id, message.data) for message in reader], 0.6)
+    assert [entry[:3] for entry in picture.parameters()] == [entry[:3] for entry in whole.parameters()]
+
+
+def test_one_channel_of_a_log(log: Path) -> None:
+    log.write_text(log.read_text() + "(0.700000) can1 123#00 R\n")
+    picture = Picture()
+    LogSource(str(log), "can1").read_into(picture)
+    assert (picture.foreign, picture.traffic["STATE_ESTIMATE"].frames) == (1, 0)
+    with pytest.raises(LeverError, match="no CAN frame of channel can7 in it"):
+        LogSource(str(log), "can7").read_into(picture)
+
+
+def test_a_clock_that_jumps_is_not_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / "jumps.log"
+    times = (100.0, 100.1, 50.0, 50.1, 1e9, 1e9 + 0.1)
+    path.write_text("".join(f"({when:.6f}) can0 123#00 R\n" for when in times))
+    pauses = [pause for pause, _ in LogSource(str(path))._frames()]
+    assert pauses == pytest.approx([0.0, 0.1, 0.0, 0.1, sources.LONGEST_PAUSE, 0.1], abs=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # python-can leaves a file open
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [
+        ("missing.log", None, "cannot read .*missing.log: No such file or directory"),
+        ("a.unknown", b"x", "cannot read .*a.unknown: "),
+        ("empty.log", b"", "empty.log: no CAN frame in it"),
+        ("garbage.log", bytes(range(256)) * 9, "garbage.log: not to be read any further: "),
+        ("truncated.log", b"(1.000000) can0 123#00 R\n(1.1", "truncated.log: not to be read any further: "),
+        ("garbage.blf", b"LOGG" + bytes(300), "garbage.blf: "),
+    ],
+)
+def test_a_log_that_is_none(name: str, content: bytes | None, text: str, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(LeverError, match=text) as raised:
+        LogSource(str(tmp_path / name)).read_into(Picture())
+    assert "\n" not in str(raised.value)
+    del raised
+    gc.collect()
+
+
+# --- a simulation ----------------------------------------------------------------------------------------------------
+
+
+def test_a_simulation_runs_in_real_time_and_obeys() -> None:
+    source, picture = SimulationSource(load("steady", ["duration=30 s"])), Picture()
+    source.start()
+    try:
+        while picture.mode != "run" or picture.traffic["STATE_ESTIMATE"].frames < 2000:
+            assert source.now < 30.0
+            time.sleep(0.1)
+            picture.take(source.drain(), source.now)
+        assert source.now > 1.9  # 2000 samples in real time
+        assert not math.isnan(picture.parameters()[0].value)
+        truth = source.truth(FREQUENCIES)
+        assert truth is not None
+        assert set(truth[0]) >= {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
+        source.command({"request": "freeze"})
+        while picture.mode != "frozen":
+            assert source.now < 30.0
+            time.sleep(0.1)
+            picture.take(source.drain(), source.now)
+        assert picture.traffic["COMMAND"].corrupt == 0
+    finally:
+        begin = time.monotonic()
+        source.stop()
+    assert time.monotonic() - begin < 3.0
+    assert not source._thread.is_alive()
+
+
+def test_a_simulation_begins_again() -> None:
+    source = SimulationSource(load("steady", ["duration=0.3 s", "converged_after=0.1 s"]))
+    source.start()
+    try:
+        resets: list[bytes | bytearray] = []
+        while len(resets) < 3:
+            assert source.now < 10.0
+            resets += [data for identifier, data in source.drain() if identifier == 0x120]
+            time.sleep(0.05)
+    finally:
+        source.stop()
+    assert source.error is None

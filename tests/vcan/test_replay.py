@@ -1,0 +1,99 @@
+"""A log on a real CAN interface: canplayer feeds it to the process, candump records, `lever replay` gives the same."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from vcan import rig
+
+LEVER = str(Path(sys.executable).with_name("lever"))
+SCENARIO = ("steady", "--set=duration=3 s", "--set=converged_after=1 s", "--set=limits={}")
+INPUTS = ("110", "111", "120")
+"""Identifiers of what the estimator takes."""
+
+
+def lever(*arguments: str | Path) -> str:
+    """What the command prints; it must do."""
+    done = subprocess.run([LEVER, *map(str, arguments)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@dataclass(frozen=True)
+class Log:
+    """What was sent to the estimator in a simulation, as a log; and the settings it had."""
+
+    path: Path
+    settings: Path
+
+    @property
+    def samples(self) -> int:
+        return sum(frame.startswith("111#") for frame in rig.frames(self.path))
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    folder = tmp_path_factory.mktemp("log")
+    made = Log(folder / "inputs.log", folder / "settings")
+    made.settings.write_text(lever("sim", *SCENARIO, "--settings"))
+    lever("sim", *SCENARIO, "--out", folder / "sim")
+    lines = (folder / "sim/bus.log").read_text().splitlines(keepends=True)
+    made.path.write_text("".join(line for line in lines if line.split()[2][:3] in INPUTS))
+    return made
+
+
+def play(log: Log, interface: str) -> None:
+    """Sends the log at its own pace."""
+    subprocess.run(["canplayer", "-I", str(log.path), f"{interface}=lever"], check=True)
+
+
+def answers(log: Path) -> list[str]:
+    return [frame for frame in rig.frames(log) if frame.startswith("2") and frame[3] == "#"]
+
+
+@pytest.mark.requires("canplayer", "candump", "cansend")
+def test_the_process_answers_a_played_log_as_the_replay_does(
+    log: Log, start: rig.Starter, interface: str, tmp_path: Path
+) -> None:
+    process, recorded = start("--settings", str(log.settings)), tmp_path / "candump.log"
+    with rig.candump(interface, recorded):
+        play(log, interface)
+        rig.wait_until(lambda: recorded.read_text().count(" 210#") >= log.samples, "every sample is answered")
+    totals = process.stop()
+    assert not [name for name in ("overflowed", "unsent", "outages", "corrupt") if totals[name]]
+    assert [frame for frame in rig.frames(recorded) if frame[:3] in INPUTS] == rig.frames(log.path)
+
+    lever("replay", log.path, "--settings", log.settings, "-o", tmp_path / "replay")
+    assert answers(tmp_path / "replay/bus.log") == answers(recorded)
+
+    told = lever("replay", recorded, "--settings", log.settings, "-o", tmp_path / "again")
+    assert answers(tmp_path / "again/bus.log") == answers(recorded)
+    assert "PILOT" not in told
+    assert "others" not in told
+
+
+@pytest.mark.requires("canplayer", "cansend")
+def test_record_has_every_frame_of_a_real_bus(log: Log, start: rig.Starter, interface: str, tmp_path: Path) -> None:
+    start("--settings", str(log.settings))
+    path, partial = tmp_path / "session.log", tmp_path / "session.log.partial"
+    command = [LEVER, "record", "--interface", "socketcan", "--channel", interface, "-o", str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
+        rig.wait_until(partial.exists, "it records")
+        play(log, interface)
+        subprocess.run(["cansend", interface, "20000004#0001000000000000"], check=True)  # an overflow of the controller
+        rig.wait_until(lambda: partial.read_text().count(" 210#") >= log.samples, "every answer is recorded")
+        time.sleep(1.0)
+        recorder.send_signal(signal.SIGINT)
+        output, errors = recorder.communicate(timeout=rig.PATIENCE_S)
+    assert recorder.returncode == 0, errors
+    assert ", 0 lost, 0 corrupt, 1 error frames, " in output
+    assert "1 overflows of the controller" in output
+    assert [frame for frame in rig.frames(path) if frame[:3] in INPUTS] == rig.frames(log.path)
+    lever("replay", path, "--settings", log.settings, "-o", tmp_path / "replay")
+    assert answers(tmp_path / "replay/bus.log") == answers(path)
