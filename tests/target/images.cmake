@@ -1,4 +1,5 @@
 # cmake -D SOURCE=… -D BUILD=… -P images.cmake: builds the images for the STM32F405 in BUILD, where there is a compiler for them.
+unset(ENV{MAKEFLAGS}) # of the build that this is part of: its job server is not for this one
 find_program(gcc arm-none-eabi-gcc)
 if(NOT gcc)
     message(STATUS "No arm-none-eabi-gcc: tests of the images for the STM32F405 are skipped")

@@ -28,7 +28,14 @@ bool transport_has_received(void)
 
 void transport_poll(uint32_t now_ms)
 {
+    static uint32_t overruns;
+
     (void)now_ms;
+    usart_poll();
+    if (usart_overruns() != overruns) {
+        overruns = usart_overruns();
+        peer.status |= (uint8_t)SLCAN_STATUS_DATA_OVERRUN; /* for F */
+    }
 }
 
 transport_status_t transport_status(void)

@@ -19,7 +19,8 @@
 enum {
     RECEIVE_BYTES = 1024,  /* 10 ms at 1 Mbit/s */
     TRANSMIT_BYTES = 2048, /* 13 steps with all their frames */
-    FUNCTION_USART = 7,    /* alternate function of PA9 and PA10: data sheet, table 9 */
+    BYTES_AT_ONCE = 32,
+    FUNCTION_USART = 7, /* alternate function of PA9 and PA10: data sheet, table 9 */
     PIN_TRANSMIT = 9,
     PIN_RECEIVE = 10
 };
@@ -58,13 +59,16 @@ static void transmit(void)
     }
 }
 
-/* Takes all that has arrived. RM0090 30.6.1: reading SR, then DR, clears ORE too. A byte with a framing or noise error spoils
- * its line, which is refused. */
+/* Takes what has arrived. RM0090 30.6.1: reading SR, then DR, clears ORE too. A byte with a framing or noise error spoils its
+ * line, which is refused. In QEMU the next byte may be there at once, and then raises no interrupt of its own: therefore several at
+ * once, and usart_poll(). From the interrupt, or with interrupts off. */
 static void receive(void)
 {
-    uint32_t status = usart1.SR;
-
-    while ((status & ((uint32_t)USART_SR_RXNE | (uint32_t)USART_SR_ORE)) != 0u) {
+    for (uint32_t i = 0u; i < (uint32_t)BYTES_AT_ONCE; i++) {
+        const uint32_t status = usart1.SR;
+        if ((status & ((uint32_t)USART_SR_RXNE | (uint32_t)USART_SR_ORE)) == 0u) {
+            break;
+        }
         const uint8_t byte = (uint8_t)usart1.DR;
         if ((status & USART_SR_ORE) != 0u) {
             overruns++;
@@ -72,7 +76,6 @@ static void receive(void)
         if (((status & USART_SR_RXNE) != 0u) && !ring_put(&received, &byte, 1u)) {
             overruns++;
         }
-        status = usart1.SR; /* in QEMU the next byte may be there at once, and then raises no interrupt of its own */
     }
 }
 
@@ -82,6 +85,13 @@ void usart_interrupt(void)
     if ((usart1.CR1 & USART_CR1_TXEIE) != 0u) {
         transmit();
     }
+}
+
+void usart_poll(void)
+{
+    interrupts_off();
+    receive();
+    interrupts_on();
 }
 
 bool usart_read(uint8_t *byte)

@@ -14,6 +14,9 @@
 
 void usart_start(const clock_rates_t *rates);
 
+/* What no interrupt tells. To be called in each turn of the loop. */
+void usart_poll(void);
+
 /* Takes the next received byte; false when there is none. */
 bool usart_read(uint8_t *byte);
 

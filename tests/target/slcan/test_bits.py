@@ -60,13 +60,19 @@ def in_this_process(model: str, estimator: str) -> list[Frame]:
     return estimate_frames(b"".join(buslog.lines(frames, "lever")).decode())
 
 
+def take_processor(free: Iterator[int]) -> None:
+    """Keeps a thread, and what it runs, on a processor of its own."""
+    os.sched_setaffinity(0, {next(free)})
+
+
 @pytest.fixture(scope="module")
 def board_runs(
     slcan_image: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[dict[tuple[str, str], Future[list[Frame]]]]:
-    """All runs on the board, as many at a time as there are processors."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        folder = tmp_path_factory.mktemp("board")
+    """All runs on the board, one at a time for each processor."""
+    processors = os.sched_getaffinity(0)
+    folder = tmp_path_factory.mktemp("board")
+    with ThreadPoolExecutor(len(processors), initializer=take_processor, initargs=(iter(processors),)) as pool:
         yield {case: pool.submit(on_the_board, slcan_image, *case, folder / "_".join(case)) for case in CASES}
         pool.shutdown(cancel_futures=True)
 

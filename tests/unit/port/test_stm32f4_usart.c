@@ -1,0 +1,153 @@
+/* USART1 of the STM32F405 port and SLCAN on it, on registers that are plain memory here: what is read stays there, and what is
+ * written is read back. */
+#define LEVER_SLCAN_VERSION "1001" /* the build gives it to the port */
+
+#include <string.h>
+
+#include "port/stm32f4/transport_slcan.c" /* NOLINT(bugprone-suspicious-include): with memory for the registers */
+#include "port/stm32f4/usart.c"           /* NOLINT(bugprone-suspicious-include) */
+#include "unity.h"
+
+rcc_t rcc;
+gpio_t gpioa;
+usart_t usart1;
+nvic_t nvic;
+
+static const clock_rates_t full = {.pll = true, .crystal = true};
+
+uint32_t tick_ms(void)
+{
+    return 0u;
+}
+
+void setUp(void)
+{
+    (void)memset((void *)&usart1, 0, sizeof usart1);
+    (void)memset((void *)&gpioa, 0, sizeof gpioa);
+    ring_clear(&received);
+    ring_clear(&waiting);
+    overruns = 0u;
+    transport_start(&full);
+}
+
+void tearDown(void)
+{
+}
+
+/* The bytes, as if they had come by interrupt. */
+static void receive_text(const char *text)
+{
+    for (; *text != '\0'; text++) {
+        TEST_ASSERT_TRUE(ring_put(&received, text, 1u));
+    }
+}
+
+/* RM0090 30.3.4: 84 MHz and 16 MHz by 1 Mbit/s. */
+static void start_gives_rate_and_pins(void)
+{
+    const clock_rates_t raw = {.pll = false};
+
+    TEST_ASSERT_EQUAL_UINT32(84u, usart1.BRR);
+    TEST_ASSERT_EQUAL_HEX32(0x202Cu, usart1.CR1);           /* UE, RXNEIE, TE, RE */
+    TEST_ASSERT_EQUAL_HEX32(0x770u, gpioa.AFR[1] & 0xFF0u); /* AF7 for PA9 and PA10 */
+    TEST_ASSERT_EQUAL_HEX32(BIT(37 - 32), nvic.ISER[1]);
+    usart_start(&raw);
+    TEST_ASSERT_EQUAL_UINT32(16u, usart1.BRR);
+}
+
+static void received_byte_is_read_and_counted_as_overrun_when_one_was_lost(void)
+{
+    uint8_t byte = 0u;
+
+    usart1.DR = 'x';
+    usart1.SR = BIT(5);
+    usart_interrupt();
+    TEST_ASSERT_TRUE(usart_has_received());
+    TEST_ASSERT_TRUE(usart_read(&byte));
+    TEST_ASSERT_EQUAL_UINT8('x', byte);
+    TEST_ASSERT_EQUAL_UINT32(0u, usart_overruns());
+    usart1.SR = BIT(5) | BIT(3);
+    usart_interrupt();
+    TEST_ASSERT_GREATER_THAN_UINT32(0u, usart_overruns());
+}
+
+/* A receiver that says for ever that it has a byte must not hold the processor. */
+static void an_interrupt_takes_so_many_bytes_and_a_full_ring_counts(void)
+{
+    usart1.SR = BIT(5);
+    usart_interrupt();
+    TEST_ASSERT_EQUAL_UINT32(32u, ring_used(&received));
+    for (int i = 0; i < 32; i++) {
+        usart_poll();
+    }
+    TEST_ASSERT_EQUAL_UINT32(1024u, ring_used(&received));
+    TEST_ASSERT_EQUAL_UINT32(32u, usart_overruns());
+}
+
+static void what_the_hardware_has_no_room_for_goes_by_interrupt(void)
+{
+    TEST_ASSERT_TRUE(usart_write("ab", 2u));
+    TEST_ASSERT_EQUAL_UINT32(2u, ring_used(&waiting));
+    TEST_ASSERT_BITS_HIGH(BIT(7), usart1.CR1); /* TXEIE */
+    usart1.SR = BIT(7);
+    usart_interrupt();
+    TEST_ASSERT_EQUAL_UINT32(0u, ring_used(&waiting));
+    TEST_ASSERT_EQUAL_HEX32('b', usart1.DR);
+    TEST_ASSERT_BITS_LOW(BIT(7), usart1.CR1);
+}
+
+static void a_line_without_room_is_dropped_whole(void)
+{
+    static const char line[31];
+
+    for (int i = 0; i < 66; i++) {
+        TEST_ASSERT_TRUE(usart_write(line, sizeof line));
+    }
+    TEST_ASSERT_FALSE(usart_write(line, sizeof line));
+    TEST_ASSERT_EQUAL_UINT32(66u * 31u, ring_used(&waiting));
+}
+
+static void only_data_frames_with_11_bit_identifiers_reach_the_estimator(void)
+{
+    lever_frame_t frame;
+
+    receive_text("O\rT000001101AA\rr1108\rt111201FF\r");
+    TEST_ASSERT_TRUE(port_receive(&frame));
+    TEST_ASSERT_EQUAL_HEX32(0x111, frame.id);
+    TEST_ASSERT_EQUAL_UINT8(2, frame.length);
+    TEST_ASSERT_EQUAL_HEX8(0xFF, frame.data[1]);
+    TEST_ASSERT_FALSE(port_receive(&frame));
+    TEST_ASSERT_FALSE(transport_has_received());
+}
+
+static void losses_are_in_the_status_and_in_the_flags(void)
+{
+    static const lever_frame_t frame = {.id = 0x210u, .length = 8u};
+    lever_frame_t none;
+
+    receive_text("O\r");
+    TEST_ASSERT_FALSE(port_receive(&none));
+    for (int i = 0; i < 200; i++) { /* nobody takes them */
+        port_send(&frame);
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(0u, transport_status().dropped);
+    usart1.SR = BIT(3);
+    usart_interrupt();
+    usart1.SR = 0u;
+    transport_poll(0u);
+    TEST_ASSERT_GREATER_THAN_UINT32(0u, transport_status().overruns);
+    TEST_ASSERT_BITS_HIGH(SLCAN_STATUS_DATA_OVERRUN, peer.status);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(start_gives_rate_and_pins);
+    RUN_TEST(received_byte_is_read_and_counted_as_overrun_when_one_was_lost);
+    RUN_TEST(an_interrupt_takes_so_many_bytes_and_a_full_ring_counts);
+    RUN_TEST(what_the_hardware_has_no_room_for_goes_by_interrupt);
+    RUN_TEST(a_line_without_room_is_dropped_whole);
+    RUN_TEST(only_data_frames_with_11_bit_identifiers_reach_the_estimator);
+    RUN_TEST(losses_are_in_the_status_and_in_the_flags);
+    return UNITY_END();
+}
