@@ -31,7 +31,7 @@ the search never sees it, and before and after are compared on it. Noise that th
 What is printed: the settings with units, and for both parts, before and after,
   lnL     log-likelihood per sample of angle [rad] and rate [rad/s], given all before [nat]; more is better
   NIS     normalised innovation squared per output [1]: 1 where the filter is as certain as it may be, more: too certain
-  colour  largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
+  corr.   largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
 """
 _EPILOG = """\
 examples:
@@ -222,7 +222,7 @@ def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
                 "gain [nat]": round(gained.mean, 4),
                 "± [nat]": round(gained.error, 4),
                 **{f"NIS {when}": round(fit.nis, 3) for when, fit in seen.items()},
-                **{f"colour {when}": fit.largest_correlation for when, fit in seen.items()},
+                **{f"corr. {when}": fit.largest_correlation for when, fit in seen.items()},
             }
         )
     return rows

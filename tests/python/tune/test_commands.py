@@ -84,6 +84,13 @@ def test_sim_and_the_process_take_the_file(tuned: Path, lever: Run, build_dir: P
     assert "settings" not in said
 
 
+def test_replay_takes_the_file(tuned: Path, steady_log: Path, lever: Run, tmp_path: Path) -> None:
+    status, _, err = lever("replay", steady_log, "--settings", tuned / "my.settings", "-o", tmp_path)
+    assert (status, err) == (0, "")
+    used = json.loads((tmp_path / "summary.json").read_text())["estimator"]["settings"]
+    assert used["theta_noise"] == read_assignments(tuned / "my.settings")["theta_noise"]
+
+
 def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
     log = tmp_path / "slow.log"
     write_log(log, count=3000, period_us=10_000)
