@@ -116,4 +116,8 @@ def _short(number: float) -> float | None:
 
 def _step(moment: float, values: list[np.ndarray]) -> dict[str, Any]:
     curves = [[_short(number) for number in curve] for value in values for curve in _curves(value)]
-    return {"label": f"{moment:.3g}", "method": "restyle", "args": [{"y": curves}]}
+    return {
+        "label": f"{moment:.3g}" if moment < 1000.0 else f"{moment:.0f}",
+        "method": "restyle",
+        "args": [{"y": curves}],
+    }
