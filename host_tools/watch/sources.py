@@ -142,20 +142,16 @@ class BusSource(Source):
 
 
 class LogSource(Source):
-    """A recorded log in any format that python-can reads; `channel` chooses among several in it."""
+    """A recorded log; `channel` chooses among several in it. What is wrong in it is told in `error` at its end."""
 
     def __init__(self, path: str, channel: str | None = None) -> None:
         """Opens the log. Raises LeverError."""
-        import can
+        from ..logs import Recording
 
         super().__init__()
         self.title = path
         self._channel = channel
-        try:
-            self._reader = can.LogReader(path)
-        except (OSError, ValueError, ImportError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error
-            raise LeverError(f"cannot read {path}: {reason}") from None
+        self._log = Recording([path])
 
     def run(self) -> None:
         due = time.monotonic()
@@ -179,21 +175,29 @@ class LogSource(Source):
 
     def _frames(self) -> Iterator[tuple[float, Frame]]:
         """Each frame with the time after the one before it [s]; a clock that went back or jumped far counts as 0."""
-        last, any_yet = math.inf, False
-        try:
-            for message in self._reader:
-                if self._channel is not None and message.channel != self._channel:
-                    continue
-                pause = message.timestamp - last
-                last, any_yet = message.timestamp, True
-                yield (min(pause, LONGEST_PAUSE) if pause > 0.0 else 0.0), as_frame(message)
-        except Exception as error:  # a reader fails as its format has it: ValueError, struct.error, KeyError …
-            raise LeverError(f"{self.title}: not to be read any further: {error or type(error).__name__}") from None
-        finally:
-            self._reader.stop()
-        if not any_yet:
-            where = "" if self._channel is None else f" of channel {self._channel}"
-            raise LeverError(f"{self.title}: no CAN frame{where} in it")
+        from ..bulk import ERROR as ERROR_FRAME
+
+        last: int | None = None
+        for chunk in self._log.chunks():
+            frames = chunk
+            if self._channel is not None:
+                names = self._log.buses.names()
+                frames = chunk[chunk["bus"] == (names.index(self._channel) if self._channel in names else len(names))]
+            columns = (frames[name].tolist() for name in ("time_us", "id", "flags", "length"))
+            data = frames["data"].tobytes()
+            for k, (time_us, identifier, flags, length) in enumerate(zip(*columns, strict=True)):
+                pause = 0.0 if last is None else max(time_us - last, 0) * 1e-6
+                last = time_us
+                frame = (identifier, data[8 * k : 8 * k + length])
+                if flags:
+                    frame = (ERROR if flags & ERROR_FRAME else FOREIGN, b"")
+                yield min(pause, LONGEST_PAUSE), frame
+        if last is None:
+            raise LeverError(f"{self.title}: no CAN frame of channel {self._channel} in it")
+        if self._log.damaged:
+            self.error = f"{self.title}: {self._log.damaged} lines of it are no frame"
+        if self._log.ends_early:
+            self.error = self._log.ends_early[-1]
 
 
 def _widen(bus: can.BusABC) -> None:

@@ -65,7 +65,7 @@ class Traffic:
 
     def tick(self, now: float) -> None:
         """To be called now and then, whether or not a frame has come."""
-        if not self._marks or now - self._marks[-1][0] >= 0.99 * _MARK_PERIOD:
+        if not self._marks or now - self._marks[-1][0] >= 0.995 * _MARK_PERIOD:
             self._marks.append((now, self._total))
         while len(self._marks) > 2 and now - self._marks[0][0] > 1.01 * RATE_WINDOW:
             self._marks.popleft()

@@ -408,9 +408,9 @@ def test_an_open_port_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_source_that_fails_is_told_at_the_end(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "garbage.log"
-    path.write_text("nothing of the kind\n")
+    path.write_text("(1.000000) can0 123#00\nnothing of the kind\n")
     assert cli.main(["live", str(path), "--port", "0", "--duration", "0.5"]) == 2
-    assert "garbage.log: not to be read any further: " in capsys.readouterr().err
+    assert "garbage.log: 1 lines of it are no frame" in capsys.readouterr().err
 
 
 def test_times_keep_their_resolution() -> None:
