@@ -81,8 +81,9 @@ class Estimator:
     """An instance of the firmware. Any number may exist; each belongs to one thread at a time."""
 
     def __init__(self, config: Config | None = None) -> None:
-        self._memory = ffi.new("lever_memory_t *")  # holds the instance, so it must live as long as this object
-        self.pointer: Any = lib.lever_init(self._memory, (config or Config()).pointer)
+        self._memory = ffi.new("lever_memory_t *")  # holds the instance: both must live as long as this object
+        self._config = config or Config()
+        self.pointer: Any = lib.lever_init(self._memory, self._config.pointer)
         """For calls of `lib`; valid as long as this object."""
         if self.pointer == ffi.NULL:
             raise LeverError("the firmware refused its configuration: Config.pointer was changed after its check")

@@ -9,14 +9,12 @@
 enum { INPUTS = sizeof golden_input / sizeof golden_input[0], FRAME_BYTES = 8 };
 
 /* Alignment cut short, so that a few samples reach the learning of the parameters; golden.py has the same. */
-static lever_t *start(lever_memory_t *memory, uint8_t estimator)
+static lever_t *start(lever_memory_t *memory, lever_config_t *config, uint8_t estimator)
 {
-    lever_config_t config;
-
-    lever_config_default(&config);
-    config.estimator = estimator;
-    config.settings.align_time = GOLDEN_ALIGN_TIME;
-    return lever_init(memory, &config);
+    lever_config_default(config);
+    config->estimator = estimator;
+    config->settings.align_time = GOLDEN_ALIGN_TIME;
+    return lever_init(memory, config);
 }
 
 static uint32_t crc_of_frame(uint32_t crc, const lever_frame_t *frame)
@@ -47,10 +45,11 @@ static uint32_t crc_of_run(lever_t *lever)
 
 bool self_test(lever_memory_t *memory)
 {
+    lever_config_t config; /* as long as the instance */
     bool good = true;
 
     for (uint8_t estimator = 0u; estimator < (uint8_t)LEVER_ESTIMATOR_COUNT; estimator++) {
-        lever_t *lever = start(memory, estimator);
+        lever_t *lever = start(memory, &config, estimator);
         good = (lever != NULL) && (crc_of_run(lever) == golden_crc[estimator]) && good;
     }
     return good;

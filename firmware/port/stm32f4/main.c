@@ -80,7 +80,7 @@ void port_idle(void)
 /* The one place where the configuration is made; COMMAND changes models and choices later. */
 static lever_t *configure(void)
 {
-    lever_config_t config;
+    static lever_config_t config; /* as long as the instance */
 
     lever_build_config(&config);
     return lever_init(&memory, &config);

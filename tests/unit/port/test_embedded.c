@@ -53,7 +53,7 @@ void port_idle(void)
 
 void setUp(void)
 {
-    lever_config_t config;
+    static lever_config_t config;
 
     lever_config_default(&config);
     lever = lever_init(&memory, &config);
