@@ -3,8 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#define TURN 6.28318531f
-#define SQRT_TWO 1.41421356f
 #define HIGHEST 0.1f     /* greatest corner, in samples^-1: what the integration below is good for */
 #define SEED 2463534242u /* any but 0 (Marsaglia 2003) */
 #define SETTLING 16384u  /* samples of the impulse response that are summed up */
@@ -12,9 +10,9 @@
 /* Butterworth low-pass of second order behind the high-pass of detrend.h, by semi-implicit Euler. */
 static float filter(dither_t *dither, float in, float period)
 {
-    const float w = TURN * dither->high;
-    const float deviation = detrend_step(&dither->high_pass, in, dither->low, period);
-    const float force = (w * w * (deviation - dither->low_pass)) - (SQRT_TWO * w * dither->low_pass_rate);
+    const float deviation = detrend_step(&dither->high_pass, in, &dither->low, period);
+    const float force =
+        (dither->high.square * (deviation - dither->low_pass)) - (dither->high.damping * dither->low_pass_rate);
     dither->low_pass_rate += period * force;
     dither->low_pass += period * dither->low_pass_rate;
     return dither->low_pass;
@@ -47,8 +45,8 @@ void dither_init(dither_t *dither, float low, float high, float period, float li
 {
     const float highest = HIGHEST / period;
     (void)memset(dither, 0, sizeof *dither);
-    dither->low = (low < highest) ? low : highest;
-    dither->high = (high < highest) ? high : highest;
+    dither->low = detrend_corner((low < highest) ? low : highest);
+    dither->high = detrend_corner((high < highest) ? high : highest);
     dither->limit = limit;
     dither->fade = fade;
     dither->noise = SEED;

@@ -12,8 +12,8 @@
 #include <stdint.h>
 
 typedef struct dither {
-    float low; /* corners of the band [Hz] */
-    float high;
+    detrend_corner_t low; /* corners of the band */
+    detrend_corner_t high;
     detrend_t high_pass;
     float low_pass; /* output of the low-pass, and its rate [1/s] */
     float low_pass_rate;

@@ -1,9 +1,8 @@
 #include "app/estimator.h"
 
-#include "app/prior.h"
-#include "filter/derived.h"
 #include "math/trigonometry.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -18,6 +17,11 @@
 
 static const model_t *const models[LEVER_MODEL_COUNT] = {&model_lever, &model_linear_physical, &model_linear_black_box};
 
+static const model_t *model_of(const estimator_t *estimator)
+{
+    return models[estimator->setup.model];
+}
+
 static float squared(float x)
 {
     return x * x;
@@ -25,9 +29,9 @@ static float squared(float x)
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-static void init_constants(model_constants_t *constants, const lever_config_t *config)
+static void init_constants(model_constants_t *constants, const setup_t *setup)
 {
-    const lever_settings_t *s = &config->settings;
+    const lever_settings_t *s = setup->settings;
     constants->length = s->lever_length;
     constants->length_squared = squared(s->lever_length);
     constants->mass_moment = s->lever_mass_position * s->lever_mass;
@@ -37,15 +41,15 @@ static void init_constants(model_constants_t *constants, const lever_config_t *c
     constants->stiffness = s->lever_stiffness;
     constants->arm_preload_sine = sine_cosine(s->arm_preload_angle).sine;
     constants->lever_preload_angle = s->lever_preload_angle;
-    constants->trim = (config->preload == (uint8_t)LEVER_PRELOAD_TRIM);
+    constants->trim = (setup->preload == (uint8_t)LEVER_PRELOAD_TRIM);
 }
 
 static void init_dual(estimator_t *estimator)
 {
     (void)memset(&estimator->dual, 0, sizeof estimator->dual);
-    const lever_settings_t *s = &estimator->config.settings;
-    const prior_t prior = prior_of(&estimator->config); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
-    parameter_filter_init(&estimator->dual.parameters, estimator->model, &prior);
+    const lever_settings_t *s = estimator->setup.settings;
+    const prior_t prior = prior_of(&estimator->setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    parameter_filter_init(&estimator->dual.parameters, model_of(estimator), &estimator->constants, &prior);
 
     state_filter_t *state = &estimator->dual.state;
     state->process_noise[0] = s->theta_process_noise;
@@ -60,16 +64,16 @@ static void init_dual(estimator_t *estimator)
 /* Back to before the first sample; dither and counts go on. */
 static void start_over(estimator_t *estimator)
 {
-    estimator->model = models[estimator->config.model];
-    init_constants(&estimator->constants, &estimator->config);
+    init_constants(&estimator->constants, &estimator->setup);
     init_dual(estimator);
-    learning_start(&estimator->learning, &estimator->config, &estimator->dual);
+    learning_start(&estimator->learning, &estimator->setup, &estimator->dual);
     (void)memset(&estimator->followed, 0, sizeof estimator->followed);
     estimator->mode = LEVER_MODE_INIT;
     estimator->frozen = false;
     estimator->last_z_ddot = 0.0f;
     estimator->last_tau_m = 0.0f;
     (void)memset(&estimator->levels, 0, sizeof estimator->levels);
+    estimator->trim = sine_cosine(0.0f);
     estimator->nis = 0.0f;
     estimator->nis_size = 0u;
     estimator->faults = 0u;
@@ -79,7 +83,11 @@ void estimator_init(estimator_t *estimator, const lever_config_t *config)
 {
     const lever_settings_t *s = &config->settings;
     (void)memset(estimator, 0, sizeof *estimator);
-    estimator->config = *config;
+    estimator->setup.settings = s;
+    estimator->setup.model = config->model;
+    estimator->setup.preload = config->preload;
+    estimator->setup.estimator = config->estimator;
+    estimator->setup.adaptation = config->adaptation;
     dither_init(&estimator->dither, s->dither_low, s->dither_high, s->sample_period, s->dither_limit, s->dither_fade);
     start_over(estimator);
 }
@@ -91,13 +99,10 @@ static bool is_choice(uint8_t value, uint8_t count)
     return (value < count) || (value == (uint8_t)LEVER_KEEP);
 }
 
-static bool choose(uint8_t *choice, uint8_t value)
+/* The value of a choice that is to be, of what was asked and what is. */
+static uint8_t chosen(uint8_t asked, uint8_t now)
 {
-    const bool changed = (value != (uint8_t)LEVER_KEEP) && (value != *choice);
-    if (changed) {
-        *choice = value;
-    }
-    return changed;
+    return (asked != (uint8_t)LEVER_KEEP) ? asked : now;
 }
 
 bool estimator_command(estimator_t *estimator, const lever_command_t *command)
@@ -109,21 +114,21 @@ bool estimator_command(estimator_t *estimator, const lever_command_t *command)
                        is_choice(command->adaptation, (uint8_t)LEVER_ADAPTATION_COUNT) &&
                        (command->dither_rms >= 0.0f) && (command->dither_rms <= OTHER_MOST);
     if (known) {
-        lever_config_t *config = &estimator->config;
-        const bool model = choose(&config->model, command->model);
-        const bool preload = choose(&config->preload, command->preload);
-        const bool kind = choose(&config->estimator, command->estimator);
-        if (choose(&config->adaptation, command->adaptation)) {
-            learning_adapt(config, &estimator->dual);
+        setup_t *setup = &estimator->setup;
+        const setup_t last = *setup;
+        setup->model = chosen(command->model, last.model);
+        setup->preload = chosen(command->preload, last.preload);
+        setup->estimator = chosen(command->estimator, last.estimator);
+        setup->adaptation = chosen(command->adaptation, last.adaptation);
+        if (setup->adaptation != last.adaptation) {
+            learning_adapt(setup, &estimator->dual);
         }
-        if (model || preload || kind || (command->request == (uint8_t)LEVER_REQUEST_RESET)) {
+        if ((setup->model != last.model) || (setup->preload != last.preload) || (setup->estimator != last.estimator) ||
+            (command->request == (uint8_t)LEVER_REQUEST_RESET)) {
             start_over(estimator);
         }
-        if (command->request == (uint8_t)LEVER_REQUEST_RUN) {
-            estimator->frozen = false;
-        }
-        if (command->request == (uint8_t)LEVER_REQUEST_FREEZE) {
-            estimator->frozen = true;
+        if ((command->request == (uint8_t)LEVER_REQUEST_RUN) || (command->request == (uint8_t)LEVER_REQUEST_FREEZE)) {
+            estimator->frozen = (command->request == (uint8_t)LEVER_REQUEST_FREEZE);
         }
         if (command->dither_rms < (float)LEVER_KEEP) {
             dither_set(&estimator->dither, command->dither_rms);
@@ -207,7 +212,7 @@ static void start_state(estimator_t *estimator, const measurement_t *measurement
 /* Averages angles until align_time has passed, then starts the state at a valid one. */
 static void align(estimator_t *estimator, const taken_t *taken, float elapsed)
 {
-    const lever_settings_t *settings = &estimator->config.settings;
+    const lever_settings_t *settings = estimator->setup.settings;
     alignment_t *alignment = &estimator->alignment;
     measurement_t measurement = taken->measurement; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
     alignment->time += elapsed;
@@ -217,6 +222,7 @@ static void align(estimator_t *estimator, const taken_t *taken, float elapsed)
         alignment->count += 1.0f;
         levels_start(&estimator->levels, alignment->theta_sum / alignment->count, settings->trim_corner,
             estimator->constants.trim);
+        estimator->trim = sine_cosine(estimator->levels.output[0].level);
         estimator->z_ddot = taken->z_ddot;
         estimator->tau_m = taken->tau_m;
         measurement.y[0] -= estimator->levels.origin[0];
@@ -231,7 +237,7 @@ static void align(estimator_t *estimator, const taken_t *taken, float elapsed)
 static void begin_alignment(estimator_t *estimator, const taken_t *taken)
 {
     (void)memset(&estimator->alignment, 0, sizeof estimator->alignment);
-    estimator->followed.excitation_square = 4.0f * squared(estimator->config.settings.excitation_least);
+    estimator->followed.excitation_square = 4.0f * squared(estimator->setup.settings->excitation_least);
     estimator->followed.innovation_mean = 1.0f;
     align(estimator, taken, 0.0f);
 }
@@ -239,7 +245,7 @@ static void begin_alignment(estimator_t *estimator, const taken_t *taken)
 /* What follows the estimate: excitation, innovation level, memory of restarts. */
 static void follow(estimator_t *estimator, float elapsed)
 {
-    const lever_settings_t *s = &estimator->config.settings;
+    const lever_settings_t *s = estimator->setup.settings;
     followed_t *followed = &estimator->followed;
     const float share = (elapsed < s->excitation_time) ? (elapsed / s->excitation_time) : 1.0f;
     followed->excitation_square += share * (squared(estimator->dual.state.x[1]) - followed->excitation_square);
@@ -250,12 +256,14 @@ static void follow(estimator_t *estimator, float elapsed)
     }
 }
 
-/* Refuses an estimate that breaks an invariant, and starts again from the measurement and the first guess. */
+/* Refuses an estimate that breaks an invariant, and starts again from the measurement and the first guess. Whether it
+ * is finite is asked of every sample, the rest of the parameters when they have been revised. */
 static void restart_if_invalid(estimator_t *estimator, const measurement_t *measurement)
 {
-    if (!dual_is_valid(&estimator->dual)) {
+    const dual_t *dual = &estimator->dual;
+    if (!(learning_is_done(&estimator->learning) ? dual_is_valid(dual) : dual_is_finite(dual))) {
         init_dual(estimator);
-        learning_start(&estimator->learning, &estimator->config, &estimator->dual);
+        learning_start(&estimator->learning, &estimator->setup, &estimator->dual);
         start_state(estimator, measurement);
         estimator->followed.innovation_mean = 1.0f;
         estimator->nis = 0.0f;
@@ -278,8 +286,9 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     step.tau_m = 0.5f * (estimator->tau_m + tau_deviation);
     step.origin = levels->origin[0];
     step.trim = levels->output[0].level;
-    step.trim_sine = sine_cosine(step.trim).sine;
-    dual_predict(&estimator->dual, estimator->model, &estimator->constants, &step);
+    step.trim_sine = estimator->trim.sine;
+    step.trim_cosine = estimator->trim.cosine;
+    dual_predict(&estimator->dual, model_of(estimator), &estimator->constants, &step);
     estimator->z_ddot = z_deviation;
     estimator->tau_m = tau_deviation;
 }
@@ -294,6 +303,15 @@ static void end_outage(estimator_t *estimator, const measurement_t *measurement)
     levels_unsettle(&estimator->levels);
 }
 
+/* Outputs become what the state counts them as, and the trim follows them. Returns true at the end of an outage. */
+static bool refer(estimator_t *estimator, measurement_t *measurement, float period)
+{
+    levels_t *levels = &estimator->levels;
+    const bool back = levels_refer(levels, estimator->dual.state.x, measurement, period);
+    estimator->trim = sine_cosine(levels->output[0].level);
+    return back;
+}
+
 /* Predicts to the sample in `substeps`, inputs in between on a straight line from the last ones. */
 static void advance(
     estimator_t *estimator, taken_t *taken, float last_z_ddot, float last_tau_m, float period, uint32_t substeps)
@@ -304,10 +322,10 @@ static void advance(
             last_tau_m + (share * (taken->tau_m - last_tau_m)), period);
         if (i < substeps) {
             measurement_t nothing = {.valid = {false, false}};
-            (void)levels_refer(&estimator->levels, estimator->dual.state.x, &nothing, period);
+            (void)refer(estimator, &nothing, period);
         }
     }
-    if (levels_refer(&estimator->levels, estimator->dual.state.x, &taken->measurement, period)) {
+    if (refer(estimator, &taken->measurement, period)) {
         end_outage(estimator, &taken->measurement);
     }
 }
@@ -326,22 +344,25 @@ static enum lever_mode mode_of(const estimator_t *estimator, bool measured)
 
 static void correct(estimator_t *estimator, const measurement_t *measurement, float elapsed)
 {
-    const float least = estimator->config.settings.excitation_least;
+    const float least = estimator->setup.settings->excitation_least;
     const bool measured = measurement->valid[0] || measurement->valid[1];
     const bool excited = (estimator->followed.excitation_square >= squared(least));
-    const bool settled = estimator->levels.unsettled < (0.5f * estimator->config.settings.sample_period);
+    const bool settled = estimator->levels.unsettled < (0.5f * estimator->setup.settings->sample_period);
     const bool learn = !estimator->frozen && settled;
     const lesson_t lesson = {.walks = !estimator->frozen, .teaches = learn && measured, .excited = excited};
     estimator->nis = dual_update(&estimator->dual, measurement, learn && excited);
     estimator->nis_size = (uint8_t)((measurement->valid[0] ? 1u : 0u) + (measurement->valid[1] ? 1u : 0u));
-    learning_step(&estimator->learning, &estimator->config, &estimator->dual, &lesson, elapsed);
+    learning_step(&estimator->learning, &estimator->setup, &estimator->dual, model_of(estimator), &estimator->constants,
+        &lesson, elapsed);
     estimator->levels.unsettled -= elapsed;
     restart_if_invalid(estimator, measurement);
     follow(estimator, elapsed);
-    note(estimator, !excited, LEVER_FAULT_EXCITATION);
-    note(estimator, estimator->learning.bounded, LEVER_FAULT_BOUND);
-    note(estimator, learning_has_changed(&estimator->learning), LEVER_FAULT_CHANGE);
-    note(estimator, estimator->followed.innovation_mean > INNOVATION_TOLERATED, LEVER_FAULT_INNOVATION);
+    uint32_t faults = estimator->faults;
+    faults |= excited ? 0u : (uint32_t)LEVER_FAULT_EXCITATION;
+    faults |= estimator->learning.bounded ? (uint32_t)LEVER_FAULT_BOUND : 0u;
+    faults |= learning_has_changed(&estimator->learning) ? (uint32_t)LEVER_FAULT_CHANGE : 0u;
+    faults |= (estimator->followed.innovation_mean > INNOVATION_TOLERATED) ? (uint32_t)LEVER_FAULT_INNOVATION : 0u;
+    estimator->faults = (uint16_t)faults;
     estimator->mode = mode_of(estimator, measured);
     if (estimator->mode == LEVER_MODE_FAULT) {
         dither_set(&estimator->dither, 0.0f);
@@ -351,7 +372,7 @@ static void correct(estimator_t *estimator, const measurement_t *measurement, fl
 /* Number of sample periods in `elapsed`, at least one. */
 static uint32_t periods_in(const estimator_t *estimator, float elapsed)
 {
-    const float rounded = (elapsed / estimator->config.settings.sample_period) + 0.5f;
+    const float rounded = (elapsed / estimator->setup.settings->sample_period) + 0.5f;
     const uint32_t periods = (uint32_t)rounded;
     return (periods > 0u) ? periods : 1u;
 }
@@ -367,9 +388,9 @@ static void take_and_step(estimator_t *estimator, const lever_sample_t *sample, 
 
     if (estimator->mode == LEVER_MODE_FAULT) {
         /* only a reset helps */
-    } else if (elapsed > estimator->config.settings.gap_limit) {
-        float freed[PARAMETER_FILTER_FREED]; /* the state starts anew */
-        parameter_filter_walk(&estimator->dual.parameters, elapsed, freed);
+    } else if (elapsed > estimator->setup.settings->gap_limit) {
+        learning_skip(&estimator->learning, &estimator->setup, &estimator->dual, model_of(estimator),
+            &estimator->constants, elapsed);
         begin_alignment(estimator, &taken);
     } else if (estimator->mode == LEVER_MODE_ALIGN) {
         align(estimator, &taken, elapsed);
@@ -385,7 +406,7 @@ static void take_and_step(estimator_t *estimator, const lever_sample_t *sample, 
 static bool is_new_clock(estimator_t *estimator, uint32_t time_us)
 {
     const uint32_t advanced_us = time_us - estimator->late_time_us;
-    const float limit_us = estimator->config.settings.gap_limit * 1.0e6f;
+    const float limit_us = estimator->setup.settings->gap_limit * 1.0e6f;
     const bool goes_on = (estimator->late_series_us != 0u) && (advanced_us != 0u) && ((float)advanced_us <= limit_us);
     estimator->late++;
     estimator->late_time_us = time_us;
@@ -427,10 +448,23 @@ float estimator_state(const estimator_t *estimator, uint32_t i)
     return estimator->levels.origin[i] + estimator->dual.state.x[i];
 }
 
-void estimator_dynamics(const estimator_t *estimator, model_dynamics_t *dynamics, model_dynamics_t *sigma)
+static model_step_t step_at_trim(const estimator_t *estimator)
 {
-    const model_step_t step = {.trim = estimator->levels.output[0].level};
-    derived_dynamics(&estimator->dual.parameters, estimator->model, &estimator->constants, &step, dynamics, sigma);
+    const sine_cosine_t *trim = &estimator->trim;
+    const model_step_t step = {
+        .trim = estimator->levels.output[0].level, .trim_sine = trim->sine, .trim_cosine = trim->cosine};
+    return step;
+}
+
+void estimator_derive(const estimator_t *estimator, derived_t *derived, bool begin)
+{
+    const model_step_t step = step_at_trim(estimator);
+    const parameter_filter_t *parameters = &estimator->dual.parameters;
+    if (begin) {
+        derived_begin(derived, parameters, model_of(estimator), &estimator->constants, &step);
+    } else {
+        derived_end(derived, parameters, model_of(estimator), &estimator->constants, &step);
+    }
 }
 
 /* Standard deviation of state i. While its level waits for samples, what moves slower than trim_corner is not predicted: a
@@ -449,22 +483,22 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
     estimate->time_us = estimator->time_us;
     estimate->theta = estimator_state(estimator, 0u);
     estimate->theta_dot = estimator_state(estimator, 1u);
-    estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->config.settings.trim_corner));
+    estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->setup.settings->trim_corner));
     estimate->theta_dot_sigma = state_sigma(estimator, 1u, 1.0f);
     estimate->trim = estimator->levels.output[0].level;
     estimate->nis = estimator->nis;
     estimate->nis_size = estimator->nis_size;
-    parameter_filter_physical(&dual->parameters, estimate->parameter);
+    (void)memcpy(estimate->parameter, dual->parameters.p, sizeof estimate->parameter);
     parameter_filter_sigma(&dual->parameters, estimate->parameter_sigma);
     parameter_filter_correlation(&dual->parameters, estimate->parameter_correlation);
 
-    model_dynamics_t dynamics;
-    model_dynamics_t sigma;
-    estimator_dynamics(estimator, &dynamics, &sigma);
-    estimate->natural_frequency = dynamics.natural_frequency;
-    estimate->natural_frequency_sigma = sigma.natural_frequency;
-    estimate->damping_ratio = dynamics.damping_ratio;
-    estimate->damping_ratio_sigma = sigma.damping_ratio;
+    derived_t derived;
+    estimator_derive(estimator, &derived, true);
+    estimator_derive(estimator, &derived, false);
+    estimate->natural_frequency = derived.mean.natural_frequency;
+    estimate->natural_frequency_sigma = sqrtf(derived.variance.natural_frequency);
+    estimate->damping_ratio = derived.mean.damping_ratio;
+    estimate->damping_ratio_sigma = sqrtf(derived.variance.damping_ratio);
 }
 
 void estimator_health(const estimator_t *estimator, lever_health_t *health)

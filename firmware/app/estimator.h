@@ -5,8 +5,11 @@
 #include "app/dither.h"
 #include "app/learning.h"
 #include "app/levels.h"
+#include "app/prior.h"
+#include "filter/derived.h"
 #include "filter/dual.h"
 #include "lever_cdkf.h"
+#include "math/trigonometry.h"
 #include "model/model.h"
 
 #include <stdbool.h>
@@ -27,16 +30,15 @@ typedef struct followed {
 } followed_t;
 
 typedef struct estimator {
-    lever_config_t config;
-    const model_t *model;
+    setup_t setup;
     model_constants_t constants;
     dual_t dual;
     learning_t learning;
     levels_t levels;
+    sine_cosine_t trim; /* of the trim angle */
     followed_t followed;
     alignment_t alignment;
     enum lever_mode mode;
-    bool frozen;
     uint32_t time_us;      /* of the last sample */
     uint32_t late_time_us; /* of the last late one, and how long such a series has advanced */
     uint32_t late_series_us;
@@ -44,8 +46,10 @@ typedef struct estimator {
     float last_tau_m;
     float z_ddot; /* the same as levels.h counts them */
     float tau_m;
-    float nis; /* of the last sample */
+    derived_t derived; /* for publication */
+    float nis;         /* of the last sample */
     uint8_t nis_size;
+    bool frozen;
     uint16_t faults;
     bool communication_fault; /* reported by the CAN side for the next sample */
     bool has_platform;
@@ -58,7 +62,7 @@ typedef struct estimator {
     uint32_t recoveries;
 } estimator_t;
 
-/* Starts from a checked configuration; all counts are zero. */
+/* Starts from a checked configuration, whose settings are used as long as the instance is; all counts are zero. */
 void estimator_init(estimator_t *estimator, const lever_config_t *config);
 
 /* The functions of lever_cdkf.h of the same names. */
@@ -70,8 +74,8 @@ void estimator_platform(estimator_t *estimator, const lever_platform_t *platform
 /* State i of the estimate as the sensors see it: theta [rad], theta_dot [rad/s]. */
 float estimator_state(const estimator_t *estimator, uint32_t i);
 
-/* The part of the estimate that is derived from the parameters, and its standard deviations. */
-void estimator_dynamics(const estimator_t *estimator, model_dynamics_t *dynamics, model_dynamics_t *sigma);
+/* The part of the estimate that is derived from the parameters, in two parts of about equal cost: begin, then the rest. */
+void estimator_derive(const estimator_t *estimator, derived_t *derived, bool begin);
 
 void estimator_health(const estimator_t *estimator, lever_health_t *health);
 

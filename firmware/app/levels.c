@@ -9,7 +9,8 @@
 void levels_start(levels_t *levels, float trim, float corner, bool counted)
 {
     (void)memset(levels, 0, sizeof *levels);
-    levels->corner = corner;
+    levels->corner = detrend_corner(corner);
+    levels->settling = 1.0f / corner;
     levels->counted = counted;
     detrend_start(&levels->output[0], trim);
     levels_set_origin(levels);
@@ -18,7 +19,7 @@ void levels_start(levels_t *levels, float trim, float corner, bool counted)
 
 static float deviation(const levels_t *levels, detrend_t *detrend, float value, float period)
 {
-    const float result = detrend_step(detrend, value, levels->corner, period);
+    const float result = detrend_step(detrend, value, &levels->corner, period);
     return levels->counted ? result : value;
 }
 
@@ -63,5 +64,5 @@ bool levels_is_waiting(const levels_t *levels, uint32_t i)
 
 void levels_unsettle(levels_t *levels)
 {
-    levels->unsettled = levels->counted ? (1.0f / levels->corner) : 0.0f;
+    levels->unsettled = levels->counted ? levels->settling : 0.0f;
 }

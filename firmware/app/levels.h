@@ -19,11 +19,12 @@ typedef struct levels {
     float origin[MODEL_STATES];     /* what the state counts from: levels in preload trim, otherwise 0 */
     float missing[MODEL_STATES];    /* time since the last sample of each output [s] */
     float unsettled;                /* time still to wait before anything can be learnt [s] */
-    float corner;                   /* [Hz] */
-    bool counted;                   /* preload trim */
+    float settling;                 /* how long that is at first [s] */
+    detrend_corner_t corner;
+    bool counted; /* preload trim */
 } levels_t;
 
-/* Starts at a trim angle, nothing moving. */
+/* Starts at a trim angle, nothing moving; corner [Hz]. */
 void levels_start(levels_t *levels, float trim, float corner, bool counted);
 
 /* An input (0 z_ddot, 1 tau_m) after `period` seconds, as the estimator counts it. */

@@ -1,5 +1,6 @@
 #include "app/link.h"
 
+#include <math.h>
 #include <string.h>
 
 /* The order in which frames are fetched: the motor first, STATE_ESTIMATE last. */
@@ -14,7 +15,17 @@ enum output {
 };
 
 #define BIT(output) (1u << (uint32_t)(output))
-#define DIVIDED_OUTPUTS (BIT(OUTPUT_PARAMETERS) | BIT(OUTPUT_SIGMA) | BIT(OUTPUT_DYNAMICS) | BIT(OUTPUT_HEALTH))
+/* What is done one after the other in each publish_period: messages that are sent, and what DYNAMICS is to say. */
+enum part {
+    PART_HEALTH,
+    PART_SIGMA,
+    PART_PARAMETERS,
+    PART_DERIVE_BEGIN,
+    PART_DERIVE_END,
+    PART_PLATFORM,
+    PART_DYNAMICS,
+    PARTS
+};
 
 static const uint8_t data_ids[LINK_OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_PILOT_PARAMETERS_DATA_ID,
     MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID, MESSAGE_HEALTH_DATA_ID,
@@ -124,14 +135,58 @@ enum lever_frame_result link_on_frame(link_t *link, estimator_t *estimator, cons
 
 /* --- step ------------------------------------------------------------------------------------------------------ */
 
-static bool is_publication_due(link_t *link, const estimator_t *estimator)
+/* Does the next part of a set; returns the message that is due by that, as a bit. */
+static uint32_t go_on_publishing(link_t *link, estimator_t *estimator)
 {
-    const float rounded = (estimator->config.settings.publish_period * 1.0e6f) + 0.5f;
+    uint32_t due = 0u;
+    switch ((enum part)link->published) {
+    case PART_HEALTH:
+        due = BIT(OUTPUT_HEALTH);
+        break;
+    case PART_PARAMETERS:
+        due = BIT(OUTPUT_PARAMETERS);
+        break;
+    case PART_SIGMA:
+        due = BIT(OUTPUT_SIGMA);
+        break;
+    case PART_DERIVE_BEGIN:
+        estimator_derive(estimator, &estimator->derived, true);
+        break;
+    case PART_DERIVE_END:
+        estimator_derive(estimator, &estimator->derived, false);
+        break;
+    case PART_DYNAMICS:
+        due = BIT(OUTPUT_DYNAMICS);
+        break;
+    case PART_PLATFORM:
+        due = estimator->has_platform ? BIT(OUTPUT_PLATFORM) : 0u;
+        break;
+    case PARTS:
+    default:
+        break;
+    }
+    link->published++;
+    return due;
+}
+
+/* The divided messages that are due, as bits. A set of them is spread evenly over publish_period, so that no sample has to
+ * answer with all of them. */
+static uint32_t divided_due(link_t *link, estimator_t *estimator)
+{
+    const float rounded = (estimator->setup.settings->publish_period * 1.0e6f) + 0.5f;
     const uint32_t period_us = (uint32_t)rounded;
-    const bool due = !link->has_published || ((link->sample.time_us - link->published_us) >= period_us);
-    if (due) {
+    uint32_t due = 0u;
+    if (!link->has_published || ((link->sample.time_us - link->published_us) >= period_us)) {
+        while (link->has_published && (link->published < (uint32_t)PARTS)) { /* of the set before */
+            due |= go_on_publishing(link, estimator);
+        }
         link->has_published = true;
         link->published_us = link->sample.time_us;
+        link->published = 0u;
+    }
+    const uint32_t elapsed_us = link->sample.time_us - link->published_us;
+    while ((link->published < (uint32_t)PARTS) && ((elapsed_us * (uint32_t)PARTS) >= (period_us * link->published))) {
+        due |= go_on_publishing(link, estimator);
     }
     return due;
 }
@@ -139,14 +194,11 @@ static bool is_publication_due(link_t *link, const estimator_t *estimator)
 enum lever_mode link_step(link_t *link, estimator_t *estimator)
 {
     if (link->has_sample) {
-        const bool was_on = dither_is_on(&estimator->dither);
+        const bool dithers = dither_is_on(&estimator->dither); /* a step may end that, not begin it */
         link->has_sample = false;
         (void)estimator_update(estimator, &link->sample);
-        uint32_t due = BIT(OUTPUT_STATE_ESTIMATE);
-        if (is_publication_due(link, estimator)) {
-            due |= DIVIDED_OUTPUTS | (estimator->has_platform ? BIT(OUTPUT_PLATFORM) : 0u);
-        }
-        if (was_on || dither_is_on(&estimator->dither)) {
+        uint32_t due = BIT(OUTPUT_STATE_ESTIMATE) | divided_due(link, estimator);
+        if (dithers) {
             due |= BIT(OUTPUT_MOTOR_COMMAND);
         }
         link->due = (uint8_t)(link->due | due);
@@ -159,7 +211,7 @@ enum lever_mode link_step(link_t *link, estimator_t *estimator)
 static bool encode_motor_command(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_motor_command_t message;
-    message.model = estimator->config.model;
+    message.model = estimator->setup.model;
     message.torque = estimator->dither.torque;
     message.dither = estimator->dither.torque;
     return message_motor_command_encode(frame, &message);
@@ -168,30 +220,28 @@ static bool encode_motor_command(const estimator_t *estimator, lever_frame_t *fr
 static bool encode_parameters(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_pilot_parameters_t message;
-    message.model = estimator->config.model;
-    parameter_filter_physical(&estimator->dual.parameters, message.parameter);
+    message.model = estimator->setup.model;
+    (void)memcpy(message.parameter, estimator->dual.parameters.p, sizeof message.parameter);
     return message_pilot_parameters_encode(frame, &message);
 }
 
 static bool encode_sigma(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_pilot_sigma_t message;
-    message.model = estimator->config.model;
+    message.model = estimator->setup.model;
     parameter_filter_sigma(&estimator->dual.parameters, message.sigma);
     return message_pilot_sigma_encode(frame, &message);
 }
 
 static bool encode_dynamics(const estimator_t *estimator, lever_frame_t *frame)
 {
+    const derived_t *derived = &estimator->derived;
     message_pilot_dynamics_t message;
-    model_dynamics_t dynamics;
-    model_dynamics_t sigma;
-    estimator_dynamics(estimator, &dynamics, &sigma);
-    message.model = estimator->config.model;
-    message.natural_frequency = dynamics.natural_frequency;
-    message.natural_frequency_sigma = sigma.natural_frequency;
-    message.damping_ratio = dynamics.damping_ratio;
-    message.damping_ratio_sigma = sigma.damping_ratio;
+    message.model = estimator->setup.model;
+    message.natural_frequency = derived->mean.natural_frequency;
+    message.natural_frequency_sigma = sqrtf(derived->variance.natural_frequency);
+    message.damping_ratio = derived->mean.damping_ratio;
+    message.damping_ratio_sigma = sqrtf(derived->variance.damping_ratio);
     return message_pilot_dynamics_encode(frame, &message);
 }
 
@@ -200,7 +250,7 @@ static bool encode_health(const estimator_t *estimator, lever_frame_t *frame)
     message_health_t message;
     lever_health_t health;
     estimator_health(estimator, &health);
-    message.model = estimator->config.model;
+    message.model = estimator->setup.model;
     message.mode = (uint8_t)health.mode;
     message.faults = health.faults;
     message.lost = (uint8_t)(health.lost & 0xFFu);
@@ -214,7 +264,7 @@ static bool encode_platform(const estimator_t *estimator, lever_frame_t *frame)
 {
     const lever_platform_t *platform = &estimator->platform;
     message_platform_health_t message;
-    message.model = estimator->config.model;
+    message.model = estimator->setup.model;
     message.faults = platform->faults;
     message.transmit_errors = platform->transmit_errors;
     message.receive_errors = platform->receive_errors;
@@ -227,7 +277,7 @@ static bool encode_platform(const estimator_t *estimator, lever_frame_t *frame)
 static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_state_estimate_t message;
-    message.model = estimator->config.model;
+    message.model = estimator->setup.model;
     message.theta = estimator_state(estimator, 0u);
     message.theta_dot = estimator_state(estimator, 1u);
     message.nis = estimator->nis;
@@ -240,16 +290,20 @@ static bool (*const encoders[LINK_OUTPUTS])(const estimator_t *, lever_frame_t *
 bool link_next_frame(link_t *link, const estimator_t *estimator, lever_frame_t *frame)
 {
     bool sent = false;
-    for (uint32_t i = 0u; (i < (uint32_t)LINK_OUTPUTS) && !sent; i++) {
-        const uint32_t bit = BIT(i);
-        if ((link->due & bit) != 0u) {
-            link->due = (uint8_t)(link->due & ~bit);
-            sent = encoders[i](estimator, frame);
+    uint32_t output = 0u;
+    uint32_t due = link->due; /* from `output` on */
+    while ((due != 0u) && !sent) {
+        const bool is_due = ((due & 1u) != 0u);
+        due >>= 1u;
+        if (is_due) {
+            link->due = (uint8_t)(due << (output + 1u));
+            sent = encoders[output](estimator, frame);
             if (sent) {
-                e2e_protect(frame, data_ids[i], link->counter[i]);
-                link->counter[i] = (uint8_t)((link->counter[i] + 1u) & 15u);
+                e2e_protect(frame, data_ids[output], link->counter[output]);
+                link->counter[output] = (uint8_t)((link->counter[output] + 1u) & 15u);
             }
         }
+        output++;
     }
     return sent;
 }

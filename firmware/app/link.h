@@ -21,7 +21,8 @@ typedef struct link {
     bool has_lever_sample;
     lever_sample_t sample; /* complete, waiting for lever_step() */
     bool has_sample;
-    uint32_t published_us; /* sample time of the last set of divided messages */
+    uint32_t published_us; /* sample time at which the last set of divided messages began */
+    uint8_t published;     /* how many of it are out, or due */
     bool has_published;
     uint8_t due;                   /* messages still to fetch, a bit each */
     uint8_t counter[LINK_OUTPUTS]; /* E2E counter of the next frame of each */

@@ -6,13 +6,13 @@ typedef struct rows {
     float walk[MODEL_PARAMETERS];
 } rows_t;
 
-static rows_t rows_of(const lever_config_t *config)
+static rows_t rows_of(const setup_t *setup)
 {
-    const lever_settings_t *s = &config->settings;
+    const lever_settings_t *s = setup->settings;
     rows_t rows;
-    if (config->model == (uint8_t)LEVER_MODEL_LINEAR_PHYSICAL) {
+    if (setup->model == (uint8_t)LEVER_MODEL_LINEAR_PHYSICAL) {
         rows = (rows_t){{{s->m, s->c, s->k}, {s->m_sigma, s->c_sigma, s->k_sigma}}, {s->m_walk, s->c_walk, s->k_walk}};
-    } else if (config->model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX) {
+    } else if (setup->model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX) {
         rows = (rows_t){{{s->a21, s->a22, s->b21}, {s->a21_sigma, s->a22_sigma, s->b21_sigma}},
             {s->a21_walk, s->a22_walk, s->b21_walk}};
     } else {
@@ -22,25 +22,24 @@ static rows_t rows_of(const lever_config_t *config)
     return rows;
 }
 
-prior_t prior_of(const lever_config_t *config)
+prior_t prior_of(const setup_t *setup)
 {
-    return rows_of(config).prior;
+    return rows_of(setup).prior;
 }
 
-adaptation_t adaptation_of(const lever_config_t *config, bool positive)
+adaptation_t adaptation_of(const setup_t *setup, bool positive)
 {
-    const lever_settings_t *s = &config->settings;
-    const rows_t rows = rows_of(config); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
-    adaptation_t adaptation;
+    const lever_settings_t *s = setup->settings;
+    const rows_t rows = rows_of(setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    adaptation_t adaptation = {.kind = setup->adaptation,
+        .ceiling = s->walk_ceiling * s->walk_ceiling,
+        .annealing_time = s->annealing_time,
+        .averaging_time = s->robbins_monro_time,
+        .forgetting_time = s->forgetting_time};
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         /* of the scaled parameter w, see parameter_filter.h */
         const float walk = positive ? rows.walk[i] : (rows.walk[i] / rows.prior.sigma[i]);
         adaptation.floor[i] = walk * walk;
     }
-    adaptation.ceiling = s->walk_ceiling * s->walk_ceiling;
-    adaptation.kind = config->adaptation;
-    adaptation.annealing_time = s->annealing_time;
-    adaptation.averaging_time = s->robbins_monro_time;
-    adaptation.forgetting_time = s->forgetting_time;
     return adaptation;
 }

@@ -8,10 +8,19 @@
 
 #include <stdbool.h>
 
+/* What an instance runs with: the choices, which commands change, and the caller's settings. */
+typedef struct setup {
+    const lever_settings_t *settings;
+    uint8_t model;      /* enum lever_model */
+    uint8_t preload;    /* enum lever_preload */
+    uint8_t estimator;  /* enum lever_estimator */
+    uint8_t adaptation; /* enum lever_adaptation */
+} setup_t;
+
 /* First guess and standard deviation of the parameters of the chosen model. */
-prior_t prior_of(const lever_config_t *config);
+prior_t prior_of(const setup_t *setup);
 
 /* How their walk is set; `positive` as in model_t. */
-adaptation_t adaptation_of(const lever_config_t *config, bool positive);
+adaptation_t adaptation_of(const setup_t *setup, bool positive);
 
 #endif

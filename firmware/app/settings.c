@@ -1,16 +1,22 @@
-/* The table of settings, its defaults and its check: lever_settings.def expanded three times. */
+/* The table of settings: lever_settings.def as rows, to read, to take the defaults from and to check against. */
 #include "lever_cdkf.h"
 
 #include <stddef.h>
+#include <string.h>
 
 static const lever_setting_t table[] = {
 #define LEVER_SETTING(name, unit, value, least, greatest, meaning) {#name, unit, meaning, value, least, greatest},
 #include "lever_settings.def"
 };
 
+#define SETTINGS (sizeof(table) / sizeof(table[0]))
+
+/* cppcheck-suppress misra-c2012-2.3 ; D5 */
+typedef char settings_are_as_many_floats[(sizeof(lever_settings_t) == (SETTINGS * sizeof(float))) ? 1 : -1];
+
 uint32_t lever_setting_count(void)
 {
-    return (uint32_t)(sizeof(table) / sizeof(table[0]));
+    return (uint32_t)SETTINGS;
 }
 
 const lever_setting_t *lever_setting(uint32_t index)
@@ -20,25 +26,30 @@ const lever_setting_t *lever_setting(uint32_t index)
 
 void lever_config_default(lever_config_t *config)
 {
+    float value[SETTINGS];
+    for (uint32_t i = 0u; i < lever_setting_count(); i++) {
+        value[i] = table[i].value;
+    }
+    /* cppcheck-suppress misra-c2012-21.15 ; D2 */
+    (void)memcpy(&config->settings, value, sizeof value); /* an array of floats, as checked above */
     config->model = (uint8_t)LEVER_MODEL_LEVER;
     config->preload = (uint8_t)LEVER_PRELOAD_TRIM;
     config->estimator = (uint8_t)LEVER_ESTIMATOR_DUAL;
     config->adaptation = (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO;
-/* cppcheck-suppress misra-c2012-20.7 ; D1 */
-#define LEVER_SETTING(name, unit, value, least, greatest, meaning) config->settings.name = (value);
-#include "lever_settings.def"
 }
 
 /* The name of the first setting out of its range (a NaN is), or NULL. */
 static const char *settings_check(const lever_settings_t *settings)
 {
+    float value[SETTINGS];
+    /* cppcheck-suppress misra-c2012-21.15 ; D2 */
+    (void)memcpy(value, settings, sizeof value);
     const char *wrong = NULL;
-/* cppcheck-suppress misra-c2012-20.7 ; D1 */
-#define LEVER_SETTING(name, unit, value, low, high, meaning)                                                           \
-    if ((wrong == NULL) && !((settings->name >= (low)) && (settings->name <= (high)))) {                               \
-        wrong = #name;                                                                                                 \
+    for (uint32_t i = 0u; (i < lever_setting_count()) && (wrong == NULL); i++) {
+        if (!((value[i] >= table[i].least) && (value[i] <= table[i].greatest))) {
+            wrong = table[i].name;
+        }
     }
-#include "lever_settings.def"
     return wrong;
 }
 

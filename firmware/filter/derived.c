@@ -1,7 +1,6 @@
 #include "filter/derived.h"
 
 #include "filter/sigma_points.h"
-#include "math/factor.h"
 
 /* What one pair of sigma points adds to a variance. */
 static float spread(float plus, float minus, float mean)
@@ -11,19 +10,30 @@ static float spread(float plus, float minus, float mean)
     return (first * first) + (second * second);
 }
 
-void derived_dynamics(const parameter_filter_t *filter, const model_t *model, const model_constants_t *constants,
-    const model_step_t *step, model_dynamics_t *dynamics, model_dynamics_t *sigma)
+static void add_pair(derived_t *derived, const parameter_filter_t *filter, const model_t *model,
+    const model_constants_t *constants, const model_step_t *step, uint32_t j)
 {
-    const float (*p)[MODEL_PARAMETERS] = filter->p;
-    *dynamics = model->dynamics(constants, step, p[0]);
-    float frequency = 0.0f;
-    float damping = 0.0f;
-    for (uint32_t j = 0u; j < (uint32_t)MODEL_PARAMETERS; j++) {
-        const model_dynamics_t plus = model->dynamics(constants, step, p[1u + (2u * j)]);
-        const model_dynamics_t minus = model->dynamics(constants, step, p[2u + (2u * j)]);
-        frequency += spread(plus.natural_frequency, minus.natural_frequency, dynamics->natural_frequency);
-        damping += spread(plus.damping_ratio, minus.damping_ratio, dynamics->damping_ratio);
+    const model_dynamics_t plus = model->dynamics(constants, step, &filter->arm[1u + (2u * j)]);
+    const model_dynamics_t minus = model->dynamics(constants, step, &filter->arm[2u + (2u * j)]);
+    const model_dynamics_t *mean = &derived->mean;
+    derived->variance.natural_frequency +=
+        spread(plus.natural_frequency, minus.natural_frequency, mean->natural_frequency);
+    derived->variance.damping_ratio += spread(plus.damping_ratio, minus.damping_ratio, mean->damping_ratio);
+}
+
+void derived_begin(derived_t *derived, const parameter_filter_t *filter, const model_t *model,
+    const model_constants_t *constants, const model_step_t *step)
+{
+    derived->mean = model->dynamics(constants, step, &filter->arm[0]);
+    derived->variance.natural_frequency = 0.0f;
+    derived->variance.damping_ratio = 0.0f;
+    add_pair(derived, filter, model, constants, step, 0u);
+}
+
+void derived_end(derived_t *derived, const parameter_filter_t *filter, const model_t *model,
+    const model_constants_t *constants, const model_step_t *step)
+{
+    for (uint32_t j = 1u; j < (uint32_t)MODEL_PARAMETERS; j++) {
+        add_pair(derived, filter, model, constants, step, j);
     }
-    sigma->natural_frequency = sqrtf(frequency);
-    sigma->damping_ratio = sqrtf(damping);
 }

@@ -3,6 +3,13 @@
 #define TURN 6.28318531f
 #define SQRT_TWO 1.41421356f
 
+detrend_corner_t detrend_corner(float frequency)
+{
+    const float w = TURN * frequency;
+    const detrend_corner_t corner = {w * w, SQRT_TWO * w};
+    return corner;
+}
+
 void detrend_start(detrend_t *detrend, float level)
 {
     detrend->level = level;
@@ -10,11 +17,10 @@ void detrend_start(detrend_t *detrend, float level)
 }
 
 /* level/signal = (sqrt(2) w s + w^2) / (s^2 + sqrt(2) w s + w^2), by semi-implicit Euler. */
-float detrend_step(detrend_t *detrend, float value, float corner, float period)
+float detrend_step(detrend_t *detrend, float value, const detrend_corner_t *corner, float period)
 {
-    const float w = TURN * corner;
     const float deviation = value - detrend->level;
-    detrend->slope += period * w * w * deviation;
-    detrend->level += period * (detrend->slope + (SQRT_TWO * w * deviation));
+    detrend->slope += period * (corner->square * deviation);
+    detrend->level += period * (detrend->slope + (corner->damping * deviation));
     return deviation;
 }

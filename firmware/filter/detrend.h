@@ -9,15 +9,24 @@
 #ifndef FILTER_DETREND_H
 #define FILTER_DETREND_H
 
+/* Of a corner w [rad/s]: w^2 and sqrt(2) w. */
+typedef struct detrend_corner {
+    float square;
+    float damping;
+} detrend_corner_t;
+
 typedef struct detrend {
     float level; /* [unit of the signal] */
     float slope; /* [unit / s] */
 } detrend_t;
 
+/* Of a corner frequency [Hz]. */
+detrend_corner_t detrend_corner(float frequency);
+
 /* The signal starts at a level, at rest. */
 void detrend_start(detrend_t *detrend, float level);
 
-/* One value after `period` seconds; corner [Hz]. Returns its deviation from the level there was before it. */
-float detrend_step(detrend_t *detrend, float value, float corner, float period);
+/* One value after `period` seconds. Returns its deviation from the level there was before it. */
+float detrend_step(detrend_t *detrend, float value, const detrend_corner_t *corner, float period);
 
 #endif

@@ -18,6 +18,7 @@
 #include "filter/measurement.h"
 #include "filter/noise.h"
 #include "filter/parameter_filter.h"
+#include "filter/revision.h"
 #include "filter/state_filter.h"
 #include "model/model.h"
 
@@ -26,27 +27,26 @@
 typedef struct dual {
     state_filter_t state;
     parameter_filter_t parameters;
+    revision_t revision; /* of the parameters: under way, or as adopted last */
     noise_estimator_t noise;
 } dual_t;
 
-/* Time update over one step of the model; the parameters stand still (dual_learn). */
+/* Time update over one step of the model; the parameters stand still. */
 void dual_predict(dual_t *dual, const model_t *model, const model_constants_t *constants, const model_step_t *step);
 
 /* Measurement update of the state. `learn`: what the sample says of the parameters is gathered. Returns the normalised
- * innovation squared. */
+ * innovation squared; when not learning, that of the parameters being right. */
 float dual_update(dual_t *dual, const measurement_t *measurement, bool learn);
 
-/* The parameters learn what was gathered (with `caution`, see parameter_filter_learn), then walk for `period` seconds, the time
- * since they did so last. The change of w
- * is left in `correction`, by how much its variances have become smaller in `learnt`. `joint`: the joint filter instead of the dual one. Returns true when a parameter rests on a bound
- * of its model. */
-bool dual_learn(dual_t *dual, float period, float caution, bool joint, float correction[MODEL_PARAMETERS],
-    float learnt[MODEL_PARAMETERS]);
+/* The parameters learn by the functions of revision.h, in their order. These two of them concern the state, too: what
+ * becomes independent of the parameters stays with it in the joint filter, and is left out in the dual one. Of w from `first`
+ * on `count` parameters walk. */
+void dual_forget(dual_t *dual, float period, bool joint);
+void dual_walk(
+    dual_t *dual, uint32_t first, uint32_t count, float period, const float variance[MODEL_PARAMETERS], bool joint);
 
-/* Adds independent uncertainty to the parameters: variances of w. `joint` as above. */
-void dual_widen(dual_t *dual, const float variance[MODEL_PARAMETERS], bool joint);
-
-/* Opens the parameters' covariance to that of their prior. What they have made uncertain of the state stays with it. */
+/* Instead of revision_condition(): opens the parameters' covariance to that of their prior. What they have made uncertain of the
+ * state stays with it. */
 void dual_open(dual_t *dual);
 
 /* Standard deviation of state i, that of the parameters included. */
@@ -54,5 +54,8 @@ float dual_state_sigma(const dual_t *dual, uint32_t i);
 
 /* Invariant of both filters. */
 bool dual_is_valid(const dual_t *dual);
+
+/* The part of it that is cheap: all is finite, and the state filter valid. */
+bool dual_is_finite(const dual_t *dual);
 
 #endif

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #define OUTPUTS ((uint32_t)MEASUREMENT_OUTPUTS)
-#define L ((uint32_t)MODEL_PARAMETERS)
 #define SAMPLES_LEAST 20.0f /* of an output, for a variance to mean anything */
 #define FAR 0.5f            /* a factor further than this from 1 is done at once, */
 #define STEP_MOST 3.0f      /* up to this one; of a nearer one only */
@@ -12,43 +11,31 @@
 
 void noise_begin(noise_estimator_t *noise)
 {
-    noise->elapsed = 0.0f;
-    noise->agreement = 0.0f;
-    noise->strength = 0.0f;
-    for (uint32_t i = 0u; i < OUTPUTS; i++) {
-        noise->samples[i] = 0.0f;
-        noise->ratio[i] = 0.0f;
-        noise->share[i] = 0.0f;
-    }
+    (void)memset(noise, 0, sizeof *noise);
 }
 
-void noise_gather(noise_estimator_t *noise, const state_filter_t *filter, const measurement_t *measurement,
-    const float innovation[MEASUREMENT_OUTPUTS], const float factor[MEASUREMENT_OUTPUTS * MEASUREMENT_OUTPUTS],
-    /* cppcheck-suppress misra-c2012-10.4 ; D6 */
-    const float output[MEASUREMENT_OUTPUTS * MODEL_PARAMETERS])
+void noise_gather(noise_estimator_t *noise, const float output_noise[MEASUREMENT_OUTPUTS],
+    const measurement_t *measurement, const whitened_t *whitened, const spread_t *spread)
 {
-    /* covariance of the innovation [a b; b d] */
-    float a = factor[0] * factor[0];
-    float b = factor[0] * factor[2];
-    float d = (factor[2] * factor[2]) + (factor[3] * factor[3]);
-    for (uint32_t j = 0u; j < L; j++) {
-        a += output[j] * output[j];
-        b += output[j] * output[L + j];
-        d += output[L + j] * output[L + j];
-    }
-    const float echo[OUTPUTS] = {
-        measurement->valid[0] ? filter->echo[0] : 0.0f, measurement->valid[1] ? filter->echo[1] : 0.0f};
-    const float inverse = 1.0f / ((a * d) - (b * b));
-    const float weighted[OUTPUTS] = {
-        inverse * ((d * echo[0]) - (b * echo[1])), inverse * ((a * echo[1]) - (b * echo[0]))};
-    const float variance[OUTPUTS] = {a, d};
+    const float *echo = whitened->echo;
+    const float *innovation = whitened->innovation;
+    const float *scale = whitened->scale;
+    const float coupling = whitened->coupling;
+    const float first = spread->inverse * ((spread->d * echo[0]) - (spread->b * echo[1]));
+    const float second = spread->inverse * ((spread->a * echo[1]) - (spread->b * echo[0]));
+    noise->agreement += (first * innovation[0]) + (second * innovation[1]);
+    noise->strength += (first * echo[0]) + (second * echo[1]);
+    /* of the outputs themselves: their innovations, and the variances of those */
+    const float raw[OUTPUTS] = {scale[0] * innovation[0], (coupling * innovation[0]) + (scale[1] * innovation[1])};
+    const float cross = 2.0f * coupling * scale[1] * spread->b;
+    const float variance[OUTPUTS] = {
+        scale[0] * scale[0] * spread->a, (coupling * coupling * spread->a) + cross + (scale[1] * scale[1] * spread->d)};
     for (uint32_t i = 0u; i < OUTPUTS; i++) {
-        noise->agreement += weighted[i] * innovation[i];
-        noise->strength += weighted[i] * echo[i];
-        noise->ratio[i] += (innovation[i] * innovation[i]) / variance[i];
         if (measurement->valid[i]) {
+            const float inverse = 1.0f / variance[i];
             noise->samples[i] += 1.0f;
-            noise->share[i] += (filter->output_noise[i] * filter->output_noise[i]) / variance[i];
+            noise->ratio[i] += raw[i] * raw[i] * inverse;
+            noise->share[i] += output_noise[i] * output_noise[i] * inverse;
         }
     }
 }

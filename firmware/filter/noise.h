@@ -29,6 +29,14 @@ typedef struct noise_setting {
     float process_noise;                     /* of theta_dot, likewise */
 } noise_setting_t;
 
+/* A symmetric matrix [a b; b d], and 1 / (a d - b^2). */
+typedef struct spread {
+    float a;
+    float b;
+    float d;
+    float inverse;
+} spread_t;
+
 typedef struct noise_estimator {
     float elapsed; /* since the window began [s] */
     float samples[MEASUREMENT_OUTPUTS];
@@ -41,13 +49,10 @@ typedef struct noise_estimator {
 /* Begins a window; what is in the last one is thrown away. */
 void noise_begin(noise_estimator_t *noise);
 
-/* Takes a sample, before the filter's update: the innovation; the factor of its covariance when the parameters are given; and the
- * deviations of the output that go with the parameters [MEASUREMENT_OUTPUTS x MODEL_PARAMETERS]. Innovation and deviations
- * are zero for an output that is not valid. */
-void noise_gather(noise_estimator_t *noise, const state_filter_t *filter, const measurement_t *measurement,
-    const float innovation[MEASUREMENT_OUTPUTS], const float factor[MEASUREMENT_OUTPUTS * MEASUREMENT_OUTPUTS],
-    /* cppcheck-suppress misra-c2012-10.4 ; D6 */
-    const float output[MEASUREMENT_OUTPUTS * MODEL_PARAMETERS]);
+/* Takes a sample as the filter saw it, with the noise that the filter had. `spread` is the covariance of the whitened
+ * innovation, that of the parameters included: 1 + o o^T. */
+void noise_gather(noise_estimator_t *noise, const float output_noise[MEASUREMENT_OUTPUTS],
+    const measurement_t *measurement, const whitened_t *whitened, const spread_t *spread);
 
 /* After `period` seconds: at the end of a window sets the noise of the filter. Returns true when an output's noise was far too
  * small until now: then whatever was learnt with it is less certain than it seems. */

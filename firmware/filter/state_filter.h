@@ -11,8 +11,6 @@
 
 #include <stdbool.h>
 
-enum { STATE_FILTER_ADDED = 2 * MODEL_PARAMETERS * MODEL_STATES };
-
 typedef struct state_filter {
     float x[MODEL_STATES];                /* theta [rad], theta_dot [rad/s] */
     float s[MODEL_STATES * MODEL_STATES]; /* factor of their covariance, parameters given */
@@ -21,25 +19,17 @@ typedef struct state_filter {
     float echo[MODEL_STATES];             /* what past corrections have come to (noise.h) */
 } state_filter_t;
 
-/* Draws the points of the state pairs, and the mean, into `points`. */
+/* Draws the mean and the offsets of the state pairs into `points`. */
 void state_filter_points(const state_filter_t *filter, model_points_t *points);
 
-/* Time update over `period` [s] from the increments that the model gave. */
-void state_filter_predict(state_filter_t *filter, float increment[MODEL_POINTS][MODEL_STATES], float period);
-
-/* Factor of the predicted covariance of y, S S^T + R, parameters given. An output that is not valid gets a row of the
- * identity, so that with its innovation set to zero later steps pass over it. */
-void state_filter_innovation(const state_filter_t *filter, const measurement_t *measurement,
-    float factor[MEASUREMENT_OUTPUTS * MEASUREMENT_OUTPUTS]);
+/* Time update over `period` [s] from the response that the model gave. */
+void state_filter_predict(state_filter_t *filter, const model_response_t *response, float period);
 
 /* Measurement update with the outputs that are valid; none of them: nothing changes. `sensitivity`, columns of
- * deviations of the state [MODEL_STATES x MODEL_PARAMETERS], shrinks as the state's own errors do: by I - K H. Returns the
- * normalised innovation squared, parameters given. */
-float state_filter_update(
-    state_filter_t *filter, const measurement_t *measurement, float sensitivity[MODEL_STATES * MODEL_PARAMETERS]);
-
-/* Adds independent deviations of the state, columns [MODEL_STATES x 2 MODEL_PARAMETERS], to its uncertainty. */
-void state_filter_add(state_filter_t *filter, const float deviations[STATE_FILTER_ADDED]);
+ * deviations of the state [MODEL_STATES x MODEL_PARAMETERS], shrinks as the state's own errors do: by I - K H. What the sample
+ * said is left in `whitened`. */
+void state_filter_update(state_filter_t *filter, const measurement_t *measurement,
+    float sensitivity[MODEL_STATES * MODEL_PARAMETERS], whitened_t *whitened);
 
 /* Finite estimate of a plausible angle (a few turns), valid factor. */
 bool state_filter_is_valid(const state_filter_t *filter);

@@ -12,31 +12,32 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+enum { FACTOR_MOST = 8 }; /* greatest n of factor_add_noise */
+
 /* tria(A): factor[n x n] with factor factor^T = A A^T, for a[n x m]; `a` is used up.
  * Modified Gram-Schmidt on the rows of A, whose triangular factor is as accurate as Householder's (Bjorck 1967). A row that
  * depends on the earlier ones gives a zero on the diagonal. About n^2 m multiply-adds, n square roots, n divisions. */
 static inline void factor_tria(float *a, uint32_t n, uint32_t m, float *factor)
 {
     for (uint32_t i = 0u; i < n; i++) {
-        float *row = &a[i * m];
+        const float *row = &a[i * m];
         float square = 0.0f;
         for (uint32_t k = 0u; k < m; k++) {
             square += row[k] * row[k];
         }
         const float norm = sqrtf(square);
         const float inverse = (norm > 0.0f) ? (1.0f / norm) : 0.0f;
-        for (uint32_t k = 0u; k < m; k++) {
-            row[k] *= inverse;
-        }
         factor[(i * n) + i] = norm;
         for (uint32_t j = i + 1u; j < n; j++) {
             float *other = &a[j * m];
-            float projection = 0.0f;
+            float product = 0.0f;
             for (uint32_t k = 0u; k < m; k++) {
-                projection += other[k] * row[k];
+                product += other[k] * row[k];
             }
+            const float projection = product * inverse;
+            const float share = projection * inverse;
             for (uint32_t k = 0u; k < m; k++) {
-                other[k] -= projection * row[k];
+                other[k] -= share * row[k];
             }
             factor[(j * n) + i] = projection;
             factor[(i * n) + j] = 0.0f;
@@ -59,109 +60,44 @@ static inline void factor_solve(const float *l, uint32_t n, float *b, uint32_t c
     }
 }
 
-/* Measurement update with `p` whitened outputs (noise covariance I), one after the other, by Carlson's triangular form
- * (Carlson 1973, here for lower-triangular factors): no inverse and no downdate, the diagonal is only ever multiplied by
- * factors in (0, 1], so it cannot fail. Costs n square roots and n divisions per output.
- *   s[rows x n]           factor in its first n rows; rows below it are carried along: they belong to other quantities
- *                         with those columns as part of their factor. Before and after.
- *   c[p x n]              outputs in factor coordinates, C = H S; used up
- *   innovation[p x m]     whitened innovations, one set a column; used up
- *   correction[rows x m]  result: gain times innovation, for each set
- *   work[rows + p]        scratch
- * Returns the normalised innovation squared of the first set, chi-square with p degrees of freedom. */
-static inline float factor_update(float *s, uint32_t rows, uint32_t n, float *c, uint32_t p, float *innovation,
-    uint32_t m, float *correction, float *work)
+/* Adds independent noise of standard deviation `noise` to element i: P <- P + noise^2 e_i e_i^T, by Givens rotations of the noise
+ * column into the columns of the factor. `map` [n x n] are further rows with the same columns; they keep their covariance with the factor's. rest[n] takes what is left of the noise column in the rows of the map:
+ * deviations that are no longer correlated with the factor's. n - i square roots and divisions. */
+static inline void factor_add_noise(float *s, float *map, uint32_t n, uint32_t i, float noise, float *rest)
 {
-    float nis = 0.0f;
-    for (uint32_t r = 0u; r < (rows * m); r++) {
-        correction[r] = 0.0f;
+    float column[FACTOR_MOST];
+    for (uint32_t r = 0u; r < n; r++) {
+        column[r] = (r == i) ? noise : 0.0f;
+        rest[r] = 0.0f;
     }
-    for (uint32_t i = 0u; i < p; i++) {
-        float *covariance = work;   /* of each row with this output, built column by column */
-        float *ahead = &work[rows]; /* of the later outputs with this output */
-        float variance = 1.0f;      /* of this output, likewise: Carlson's alpha */
-        float root = 1.0f;          /* its square root and the inverse of that */
-        float inverse = 1.0f;
-        for (uint32_t r = 0u; r < (rows + p); r++) {
-            work[r] = 0.0f;
+    for (uint32_t j = i; j < n; j++) {
+        const float diagonal = s[(j * n) + j];
+        const float norm = sqrtf((diagonal * diagonal) + (column[j] * column[j]));
+        const float inverse = (norm > 0.0f) ? (1.0f / norm) : 0.0f;
+        const float cosine = (norm == diagonal) ? 1.0f : (diagonal * inverse); /* exactly 1 where noise is lost */
+        const float sine = column[j] * inverse;
+        s[(j * n) + j] = norm;
+        for (uint32_t r = j + 1u; r < n; r++) {
+            const float old = s[(r * n) + j];
+            s[(r * n) + j] = (cosine * old) + (sine * column[r]);
+            column[r] = (cosine * column[r]) - (sine * old);
         }
-        for (uint32_t left = n; left > 0u; left--) {
-            const uint32_t j = left - 1u;
-            const float f = c[(i * n) + j];
-            variance += f * f;
-            const float next_root = sqrtf(variance);
-            const float next_inverse = 1.0f / next_root;
-            const float keep = root * next_inverse;
-            const float spread = f * inverse * next_inverse;
-            root = next_root;
-            inverse = next_inverse;
-            for (uint32_t r = j; r < rows; r++) {
-                const float old = s[(r * n) + j];
-                s[(r * n) + j] = (old * keep) - (covariance[r] * spread);
-                covariance[r] += old * f;
-            }
-            for (uint32_t q = i + 1u; q < p; q++) {
-                const float old = c[(q * n) + j];
-                c[(q * n) + j] = (old * keep) - (ahead[q] * spread);
-                ahead[q] += old * f;
-            }
-        }
-        for (uint32_t set = 0u; set < m; set++) {
-            const float weight = innovation[(i * m) + set] * inverse * inverse;
-            nis += (set == 0u) ? (innovation[i * m] * weight) : 0.0f;
-            for (uint32_t r = 0u; r < rows; r++) {
-                correction[(r * m) + set] += covariance[r] * weight;
-            }
-            for (uint32_t q = i + 1u; q < p; q++) {
-                innovation[(q * m) + set] -= ahead[q] * weight;
-            }
-        }
-    }
-    return nis;
-}
-
-/* Adds independent noise to a factor: P <- P + diag(noise^2), noise[n] standard deviations, by Givens rotations of each
- * noise column into the columns of the factor. s[rows x n] as in factor_update: rows below the first n keep their
- * covariance with the first n elements. rest[n x rows] takes what is left of each noise column: zeros for the first n rows,
- * and for the others deviations that are no longer correlated with the first n elements. */
-static inline void factor_add_noise(float *s, uint32_t rows, uint32_t n, const float *noise, float *rest)
-{
-    for (uint32_t i = 0u; i < n; i++) {
-        float *column = &rest[i * rows];
-        for (uint32_t r = 0u; r < rows; r++) {
-            column[r] = (r == i) ? noise[i] : 0.0f;
-        }
-        for (uint32_t j = i; j < n; j++) {
-            const float diagonal = s[(j * n) + j];
-            const float norm = sqrtf((diagonal * diagonal) + (column[j] * column[j]));
-            const float cosine = (norm > 0.0f) ? (diagonal / norm) : 1.0f; /* exactly 1 where there is no noise */
-            const float sine = (norm > 0.0f) ? (column[j] / norm) : 0.0f;
-            s[(j * n) + j] = norm;
-            column[j] = 0.0f;
-            for (uint32_t r = j + 1u; r < rows; r++) {
-                const float old = s[(r * n) + j];
-                s[(r * n) + j] = (cosine * old) + (sine * column[r]);
-                column[r] = (cosine * column[r]) - (sine * old);
-            }
+        for (uint32_t r = 0u; r < n; r++) {
+            const float old = map[(r * n) + j];
+            map[(r * n) + j] = (cosine * old) + (sine * rest[r]);
+            rest[r] = (cosine * rest[r]) - (sine * old);
         }
     }
 }
 
 #define FACTOR_ROUNDING 1.0e-6f /* of a difference of sums of a few products, relative to the sums */
 
-/* Conditions a factor on information gathered elsewhere: P <- S (I + information)^-1 S^T, by the reverse Cholesky factor
- * U U^T = I + information (U upper triangular), S <- S U^-T. Every pivot of U is at least 1; it is kept from falling below
- * that, or below the rounding of the information, so it cannot fail. Directions that have less than a millionth of the
- * greatest information drown in that rounding.
- *   s[rows x n]           as in factor_update; before and after
- *   information[n x n]    sum of C^T C over outputs C = H S with noise covariance I; used up
- *   score[n]              sum of C^T innovation; used up
- *   correction[rows]      result: S (I + information)^-1 score
- * Costs n square roots and n divisions, whatever the number of outputs. */
-static inline void factor_condition(
-    float *s, uint32_t rows, uint32_t n, float *information, float *score, float *correction)
+/* Reverse Cholesky factor: U U^T = I + information, U upper triangular, in place of the upper triangle of `information`; the
+ * diagonal holds the inverse of U's. Every pivot is at least 1; it is kept from falling below that, or below the rounding of
+ * the information, so it cannot fail. */
+static inline void factor_reverse(float *information, uint32_t n)
 {
-    float *u = information; /* its upper triangle; the diagonal holds the inverse of U's */
+    float *u = information;
     for (uint32_t left = n; left > 0u; left--) {
         const uint32_t j = left - 1u;
         const float rounding = FACTOR_ROUNDING * u[(j * n) + j];
@@ -180,47 +116,70 @@ static inline void factor_condition(
             u[(i * n) + j] = sum * inverse;
         }
     }
-    for (uint32_t r = 0u; r <= rows; r++) { /* the rows of S, and last the score: U z = row */
-        float *row = (r < rows) ? &s[r * n] : score;
-        for (uint32_t left = n; left > 0u; left--) {
-            const uint32_t j = left - 1u;
-            float sum = row[j];
-            for (uint32_t k = left; k < n; k++) {
-                sum -= u[(j * n) + k] * row[k];
-            }
-            row[j] = sum * u[(j * n) + j];
+}
+
+/* row <- U^-1 row, for such a U, of a row whose entries from `length` on are 0 and stay so. */
+static inline void factor_reverse_solve(const float *u, uint32_t n, float *row, uint32_t length)
+{
+    for (uint32_t left = length; left > 0u; left--) {
+        const uint32_t j = left - 1u;
+        float sum = row[j];
+        for (uint32_t k = left; k < length; k++) {
+            sum -= u[(j * n) + k] * row[k];
         }
-    }
-    for (uint32_t r = 0u; r < rows; r++) {
-        float sum = 0.0f;
-        for (uint32_t j = 0u; j < n; j++) {
-            sum += s[(r * n) + j] * score[j];
-        }
-        correction[r] = sum;
+        row[j] = sum * u[(j * n) + j];
     }
 }
 
-/* Standard deviation of element i: the norm of row i. */
-static inline float factor_sigma(const float *factor, uint32_t n, uint32_t i)
+/* Conditions a factor on information gathered elsewhere: P <- S (I + information)^-1 S^T, by S <- S U^-T. Directions that have
+ * less than a millionth of the greatest information drown in its rounding.
+ *   s[n x n]              before and after
+ *   map[n x n]            result: U^-T, lower triangular
+ *   u[n x n]              factor_reverse() of the information: sum of C^T C over outputs C = H S with noise covariance I
+ *   score[n]              sum of C^T innovation; result: U^-1 score, so S score (after) is the correction
+ * The cost does not depend on the number of outputs. */
+static inline void factor_condition(float *s, float *map, uint32_t n, const float *u, float *score)
+{
+    factor_reverse_solve(u, n, score, n);
+    for (uint32_t r = 0u; r < n; r++) {
+        for (uint32_t j = 0u; j < n; j++) {
+            map[(r * n) + j] = (j == r) ? 1.0f : 0.0f;
+        }
+        factor_reverse_solve(u, n, &s[r * n], r + 1u);
+        factor_reverse_solve(u, n, &map[r * n], r + 1u);
+    }
+}
+
+/* Variance of element i, and its standard deviation: the norm of row i. */
+static inline float factor_variance(const float *factor, uint32_t n, uint32_t i)
 {
     float square = 0.0f;
     for (uint32_t k = 0u; k <= i; k++) {
         square += factor[(i * n) + k] * factor[(i * n) + k];
     }
-    return sqrtf(square);
+    return square;
+}
+
+static inline float factor_sigma(const float *factor, uint32_t n, uint32_t i)
+{
+    return sqrtf(factor_variance(factor, n, i));
 }
 
 /* The invariant of a factor: every entry finite, diagonal positive, upper triangle zero. */
 static inline bool factor_is_valid(const float *factor, uint32_t n)
 {
-    bool valid = true;
+    bool positive = true;
+    float size = 0.0f;
+    float above = 0.0f;
     for (uint32_t i = 0u; i < n; i++) {
+        positive = positive && (factor[(i * n) + i] > 0.0f);
         for (uint32_t j = 0u; j < n; j++) {
-            const float entry = factor[(i * n) + j];
-            valid = valid && (fabsf(entry) < 1.0e17f) && ((j <= i) || (entry == 0.0f)) && ((j != i) || (entry > 0.0f));
+            const float entry = fabsf(factor[(i * n) + j]);
+            size += (j <= i) ? entry : 0.0f;
+            above += (j <= i) ? 0.0f : entry;
         }
     }
-    return valid;
+    return positive && (size < 1.0e17f) && (above == 0.0f);
 }
 
 #endif

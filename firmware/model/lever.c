@@ -19,97 +19,96 @@
 #include "math/trigonometry.h"
 #include "model/model.h"
 
+#include <math.h>
+
 #define GRAVITY 9.80665f /* [m/s^2] */
 
-/* What depends on the angle only. */
-typedef struct geometry {
-    float cosine;
-    float cosine_squared;
-    float arm_stretch; /* (sin theta - sine at rest) cos theta */
-    float torque;      /* lever spring and motor [N m] */
-} geometry_t;
+/* The coefficients of an arm. */
+enum arm {
+    INERTIA,  /* M [kg m^2] */
+    FORCING,  /* l mu: torque per acceleration and cosine [kg m] */
+    DAMPING,  /* l^2 c_p [N m s/rad] */
+    STIFFNESS /* l^2 k_p [N m/rad] */
+};
 
-/* What depends on the parameters only. */
-typedef struct arm {
-    float inertia;   /* M [kg m^2] */
-    float forcing;   /* torque per cosine by base acceleration and gravity [N m] */
-    float damping;   /* l^2 c_p */
-    float stiffness; /* l^2 k_p */
-} arm_t;
-
-static inline float middle_of(const model_step_t *step, const float x[MODEL_STATES])
+static void prepare(const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_arm_t *arm)
 {
-    return step->origin + x[0] + (0.5f * step->period * x[1]);
+    arm->coefficient[INERTIA] = constants->inertia + (constants->length_squared * p[0]);
+    arm->coefficient[FORCING] = constants->length * (constants->mass_moment + p[0]);
+    arm->coefficient[DAMPING] = constants->length_squared * p[1];
+    arm->coefficient[STIFFNESS] = constants->length_squared * p[2];
 }
 
-static inline geometry_t geometry_at(
-    const model_constants_t *constants, const model_step_t *step, float middle, const sine_cosine_t *sc)
+/* What the points of a step share. */
+typedef struct shared {
+    float period;
+    float half;         /* of the period */
+    float acceleration; /* of the base, and gravity unless preload trim has it cancel [m/s^2] */
+    float rest_sine;    /* of the angle at which the arm's spring rests */
+    float damping;      /* the lever's own */
+} shared_t;
+
+/* Change of theta_dot at a point: angle by sine and cosine, torque of lever spring and motor there. */
+static inline float change_at(
+    const shared_t *shared, const model_arm_t *arm, float sine, float cosine, float torque, float theta_dot)
 {
-    const float rest_sine = constants->trim ? step->trim_sine : constants->arm_preload_sine;
-    const float rest_angle = constants->trim ? step->trim : constants->lever_preload_angle;
-    geometry_t geometry;
-    geometry.cosine = sc->cosine;
-    geometry.cosine_squared = sc->cosine * sc->cosine;
-    geometry.arm_stretch = (sc->sine - rest_sine) * sc->cosine;
-    geometry.torque = step->tau_m - (constants->stiffness * (middle - rest_angle));
-    return geometry;
+    const float *of = arm->coefficient;
+    const float damping = (of[DAMPING] * (cosine * cosine)) + shared->damping;
+    const float arm_force = (of[FORCING] * shared->acceleration) + (of[STIFFNESS] * (sine - shared->rest_sine));
+    const float force = (torque - (cosine * arm_force)) - (damping * theta_dot);
+    return (shared->period * force) / (of[INERTIA] + (shared->half * damping));
 }
 
-static inline arm_t arm_of(
-    const model_constants_t *constants, const model_step_t *step, const float p[MODEL_PARAMETERS])
+static void respond(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
+    model_response_t *response)
 {
-    const float acceleration = constants->trim ? step->z_ddot : (step->z_ddot + GRAVITY);
-    arm_t arm;
-    arm.inertia = constants->inertia + (constants->length_squared * p[0]);
-    arm.forcing = constants->length * (constants->mass_moment + p[0]) * acceleration;
-    arm.damping = constants->length_squared * p[1];
-    arm.stiffness = constants->length_squared * p[2];
-    return arm;
-}
-
-static inline void advance(const model_constants_t *constants, const model_step_t *step, const geometry_t *geometry,
-    const arm_t *arm, float theta_dot, float increment[MODEL_STATES])
-{
-    const float damping = (arm->damping * geometry->cosine_squared) + constants->damping;
-    const float force = geometry->torque - (arm->forcing * geometry->cosine) - (arm->stiffness * geometry->arm_stretch);
-    const float impulse = step->period * (force - (damping * theta_dot));
-    const float change = impulse / (arm->inertia + (0.5f * step->period * damping));
-    increment[0] = step->period * (theta_dot + (0.5f * change));
-    increment[1] = change;
-}
-
-static void propagate(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
-    float increment[MODEL_POINTS][MODEL_STATES])
-{
-    const float mean_middle = middle_of(step, points->x[0]);
-    const sine_cosine_t mean_sc = sine_cosine(mean_middle);
-    const arm_t mean_arm = arm_of(constants, step, points->p[0]);
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_POINTS; i++) {
-        const float middle = middle_of(step, points->x[i]);
-        const sine_cosine_t sc = sine_cosine_near(&mean_sc, middle - mean_middle);
-        const geometry_t geometry = geometry_at(constants, step, middle, &sc);
-        const arm_t arm = (i < (uint32_t)MODEL_PARAMETER_POINTS) ? arm_of(constants, step, points->p[i]) : mean_arm;
-        advance(constants, step, &geometry, &arm, points->x[i][1], increment[i]);
+    const shared_t shared = {.period = step->period,
+        .half = 0.5f * step->period,
+        .acceleration = constants->trim ? step->z_ddot : (step->z_ddot + GRAVITY),
+        .rest_sine = constants->trim ? step->trim_sine : constants->arm_preload_sine,
+        .damping = constants->damping};
+    const float rest = constants->trim ? step->trim : constants->lever_preload_angle;
+    const float theta_dot = points->x[1];
+    const float middle = step->origin + (points->x[0] + (shared.half * theta_dot));
+    const sine_cosine_t at = sine_cosine(middle);
+    const float torque = step->tau_m - (constants->stiffness * (middle - rest));
+    response->mean = change_at(&shared, &points->arm[0], at.sine, at.cosine, torque, theta_dot);
+    for (uint32_t j = 0u; j < (uint32_t)MODEL_PAIRS; j++) {
+        const bool moves_arm = (j < (uint32_t)MODEL_PARAMETERS);
+        const model_arm_t *plus_arm = &points->arm[moves_arm ? (1u + (2u * j)) : 0u];
+        const model_arm_t *minus_arm = &points->arm[moves_arm ? (2u + (2u * j)) : 0u];
+        const float rate = points->offset[j][1];
+        const float angle = points->offset[j][0] + (shared.half * rate);
+        const sine_cosine_t by = sine_cosine_small(angle);
+        const float sine = at.sine * by.cosine; /* addition theorem: the parts that + and - share, and the others */
+        const float cosine = at.cosine * by.cosine;
+        const float more_sine = at.cosine * by.sine;
+        const float less_cosine = at.sine * by.sine;
+        const float less_torque = constants->stiffness * angle;
+        const float plus = change_at(
+            &shared, plus_arm, sine + more_sine, cosine - less_cosine, torque - less_torque, theta_dot + rate);
+        const float minus = change_at(
+            &shared, minus_arm, sine - more_sine, cosine + less_cosine, torque + less_torque, theta_dot - rate);
+        model_response_pair(response, j, plus, minus);
     }
 }
 
-/* K = d/dtheta of the restoring torque and D at the trim; omega = sqrt(K/M), zeta = D / (2 sqrt(K M)). A trim at which
- * the lever would fall (K <= 0) has frequency 0 and damping ratio 0. */
-static model_dynamics_t dynamics(
-    const model_constants_t *constants, const model_step_t *step, const float p[MODEL_PARAMETERS])
+/* K = d/dtheta of the restoring torque and D at the trim; omega = sqrt(K/M), zeta = D / (2 M omega). A trim at which the
+ * lever would fall (K <= 0) has frequency 0 and damping ratio 0. */
+static model_dynamics_t dynamics(const model_constants_t *constants, const model_step_t *step, const model_arm_t *arm)
 {
-    const sine_cosine_t sc = sine_cosine(step->trim);
-    const float arm_stiffness = constants->length_squared * p[2];
-    const float weight = GRAVITY * constants->length * (constants->mass_moment + p[0]);
+    const float *of = arm->coefficient;
+    const float squared = step->trim_cosine * step->trim_cosine;
+    const float weight = GRAVITY * of[FORCING];
     const float geometric =
-        constants->trim ? 0.0f : ((arm_stiffness * (constants->arm_preload_sine - sc.sine)) - weight);
-    const float stiffness = (arm_stiffness * sc.cosine * sc.cosine) + (geometric * sc.sine) + constants->stiffness;
-    const float damping = (constants->length_squared * p[1] * sc.cosine * sc.cosine) + constants->damping;
-    const float inertia = constants->inertia + (constants->length_squared * p[0]);
+        constants->trim ? 0.0f : ((of[STIFFNESS] * (constants->arm_preload_sine - step->trim_sine)) - weight);
+    const float stiffness = (of[STIFFNESS] * squared) + (geometric * step->trim_sine) + constants->stiffness;
+    const float damping = (of[DAMPING] * squared) + constants->damping;
     model_dynamics_t result = {0.0f, 0.0f};
     if (stiffness > 0.0f) {
-        result.natural_frequency = sqrtf(stiffness / inertia) * MODEL_INVERSE_TURN;
-        result.damping_ratio = damping / (2.0f * sqrtf(stiffness * inertia));
+        const float omega = sqrtf(stiffness / of[INERTIA]);
+        result.natural_frequency = omega * MODEL_INVERSE_TURN;
+        result.damping_ratio = damping / (2.0f * (of[INERTIA] * omega));
     }
     return result;
 }
@@ -118,6 +117,7 @@ const model_t model_lever = {
     .name = "lever",
     .parameter = {{"m_p", "kg", 0.3f, 10.0f}, {"c_p", "N s/m", 2.0f, 400.0f}, {"k_p", "N/m", 50.0f, 6500.0f}},
     .positive = true,
-    .propagate = propagate,
+    .prepare = prepare,
+    .respond = respond,
     .dynamics = dynamics,
 };

@@ -8,33 +8,20 @@
 #include "model/linear.h"
 #include "model/model.h"
 
-static linear_t system_of(const model_step_t *step, const float p[MODEL_PARAMETERS])
-{
-    linear_t system;
-    system.stiffness = -p[0];
-    system.damping = -p[1];
-    system.drive = p[2] * step->z_ddot;
-    return system;
-}
-
-static void propagate(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
-    float increment[MODEL_POINTS][MODEL_STATES])
-{
-    linear_propagate(system_of, constants, step, points, increment);
-}
-
-static model_dynamics_t dynamics(
-    const model_constants_t *constants, const model_step_t *step, const float p[MODEL_PARAMETERS])
+static void prepare(const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_arm_t *arm)
 {
     (void)constants;
-    (void)step;
-    return linear_dynamics(-p[0], -p[1]);
+    arm->coefficient[LINEAR_STIFFNESS] = -p[0];
+    arm->coefficient[LINEAR_DAMPING] = -p[1];
+    arm->coefficient[LINEAR_BASE] = p[2];
+    arm->coefficient[LINEAR_TORQUE] = 0.0f;
 }
 
 const model_t model_linear_black_box = {
     .name = "linear_black_box",
     .parameter = {{"a21", "1/s^2", -3200.0f, 3200.0f}, {"a22", "1/s", -320.0f, 320.0f}, {"b21", "1", -32.0f, 32.0f}},
     .positive = false,
-    .propagate = propagate,
-    .dynamics = dynamics,
+    .prepare = prepare,
+    .respond = linear_respond,
+    .dynamics = linear_dynamics,
 };

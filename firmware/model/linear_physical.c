@@ -9,34 +9,21 @@
 #include "model/linear.h"
 #include "model/model.h"
 
-static linear_t system_of(const model_step_t *step, const float p[MODEL_PARAMETERS])
+static void prepare(const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_arm_t *arm)
 {
     const float inverse = 1.0f / p[0];
-    linear_t system;
-    system.stiffness = p[2] * inverse;
-    system.damping = p[1] * inverse;
-    system.drive = step->z_ddot + (step->tau_m * inverse);
-    return system;
-}
-
-static void propagate(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
-    float increment[MODEL_POINTS][MODEL_STATES])
-{
-    linear_propagate(system_of, constants, step, points, increment);
-}
-
-static model_dynamics_t dynamics(
-    const model_constants_t *constants, const model_step_t *step, const float p[MODEL_PARAMETERS])
-{
     (void)constants;
-    (void)step;
-    return linear_dynamics(p[2] / p[0], p[1] / p[0]);
+    arm->coefficient[LINEAR_STIFFNESS] = p[2] * inverse;
+    arm->coefficient[LINEAR_DAMPING] = p[1] * inverse;
+    arm->coefficient[LINEAR_BASE] = 1.0f;
+    arm->coefficient[LINEAR_TORQUE] = inverse;
 }
 
 const model_t model_linear_physical = {
     .name = "linear_physical",
     .parameter = {{"m", "kg", 0.05f, 60.0f}, {"c", "N s/m", 0.1f, 600.0f}, {"k", "N/m", 1.0f, 6500.0f}},
     .positive = true,
-    .propagate = propagate,
-    .dynamics = dynamics,
+    .prepare = prepare,
+    .respond = linear_respond,
+    .dynamics = linear_dynamics,
 };

@@ -106,7 +106,10 @@ uint32_t innovation_samples(const lever_frame_t *frames, uint32_t count, lever_s
             (void)link_step(&link, &estimator);
         }
     }
-    *config = estimator.config;
+    config->model = estimator.setup.model; /* as COMMAND frames have left them */
+    config->preload = estimator.setup.preload;
+    config->estimator = estimator.setup.estimator;
+    config->adaptation = estimator.setup.adaptation;
     estimator_health(&estimator, health);
     return taken;
 }

@@ -9,7 +9,9 @@ of A. Nelson ("Nonlinear estimation and modeling of noisy time series by dual Ka
               differences of the latter, too) and, by first differences, T⁻
     update    ν = y - H x̂⁻;  S_e = tria[H S⁻, S_n];  K = S⁻ S⁻ᵀ Hᵀ (S_e S_eᵀ)⁻¹;  x̂ = x̂⁻ + K ν;  V = (I - K H) V⁻;
               information J += (H V⁻)ᵀ (S_e S_eᵀ)⁻¹ H V⁻,  score s += (H V⁻)ᵀ (S_e S_eᵀ)⁻¹ ν
-    learn     P_w = (P_w⁻¹ + c J)⁻¹;  ŵ += c P_w s;  x̂ += c V P_w s, where c <= 1 is how far J and s are trusted
+    hold      J and s are put aside, to be learnt later; gathering begins anew
+    learn     of what was put aside: P_w = (P_w⁻¹ + c J)⁻¹;  ŵ += c P_w s;  x̂ += c V P_w s, where c <= 1 is how far J
+              and s are trusted. What has been gathered since was about the old ŵ: its s becomes s - J c P_w s
     walk      P_w⁻ = (1 + growth) P_w + Q;  the covariance of x and w, V P_w, stays. What that takes from the state's
               own uncertainty, V P_w Vᵀ - V⁻ P_w⁻ V⁻ᵀ, a joint filter gives to S and a dual one forgets.
 
@@ -69,16 +71,20 @@ class Belief(ABC):
         """Takes the valid ones of two outputs with noise factor (2, 2). Returns the normalised innovation squared."""
 
     @abstractmethod
-    def learn(self, trust: float = 1.0) -> Array:
-        """The parameters learn what was gathered, which counts by `trust`; returns the change of w (3,)."""
-
-    @property
-    def informed(self) -> bool:
-        """Whether something was gathered."""
-        return True
+    def hold(self) -> bool:
+        """Puts aside what was gathered; whether there was something."""
 
     @abstractmethod
-    def walk(self, variance: Array, growth: float, most: Array) -> None:
+    def learn(self, trust: float = 1.0) -> Array:
+        """The parameters learn what was put aside, which counts by `trust`; returns the change of w (3,)."""
+
+    @abstractmethod
+    def free(self, trust: float, variance: Array, growth: float) -> None:
+        """What a walk after learning will take from what the parameters explain of the state, a joint filter adds to
+        the state's own uncertainty already now: walk() is then told that it is `freed`."""
+
+    @abstractmethod
+    def walk(self, variance: Array, growth: float, most: Array, freed: bool = False) -> None:
         """Parameters walk with the variance (3,) and forget; no standard deviation gets greater than `most` (3,)."""
 
     @abstractmethod
@@ -97,6 +103,7 @@ class Parts(Belief):
         self.x_factor = x_factor
         self.v: Array = np.zeros((len(x), len(w_factor)))  # dx/dw
         self._drop_gathered()
+        self.hold()
 
     @property
     def w(self) -> Array:
@@ -150,27 +157,42 @@ class Parts(Belief):
         moved = output @ self._w_factor
         return float(innovation @ np.linalg.solve(given + moved @ moved.T, innovation))
 
-    @property
-    def informed(self) -> bool:
-        return bool(self.information.any())
+    def hold(self) -> bool:
+        self.held_information, self.held_score = self.information, self.score
+        self._drop_gathered()
+        return bool(self.held_information.any())
+
+    def _learnt(self, trust: float) -> Array:
+        """Covariance of w when what was put aside is learnt."""
+        prior = np.linalg.inv(self._w_factor @ self._w_factor.T)
+        learnt: Array = np.linalg.inv(prior + trust * self.held_information)
+        return learnt
 
     def learn(self, trust: float = 1.0) -> Array:
-        prior = np.linalg.inv(self._w_factor @ self._w_factor.T)
-        covariance = np.linalg.inv(prior + trust * self.information)
-        correction: Array = trust * covariance @ self.score
+        covariance = self._learnt(trust)
+        correction: Array = trust * covariance @ self.held_score
         self._w_factor = np.linalg.cholesky(covariance)
         self._w = self._w + correction
         self._x = self._x + self.v @ correction
-        self._drop_gathered()
+        self.score = self.score - self.information @ correction
         return correction
 
-    def walk(self, variance: Array, growth: float, most: Array) -> None:
+    def _free(self, before: Array, grown: Array) -> None:
+        if self.joint:
+            own = self.x_factor @ self.x_factor.T
+            explained = before - before @ np.linalg.inv(grown) @ before
+            self.x_factor = np.linalg.cholesky(own + self.v @ explained @ self.v.T)
+
+    def free(self, trust: float, variance: Array, growth: float) -> None:
+        learnt = self._learnt(trust)
+        self._free(learnt, (1.0 + growth) * learnt + np.diag(variance))
+
+    def walk(self, variance: Array, growth: float, most: Array, freed: bool = False) -> None:
         before = self._w_factor @ self._w_factor.T
         grown = (1.0 + growth) * before + np.diag(variance)
         v = self.v @ before @ np.linalg.inv(grown)
-        if self.joint:
-            own = self.x_factor @ self.x_factor.T
-            self.x_factor = np.linalg.cholesky(own + self.v @ before @ self.v.T - v @ grown @ v.T)
+        if not freed:
+            self._free(before, grown)
         factor = np.linalg.cholesky(grown)
         shrink = np.minimum(most / cdkf.deviations(factor), 1.0)
         self._w_factor = factor * shrink[:, np.newaxis]
@@ -238,12 +260,18 @@ class Whole(Belief):
         self.z, self.factor = cdkf.update(self.z, self.factor, expected, gain, innovation)
         return nis
 
+    def hold(self) -> bool:
+        return True
+
     def learn(self, trust: float = 1.0) -> Array:
         """Everything was learnt sample by sample, and fully: `trust` comes too late."""
         correction, self.correction = self.correction, np.zeros(self.parameters)
         return correction
 
-    def walk(self, variance: Array, growth: float, most: Array) -> None:
+    def free(self, trust: float, variance: Array, growth: float) -> None:
+        """It is all one: nothing is explained by one part for another."""
+
+    def walk(self, variance: Array, growth: float, most: Array, freed: bool = False) -> None:
         n = self.parameters
         noise = np.zeros((len(self.z), 2 * n))
         noise[:n, :n] = np.diag(np.sqrt(variance))

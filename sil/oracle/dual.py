@@ -1,7 +1,8 @@
 """The estimator as the firmware runs it: a belief (belief.py), when it learns and walks, trim, gaps, alignment.
 
 In preload trim all signals are deviations from their levels (detrend), so x is, too; in preload fixed they are as they
-come. Parameters learn, and then walk, once every learn_period; how they walk is set by the adaptation. Detection of
+come. Parameters learn, and then walk, once every learn_period; how they walk is set by the adaptation. The firmware
+spreads the work of that over the next samples, so what was gathered takes effect a few samples late. Detection of
 changes and estimation of noise are not repeated here: compare with the settings change_threshold and noise_window at 0.
 """
 
@@ -24,6 +25,7 @@ ADAPTATIONS = ("fixed", "annealing", "robbins_monro", "forgetting")
 ESTIMATORS = ("dual", "joint", "whole")
 OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 16  # predictions through a gap
+STEPS, WALK, ADOPT = 10, 4, 7  # of a revision of the parameters; those (from 0) in which w has walked, and takes effect
 UNBOUNDED = np.array([[-math.inf, math.inf]] * 3)
 
 Model = Lever | LinearPhysical | LinearBlackBox
@@ -93,6 +95,10 @@ class DualFilter:
         self.growth = self._growth(excited=True)  # [1/s]
         self.unlearnt = 0.0  # time since the parameters learnt last [s]
         self.trust = 0.0  # part of the information that counts
+        self.pace = _pace(settings)
+        self.waiting: tuple[float, bool, bool] | None = None  # revision under way: period, taught, excited
+        self.samples_left = 0  # until it takes effect
+        self.freed = False  # what its walk frees is the state's already
         self.excitation_square = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], presumed until measured
         self.nis = 0.0
         self.missing = [0.0, 0.0]  # time since the last sample of θ, of θ̇ [s]
@@ -188,19 +194,35 @@ class DualFilter:
     def _learn_when_due(self, duration: float, taught: bool, excited: bool) -> None:
         """Once every learn_period; a sample that is half a sample_period early is on time."""
         self.unlearnt += duration
-        if self.unlearnt <= self.settings["learn_period"] - 0.5 * self.settings["sample_period"]:
+        self.samples_left -= 1
+        if self.unlearnt > self.settings["learn_period"] - 0.5 * self.settings["sample_period"]:
+            self._learn()
+            caution = self.settings["caution_time"]
+            if self.belief.hold():  # far from the truth the sensitivities are wrong, and would be overrated
+                self.trust = min(self.trust + (self.unlearnt / caution if caution > self.unlearnt else 1.0), 1.0)
+            self.waiting = (self.unlearnt, taught, excited)
+            self.samples_left = ADOPT // self.pace
+            self.unlearnt = 0.0
+        if self.waiting is not None and self.samples_left == ADOPT // self.pace - WALK // self.pace:
+            self.belief.free(self.trust, self.walk * self.waiting[0], self.growth * self.waiting[0])
+            self.freed = True
+        if self.samples_left <= 0:
+            self._learn()
+
+    def _learn(self) -> None:
+        """What was put aside takes effect, with the walk of its time."""
+        if self.waiting is None:
             return
-        caution = self.settings["caution_time"]
-        if self.belief.informed:  # far from the truth the sensitivities are wrong, and information would be overrated
-            self.trust = min(self.trust + (self.unlearnt / caution if caution > self.unlearnt else 1.0), 1.0)
+        period, taught, excited = self.waiting
+        self.waiting = None
         correction = self.belief.learn(self.trust)
         self.belief.bound(self.bounds[:, 0], self.bounds[:, 1])
-        self.belief.walk(self.walk * self.unlearnt, self.growth * self.unlearnt, self.cap)
+        self.belief.walk(self.walk * period, self.growth * period, self.cap, self.freed)
+        self.freed = False
         if taught:
-            self._adapt_walk(correction, self.unlearnt, excited)
+            self._adapt_walk(correction, period, excited)
         else:
             self.growth = 0.0  # what cannot be learnt again is not forgotten
-        self.unlearnt = 0.0
 
     def _growth(self, excited: bool) -> float:
         """Forgetting: the covariance grows by 1/λ = 1 + growth dt."""
@@ -244,6 +266,12 @@ class DualFilter:
         values = self.model.dynamics(points, self.trim)
         _, first, second = cdkf.differences(values)
         return values[:, 0], cdkf.deviations(np.concatenate((first, second), axis=1))
+
+
+def _pace(settings: Mapping[str, float]) -> int:
+    """Steps a sample, so that all are done in a learn_period."""
+    samples = max(1, math.floor(settings["learn_period"] / settings["sample_period"] + 0.5))
+    return math.ceil(STEPS / samples)
 
 
 # --- a whole run -----------------------------------------------------------------------------------------------------

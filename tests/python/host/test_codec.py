@@ -254,12 +254,13 @@ def test_decoding_what_the_firmware_says(model: int) -> None:
         for index, name in enumerate(MODELS[model]) if "PILOT_PARAMETERS" in said else ():
             step = 0.501 * float(MESSAGES["PILOT_PARAMETERS"].get_signal_by_name(name).scale)
             assert said["PILOT_PARAMETERS"][name] == pytest.approx(estimate.parameter[index], abs=step)
+        for index, name in enumerate(MODELS[model]) if "PILOT_SIGMA" in said else ():
             sigma = MESSAGES["PILOT_SIGMA"].get_signal_by_name(f"{name}_sigma")
             expected = min(estimate.parameter_sigma[index], sigma.maximum or 0.0)
             assert said["PILOT_SIGMA"][f"{name}_sigma"] == pytest.approx(expected, abs=0.501 * float(sigma.scale))
         if "HEALTH" in said:
             assert native.enum_names("lever_mode")[int(said["HEALTH"]["mode"])] == health.mode
-    assert {"STATE_ESTIMATE", "PILOT_PARAMETERS", "HEALTH"} <= seen
+    assert {"STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "HEALTH"} <= seen
 
 
 def test_decoding_refuses() -> None:

@@ -171,13 +171,15 @@ def test_other_settings_give_other_estimates_and_are_compared(session: Session, 
     columns = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     for key, unit in (("k_p", "_N_m"), ("m_p", "_kg"), ("natural_frequency", "_Hz"), ("damping_ratio", "")):
         difference = columns[f"{key}_estimate{unit}"] - columns[f"{key}_recorded{unit}"]
+        said = ~np.isnan(difference)  # from the first message on
+        difference = difference[said]
         signal = told["signals"][key]
-        assert signal["samples"] == len(rows)
+        assert signal["samples"] == len(difference) > len(rows) - 20
         assert signal["identical_samples"] == int(np.sum(difference == 0.0)) < len(rows)
         assert signal["rms"] == pytest.approx(math.sqrt(np.mean(difference**2)), rel=1e-6)
         assert signal["bias"] == pytest.approx(np.mean(difference), rel=1e-6, abs=1e-12)
         assert abs(signal["largest"]) == pytest.approx(np.max(np.abs(difference)), abs=1e-9)
-        in_sigma = difference / columns[f"{key}_sigma{unit}"]
+        in_sigma = difference / columns[f"{key}_sigma{unit}"][said]
         assert signal["rms_in_sigma"] == pytest.approx(math.sqrt(np.mean(in_sigma**2)), rel=1e-6)
     assert "Against the estimates that were recorded with the log" in summary["verdict"]
 
@@ -247,7 +249,7 @@ def test_a_long_log_is_reduced_for_the_page_and_nowhere_else(
     assert list(short) == list(whole)
     assert len(json.dumps(short["figure-motion"])) < 0.6 * len(json.dumps(whole["figure-motion"]))
     assert short["figure-detail"] == whole["figure-detail"]
-    assert short["figure-spectra"] == whole["figure-spectra"]
+    assert short["figure-spectra"]["data"] == whole["figure-spectra"]["data"]
 
 
 def test_the_page_has_all_but_truth(replay: tuple[Path, Summary]) -> None:

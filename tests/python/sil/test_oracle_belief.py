@@ -88,6 +88,7 @@ def test_with_a_walk_and_forgetting_it_is_the_kalman_filter(form: str, block: in
     for _ in range(600 // block):
         for _ in range(block):
             linear.sample(missing=0.3)
+        linear.belief.hold()
         linear.belief.learn()
         linear.walk(1e-5 * block * np.array([1.0, 2.0, 3.0]), growth=1e-3 * block)
         linear.assert_equal()
@@ -99,8 +100,24 @@ def test_with_constant_parameters_the_dual_filter_is_the_kalman_filter(block: in
     for _ in range(600 // block):
         for _ in range(block):
             linear.sample(missing=0.3)
+        linear.belief.hold()
         linear.belief.learn()
         linear.assert_equal()
+
+
+@pytest.mark.parametrize("form", ["dual", "joint"])
+def test_what_is_put_aside_and_learnt_late_is_learnt_in_full(form: str) -> None:
+    linear = Linear(form)
+    for _ in range(100):
+        for _ in range(6):
+            linear.sample(missing=0.3)
+        linear.belief.hold()
+        for _ in range(4):
+            linear.sample(missing=0.3)
+        linear.belief.learn()
+    linear.belief.hold()
+    linear.belief.learn()
+    linear.assert_equal()
 
 
 def test_a_walk_makes_the_dual_filter_surer_of_the_state_and_of_nothing_else() -> None:
@@ -108,6 +125,7 @@ def test_a_walk_makes_the_dual_filter_surer_of_the_state_and_of_nothing_else() -
     linear = Linear("dual")
     for _ in range(200):
         linear.sample()
+    linear.belief.hold()
     linear.belief.learn()
     linear.walk(np.array([0.01, 0.02, 0.03]), growth=0.5)
     grown, cross = linear.reference.P[:3, :3], linear.reference.P[3:, :3]
@@ -160,6 +178,7 @@ def test_joint_in_parts_and_in_one_piece_are_one_filter() -> None:
             one.predict(curved(index), PROCESS)
             if valid.any():
                 one.update(y, valid, OUTPUT, learn=index % 7 > 1)
+            one.hold()
             one.learn()
             one.walk(np.array([1e-5, 2e-5, 3e-3]), 1e-3, most)
             if index == 150:
@@ -176,6 +195,7 @@ def test_normalised_innovations_are_those_of_the_joint_belief() -> None:
         for one in (parts, whole):
             one.predict(curved(index), PROCESS)
             nis.append(one.update(np.array([0.1, 0.02]), BOTH, OUTPUT, learn=True))
+            one.hold()
             one.learn()
         assert nis[0] == pytest.approx(nis[1], rel=1e-9)
 

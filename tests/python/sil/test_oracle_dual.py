@@ -179,10 +179,10 @@ def test_annealing_falls_exponentially_to_the_floor() -> None:
     settings = SETTINGS | {"annealing_time": 0.5, "excitation_least": 0.0, "walk_ceiling": 10.0}
     dual = DualFilter(settings, start_of(samples), "fixed", adaptation="annealing")
     np.testing.assert_allclose(dual.walk, dual.ceiling)
-    feed(dual, samples, 1, 501)
+    feed(dual, samples, 1, 508)  # what is learnt takes effect seven samples later
     np.testing.assert_allclose(dual.walk, np.exp(-1.0) * dual.ceiling, rtol=1e-9)
     settings["annealing_time"] = 0.01
-    feed(dual, samples, 501, 1000)
+    feed(dual, samples, 508, 1000)
     np.testing.assert_array_equal(dual.walk, dual.floor)
 
 

@@ -32,12 +32,9 @@ static inline sine_cosine_t sine_cosine(double angle)
     return result;
 }
 
-static inline sine_cosine_t sine_cosine_near(const sine_cosine_t *known, double delta)
+static inline sine_cosine_t sine_cosine_small(double angle)
 {
-    const sine_cosine_t step = {sin(delta), cos(delta)};
-    const sine_cosine_t result = {(known->sine * step.cosine) + (known->cosine * step.sine),
-        (known->cosine * step.cosine) - (known->sine * step.sine)};
-    return result;
+    return sine_cosine(angle);
 }
 
 #define float double

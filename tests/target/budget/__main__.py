@@ -21,7 +21,7 @@ _EPILOG = """\
 examples:
   python tests/target/budget table
   python tests/target/budget table --check --firmware ../other/firmware --build /tmp/other
-  python tests/target/budget profile --estimator joint --learning with
+  python tests/target/budget profile --estimator joint --worst
   python tests/target/budget profile --form tick --window 6:7 --worst
 
 Exit status: 0; 1 when --check finds a limit that does not hold or a regression; 2 when it cannot be measured.
@@ -64,9 +64,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     profile.add_argument("--window", metavar="FROM:TO", default="2:3", help="time [s] (default: %(default)s)")
     profile.add_argument("--worst", action="store_true", help="only the most expensive step of the window")
-    profile.add_argument(
-        "--learning", choices=("with", "without"), help="only steps over 1.1 times the median, or only the others"
-    )
     profile.add_argument("--lines", type=int, default=40, metavar="N", help="source lines shown (default: %(default)s)")
     profile.set_defaults(run=hot_spots.run)
     return parser

@@ -68,7 +68,7 @@ def memory(values: Values) -> str:
         "flash: its constants, of which the texts of the settings are most": values["rodata_bytes"],
         "RAM: variables of the core": values["data_bytes"] + values["bss_bytes"],
         f"RAM: `lever_memory_t`, for each instance ({used:g} of them used)": room,
-        "stack: `lever_config_t` of who calls `lever_init()`": ffi.sizeof("lever_config_t"),
+        "flash or RAM: `lever_config_t`, which instances may share": ffi.sizeof("lever_config_t"),
     }
     stack = {name.removeprefix("stack."): bytes_ for name, bytes_ in values.items() if name.startswith("stack.")}
     for name in ("lever_on_frame", "lever_step", "lever_next_frame", "lever_update", "lever_estimate", "lever_init"):

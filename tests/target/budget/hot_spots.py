@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
     first, last = _window(args.window, len(recording.samples))
     elf = image.build(args.build, args.firmware, args.flags)
     traced = trace(elf, recording, args.model, args.estimator, args.form, first, last)
-    chosen = _choose(traced, args.worst, args.learning)
+    chosen = _choose(traced, args.worst)
     instructions, operations = traced.instructions[chosen], traced.operations[chosen]
     print(
         f"{args.estimator} {args.model} {args.form}: {len(chosen)} samples from {(first + chosen[0]) * 1e-3:.3f} s on, "
@@ -46,15 +46,9 @@ def _window(text: str, count: int) -> tuple[int, int]:
     return first, end - 1
 
 
-def _choose(traced: Trace, worst: bool, learning: str | None) -> list[int]:
-    """Indices of the samples that are looked at. Raises LeverError when there is none."""
-    instructions = traced.instructions
-    many = instructions > 1.1 * np.median(instructions)
-    wanted = np.full(len(instructions), True) if learning is None else many == (learning == "with")
-    chosen = [int(i) for i in np.flatnonzero(wanted)]
-    if not chosen:
-        raise LeverError("no sample of the window is of that kind")
-    return [max(chosen, key=lambda i: int(instructions[i]))] if worst else chosen
+def _choose(traced: Trace, worst: bool) -> list[int]:
+    """Indices of the samples that are looked at."""
+    return [int(np.argmax(traced.instructions))] if worst else list(range(len(traced.instructions)))
 
 
 @dataclass(frozen=True)

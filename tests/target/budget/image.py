@@ -93,9 +93,9 @@ def run_tool(name: str, *arguments: str | Path) -> str:
     return _run([tool(name), *(str(argument) for argument in arguments)], name, _TOOLCHAIN_PACKAGES)
 
 
-def core_library(elf: Path) -> Path:
-    """The static library of the core that was linked into the image."""
-    return elf.parent / "lever_cdkf/liblever_cdkf.a"
+def call_graph(elf: Path) -> Path:
+    """What the compiler says of the functions of the core as they are linked into the image."""
+    return elf.with_name(f"{elf.name}.ltrans0.ltrans.ci")
 
 
 def core_objects(elf: Path) -> dict[str, Path]:

@@ -139,7 +139,7 @@ def _calibration(runs: dict[Case, Run]) -> dict[str, float]:
 
 
 def _bytes(elf: Path) -> dict[str, Any]:
-    library, instance = sizes.of_library(elf), sizes.of_instance(elf)
+    library, instance = sizes.of_core(elf), sizes.of_instance(elf)
     return {
         "text_bytes": library["text"],
         "rodata_bytes": library["rodata"],

@@ -74,7 +74,7 @@ def tables(budget: dict[str, Any]) -> Tables:
         {"function": name, "stack [bytes]": entry["bytes"], "deepest chain": " > ".join(entry["chain"])}
         for name, entry in budget["stack"].items()
     ]
-    files = [{"file": file, **sections} for file, sections in budget["files"].items()]
+    files = [{"file": file, "text": size} for file, size in budget["files"].items()]
     return {
         "How it was measured": measured,
         "Instructions a sample": _instructions(budget),

@@ -5,29 +5,26 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from .image import core_library, core_objects, run_tool
+from .image import core_objects, run_tool
+from .stack import of_image
 
 _SECTION = re.compile(r"^\.(text|rodata|data|bss)(?:\.\S*)?\s+(\d+)\s", re.MULTILINE)
 _TYPE = r"DW_TAG_{kind}_type\)\s+<\w+>\s+DW_AT_name\s+:[^\n]*\b{name}\s+<\w+>\s+DW_AT_byte_size\s+: (\d+)"
 
 
-def of_library(elf: Path) -> dict[str, int]:
-    """Bytes of text, rodata, data and bss in the core's static library, whether a program needs all of it or not."""
+def of_core(elf: Path) -> dict[str, int]:
+    """Bytes of text, rodata, data and bss of the core: of text what is linked into the image, which has all of the
+    façade; of the others what is in the library."""
     total = dict.fromkeys(("text", "rodata", "data", "bss"), 0)
-    for kind, count in _SECTION.findall(run_tool("size", "-A", core_library(elf))):
-        total[kind] += int(count)
-    return total
-
-
-def of_files(elf: Path) -> dict[str, dict[str, int]]:
-    """Bytes of text and rodata by source file ("filter/dual.c")."""
-    found = {}
-    for name, path in core_objects(elf).items():
-        found[name] = dict.fromkeys(("text", "rodata"), 0)
+    for path in core_objects(elf).values():
         for kind, count in _SECTION.findall(run_tool("size", "-A", path)):
-            if kind in found[name]:
-                found[name][kind] += int(count)
-    return found
+            total[kind] += int(count)
+    return total | {"text": sum(of_files(elf).values())}
+
+
+def of_files(elf: Path) -> dict[str, int]:
+    """Bytes of text by source file ("filter/dual.c"), as far as its functions have not been taken into others."""
+    return of_image(elf).text_by_file()
 
 
 def of_instance(elf: Path) -> dict[str, int]:

@@ -1,9 +1,10 @@
-"""The most stack that a call of the façade can take, from the compiler's call graph (gcc -fcallgraph-info=su).
+"""The most stack that a call of the façade can take, from the compiler's call graph (gcc -fcallgraph-info=su) of the
+program as it is linked: a function may have been taken into its caller, from another file, too.
 
 What the graph leaves open is resolved so:
-- A call through a pointer may reach every function whose address stands in a constant table of the caller's own file,
-  or of a folder below the caller's (firmware/README.md: who includes whom): from filter/ the models' functions, from
-  app/link.c its encoders too.
+- A call through a pointer may reach every function whose address stands in a constant table of the file that the call
+  is written in, or of a folder below it (firmware/README.md: who includes whom): from filter/ the models' functions,
+  from app/link.c its encoders too.
 - A function of the C library takes all that its instructions push, whatever path they take.
 A graph with a circle, a frame without a bound, or a call that cannot be resolved is refused.
 """
@@ -17,16 +18,17 @@ from pathlib import Path
 
 from lever_cdkf.host_tools.errors import LeverError
 
-from .image import core_objects, run_tool
+from .image import call_graph, core_objects, run_tool
 
 FOLDERS = ("math", "model", "can", "filter", "app")
 """From the bottom up; nothing calls upwards but through a pointer that it was given."""
 
 _INDIRECT = "__indirect_call"
-_NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n(\d+) bytes \((\w+)[^)]*\)')
-_EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+_NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"\\]*\\n([^"\\]*?):\d+:\d+\\n(\d+) bytes \((\w+)[^)]*\)')
+_EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"(?: label: "([^"]*?):\d+:\d+")?')
 _TABLE = re.compile(r"RELOCATION RECORDS FOR \[\.(?:rodata|data)[^\]]*\]:\n(?:OFFSET.*\n)?((?:[0-9a-f]{8} .*\n)*)")
 _ENTRY = re.compile(r"^[0-9a-f]{8} R_ARM_ABS32\s+(\w+)$", re.MULTILINE)
+_SYMBOL = re.compile(r"^\w+ (\w+) [tTwW] (\S+)$", re.MULTILINE)
 _PUSH = re.compile(
     r"\t(?:push|stmdb\s+sp!,|v?push(?:\.w)?)\s*\{([^}]*)\}|\tsub(?:\.w|w)?\s+sp, (?:sp, )?#(\d+)|\[sp, #-(\d+)\]!"
 )
@@ -37,6 +39,8 @@ class _Function:
     file: str
     frame: int
     calls: set[str] = field(default_factory=set)
+    points: set[str] = field(default_factory=set)
+    """Files that its calls through a pointer are written in."""
 
 
 @dataclass(frozen=True)
@@ -50,34 +54,45 @@ class Deepest:
 class CallGraph:
     """The functions of the core; a name is "filter/dual.c:is_joint" when static, else as the linker sees it."""
 
-    def __init__(self, objects: Mapping[str, Path], elf: Path) -> None:
-        """`objects`: the object file of each source file, with its .ci beside it; `elf`: what they are linked into."""
+    def __init__(self, objects: Mapping[str, Path], elf: Path, graph: Path) -> None:
+        """`objects`: the object file of each source file; `elf`: what they are linked into; `graph`: its .ci."""
         self._elf = elf
         self._functions: dict[str, _Function] = {}
-        self._tables: dict[str, set[str]] = {}
         self._known: dict[str, Deepest] = {}
-        for file, path in objects.items():
-            self._read(file, path)
+        self._read(graph.read_text(encoding="utf-8"))
+        self._tables = {file: self._table(file, path) for file, path in objects.items()}
 
-    def _read(self, file: str, path: Path) -> None:
-        """Functions, frames and calls of one source file, and the functions in its constant tables."""
-        text = path.with_suffix(".ci").read_text(encoding="utf-8")
-        names = {title: f"{file}:{title.rpartition(':')[2]}" if ":" in title else title for title in self._titles(text)}
-        for title, frame, kind in _NODE.findall(text):
+    def _read(self, text: str) -> None:
+        """Functions, frames and calls."""
+        names: dict[str, str] = {}
+        for title, path, frame, kind in _NODE.findall(text):
+            file = "/".join(path.split("/")[-2:])
+            names[title] = f"{file}:{title.rpartition(':')[2]}" if ":" in title else title
             if kind != "static":
                 raise LeverError(f"{names[title]}: its stack frame has no bound ({kind})")
             self._functions[names[title]] = _Function(file, int(frame))
-        for source, target in _EDGE.findall(text):
-            self._functions[names[source]].calls.add(names[target])
+        for source, target, path in _EDGE.findall(text):
+            function = self._functions[names[source]]
+            if target == _INDIRECT:
+                function.points.add("/".join(path.split("/")[-2:]))
+            else:
+                function.calls.add(names.get(target, target))
+
+    def _table(self, file: str, path: Path) -> set[str]:
+        """The functions in the constant tables of a source file."""
         entries = {
             entry for table in _TABLE.findall(run_tool("objdump", "-r", path)) for entry in _ENTRY.findall(table)
         }
-        local = {name.rpartition(":")[2]: name for name, function in self._functions.items() if function.file == file}
-        self._tables[file] = {local[entry] for entry in entries if entry in local}
+        own = (name for name, function in self._functions.items() if function.file == file)
+        return {name for name in own if name.rpartition(":")[2].partition(".")[0] in entries}
 
-    @staticmethod
-    def _titles(text: str) -> set[str]:
-        return {title for edge in _EDGE.findall(text) for title in edge} | {node[0] for node in _NODE.findall(text)}
+    def text_by_file(self) -> dict[str, int]:
+        """Bytes of code in the image, by the source file of the function that it stands in."""
+        sizes = {name: size for size, name in _SYMBOL.findall(run_tool("nm", "--print-size", self._elf))}
+        found: dict[str, int] = {}
+        for name, function in self._functions.items():
+            found[function.file] = found.get(function.file, 0) + int(sizes.get(name.rpartition(":")[2], "0"), 16)
+        return found
 
     def deepest(self, name: str, above: tuple[str, ...] = ()) -> Deepest:
         """The deepest chain of calls from a function on. Raises LeverError."""
@@ -93,9 +108,9 @@ class CallGraph:
         if name not in self._functions:
             return set()
         function = self._functions[name]
-        callees = function.calls - {_INDIRECT}
-        if _INDIRECT in function.calls:
-            reached = self._reached_from(function.file)
+        callees = set(function.calls)
+        for file in function.points:
+            reached = self._reached_from(file)
             if not reached:
                 raise LeverError(
                     f"{name} calls through a pointer, and no constant table that it may use has a function"
@@ -136,7 +151,12 @@ def _pushed(registers: str, count: str) -> int:
     return total
 
 
+def of_image(elf: Path) -> CallGraph:
+    """The call graph of the core in the image."""
+    return CallGraph(core_objects(elf), elf, call_graph(elf))
+
+
 def worst_case(elf: Path, facade: list[str]) -> dict[str, Deepest]:
     """The deepest chain of each function of the façade. Raises LeverError."""
-    graph = CallGraph(core_objects(elf), elf)
+    graph = of_image(elf)
     return {name: graph.deepest(name) for name in facade}

@@ -48,10 +48,15 @@ def test_platform_health_of_a_board_that_is_well(talk: Talk) -> None:
     assert {name: report[name] for name in quantities} == dict.fromkeys(quantities, 0)
 
 
-def test_keeps_up_with_samples_each_millisecond(talk: Talk, board: Board) -> None:
-    """Not in lock-step: the sensors do not wait. With dither, so that a motor command goes out with every estimate."""
+def dither(talk: Talk) -> None:
+    """From now on a motor command goes out with every estimate."""
     keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
     talk.tell(Frame(COMMAND, codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **keep})))
+
+
+def test_keeps_up_with_samples_each_millisecond(talk: Talk, board: Board) -> None:
+    """Not in lock-step: the sensors do not wait."""
+    dither(talk)
     start, count = board.schedule.now + MS, 250
     for k in range(count):
         board.schedule.at(start + k * MS, talk.send)
@@ -99,6 +104,7 @@ def test_order_is_kept_on_a_busy_bus(talk: Talk, board: Board) -> None:
 def test_all_mailboxes_wait(talk: Talk, board: Board) -> None:
     """And identifiers do not decide: STATE_ESTIMATE ends a step though its own is the least."""
     urgent = Peer(board.bus)
+    dither(talk)
     waited = 0
     for _ in range(120):
         heard = len(board.peer.heard)

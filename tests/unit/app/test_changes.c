@@ -67,6 +67,7 @@ static void test_a_sudden_grip_is_reported_for_a_second_and_opens_the_parameters
     const lever_estimate_t before = rig_estimate(lever);
     grip();
     TEST_ASSERT_LESS_THAN_UINT32(1000u, samples_until_change(1000u));
+    (void)rig_run(&rig, lever, 10u); /* learn_period: then it has taken effect */
     const lever_estimate_t opened = rig_estimate(lever);
     for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
         TEST_ASSERT_TRUE(opened.parameter_sigma[i] > before.parameter_sigma[i]);

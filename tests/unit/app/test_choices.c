@@ -11,9 +11,16 @@ static lever_t *lever;
 static sender_t sender;
 static lever_frame_t frames[FRAMES_MOST];
 
+/* Every sample is answered with all messages. */
+static void configure(uint32_t combination)
+{
+    config = rig_config(combination);
+    config.settings.publish_period = 1.0e-4f;
+}
+
 void setUp(void)
 {
-    lever_config_default(&config);
+    configure(0u);
     lever = lever_init(&memory, &config);
     TEST_ASSERT_NOT_NULL(lever);
     sender = sender_typical();
@@ -54,7 +61,7 @@ static void assert_commanded_as_configured(uint32_t choice)
 {
     double truth[PARAMETERS];
     setUp();
-    config = rig_config(choice % (uint32_t)RIG_COMBINATIONS);
+    configure(choice % (uint32_t)RIG_COMBINATIONS);
     config.adaptation = (uint8_t)(choice / (uint32_t)RIG_COMBINATIONS);
     lever_command_t all = rig_command();
     all.request = (uint8_t)LEVER_REQUEST_RESET;
@@ -85,7 +92,7 @@ static void test_every_choice_makes_a_difference(void)
 {
     lever_estimate_t estimates[CHOICES];
     for (uint32_t choice = 0u; choice < (uint32_t)CHOICES; choice++) {
-        config = rig_config(choice % (uint32_t)RIG_COMBINATIONS);
+        configure(choice % (uint32_t)RIG_COMBINATIONS);
         config.adaptation = (uint8_t)(choice / (uint32_t)RIG_COMBINATIONS);
         lever = lever_init(&memory, &config);
         sender = sender_typical();

@@ -225,7 +225,7 @@ static void test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyon
 static void test_a_command_fades_it_in_and_health_tells_the_torque(void)
 {
     lever_memory_t memory;
-    lever_config_t config;
+    static lever_config_t config;
     rig_t rig = rig_typical();
     lever_config_default(&config);
     lever_t *lever = lever_init(&memory, &config);

@@ -51,7 +51,8 @@ static void test_a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk(v
     (void)lever_update(lever, &sample);
     const lever_estimate_t after = rig_estimate(lever);
     for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
-        TEST_ASSERT_TRUE(after.parameter[i] == before.parameter[i]);
+        /* what was gathered before the gap is learnt yet */
+        TEST_ASSERT_FLOAT_WITHIN(0.15f * before.parameter_sigma[i], before.parameter[i], after.parameter[i]);
         TEST_ASSERT_TRUE(after.parameter_sigma[i] > 1.2f * before.parameter_sigma[i]);
     }
 }

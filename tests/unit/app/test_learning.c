@@ -104,7 +104,7 @@ static void test_a_learn_period_shorter_than_a_sample_learns_from_every_sample(v
     assert_learns_every(1u);
 }
 
-/* Less often is not less. */
+/* Less often is not less; it only takes effect later, so that the walk of that time is not yet made up for. */
 static void test_what_is_learnt_hardly_depends_on_the_learn_period(void)
 {
     const float periods[] = {4.0e-3f, 2.0e-2f};
@@ -122,7 +122,7 @@ static void test_what_is_learnt_hardly_depends_on_the_learn_period(void)
         for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
             TEST_ASSERT_FLOAT_WITHIN(0.1f * wanted.parameter_sigma[i], wanted.parameter[i], found.parameter[i]);
             TEST_ASSERT_FLOAT_WITHIN(
-                0.02f * wanted.parameter_sigma[i], wanted.parameter_sigma[i], found.parameter_sigma[i]);
+                0.03f * wanted.parameter_sigma[i], wanted.parameter_sigma[i], found.parameter_sigma[i]);
         }
     }
 }
@@ -194,7 +194,7 @@ static void test_without_excitation_nothing_is_learnt(void)
         do {
             TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1u));
         } while ((estimator.faults & (uint16_t)LEVER_FAULT_EXCITATION) == 0u);
-        (void)run(10u); /* learn_period: what was gathered last is learnt yet */
+        (void)run(20u); /* two learn_periods: what was gathered last is learnt yet */
         const lever_estimate_t before = estimate();
         (void)run(60000u);
         const lever_estimate_t after = estimate();

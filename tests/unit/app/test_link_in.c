@@ -7,7 +7,7 @@ static sender_t sender;
 
 void setUp(void)
 {
-    lever_config_t config;
+    static lever_config_t config;
     lever_config_default(&config);
     lever = lever_init(&memory, &config);
     sender = sender_typical();
@@ -44,7 +44,7 @@ static void test_a_pair_is_a_sample_without_fault(void)
 static void test_estimates_over_can_are_those_of_the_decoded_samples(void)
 {
     lever_memory_t other_memory;
-    lever_config_t config;
+    static lever_config_t config;
     lever_config_default(&config);
     lever_t *other = lever_init(&other_memory, &config);
     setUp();

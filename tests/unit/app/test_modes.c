@@ -151,9 +151,9 @@ static void test_coasting_grows_the_uncertainty_of_state_and_parameters(void)
 {
     run_for(10000u);
     const lever_estimate_t before = rig_estimate(lever);
-    (void)rig_run_blind(&rig, lever, 4u); /* learn_period: what was gathered last is learnt yet */
+    (void)rig_run_blind(&rig, lever, 20u); /* two learn_periods: what was gathered last is learnt yet */
     const lever_estimate_t learnt = rig_estimate(lever);
-    (void)rig_run_blind(&rig, lever, 396u);
+    (void)rig_run_blind(&rig, lever, 380u);
     const lever_estimate_t after = rig_estimate(lever);
     TEST_ASSERT_TRUE(after.theta_sigma > 1.5f * before.theta_sigma);
     TEST_ASSERT_TRUE(after.theta_dot_sigma > 1.5f * before.theta_dot_sigma);

@@ -87,12 +87,13 @@ static void test_recovers_from_damage_to_any_factor_or_estimate(void)
     }
 }
 
-/* What is gathered, and the points of the parameters, show when they are used: within a block of samples. */
-static void assert_recovers_within_a_block(float *entry)
+/* What is gathered, and the points of the parameters, show when they are used: when what the next block of samples says is
+ * adopted. */
+static void assert_recovers_within_two_blocks(float *entry)
 {
     setUp();
     *entry = NAN;
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(4u));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(20u));
     TEST_ASSERT_EQUAL_UINT32(1u, health().recoveries);
     TEST_ASSERT_TRUE(dual_is_valid(&estimator.dual));
 }
@@ -101,15 +102,17 @@ static void test_recovers_from_damage_to_what_is_gathered_and_to_the_points(void
 {
     parameter_filter_t *parameters = &estimator.dual.parameters;
     for (uint32_t k = 0u; k < (uint32_t)MODEL_PARAMETERS; k++) {
-        assert_recovers_within_a_block(&parameters->score[k]);
-        for (uint32_t i = 0u; i <= k; i++) {
-            assert_recovers_within_a_block(&parameters->information[(i * (uint32_t)MODEL_PARAMETERS) + k]);
-        }
-        for (uint32_t point = 0u; point < (uint32_t)MODEL_PARAMETER_POINTS; point++) {
-            assert_recovers_within_a_block(&parameters->p[point][k]);
+        assert_recovers_within_two_blocks(&parameters->gathered.score[k]);
+    }
+    for (uint32_t k = 0u; k < (uint32_t)INFORMATION_SIZE; k++) {
+        assert_recovers_within_two_blocks(&parameters->gathered.upper[k]);
+    }
+    for (uint32_t point = 0u; point < (uint32_t)MODEL_PARAMETER_POINTS; point++) {
+        for (uint32_t k = 0u; k < (uint32_t)MODEL_COEFFICIENTS; k++) {
+            assert_recovers_within_two_blocks(&parameters->arm[point].coefficient[k]);
         }
     }
-    assert_recovers_within_a_block(&parameters->growth);
+    assert_recovers_within_two_blocks(&parameters->growth);
 }
 
 static void test_restarts_from_the_measurement_and_the_first_guess(void)
@@ -247,7 +250,8 @@ static void test_an_estimate_beyond_a_bound_is_held_there_and_said(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1u));
     lever_estimate_t estimate;
     estimator_estimate(&estimator, &estimate);
-    const float greatest = estimator.model->parameter[0].greatest;
+    const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box};
+    const float greatest = models[config.model]->parameter[0].greatest;
     TEST_ASSERT_FLOAT_WITHIN(1.0e-6f * greatest, greatest, estimate.parameter[0]);
     TEST_ASSERT_TRUE((health().faults & (uint16_t)LEVER_FAULT_BOUND) != 0u);
     TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);

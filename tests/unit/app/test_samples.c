@@ -12,7 +12,8 @@ static double truth[LEVER_PARAMETERS];
 
 static lever_t *make(lever_memory_t *in)
 {
-    const lever_config_t config = rig_config(combination);
+    static lever_config_t config;
+    config = rig_config(combination);
     lever_t *made = lever_init(in, &config);
     TEST_ASSERT_NOT_NULL(made);
     return made;
@@ -302,7 +303,8 @@ static void test_innovations_larger_than_set_are_not_those_larger_than_predicted
 
 static void test_innovations_larger_than_predicted_are_said(void)
 {
-    lever_config_t config = rig_config(combination);
+    static lever_config_t config;
+    config = rig_config(combination);
     config.settings.noise_window = 0.0f; /* or the estimator would find out */
     lever = lever_init(&memory, &config);
     (void)rig_run(&rig, lever, 3000u);

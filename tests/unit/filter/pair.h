@@ -5,6 +5,7 @@
 
 #include "filter/dual.h"
 #include "kalman.h"
+#include "revise.h"
 #include "unity.h"
 
 #include <stddef.h>
@@ -27,38 +28,52 @@ static inline matrix_t pair_transition(const model_step_t *at)
 {
     const double period = (double)at->period;
     matrix_t a = matrix_identity((uint32_t)PAIR_ALL);
-    a.at[0][1] = period;
     a.at[1][0] = -630.0 * period;
     a.at[1][1] = 1.0 - (15.0 * period);
     a.at[1][2] = period * (double)at->z_ddot;
     a.at[1][3] = period * (double)at->tau_m;
     a.at[1][4] = period * (double)at->trim;
+    for (uint32_t k = 0u; k < (uint32_t)PAIR_ALL; k++) { /* theta moves by T (theta_dot + change / 2) */
+        const double rate = (k == 1u) ? 1.0 : 0.0;
+        a.at[0][k] += period * (rate + (0.5 * (a.at[1][k] - rate)));
+    }
     return a;
 }
 
-static inline void pair_propagate(const model_constants_t *constants, const model_step_t *at,
-    const model_points_t *points, float increment[MODEL_POINTS][MODEL_STATES])
+/* Change of theta_dot at x + sign offset. */
+static inline double pair_change(
+    const matrix_t *a, const float x[PAIR_X], const float offset[PAIR_X], double sign, const model_arm_t *arm)
+{
+    double change = 0.0;
+    for (uint32_t k = 0u; k < (uint32_t)PAIR_X; k++) {
+        change += (a->at[1][k] - ((k == 1u) ? 1.0 : 0.0)) * ((double)x[k] + (sign * (double)offset[k]));
+    }
+    for (uint32_t k = 0u; k < (uint32_t)PAIR_W; k++) {
+        change += a->at[1][(uint32_t)PAIR_X + k] * log((double)arm->coefficient[k]);
+    }
+    return change;
+}
+
+static inline void pair_respond(const model_constants_t *constants, const model_step_t *at,
+    const model_points_t *points, model_response_t *response)
 {
     (void)constants;
     const matrix_t a = pair_transition(at);
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_POINTS; i++) {
-        const float *p = points->p[(i < (uint32_t)MODEL_PARAMETER_POINTS) ? i : 0u];
-        for (uint32_t row = 0u; row < (uint32_t)PAIR_X; row++) {
-            double change = 0.0;
-            for (uint32_t k = 0u; k < (uint32_t)PAIR_ALL; k++) {
-                const double from =
-                    (k < (uint32_t)PAIR_X) ? (double)points->x[i][k] : log((double)p[k - (uint32_t)PAIR_X]);
-                change += (a.at[row][k] - ((row == k) ? 1.0 : 0.0)) * from;
-            }
-            increment[i][row] = (float)change;
-        }
+    response->mean = (float)pair_change(&a, points->x, points->x, 0.0, &points->arm[0]);
+    for (uint32_t j = 0u; j < (uint32_t)MODEL_PAIRS; j++) {
+        const bool of_w = j < (uint32_t)PAIR_W;
+        const float *offset = points->offset[j];
+        model_response_pair(response, j,
+            (float)pair_change(&a, points->x, offset, 1.0, &points->arm[of_w ? (1u + (2u * j)) : 0u]),
+            (float)pair_change(&a, points->x, offset, -1.0, &points->arm[of_w ? (2u + (2u * j)) : 0u]));
     }
 }
 
 static const model_t pair_model = {.name = "linear",
     .parameter = {{"a", "1", 1.0e-3f, 1.0e3f}, {"b", "1", 1.0e-3f, 1.0e3f}, {"c", "1", 1.0e-3f, 1.0e3f}},
     .positive = true,
-    .propagate = pair_propagate};
+    .prepare = plain_prepare,
+    .respond = pair_respond};
 
 /* --- both filters ------------------------------------------------------------------------------------------------- */
 
@@ -67,7 +82,7 @@ static inline pair_t pair_typical(bool joint)
     const prior_t prior = {.guess = {1.0f, 1.0f, 1.0f}, .sigma = {0.4f, 0.6f, 0.5f}};
     const double sigmas[PAIR_ALL] = {(double)1.0e-3f, (double)1.0e-2f, (double)0.4f, (double)0.6f, (double)0.5f};
     pair_t pair = {.joint = joint, .source = {1234u}};
-    parameter_filter_init(&pair.dual.parameters, &pair_model, &prior);
+    parameter_filter_init(&pair.dual.parameters, &pair_model, NULL, &prior);
     pair.dual.state = (state_filter_t){.x = {0.1f, 0.0f},
         .s = {1.0e-3f, 0.0f, 0.0f, 1.0e-2f},
         .process_noise = {0.0f, 0.05f},
@@ -177,8 +192,7 @@ static inline void pair_block(pair_t *pair, uint32_t samples, double missing, fl
             TEST_ASSERT_DOUBLE_WITHIN(5.0e-3 * (1.0 + wanted), wanted, nis);
         }
     }
-    float learnt[PAIR_W];
-    TEST_ASSERT_FALSE(dual_learn(&pair->dual, period, 0.0f, pair->joint, correction, learnt));
+    TEST_ASSERT_FALSE(revise(&pair->dual, &pair_model, NULL, period, 0.0f, pair->joint, correction));
     pair_reference_walk(pair, (double)period);
 }
 

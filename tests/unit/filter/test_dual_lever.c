@@ -5,6 +5,7 @@
 #include "../model/constants.h"
 #include "../model/simulation.h"
 #include "math/factor.h"
+#include "revise.h"
 #include "unity.h"
 
 #include <string.h>
@@ -25,7 +26,7 @@ static void start(void)
     const plant_t *plant = &simulation.plant;
     constants = constants_of(plant);
     (void)memset(&dual, 0, sizeof dual);
-    parameter_filter_init(&dual.parameters, &model_lever, &prior);
+    parameter_filter_init(&dual.parameters, &model_lever, &constants, &prior);
     dual.state.x[0] = (float)plant->theta;
     dual.state.s[0] = (float)simulation.theta_noise;
     dual.state.s[3] = (float)simulation.theta_dot_noise;
@@ -54,19 +55,19 @@ static double sample(bool theta_valid, bool theta_dot_valid, bool learn)
         .z_ddot = (float)(0.5 * (last_z_ddot + simulation.z_ddot)),
         .tau_m = (float)(0.5 * (last_tau_m + simulation.tau_m)),
         .trim = (float)simulation.plant.trim,
-        .trim_sine = (float)sin(simulation.plant.trim)};
+        .trim_sine = (float)sin(simulation.plant.trim),
+        .trim_cosine = (float)cos(simulation.plant.trim)};
     const measurement_t measurement = {
         .y = {theta_valid ? (float)simulation.theta : NAN, theta_dot_valid ? (float)simulation.theta_dot : NAN},
         .valid = {theta_valid, theta_dot_valid}};
     float correction[L];
-    float learnt[L];
     last_z_ddot = simulation.z_ddot;
     last_tau_m = simulation.tau_m;
     dual_predict(&dual, &model_lever, &constants, &step);
     TEST_ASSERT_TRUE(dual_is_valid(&dual));
     const double nis = (double)dual_update(&dual, &measurement, learn);
     if (learn) {
-        (void)dual_learn(&dual, (float)PERIOD, 0.0f, false, correction, learnt);
+        (void)revise(&dual, &model_lever, &constants, (float)PERIOD, 0.0f, false, correction);
     }
     TEST_ASSERT_TRUE(dual_is_valid(&dual));
     return nis;

@@ -100,9 +100,8 @@ static void test_the_dual_filter_is_surer_of_the_state_by_what_a_walk_frees(void
     dual_t joint = pair.dual;
     dual_t dual = pair.dual;
     const matrix_t before = pair_covariance(&pair.dual);
-    float learnt[L];
-    (void)dual_learn(&joint, 0.1f, 0.0f, true, correction, learnt);
-    (void)dual_learn(&dual, 0.1f, 0.0f, false, correction, learnt);
+    (void)revise(&joint, &pair_model, NULL, 0.1f, 0.0f, true, correction);
+    (void)revise(&dual, &pair_model, NULL, 0.1f, 0.0f, false, correction);
     const matrix_t of_joint = pair_covariance(&joint);
     const matrix_t of_dual = pair_covariance(&dual);
     const matrix_t grown = matrix_block(&of_joint, (uint32_t)N, (uint32_t)L, (uint32_t)N, (uint32_t)L);

@@ -13,8 +13,8 @@ enum { SENSITIVITIES = MODEL_STATES * MODEL_PARAMETERS };
 #define THETA_DOT_NOISE 1.0e-2
 #define PROCESS_NOISE 0.05
 
-/* x_next - x of a damped oscillator of 4 Hz. */
-static const double increment_matrix[4] = {0.0, 1.0e-3, -0.63, -0.015};
+/* Change of theta_dot of a damped oscillator of 4 Hz. */
+static const double change_of[2] = {-0.63, -0.015};
 
 static random_source_t source;
 static state_filter_t filter;
@@ -51,46 +51,39 @@ static void start(double output_factor, double process_factor)
 static void predict(void)
 {
     model_points_t points;
-    float increment[MODEL_POINTS][MODEL_STATES];
+    model_response_t response = {.bend = {0.0f}};
+    const double *a = change_of;
     state_filter_points(&filter, &points);
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_POINTS; i++) {
-        const float *x = points.x[(i < (uint32_t)MODEL_PARAMETER_POINTS) ? 0u : i];
-        for (uint32_t row = 0u; row < 2u; row++) {
-            const double *a = &increment_matrix[2u * row];
-            increment[i][row] = (float)((a[0] * (double)x[0]) + (a[1] * (double)x[1]));
-        }
+    response.mean = (float)((a[0] * (double)points.x[0]) + (a[1] * (double)points.x[1]));
+    for (uint32_t j = (uint32_t)MODEL_PARAMETERS; j < (uint32_t)MODEL_PAIRS; j++) {
+        const float *offset = points.offset[j];
+        response.difference[j] = (float)(2.0 * ((a[0] * (double)offset[0]) + (a[1] * (double)offset[1])));
     }
-    state_filter_predict(&filter, increment, PERIOD);
+    state_filter_predict(&filter, &response, PERIOD);
 }
 
 static void move(void)
 {
-    const double theta = truth[0] + (increment_matrix[1] * truth[1]);
-    truth[1] += (increment_matrix[2] * truth[0]) + (increment_matrix[3] * truth[1]) +
-                (PROCESS_NOISE * sqrt((double)PERIOD) * random_normal(&source));
-    truth[0] = theta;
+    const double change = (change_of[0] * truth[0]) + (change_of[1] * truth[1]);
+    truth[0] += (double)PERIOD * (truth[1] + (0.5 * change));
+    truth[1] += change + (PROCESS_NOISE * sqrt((double)PERIOD) * random_normal(&source));
 }
 
 /* So many samples, outputs valid as flagged. Returns how often the noise was said to have been far too small. */
 static uint32_t run(uint32_t samples, bool theta_valid, bool theta_dot_valid)
 {
-    const float no_parameters[SENSITIVITIES] = {0.0f};
     uint32_t far_too_small = 0u;
     for (uint32_t k = 0u; k < samples; k++) {
-        float factor[4];
+        const spread_t alone = {.a = 1.0f, .d = 1.0f, .inverse = 1.0f}; /* no parameters */
         float sensitivity[SENSITIVITIES] = {0.0f};
-        float innovation[2];
+        whitened_t whitened;
         predict();
         move();
         measurement_t measurement = {.valid = {theta_valid, theta_dot_valid}};
         measurement.y[0] = (float)(truth[0] + (output_scale * THETA_NOISE * random_normal(&source)));
         measurement.y[1] = (float)(truth[1] + (output_scale * THETA_DOT_NOISE * random_normal(&source)));
-        for (uint32_t i = 0u; i < 2u; i++) {
-            innovation[i] = measurement.valid[i] ? (measurement.y[i] - filter.x[i]) : 0.0f;
-        }
-        state_filter_innovation(&filter, &measurement, factor);
-        noise_gather(&noise, &filter, &measurement, innovation, factor, no_parameters);
-        (void)state_filter_update(&filter, &measurement, sensitivity);
+        state_filter_update(&filter, &measurement, sensitivity, &whitened);
+        noise_gather(&noise, filter.output_noise, &measurement, &whitened, &alone);
         far_too_small += noise_step(&noise, &filter, &setting, PERIOD) ? 1u : 0u;
         TEST_ASSERT_TRUE(state_filter_is_valid(&filter));
     }

@@ -3,6 +3,7 @@
 #include "filter/parameter_filter.h"
 
 #include "kalman.h"
+#include "revise.h"
 #include "unity.h"
 
 enum { L = MODEL_PARAMETERS, N = MODEL_STATES, ROWS = PARAMETER_FILTER_ROWS, REPEATS = 200 };
@@ -13,13 +14,16 @@ static const prior_t prior = {.guess = {2.5f, 42.0f, 1500.0f}, .sigma = {0.4f, 0
 static const prior_t signed_prior = {.guess = {-465.0f, -13.7f, -2.2f}, .sigma = {180.0f, 6.0f, 0.8f}};
 
 static random_source_t source;
-static parameter_filter_t filter;
-static float freed[PARAMETER_FILTER_FREED];
+static model_t model; /* with plain arms */
+static dual_t dual;
+static parameter_filter_t *const filter = &dual.parameters;
+static float freed[N * 2 * L]; /* by forgetting, by the walk */
 
 void setUp(void)
 {
     source.state = 29u;
-    parameter_filter_init(&filter, &model_lever, &prior);
+    model = plain_model(&model_lever);
+    parameter_filter_init(filter, &model, NULL, &prior);
 }
 
 void tearDown(void)
@@ -30,20 +34,50 @@ void tearDown(void)
 static void draw(uint32_t repeat)
 {
     const bool positive = ((repeat % 2u) == 0u);
-    parameter_filter_init(
-        &filter, positive ? &model_lever : &model_linear_black_box, positive ? &prior : &signed_prior);
-    random_floats(&source, filter.s, (uint32_t)(ROWS * L), 0.1);
+    model = plain_model(positive ? &model_lever : &model_linear_black_box);
+    parameter_filter_init(filter, &model, NULL, positive ? &prior : &signed_prior);
+    random_floats(&source, filter->s, (uint32_t)(ROWS * L), 0.1);
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        filter.s[(i * L) + i] = (float)random_between(&source, 0.05, 0.2);
+        filter->s[(i * L) + i] = (float)random_between(&source, 0.05, 0.2);
         for (uint32_t j = i + 1u; j < (uint32_t)L; j++) {
-            filter.s[(i * L) + j] = 0.0f;
+            filter->s[(i * L) + j] = 0.0f;
         }
     }
 }
 
+/* A revision without anything to learn. */
+static void widen(float period, const float *variance)
+{
+    float x[N] = {0.0f, 0.0f};
+    float learnt[L];
+    float parts[2][N * L] = {{0.0f}};
+    revision_t *revision = &dual.revision;
+    revision_take(revision, filter, period, 0.0f);
+    revision_condition(revision, filter);
+    (void)revision_correct(revision, filter, learnt);
+    (void)revision_forget(revision, filter, period, parts[0]);
+    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+        revision_walk(revision, filter, i, period, (variance != NULL) ? variance[i] : 0.0f, parts[1]);
+    }
+    for (uint32_t k = 0u; k < (uint32_t)(N * 2 * L); k++) {
+        const uint32_t column = k % (uint32_t)(2 * L);
+        const uint32_t row = k / (uint32_t)(2 * L);
+        freed[k] = parts[column / (uint32_t)L][(row * (uint32_t)L) + (column % (uint32_t)L)];
+    }
+    revision_cap(revision, filter);
+    revision_draw_mean(revision, filter);
+    revision_draw_pairs(revision, filter);
+    revision_adopt(revision, filter, &model, NULL, x);
+}
+
+static void walk(float period)
+{
+    widen(period, NULL);
+}
+
 static matrix_t covariance_of_all(void)
 {
-    return matrix_gram(matrix_of(filter.s, (uint32_t)ROWS, (uint32_t)L));
+    return matrix_gram(matrix_of(filter->s, (uint32_t)ROWS, (uint32_t)L));
 }
 
 /* Covariance of [w; x] with what has been freed: independent of w, in the rows of the state. */
@@ -62,10 +96,10 @@ static matrix_t covariance_with_freed(void)
 /* Random growth and walk, none of either one time in four. */
 static void draw_walk(void)
 {
-    filter.growth = (random_unit(&source) > 0.25) ? (float)random_between(&source, 0.01, 1.0) : 0.0f;
+    filter->growth = (random_unit(&source) > 0.25) ? (float)random_between(&source, 0.01, 1.0) : 0.0f;
     const bool walks = random_unit(&source) > 0.25;
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        filter.walk[i] = walks ? (float)random_between(&source, 0.0, 0.02) : 0.0f;
+        filter->walk[i] = walks ? (float)random_between(&source, 0.0, 0.02) : 0.0f;
     }
 }
 
@@ -81,14 +115,14 @@ static void test_walk_and_forgetting_widen_the_parameters_and_nothing_else(void)
         matrix_t wanted = covariance_of_all();
         for (uint32_t i = 0u; i < (uint32_t)L; i++) {
             for (uint32_t j = 0u; j < (uint32_t)L; j++) {
-                wanted.at[i][j] *= 1.0 + ((double)filter.growth * period);
+                wanted.at[i][j] *= 1.0 + ((double)filter->growth * period);
             }
-            wanted.at[i][i] += (double)filter.walk[i] * period;
+            wanted.at[i][i] += (double)filter->walk[i] * period;
         }
-        parameter_filter_walk(&filter, (float)period, freed);
+        walk((float)period);
         const matrix_t found = covariance_with_freed();
         TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE, 0.0, covariance_difference(&found, &wanted, &wanted));
-        TEST_ASSERT_TRUE(parameter_filter_is_valid(&filter));
+        TEST_ASSERT_TRUE(parameter_filter_is_valid(filter));
     }
 }
 
@@ -99,7 +133,7 @@ static void test_what_is_freed_is_what_the_parameters_no_longer_explain(void)
         draw(repeat);
         draw_walk();
         const matrix_t before = covariance_of_all();
-        parameter_filter_walk(&filter, 0.1f, freed);
+        walk(0.1f);
         const matrix_t after = covariance_of_all();
         const matrix_t ww = matrix_block(&after, 0u, (uint32_t)L, 0u, (uint32_t)L);
         const matrix_t xw = matrix_block(&before, (uint32_t)L, (uint32_t)N, 0u, (uint32_t)L);
@@ -117,10 +151,10 @@ static void test_forgetting_alone_scales_the_covariance_and_keeps_correlations(v
         float after[L];
         draw(repeat);
         const matrix_t covariance = covariance_of_all();
-        parameter_filter_correlation(&filter, before);
-        filter.growth = 0.5f;
-        parameter_filter_walk(&filter, 0.5f, freed);
-        parameter_filter_correlation(&filter, after);
+        parameter_filter_correlation(filter, before);
+        filter->growth = 0.5f;
+        walk(0.5f);
+        parameter_filter_correlation(filter, after);
         const matrix_t grown = covariance_of_all();
         for (uint32_t i = 0u; i < (uint32_t)L; i++) {
             TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE * covariance.at[i][i], 1.25 * covariance.at[i][i], grown.at[i][i]);
@@ -135,7 +169,7 @@ static void test_without_either_nothing_changes_and_nothing_is_freed(void)
         draw(repeat);
         const matrix_t before = covariance_of_all();
         for (uint32_t k = 0u; k < 100u; k++) {
-            parameter_filter_walk(&filter, 1.0e-3f, freed);
+            walk(1.0e-3f);
             for (uint32_t i = 0u; i < (uint32_t)(N * 2 * L); i++) {
                 TEST_ASSERT_TRUE(freed[i] == 0.0f);
             }
@@ -150,13 +184,13 @@ static void test_the_walk_draws_the_points_of_the_next_samples(void)
     for (uint32_t repeat = 0u; repeat < 2u; repeat++) {
         model_points_t points;
         draw(repeat);
-        filter.walk[0] = 0.01f;
-        parameter_filter_walk(&filter, 1.0f, freed);
-        parameter_filter_points(&filter, &points);
-        const double h = sqrt(3.0) * (double)filter.s[0];
-        const double guess = (double)filter.prior.guess[0];
-        const double wanted = filter.positive ? (guess * exp(h)) : (guess + ((double)filter.prior.sigma[0] * h));
-        TEST_ASSERT_DOUBLE_WITHIN(2.0e-6 * fabs(guess), wanted, (double)points.p[1][0]);
+        filter->walk[0] = 0.01f;
+        walk(1.0f);
+        parameter_filter_points(filter, &points);
+        const double h = sqrt(3.0) * (double)filter->s[0];
+        const double guess = (double)filter->prior.guess[0];
+        const double wanted = filter->positive ? (guess * exp(h)) : (guess + ((double)filter->prior.sigma[0] * h));
+        TEST_ASSERT_DOUBLE_WITHIN(2.0e-6 * fabs(guess), wanted, (double)points.arm[1].coefficient[0]);
     }
 }
 
@@ -164,7 +198,7 @@ static void test_the_walk_draws_the_points_of_the_next_samples(void)
 
 static double first_sigma(uint32_t i)
 {
-    return filter.positive ? (double)filter.prior.sigma[i] : 1.0;
+    return filter->positive ? (double)filter->prior.sigma[i] : 1.0;
 }
 
 static void test_widening_adds_variances(void)
@@ -178,7 +212,7 @@ static void test_widening_adds_variances(void)
             variance[i] = (float)(sigma * sigma);
             wanted.at[i][i] += sigma * sigma;
         }
-        parameter_filter_widen(&filter, variance, freed);
+        widen(0.0f, variance);
         const matrix_t found = covariance_of_all();
         for (uint32_t i = 0u; i < (uint32_t)ROWS; i++) {
             for (uint32_t j = 0u; j < (uint32_t)L; j++) {
@@ -193,15 +227,15 @@ static void test_widening_draws_the_points_and_keeps_the_estimate(void)
 {
     model_points_t points;
     draw(0u);
-    random_floats(&source, filter.w, (uint32_t)L, 0.3);
-    const parameter_filter_t before = filter;
+    random_floats(&source, filter->w, (uint32_t)L, 0.3);
+    const parameter_filter_t before = *filter;
     const float variance[L] = {0.01f, 0.02f, 0.03f};
-    parameter_filter_widen(&filter, variance, freed);
-    parameter_filter_points(&filter, &points);
-    const double w = (double)filter.w[0] + (sqrt(3.0) * (double)filter.s[0]);
+    widen(0.0f, variance);
+    parameter_filter_points(filter, &points);
+    const double w = (double)filter->w[0] + (sqrt(3.0) * (double)filter->s[0]);
     const double wanted = (double)prior.guess[0] * exp(w);
-    TEST_ASSERT_DOUBLE_WITHIN(2.0e-6 * wanted, wanted, (double)points.p[1][0]);
-    TEST_ASSERT_EQUAL_MEMORY(before.w, filter.w, sizeof filter.w);
+    TEST_ASSERT_DOUBLE_WITHIN(2.0e-6 * wanted, wanted, (double)points.arm[1].coefficient[0]);
+    TEST_ASSERT_EQUAL_MEMORY(before.w, filter->w, sizeof filter->w);
 }
 
 /* --- cap -------------------------------------------------------------------------------------------------------------- */
@@ -212,7 +246,7 @@ static void assert_capped(void)
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
         TEST_ASSERT_TRUE(sqrt(covariance.at[i][i]) <= first_sigma(i) * 1.000001);
     }
-    TEST_ASSERT_TRUE(parameter_filter_is_valid(&filter));
+    TEST_ASSERT_TRUE(parameter_filter_is_valid(filter));
 }
 
 static void test_standard_deviations_never_outgrow_the_first_guess(void)
@@ -220,14 +254,14 @@ static void test_standard_deviations_never_outgrow_the_first_guess(void)
     for (uint32_t kind = 0u; kind < 6u; kind++) {
         draw(kind);
         for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-            filter.walk[i] = ((kind / 2u) == 0u) ? 10.0f : 0.0f;
+            filter->walk[i] = ((kind / 2u) == 0u) ? 10.0f : 0.0f;
         }
-        filter.growth = ((kind / 2u) == 1u) ? 10.0f : 0.0f;
+        filter->growth = ((kind / 2u) == 1u) ? 10.0f : 0.0f;
         for (uint32_t k = 0u; k < 1000u; k++) {
             if ((kind / 2u) == 2u) {
-                parameter_filter_widen(&filter, (const float[]){0.1f, 0.1f, 0.1f}, freed);
+                widen(0.0f, (const float[]){0.1f, 0.1f, 0.1f});
             } else {
-                parameter_filter_walk(&filter, 1.0e-3f, freed);
+                walk(1.0e-3f);
             }
             assert_capped();
         }
@@ -243,11 +277,11 @@ static void test_cap_keeps_correlations(void)
         float after[L];
         draw(repeat);
         for (uint32_t k = 0u; k < (uint32_t)(L * L); k++) {
-            filter.s[k] *= 100.0f;
+            filter->s[k] *= 100.0f;
         }
-        parameter_filter_correlation(&filter, before);
-        parameter_filter_walk(&filter, 0.0f, freed);
-        parameter_filter_correlation(&filter, after);
+        parameter_filter_correlation(filter, before);
+        walk(0.0f);
+        parameter_filter_correlation(filter, after);
         assert_capped();
         for (uint32_t i = 0u; i < (uint32_t)L; i++) {
             TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, (double)before[i], (double)after[i]);

@@ -3,6 +3,7 @@
 #include "filter/dual.h"
 
 #include "kalman.h"
+#include "revise.h"
 #include "unity.h"
 
 enum { L = MODEL_PARAMETERS, STEPS = 20000 };
@@ -37,15 +38,26 @@ static void rls_update(rls_t *rls, matrix_t phi, double y)
 /* --- the system ----------------------------------------------------------------------------------------------------- */
 
 /* x_ddot = a21 x + a22 x_dot + b21 z_ddot by Euler's rule, in which the parameters are exactly linear. */
-static void propagate_euler(const model_constants_t *constants, const model_step_t *at, const model_points_t *points,
-    float increment[MODEL_POINTS][MODEL_STATES])
+static void respond_euler(const model_constants_t *constants, const model_step_t *at, const model_points_t *points,
+    model_response_t *response)
 {
     (void)constants;
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_POINTS; i++) {
-        const float *p = points->p[(i < (uint32_t)MODEL_PARAMETER_POINTS) ? i : 0u];
-        const float *x = points->x[i];
-        increment[i][0] = at->period * x[1];
-        increment[i][1] = at->period * ((p[0] * x[0]) + (p[1] * x[1]) + (p[2] * at->z_ddot));
+    for (uint32_t i = 0u; i < (uint32_t)(1 + (2 * MODEL_PAIRS)); i++) {
+        const uint32_t j = (i - 1u) / 2u;
+        const bool of_w = (i >= 1u) && (j < (uint32_t)L);
+        const float *p = points->arm[of_w ? i : 0u].coefficient;
+        const float sign = (i == 0u) ? 0.0f : (((i % 2u) == 1u) ? 1.0f : -1.0f);
+        const float *offset = points->offset[(i == 0u) ? 0u : j];
+        const float x[2] = {points->x[0] + (sign * offset[0]), points->x[1] + (sign * offset[1])};
+        const float change = at->period * ((p[0] * x[0]) + (p[1] * x[1]) + (p[2] * at->z_ddot));
+        static float plus;
+        if (i == 0u) {
+            response->mean = change;
+        } else if (sign > 0.0f) {
+            plus = change;
+        } else {
+            model_response_pair(response, j, plus, change);
+        }
     }
 }
 
@@ -66,6 +78,7 @@ static double increment_of(const double p[L], const double x[2], double u, bool 
 
 /* --- both estimators -------------------------------------------------------------------------------------------------- */
 
+static const model_constants_t constants = {.trim = true};
 static model_t model;
 static random_source_t source;
 static dual_t dual;
@@ -75,16 +88,16 @@ static float state[2]; /* known, before the step */
 
 static void start(bool implicit, float growth)
 {
-    float freed[MODEL_STATES * 2 * L];
     source.state = 61u;
-    model = model_linear_black_box;
-    model.propagate = implicit ? model_linear_black_box.propagate : propagate_euler;
-    parameter_filter_init(&dual.parameters, &model, &prior);
+    float correction[L];
+    model = implicit ? model_linear_black_box : plain_model(&model_linear_black_box);
+    model.respond = implicit ? model_linear_black_box.respond : respond_euler;
+    parameter_filter_init(&dual.parameters, &model, &constants, &prior);
     for (uint32_t k = 0u; k < (uint32_t)(L * L); k++) {
         dual.parameters.s[k] *= SHARE;
     }
+    (void)revise(&dual, &model, &constants, 0.0f, 0.0f, false, correction); /* draws the points */
     dual.parameters.growth = growth;
-    parameter_filter_walk(&dual.parameters, 0.0f, freed); /* draws the points */
     dual.state = (state_filter_t){.process_noise = {0.0f, 0.05f}, .output_noise = {1.0f, 1.0e-6f}};
     noise = 0.05 * sqrt((double)PERIOD);
     reference.lambda = 1.0 / (1.0 + ((double)growth * (double)PERIOD));
@@ -108,7 +121,6 @@ void tearDown(void)
 /* The state is known, the next rate measured: both exactly. */
 static void filter_step(const model_step_t *step, float next_rate)
 {
-    const model_constants_t constants = {.trim = true};
     const measurement_t measurement = {.y = {NAN, next_rate}, .valid = {false, true}};
     float correction[L];
     for (uint32_t i = 0u; i < 2u; i++) {
@@ -119,8 +131,7 @@ static void filter_step(const model_step_t *step, float next_rate)
     parameter_filter_forget_state(&dual.parameters);
     dual_predict(&dual, &model, &constants, step);
     (void)dual_update(&dual, &measurement, true);
-    float learnt[L];
-    TEST_ASSERT_FALSE(dual_learn(&dual, PERIOD, 0.0f, false, correction, learnt));
+    TEST_ASSERT_FALSE(revise(&dual, &model, &constants, PERIOD, 0.0f, false, correction));
 }
 
 /* Regression of the change of the rate, as a function of w that is linear about the estimate. */

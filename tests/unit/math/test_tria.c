@@ -71,13 +71,13 @@ static void test_factorises_entries_near_the_ends_of_its_range(void)
     random_matrices_of_every_size(0u, 1.0e-16);
 }
 
-static void test_rows_from_1e_minus_12_to_1e12_are_each_accurate_on_their_own_scale(void)
+static void test_rows_from_1e_minus_16_to_1e16_are_each_accurate_on_their_own_scale(void)
 {
     for (uint32_t repeat = 0u; repeat < (uint32_t)(20 * REPEATS); repeat++) {
         float a[MOST_ROWS * MOST_COLUMNS];
         float factor[MOST_ROWS * MOST_ROWS];
         for (uint32_t i = 0u; i < MOST_ROWS; i++) {
-            random_floats(&source, &a[i * MOST_COLUMNS], MOST_COLUMNS, pow(10.0, random_between(&source, -12.0, 12.0)));
+            random_floats(&source, &a[i * MOST_COLUMNS], MOST_COLUMNS, pow(10.0, random_between(&source, -16.0, 16.0)));
         }
         assert_factorises(a, MOST_ROWS, MOST_COLUMNS, factor);
     }
@@ -156,7 +156,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_factorises_random_matrices_of_every_size);
     RUN_TEST(test_factorises_entries_near_the_ends_of_its_range);
-    RUN_TEST(test_rows_from_1e_minus_12_to_1e12_are_each_accurate_on_their_own_scale);
+    RUN_TEST(test_rows_from_1e_minus_16_to_1e16_are_each_accurate_on_their_own_scale);
     RUN_TEST(test_columns_from_1e_minus_12_to_1e12_may_be_mixed_in_a_row);
     RUN_TEST(test_has_no_absolute_threshold);
     RUN_TEST(test_a_row_that_depends_on_earlier_ones_gives_nothing_on_the_diagonal);

@@ -66,37 +66,52 @@ static void test_beyond_30_rad_and_not_a_number_give_the_result_of_zero(void)
     }
 }
 
-/* Greatest error of the near variant, the known angle and `delta` both being exact. */
-static double near_error(double greatest_delta)
+/* Greatest error of the variant for small angles, up to the one given. */
+static double small_error(double most)
 {
     double greatest = 0.0;
-    for (int32_t a = -64; a <= 64; a++) {
-        const double angle = 0.05 * (double)a;
-        const sine_cosine_t known = {(float)sin(angle), (float)cos(angle)};
-        for (int32_t k = -500; k <= 500; k++) {
-            const float delta = (float)(greatest_delta * (double)k / 500.0);
-            const double error = error_against(sine_cosine_near(&known, delta), angle + (double)delta);
-            greatest = (error > greatest) ? error : greatest;
-        }
+    for (int32_t k = -GRID; k <= GRID; k++) {
+        const float angle = (float)(most * (double)k / (double)GRID);
+        const double error = error_against(sine_cosine_small(angle), (double)angle);
+        greatest = (isnan(greatest) || (error <= greatest)) ? greatest : error; /* NaN counts as greatest */
     }
     return greatest;
 }
 
-static void test_near_variant_is_at_most_5e_minus_7_off_within_a_quarter_rad(void)
+static void test_small_variant_is_at_most_5e_minus_7_off_within_a_quarter_rad(void)
 {
-    TEST_ASSERT_DOUBLE_WITHIN(5.0e-7, 0.0, near_error(0.25));
+    TEST_ASSERT_DOUBLE_WITHIN(5.0e-7, 0.0, small_error(0.25));
 }
 
-static void test_near_variant_is_at_most_3e_minus_5_off_within_half_a_rad(void)
+static void test_small_variant_is_at_most_3e_minus_5_off_within_half_a_rad(void)
 {
-    TEST_ASSERT_DOUBLE_WITHIN(3.0e-5, 0.0, near_error(0.5));
+    TEST_ASSERT_DOUBLE_WITHIN(3.0e-5, 0.0, small_error(0.5));
 }
 
-static void test_near_variant_with_no_distance_is_exact(void)
+/* Where sigma points are mostly, the series has ended: nothing is left but rounding. */
+static void test_small_variant_is_rounding_off_within_a_tenth_of_a_rad(void)
 {
-    const sine_cosine_t known = {0.6f, 0.8f};
-    const sine_cosine_t found = sine_cosine_near(&known, 0.0f);
-    TEST_ASSERT_TRUE((found.sine == 0.6f) && (found.cosine == 0.8f));
+    TEST_ASSERT_DOUBLE_WITHIN((double)FLT_EPSILON, 0.0, small_error(0.1));
+}
+
+static void test_small_variant_of_tiny_angles_is_exact(void)
+{
+    const float angles[] = {0.0f, 1.0e-38f, -1.0e-20f, 1.0e-6f, -1.0e-4f};
+    for (uint32_t k = 0u; k < 5u; k++) {
+        const sine_cosine_t found = sine_cosine_small(angles[k]);
+        TEST_ASSERT_TRUE((found.sine == angles[k]) && (found.cosine == 1.0f));
+    }
+}
+
+/* One evaluation serves both points of a pair. */
+static void test_small_variant_is_odd_and_even_to_the_bit(void)
+{
+    for (int32_t k = 1; k <= 1000; k++) {
+        const float angle = (float)(0.5 * (double)k / 1000.0);
+        const sine_cosine_t plus = sine_cosine_small(angle);
+        const sine_cosine_t minus = sine_cosine_small(-angle);
+        TEST_ASSERT_TRUE((plus.sine == -minus.sine) && (plus.cosine == minus.cosine));
+    }
 }
 
 int main(void)
@@ -106,8 +121,10 @@ int main(void)
     RUN_TEST(test_error_is_at_most_1_2e_minus_7_at_the_seams_between_quadrants);
     RUN_TEST(test_small_angles_are_their_own_sine);
     RUN_TEST(test_beyond_30_rad_and_not_a_number_give_the_result_of_zero);
-    RUN_TEST(test_near_variant_is_at_most_5e_minus_7_off_within_a_quarter_rad);
-    RUN_TEST(test_near_variant_is_at_most_3e_minus_5_off_within_half_a_rad);
-    RUN_TEST(test_near_variant_with_no_distance_is_exact);
+    RUN_TEST(test_small_variant_is_at_most_5e_minus_7_off_within_a_quarter_rad);
+    RUN_TEST(test_small_variant_is_at_most_3e_minus_5_off_within_half_a_rad);
+    RUN_TEST(test_small_variant_is_rounding_off_within_a_tenth_of_a_rad);
+    RUN_TEST(test_small_variant_of_tiny_angles_is_exact);
+    RUN_TEST(test_small_variant_is_odd_and_even_to_the_bit);
     return UNITY_END();
 }

@@ -19,9 +19,12 @@ void tearDown(void)
 static model_dynamics_t dynamics_of(const plant_t *plant)
 {
     const model_constants_t constants = constants_of(plant);
-    const model_step_t step = {.trim = (float)plant->trim, .trim_sine = (float)sin(plant->trim)};
+    const model_step_t step = {
+        .trim = (float)plant->trim, .trim_sine = (float)sin(plant->trim), .trim_cosine = (float)cos(plant->trim)};
     const float p[MODEL_PARAMETERS] = {(float)plant->m_p, (float)plant->c_p, (float)plant->k_p};
-    return model_lever.dynamics(&constants, &step, p);
+    model_arm_t arm;
+    model_lever.prepare(&constants, p, &arm);
+    return model_lever.dynamics(&constants, &step, &arm);
 }
 
 static void assert_dynamics(bool follows_trim)

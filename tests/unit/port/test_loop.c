@@ -153,7 +153,7 @@ static void compute_expected(const lever_config_t *config)
 
 void setUp(void)
 {
-    lever_config_t config;
+    static lever_config_t config;
 
     lever_config_default(&config);
     config.settings.align_time = 0.05f; /* so that most of the samples are really estimated */
