@@ -2,10 +2,10 @@
  *
  * What the filter has gathered is put aside, and new values of w, S_w and the sigma points are made from it beside the old
  * ones, with which the filter goes on meanwhile: condition on the information, let w walk, draw the points. What that does to
- * anything in coordinates of the columns of S_w, a map M, is made with them: a vector of such coordinates x is shift + M y in the
- * new ones. Then the filter adopts all of it at once: T <- T M, and the state moves by T shift. What it has gathered meanwhile,
- * in the old coordinates, is carried over, so that nothing is lost; only the point about which the model is linearised is
- * older by the time that the steps take. In between, all functions of parameter_filter.h are as ever.
+ * coordinates of the columns of S_w is made with them, a map M: x = shift + M y for old ones x and new ones y. Then the filter
+ * adopts all of it at once: T <- T M, and the state moves by T shift. What it has gathered meanwhile, in the old coordinates, is
+ * carried over, so that nothing is lost; only the point about which the model is linearised is older by the time that the
+ * steps take. What a walk frees of the state is known, and the state's, those few samples before the walk is adopted.
  */
 #ifndef FILTER_REVISION_H
 #define FILTER_REVISION_H
@@ -15,14 +15,17 @@
 #include <stdbool.h>
 
 typedef struct revision {
-    float s[MODEL_PARAMETERS * MODEL_PARAMETERS]; /* S_w and w, */
+    /* what is to be: S_w, w, and w in the units of the model; once that is adopted, s is the old S_w */
+    float s[MODEL_PARAMETERS * MODEL_PARAMETERS];
     float w[MODEL_PARAMETERS];
-    float p[MODEL_PARAMETERS]; /* w in the units of the model: what is to be */
-    float work[MODEL_PARAMETERS *
-               MODEL_PARAMETERS]; /* factor of the information; the pairs of sigma points; S_old^-1 S_new */
-    float map[MODEL_PARAMETERS * MODEL_PARAMETERS]; /* M, and the shift; later, the information gathered meanwhile */
+    float p[MODEL_PARAMETERS];
+    /* one after the other: factor of the information that is learnt; pairs of sigma points; S_old^-1 S_new */
+    float work[MODEL_PARAMETERS * MODEL_PARAMETERS];
+    /* M, and the shift; at last the information that is carried over */
+    float map[MODEL_PARAMETERS * MODEL_PARAMETERS];
     float shift[MODEL_PARAMETERS];
-    information_t information; /* put aside: the score of what is learnt; later, what was gathered meanwhile */
+    /* put aside: the score of what is learnt; later, what was gathered meanwhile */
+    information_t information;
 } revision_t;
 
 /* Puts aside what was gathered in `period` seconds, factorised. From the start, or an opened covariance, on it counts
@@ -34,7 +37,7 @@ void revision_take(revision_t *revision, parameter_filter_t *filter, float perio
 /* Conditions on it. */
 void revision_condition(revision_t *revision, const parameter_filter_t *filter);
 
-/* Instead of that: drops it, and goes back to the covariance of the prior, uncorrelated with the state. */
+/* Instead of revision_condition(): drops it, and goes back to the covariance of the prior, uncorrelated with the state. */
 void revision_open(revision_t *revision, parameter_filter_t *filter);
 
 /* Corrects w by it, within the bounds of the model, and says by how much the variances of w have become smaller. Returns true
