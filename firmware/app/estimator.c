@@ -88,7 +88,7 @@ void estimator_init(estimator_t *estimator, const lever_config_t *config)
     estimator->setup.preload = config->preload;
     estimator->setup.estimator = config->estimator;
     estimator->setup.adaptation = config->adaptation;
-    dither_init(&estimator->dither, s->dither_low, s->dither_high, s->sample_period, s->dither_limit, s->dither_fade);
+    dither_init(&estimator->dither, s->dither_low, s->dither_high, s->sample_period, s->torque_limit, s->dither_fade);
     start_over(estimator);
 }
 
@@ -511,7 +511,8 @@ void estimator_health(const estimator_t *estimator, lever_health_t *health)
     health->late = estimator->late;
     health->recoveries = estimator->recoveries;
     health->excitation = sqrtf(estimator->followed.excitation_square);
-    health->dither = estimator->dither.torque;
+    health->torque = estimator->dither.torque;
+    health->gate_open = dither_is_on(&estimator->dither);
 }
 
 void estimator_platform(estimator_t *estimator, const lever_platform_t *platform)

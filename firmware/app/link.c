@@ -212,8 +212,10 @@ static bool encode_motor_command(const estimator_t *estimator, lever_frame_t *fr
 {
     message_motor_command_t message;
     message.model = estimator->setup.model;
+    message.valid = (estimator->mode >= LEVER_MODE_RUN) && (estimator->mode <= LEVER_MODE_FROZEN);
     message.torque = estimator->dither.torque;
     message.dither = estimator->dither.torque;
+    message.time_low = (uint16_t)(estimator->time_us & 0xFFFFu);
     return message_motor_command_encode(frame, &message);
 }
 
@@ -221,6 +223,7 @@ static bool encode_parameters(const estimator_t *estimator, lever_frame_t *frame
 {
     message_pilot_parameters_t message;
     message.model = estimator->setup.model;
+    message.valid = (estimator->mode >= LEVER_MODE_RUN) && (estimator->mode <= LEVER_MODE_FROZEN);
     (void)memcpy(message.parameter, estimator->dual.parameters.p, sizeof message.parameter);
     return message_pilot_parameters_encode(frame, &message);
 }
@@ -229,6 +232,7 @@ static bool encode_sigma(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_pilot_sigma_t message;
     message.model = estimator->setup.model;
+    message.valid = (estimator->mode >= LEVER_MODE_RUN) && (estimator->mode <= LEVER_MODE_FROZEN);
     parameter_filter_sigma(&estimator->dual.parameters, message.sigma);
     return message_pilot_sigma_encode(frame, &message);
 }
@@ -238,6 +242,7 @@ static bool encode_dynamics(const estimator_t *estimator, lever_frame_t *frame)
     const derived_t *derived = &estimator->derived;
     message_pilot_dynamics_t message;
     message.model = estimator->setup.model;
+    message.valid = (estimator->mode >= LEVER_MODE_RUN) && (estimator->mode <= LEVER_MODE_FROZEN);
     message.natural_frequency = derived->mean.natural_frequency;
     message.natural_frequency_sigma = sqrtf(derived->variance.natural_frequency);
     message.damping_ratio = derived->mean.damping_ratio;
@@ -250,12 +255,9 @@ static bool encode_health(const estimator_t *estimator, lever_frame_t *frame)
     message_health_t message;
     lever_health_t health;
     estimator_health(estimator, &health);
-    message.model = estimator->setup.model;
     message.mode = (uint8_t)health.mode;
     message.faults = health.faults;
-    message.lost = (uint8_t)(health.lost & 0xFFu);
-    message.corrupt = (uint8_t)(health.corrupt & 0xFFu);
-    message.late = (uint8_t)(health.late & 0xFFu);
+    message.restarts = (uint8_t)(health.recoveries & 0xFFu);
     message.excitation = health.excitation;
     return message_health_encode(frame, &message);
 }
@@ -265,6 +267,7 @@ static bool encode_platform(const estimator_t *estimator, lever_frame_t *frame)
     const lever_platform_t *platform = &estimator->platform;
     message_platform_health_t message;
     message.model = estimator->setup.model;
+    message.valid = (estimator->mode >= LEVER_MODE_RUN) && (estimator->mode <= LEVER_MODE_FROZEN);
     message.faults = platform->faults;
     message.transmit_errors = platform->transmit_errors;
     message.receive_errors = platform->receive_errors;
@@ -277,10 +280,11 @@ static bool encode_platform(const estimator_t *estimator, lever_frame_t *frame)
 static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *frame)
 {
     message_state_estimate_t message;
-    message.model = estimator->setup.model;
+    message.valid = (estimator->mode >= LEVER_MODE_RUN) && (estimator->mode <= LEVER_MODE_FROZEN);
     message.theta = estimator_state(estimator, 0u);
     message.theta_dot = estimator_state(estimator, 1u);
-    message.nis = estimator->nis;
+    message.innovation = (estimator->nis_size != 0u) ? sqrtf(estimator->nis) : NAN;
+    message.time_low = (uint16_t)(estimator->time_us & 0xFFFFu);
     return message_state_estimate_encode(frame, &message);
 }
 
