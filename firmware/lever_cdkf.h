@@ -115,7 +115,7 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1024 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1152 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];
@@ -164,7 +164,7 @@ enum lever_request {
     LEVER_REQUEST_NONE = 0,
     LEVER_REQUEST_RUN = 1,    /* leave frozen */
     LEVER_REQUEST_FREEZE = 2, /* hold the parameters */
-    LEVER_REQUEST_RESET = 3   /* back to the first guess, for a new series of samples; also leaves fault and ends dither.
+    LEVER_REQUEST_RESET = 3 /* back to the first guess, for a new series of samples; also leaves fault and ends dither.
                                   Counts go on */
 };
 

@@ -38,6 +38,22 @@ void lever_config_default(lever_config_t *config)
     config->adaptation = (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO;
 }
 
+/* Bit by bit, lowest first: it is asked for once. */
+uint32_t lever_settings_crc(const lever_settings_t *settings)
+{
+    uint32_t words[SETTINGS];
+    /* cppcheck-suppress misra-c2012-21.15 ; D2 */
+    (void)memcpy(words, settings, sizeof words);
+    uint32_t crc = UINT32_MAX;
+    for (uint32_t i = 0u; i < lever_setting_count(); i++) {
+        crc ^= words[i];
+        for (uint32_t bit = 0u; bit < 32u; bit++) {
+            crc = (crc >> 1u) ^ (((crc & 1u) != 0u) ? 0xEDB88320u : 0u);
+        }
+    }
+    return ~crc;
+}
+
 /* The name of the first setting out of its range (a NaN is), or NULL. */
 static const char *settings_check(const lever_settings_t *settings)
 {

@@ -35,12 +35,14 @@ static bool is_available(float value)
 /* --- LEVER_SAMPLE ------------------------------------------------------------------------------------------------- */
 
 static const place_t lever_sample_code[] = {CODE(12u, 1u), CODE(13u, 1u), CODE(14u, 1u)};
-static const quantity_t lever_sample_quantity[] = {SIGNED(16u, 16u, 10000.0f), SIGNED(32u, 16u, 2000.0f), SIGNED(48u, 16u, 1000.0f)};
+static const quantity_t lever_sample_quantity[] = {
+    SIGNED(16u, 16u, 10000.0f), SIGNED(32u, 16u, 2000.0f), SIGNED(48u, 16u, 1000.0f)};
 static const layout_t lever_sample = LAYOUT(MESSAGE_LEVER_SAMPLE_ID, lever_sample_code, lever_sample_quantity);
 
 bool message_lever_sample_encode(lever_frame_t *frame, const message_lever_sample_t *message)
 {
-    const uint32_t code[] = {bit_of(message->theta_valid), bit_of(message->theta_dot_valid), bit_of(message->tau_m_valid)};
+    const uint32_t code[] = {
+        bit_of(message->theta_valid), bit_of(message->theta_dot_valid), bit_of(message->tau_m_valid)};
     const float value[] = {message->theta_valid ? message->theta : 0.0f,
         message->theta_dot_valid ? message->theta_dot : 0.0f, message->tau_m_valid ? message->tau_m : 0.0f};
     return layout_encode(frame, &lever_sample, code, value);
@@ -120,7 +122,8 @@ bool message_command_decode(message_command_t *message, const lever_frame_t *fra
 /* --- STATE_ESTIMATE ----------------------------------------------------------------------------------------------- */
 
 static const place_t state_estimate_code[] = {CODE(12u, 1u), CODE(48u, 65535u)};
-static const quantity_t state_estimate_quantity[] = {UNSIGNED(13u, 8u, 8.0f), SIGNED(21u, 13u, 500.0f), SIGNED(34u, 14u, 5000.0f)};
+static const quantity_t state_estimate_quantity[] = {
+    UNSIGNED(13u, 8u, 8.0f), SIGNED(21u, 13u, 500.0f), SIGNED(34u, 14u, 5000.0f)};
 static const layout_t state_estimate = LAYOUT(MESSAGE_STATE_ESTIMATE_ID, state_estimate_code, state_estimate_quantity);
 
 bool message_state_estimate_encode(lever_frame_t *frame, const message_state_estimate_t *message)
@@ -225,13 +228,15 @@ bool message_pilot_sigma_decode(message_pilot_sigma_t *message, const lever_fram
 /* --- PILOT_DYNAMICS ----------------------------------------------------------------------------------------------- */
 
 static const place_t pilot_dynamics_code[] = {MODEL, VALID};
-static const quantity_t pilot_dynamics_quantity[] = {UNSIGNED(16u, 14u, 1000.0f), UNSIGNED(44u, 10u, 500.0f), UNSIGNED(30u, 14u, 5000.0f), UNSIGNED(54u, 10u, 1000.0f)};
+static const quantity_t pilot_dynamics_quantity[] = {
+    UNSIGNED(16u, 14u, 1000.0f), UNSIGNED(44u, 10u, 500.0f), UNSIGNED(30u, 14u, 5000.0f), UNSIGNED(54u, 10u, 1000.0f)};
 static const layout_t pilot_dynamics = LAYOUT(MESSAGE_PILOT_DYNAMICS_ID, pilot_dynamics_code, pilot_dynamics_quantity);
 
 bool message_pilot_dynamics_encode(lever_frame_t *frame, const message_pilot_dynamics_t *message)
 {
     const uint32_t code[] = {message->model, bit_of(message->valid)};
-    const float value[] = {message->natural_frequency, message->natural_frequency_sigma, message->damping_ratio, message->damping_ratio_sigma};
+    const float value[] = {message->natural_frequency, message->natural_frequency_sigma, message->damping_ratio,
+        message->damping_ratio_sigma};
     return layout_encode(frame, &pilot_dynamics, code, value);
 }
 
@@ -308,12 +313,14 @@ bool message_motor_command_decode(message_motor_command_t *message, const lever_
 
 /* --- PLATFORM_HEALTH ---------------------------------------------------------------------------------------------- */
 
-static const place_t platform_health_code[] = {MODEL, VALID, CODE(16u, 255u), CODE(24u, 255u), CODE(32u, 255u), CODE(40u, 255u), CODE(48u, 255u), CODE(56u, 255u)};
+static const place_t platform_health_code[] = {
+    MODEL, VALID, CODE(16u, 255u), CODE(24u, 255u), CODE(32u, 255u), CODE(40u, 255u), CODE(48u, 255u), CODE(56u, 255u)};
 static const layout_t platform_health = CODES_ONLY(MESSAGE_PLATFORM_HEALTH_ID, platform_health_code);
 
 bool message_platform_health_encode(lever_frame_t *frame, const message_platform_health_t *message)
 {
-    const uint32_t code[] = {message->model, bit_of(message->valid), message->faults, message->transmit_errors, message->receive_errors, message->bus_offs, message->overruns, message->dropped};
+    const uint32_t code[] = {message->model, bit_of(message->valid), message->faults, message->transmit_errors,
+        message->receive_errors, message->bus_offs, message->overruns, message->dropped};
     return layout_encode(frame, &platform_health, code, no_quantity);
 }
 
@@ -338,7 +345,8 @@ bool message_platform_health_decode(message_platform_health_t *message, const le
 /* --- IDENTITY, multiplexed by page -------------------------------------------------------------------------------- */
 
 /* Code 0 is the page. */
-static const place_t version_code[] = {CODE(12u, 15u), CODE(16u, 255u), CODE(24u, 255u), CODE(32u, 255u), CODE(40u, 255u)};
+static const place_t version_code[] = {
+    CODE(12u, 15u), CODE(16u, 255u), CODE(24u, 255u), CODE(32u, 255u), CODE(40u, 255u)};
 static const place_t settings_code[] = {CODE(12u, 15u), CODE(16u, UINT32_MAX)};
 static const place_t choices_code[] = {CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u)};
 static const quantity_t choices_quantity[] = {UNSIGNED(32u, 16u, 1000.0f)};
@@ -356,15 +364,16 @@ bool message_identity_encode(lever_frame_t *frame, const message_identity_t *mes
         {message->page, message->model, message->preload, message->estimator, message->adaptation},
     };
     const uint8_t page = message->page;
-    return (page < (uint8_t)MESSAGE_PAGE_COUNT) && layout_encode(frame, &identity[page], code[page], &message->dither_rms);
+    return (page < (uint8_t)MESSAGE_PAGE_COUNT) &&
+           layout_encode(frame, &identity[page], code[page], &message->dither_rms);
 }
 
 bool message_identity_decode(message_identity_t *message, const lever_frame_t *frame)
 {
     uint32_t code[COUNT(version_code)] = {0u};
     float value[1] = {0.0f};
-    const bool fits = layout_decode(code, value, &identity[MESSAGE_PAGE_SETTINGS], frame) &&
-                      (code[0] < (uint32_t)MESSAGE_PAGE_COUNT);
+    const bool fits =
+        layout_decode(code, value, &identity[MESSAGE_PAGE_SETTINGS], frame) && (code[0] < (uint32_t)MESSAGE_PAGE_COUNT);
     if (fits) {
         const uint32_t page = code[0];
         (void)layout_decode(code, value, &identity[page], frame);
@@ -389,13 +398,15 @@ bool message_identity_decode(message_identity_t *message, const lever_frame_t *f
 
 /* --- COMMAND_ACK -------------------------------------------------------------------------------------------------- */
 
-static const place_t command_ack_code[] = {CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u)};
+static const place_t command_ack_code[] = {
+    CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u)};
 static const quantity_t command_ack_quantity[] = {UNSIGNED(48u, 16u, 1000.0f)};
 static const layout_t command_ack = LAYOUT(MESSAGE_COMMAND_ACK_ID, command_ack_code, command_ack_quantity);
 
 bool message_command_ack_encode(lever_frame_t *frame, const message_command_ack_t *message)
 {
-    const uint32_t code[] = {message->command_counter, message->result, message->model, message->preload, message->estimator, message->adaptation};
+    const uint32_t code[] = {message->command_counter, message->result, message->model, message->preload,
+        message->estimator, message->adaptation};
     const float value[] = {message->dither_rms};
     return layout_encode(frame, &command_ack, code, value);
 }

@@ -83,7 +83,8 @@ typedef struct message_base_sample {
 bool message_base_sample_encode(lever_frame_t *frame, const message_base_sample_t *message);
 bool message_base_sample_decode(message_base_sample_t *message, const lever_frame_t *frame);
 
-typedef lever_command_t message_command_t; /* what lever_command() takes; a dither_rms beyond 65.534 is sent, and comes, as
+typedef lever_command_t
+    message_command_t; /* what lever_command() takes; a dither_rms beyond 65.534 is sent, and comes, as
                                               65.535: keep. A negative one or NaN is refused */
 
 bool message_command_encode(lever_frame_t *frame, const message_command_t *message);
@@ -92,11 +93,11 @@ bool message_command_decode(message_command_t *message, const lever_frame_t *fra
 /* --- from the estimator ---------------------------------------------------------------------------------------- */
 
 typedef struct message_state_estimate {
-    float theta; /* [rad] */
-    float theta_dot; /* [rad/s] */
-    float innovation; /* normalised: sqrt(NIS) [1]; NaN without measurement */
+    float theta;       /* [rad] */
+    float theta_dot;   /* [rad/s] */
+    float innovation;  /* normalised: sqrt(NIS) [1]; NaN without measurement */
     uint16_t time_low; /* low 16 bits of the sample time [us] */
-    bool valid; /* the estimate may be used */
+    bool valid;        /* the estimate may be used */
 } message_state_estimate_t;
 
 bool message_state_estimate_encode(lever_frame_t *frame, const message_state_estimate_t *message);
@@ -106,7 +107,7 @@ bool message_state_estimate_decode(message_state_estimate_t *message, const leve
 typedef struct message_pilot_parameters {
     float parameter[LEVER_PARAMETERS];
     uint8_t model; /* enum lever_model, here and below; not known: refused in both directions */
-    bool valid; /* as above, here and below */
+    bool valid;    /* as above, here and below */
 } message_pilot_parameters_t;
 
 bool message_pilot_parameters_encode(lever_frame_t *frame, const message_pilot_parameters_t *message);
@@ -123,10 +124,10 @@ bool message_pilot_sigma_encode(lever_frame_t *frame, const message_pilot_sigma_
 bool message_pilot_sigma_decode(message_pilot_sigma_t *message, const lever_frame_t *frame);
 
 typedef struct message_pilot_dynamics {
-    float natural_frequency; /* [Hz] */
+    float natural_frequency;       /* [Hz] */
     float natural_frequency_sigma; /* [Hz] */
-    float damping_ratio; /* [1] */
-    float damping_ratio_sigma; /* [1] */
+    float damping_ratio;           /* [1] */
+    float damping_ratio_sigma;     /* [1] */
     uint8_t model;
     bool valid;
 } message_pilot_dynamics_t;
@@ -136,8 +137,8 @@ bool message_pilot_dynamics_decode(message_pilot_dynamics_t *message, const leve
 
 typedef struct message_health {
     float excitation; /* [rad/s] */
-    uint32_t faults; /* of enum lever_fault, present since the last HEALTH; 24 bits */
-    uint8_t mode; /* enum lever_mode */
+    uint32_t faults;  /* of enum lever_fault, present since the last HEALTH; 24 bits */
+    uint8_t mode;     /* enum lever_mode */
     uint8_t restarts; /* the low eight bits of lever_health_t.recoveries */
 } message_health_t;
 
@@ -173,13 +174,13 @@ enum message_page { MESSAGE_PAGE_VERSION = 0, MESSAGE_PAGE_SETTINGS = 1, MESSAGE
 
 /* One page of it: only that page's members are sent, and what is received leaves the others 0. */
 typedef struct message_identity {
-    uint8_t page; /* enum message_page; not known: refused in both directions */
+    uint8_t page;           /* enum message_page; not known: refused in both directions */
     uint8_t firmware_major; /* page 0 */
     uint8_t firmware_minor;
     uint8_t firmware_patch;
-    uint8_t contract; /* VERSION of the DBC */
+    uint8_t contract;      /* VERSION of the DBC */
     uint32_t settings_crc; /* page 1: lever_settings_crc() */
-    uint8_t model; /* page 2 */
+    uint8_t model;         /* page 2 */
     uint8_t preload;
     uint8_t estimator;
     uint8_t adaptation;
@@ -199,8 +200,8 @@ enum message_result {
 
 typedef struct message_command_ack {
     uint8_t command_counter; /* of the COMMAND that this answers */
-    uint8_t result; /* enum message_result */
-    uint8_t model; /* the choices as they stand now, here and below */
+    uint8_t result;          /* enum message_result */
+    uint8_t model;           /* the choices as they stand now, here and below */
     uint8_t preload;
     uint8_t estimator;
     uint8_t adaptation;
