@@ -23,22 +23,22 @@
 #include <stdint.h>
 
 typedef struct torque_gate {
-    float limit;            /* [N m] */
-    float slew;             /* [N m / us] */
-    float open_step;        /* of the gain, in a sample */
-    float square_most;      /* greatest mean square [N^2 m^2] */
-    float sustained;        /* its root: amplitude allowed for ever [N m] */
-    float amplitude_slope;  /* amplitude allowed beyond that per room left [1 / (N m)] */
-    uint32_t period_us;     /* of a sample */
-    uint32_t silence_us;    /* longest time without a sample, or output */
-    float torque;           /* let through [N m] */
-    float gain;             /* 0 to 1, of an opening gate */
-    float closing;          /* rate of a closing one [N m / us] */
-    float mean_square;      /* of torque [N^2 m^2] */
-    uint32_t since_sample;  /* [us], here and below; saturate */
-    uint32_t since_output;  /* last valid theta or theta_dot */
-    uint32_t since_command; /* last accepted command */
-    uint32_t counted;       /* time since the last sample of any kind that torque_gate_idle() has counted */
+    float limit;           /* [N m] */
+    float slew;            /* [N m / us] */
+    float open_step;       /* of the gain, in a sample */
+    float square_most;     /* greatest mean square [N^2 m^2] */
+    float sustained;       /* its root: amplitude allowed for ever [N m] */
+    float amplitude_slope; /* amplitude allowed beyond that per room left [1 / (N m)] */
+    uint32_t period_us;    /* of a sample */
+    uint32_t silence_us;   /* longest time without a sample, or output */
+    float torque;          /* let through [N m] */
+    float gain;            /* 0 to 1, of an opening gate */
+    float closing;         /* rate of a closing one [N m / us] */
+    float mean_square;     /* of torque [N^2 m^2] */
+    uint32_t sample_left;  /* time for which the last sample serves [us] */
+    uint32_t output_left;  /* the last valid theta or theta_dot */
+    uint32_t command_left; /* the last accepted command */
+    uint32_t counted;      /* time since the last sample of any kind that torque_gate_idle() has counted [us] */
     bool open;
 } torque_gate_t;
 
