@@ -18,8 +18,9 @@ static float clamped(float value, float most)
     return (above < -most) ? -most : above;
 }
 
-/* Room of the mean square below square_most in which the amplitude allowed falls from the limit to what may stay for ever: wide
- * enough that it falls no faster than torque_slew, and that the longest step leaves the mean square below. */
+/* Room of the mean square below square_most in which the amplitude allowed falls from the limit to what may stay for
+ * ever: wide enough that it falls no faster than torque_slew, and that the longest step leaves the mean square
+ * below. */
 static float room_of(const torque_gate_t *gate, float slew)
 {
     const float beyond = gate->limit - gate->sustained;
@@ -49,7 +50,7 @@ void torque_gate_init(torque_gate_t *gate, const lever_settings_t *settings)
     }
 }
 
-/* --- open or closed ------------------------------------------------------------------------------------------------ */
+/* --- open or closed ----------------------------------------------------------------------------------------------- */
 
 /* What is left of a time after some of it. */
 static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)
@@ -100,7 +101,7 @@ static void age(torque_gate_t *gate, uint32_t elapsed_us)
     }
 }
 
-/* --- limits -------------------------------------------------------------------------------------------------------- */
+/* --- limits ------------------------------------------------------------------------------------------------------- */
 
 static void drive(torque_gate_t *gate, float asked, uint32_t elapsed_us)
 {

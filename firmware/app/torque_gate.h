@@ -1,19 +1,20 @@
 /* The one way out for torque: nothing reaches a MOTOR_COMMAND but through here.
  *
- * What is asked for passes finite, amplitude (torque_limit), slew (torque_slew) and rms (torque_rms) in this order. The gate is
- * open while all of this holds:
+ * What is asked for passes finite, amplitude (torque_limit), slew (torque_slew) and rms (torque_rms) in this order. The
+ * gate is open while all of this holds:
  *   - the mode, the sample clock and the machine permit it: torque_sample_t;
  *   - a sample came, and in one a valid output, within 20 ms or three sample periods, whichever is longer;
  *   - a command was accepted within the last second (keep-alive).
- * Otherwise torque goes to exactly zero, on a straight line within 40 ms (and the slew limit, if that would take longer, is
- * overruled). After that it opens over dither_fade. Closing needs no sample: the port calls torque_gate_idle().
+ * Otherwise torque goes to exactly zero, on a straight line within 40 ms (and the slew limit, if that would take
+ * longer, is overruled). After that it opens over dither_fade. Closing needs no sample: the port calls
+ * torque_gate_idle().
  *
- * Rms. The mean square of the torque with a memory of 0.25 s is held below torque_rms^2 / 1.25, by an amplitude that falls with
- * the room left: then no second holds more than torque_rms. That amplitude falls slower than torque_slew, so that all limits
- * hold at once.
+ * Rms. The mean square of the torque with a memory of 0.25 s is held below torque_rms^2 / 1.25, by an amplitude that
+ * falls with the room left: then no second holds more than torque_rms. That amplitude falls slower than torque_slew, so
+ * that all limits hold at once.
  *
- * Time is that of the samples, or the port's where none came; the torque of a step moves by what a sample period allows,
- * however long the step was. */
+ * Time is that of the samples, or the port's where none came; the torque of a step moves by what a sample period
+ * allows, however long the step was. */
 #ifndef APP_TORQUE_GATE_H
 #define APP_TORQUE_GATE_H
 

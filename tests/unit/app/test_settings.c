@@ -52,7 +52,7 @@ static void assert_refused(const char *name)
     TEST_ASSERT_NULL(lever_init(&memory, &config));
 }
 
-/* --- table --------------------------------------------------------------------------------------------------------- */
+/* --- table -------------------------------------------------------------------------------------------------------- */
 
 static void test_table_has_a_row_for_every_float_of_the_struct(void)
 {
@@ -111,7 +111,7 @@ static void test_defaults_are_those_of_the_table(void)
     TEST_ASSERT_EQUAL_UINT8(LEVER_ADAPTATION_ROBBINS_MONRO, config.adaptation);
 }
 
-/* --- check --------------------------------------------------------------------------------------------------------- */
+/* --- check -------------------------------------------------------------------------------------------------------- */
 
 static void test_the_default_configuration_is_accepted(void)
 {
@@ -238,7 +238,7 @@ static void test_keep_is_no_choice_for_a_configuration(void)
     assert_refused("adaptation");
 }
 
-/* --- init ---------------------------------------------------------------------------------------------------------- */
+/* --- init --------------------------------------------------------------------------------------------------------- */
 
 static void test_a_refused_configuration_leaves_the_memory_alone(void)
 {
