@@ -224,18 +224,18 @@ static void test_rounds_to_the_nearest_count(void)
 }
 
 /* Values that are exactly half way, so that nothing but the rule decides. */
-static void test_ties_go_away_from_zero(void)
+static void test_ties_go_to_the_even_count(void)
 {
-    assert_sent(&quantities[0], 313, 0.03125f); /* theta, 312.5 counts */
-    assert_sent(&quantities[0], -313, -0.03125f);
-    assert_sent(&quantities[1], 125 + 63, 0.09375f); /* theta_dot, 187.5 */
-    assert_sent(&quantities[1], -63, -0.03125f);     /* 62.5 */
-    assert_sent(&quantities[3], 63, 0.0625f);        /* z_ddot, 62.5 */
-    assert_sent(&quantities[3], -188, -0.1875f);     /* 187.5 */
-    assert_sent(&quantities[9], 13, 0.125f);         /* c_p, 12.5 */
-    assert_sent(&quantities[10], 3, 0.25f);          /* k_p, 2.5 */
-    assert_sent(&quantities[15], 313, 0.0625f);      /* damping_ratio, 312.5 */
-    assert_sent(&quantities[7], 1, 0.0625f);         /* innovation, 0.5 */
+    assert_sent(&quantities[0], 312, 0.03125f); /* theta, 312.5 counts */
+    assert_sent(&quantities[0], -312, -0.03125f);
+    assert_sent(&quantities[1], 188, 0.09375f);  /* theta_dot, 187.5 */
+    assert_sent(&quantities[1], -62, -0.03125f); /* 62.5 */
+    assert_sent(&quantities[3], 62, 0.0625f);    /* z_ddot, 62.5 */
+    assert_sent(&quantities[3], -188, -0.1875f); /* 187.5 */
+    assert_sent(&quantities[9], 12, 0.125f);     /* c_p, 12.5 */
+    assert_sent(&quantities[10], 2, 0.25f);      /* k_p, 2.5 */
+    assert_sent(&quantities[15], 312, 0.0625f);  /* damping_ratio, 312.5 */
+    assert_sent(&quantities[7], 0, 0.0625f);     /* innovation, 0.5 */
 }
 
 /* Adding 0.5 and cutting off would send these, 0.49999997 counts in float, as 1. */
@@ -269,7 +269,7 @@ int main(void)
     RUN_TEST(test_an_input_that_is_not_available_is_not_valid);
     RUN_TEST(test_every_count);
     RUN_TEST(test_rounds_to_the_nearest_count);
-    RUN_TEST(test_ties_go_away_from_zero);
+    RUN_TEST(test_ties_go_to_the_even_count);
     RUN_TEST(test_just_below_half_is_zero);
     RUN_TEST(test_value_without_flag_is_not_read);
     return UNITY_END();
