@@ -5,7 +5,7 @@
  *   - the mode, the sample clock and the machine permit it: torque_sample_t;
  *   - a sample with a valid output came within 20 ms or three sample periods, whichever is longer;
  *   - a command was accepted within the last second (keep-alive).
- * Otherwise torque goes to exactly zero on a straight line within 40 ms, though torque_slew may be less than that takes.
+ * Otherwise torque goes to exactly zero on a straight line within 40 ms, even if torque_slew is less than that takes.
  * Closing needs no sample: the port calls torque_gate_idle(). Opening takes dither_fade.
  *
  * Rms. The mean square of the torque with a memory of 0.25 s is held below torque_rms^2 / 1.25, by an amplitude that
