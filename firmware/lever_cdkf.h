@@ -3,11 +3,11 @@
  * This header is the whole outside of the firmware; no other header is needed, and nothing below it is promised.
  *
  * What it does. A square-root Central Difference Kalman Filter (single precision, fixed size) estimates the angle and
- * rate of the lever and, in step with them, the pilot's parameters [m_p, c_p, k_p], each with its standard deviation; or those
- * of a linear model, for an arm on another device.
+ * rate of the lever and, in step with them, the pilot's parameters [m_p, c_p, k_p], each with its standard deviation;
+ * or those of a linear model, for an arm on another device.
  *
- * What it needs. A sample each sample_period: lever angle and rate, base vertical acceleration, motor torque. It uses no
- * heap, operating system, clock, thread, or mutable static; all memory is the caller's, time comes with the samples.
+ * What it needs. A sample each sample_period: lever angle and rate, base vertical acceleration, motor torque. It uses
+ * no heap, operating system, clock, thread, or mutable static; all memory is the caller's, time comes with the samples.
  *
  * Two ways to use it, on the same instance type:
  *
@@ -19,8 +19,8 @@
  *     // without CAN                                // with CAN
  *     lever_update(lever, &sample);                 if (lever_on_frame(lever, &rx) == LEVER_FRAME_SAMPLE) {
  *     lever_estimate(lever, &estimate);                 lever_step(lever);
- *                                                       while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *                                                   }
+ *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent.
  * Cost. Every call is bounded; lever_update() is the expensive one: 2,460 instructions on a Cortex-M4F (lever model, built for
@@ -38,6 +38,11 @@
 extern "C" {
 #endif
 
+/* Semantic version of API, wire and settings: firmware/CHANGELOG.md says what changed. */
+#define LEVER_VERSION_MAJOR 0
+#define LEVER_VERSION_MINOR 2
+#define LEVER_VERSION_PATCH 0
+
 /* --- configuration --------------------------------------------------------------------------------------------- */
 
 /* Model of arm and lever: see firmware/model. */
@@ -52,8 +57,8 @@ enum lever_model {
  * cancels at a trim angle that follows theta slowly, and all signals count from their slow part (trim_corner). */
 enum lever_preload { LEVER_PRELOAD_FIXED = 0, LEVER_PRELOAD_TRIM = 1, LEVER_PRELOAD_COUNT };
 
-/* How state and parameters are estimated together. DUAL: two filters in step, of which the state's takes the parameters as
- * they are. JOINT: one filter on both, for which what the parameters may have done since the last sample also is
+/* How state and parameters are estimated together. DUAL: two filters in step, of which the state's takes the parameters
+ * as they are. JOINT: one filter on both, for which what the parameters may have done since the last sample also is
  * uncertainty of the state. */
 enum lever_estimator { LEVER_ESTIMATOR_DUAL = 0, LEVER_ESTIMATOR_JOINT = 1, LEVER_ESTIMATOR_COUNT };
 
@@ -101,13 +106,17 @@ const lever_setting_t *lever_setting(uint32_t index);
 void lever_config_default(lever_config_t *config);
 
 /* NULL when the configuration is usable, otherwise the name of the first thing that is out of range (a setting, or
- * "model", "preload", "estimator", "adaptation"). */
+ * "model", "preload", "estimator", "adaptation"), or of a setting that does not go with another; its meaning says with
+ * which. */
 const char *lever_config_check(const lever_config_t *config);
+
+/* CRC-32 (IEEE 802.3) over the settings in their order, each as the four bytes of its float, lowest first. */
+uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1024 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1152 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];
@@ -115,10 +124,10 @@ typedef union lever_memory {
 
 typedef struct lever lever_t;
 
-/* Makes an instance in `memory`. Memory and configuration are the caller's, and must outlive it; the configuration, of which
- * the instance reads the settings, must not change meanwhile, and may be constant, in flash, and shared by instances. There is
- * nothing to release. Returns NULL, touching nothing, if the configuration is not usable. Also the way to start over with
- * another configuration. */
+/* Makes an instance in `memory`. Memory and configuration are the caller's, and must outlive it; the configuration, of
+ * which the instance reads the settings, must not change meanwhile, and may be constant, in flash, and shared by
+ * instances. There is nothing to release. Returns NULL, touching nothing, if the configuration is not usable. Also the
+ * way to start over with another configuration. */
 lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config);
 
 /* --- samples in ------------------------------------------------------------------------------------------------ */
@@ -143,21 +152,21 @@ enum lever_mode {
     LEVER_MODE_RUN = 2,    /* estimating */
     LEVER_MODE_COAST = 3,  /* no usable theta or theta_dot: predicting, uncertainty grows */
     LEVER_MODE_FROZEN = 4, /* by command: states are estimated, parameters held */
-    LEVER_MODE_FAULT = 5 /* the filter had to be restarted too often; dither fades out; only a reset leaves this mode */
+    LEVER_MODE_FAULT = 5   /* the filter had to be restarted too often; only a reset leaves this mode */
 };
 
 /* Takes one sample: predicts to its time (through up to gap_limit of missing samples), then updates. Inputs between two
- * samples are taken as the mean of both. A sample not newer than the last is counted as late and ignored; when such samples
- * advance for gap_limit, their sender has restarted its clock, and the estimator aligns anew. Returns the mode after the
- * sample. */
+ * samples are taken as the mean of both. A sample not newer than the last is counted as late and ignored; when such
+ * samples advance for gap_limit, their sender has restarted its clock, and the estimator aligns anew. Returns the mode
+ * after the sample. */
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample);
 
 enum lever_request {
     LEVER_REQUEST_NONE = 0,
     LEVER_REQUEST_RUN = 1,    /* leave frozen */
     LEVER_REQUEST_FREEZE = 2, /* hold the parameters */
-    LEVER_REQUEST_RESET = 3   /* back to the first guess, for a new series of samples; also leaves fault. Counts and
-                                  dither go on */
+    LEVER_REQUEST_RESET = 3 /* back to the first guess, for a new series of samples; also leaves fault and ends dither.
+                                  Counts go on */
 };
 
 enum lever_keep { LEVER_KEEP = 15 };
@@ -169,8 +178,8 @@ typedef struct lever_command {
     uint8_t preload;    /* enum lever_preload or LEVER_KEEP; a change resets the estimator */
     uint8_t estimator;  /* enum lever_estimator or LEVER_KEEP; a change resets the estimator */
     uint8_t adaptation; /* enum lever_adaptation or LEVER_KEEP */
-    float dither_rms;   /* identification torque [N m]: 0 fades it out, dither_limit limits it, from LEVER_KEEP on it
-                           stays as it is (on CAN: 65.535) */
+    float dither_rms;   /* identification torque [N m]: 0 fades it out, torque_rms and torque_limit limit it, from
+                           LEVER_KEEP on it stays as it is (on CAN: 65.535) */
 } lever_command_t;
 
 /* Carries a command out before the next sample. Returns false, changing nothing, if any part of it is not known. */
@@ -195,8 +204,8 @@ typedef struct lever_estimate {
     float damping_ratio; /* [1] */
     float damping_ratio_sigma;
     float trim;       /* angle about which the dynamics are linearised [rad] */
-    float nis;        /* normalised innovation squared of the last update, chi-square with nis_size
-                                                degrees of freedom when the filter is consistent; 0 without measurement */
+    float nis;        /* normalised innovation squared of the last update, chi-square with nis_size degrees of
+                         freedom when the filter is consistent; 0 without measurement */
     uint8_t nis_size; /* 0, 1 or 2 outputs used in the last update */
 } lever_estimate_t;
 
@@ -209,7 +218,7 @@ const char *lever_parameter_unit(uint8_t model, uint32_t index);
 
 /* --- health ---------------------------------------------------------------------------------------------------- */
 
-/* Conditions present at the last sample; none of them stops the estimator. */
+/* Conditions present at the last sample; none of them stops the estimator. HEALTH has those since the last HEALTH. */
 enum lever_fault {
     LEVER_FAULT_THETA = 1,          /* theta missing or invalid */
     LEVER_FAULT_THETA_DOT = 2,      /* theta_dot missing or invalid */
@@ -222,19 +231,22 @@ enum lever_fault {
     LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model */
     LEVER_FAULT_RECOVERED = 512,    /* an invalid factor or estimate was refused and restarted at this sample */
     LEVER_FAULT_CHANGE = 1024,      /* the pilot has changed suddenly within the last second; learning anew */
-    LEVER_FAULT_PLATFORM = 2048     /* the machine reports a fault of its own: lever_platform() */
+    LEVER_FAULT_PLATFORM = 2048,    /* the machine reports a fault of its own: lever_platform() */
+    LEVER_FAULT_CLOCK = 4096,       /* the sample clock stands or runs backwards */
+    LEVER_FAULT_DUPLICATE = 8192    /* another estimator has spoken on this bus within the last two seconds */
 };
 
 typedef struct lever_health {
     enum lever_mode mode;
-    uint16_t faults;  /* of enum lever_fault */
+    uint32_t faults;  /* of enum lever_fault */
     uint32_t samples; /* samples taken */
     uint32_t lost;    /* samples or frames that never came */
     uint32_t corrupt; /* frames with a wrong CRC or length or an unknown command, values not finite or not plausible */
     uint32_t late;    /* samples or frames that came twice, out of order or too late */
     uint32_t recoveries; /* times that the filter was restarted */
     float excitation;    /* rms of theta_dot over excitation_time [rad/s] */
-    float dither;        /* identification torque asked of the motor for the next sample [N m] */
+    float torque;        /* what the torque gate asks of the motor until the next sample [N m] */
+    bool gate_open;      /* torque may be other than zero: see lever_idle() */
 } lever_health_t;
 
 void lever_health(const lever_t *lever, lever_health_t *health);
@@ -260,9 +272,25 @@ typedef struct lever_platform {
     uint16_t dropped;  /* frames to send dropped */
 } lever_platform_t;
 
-/* Takes the port's report, which stands until the next one. From the first report on PLATFORM_HEALTH is sent beside HEALTH,
- * and any of the faults raises LEVER_FAULT_PLATFORM. Without one nothing of it is sent. */
+/* Takes the port's report, which stands until the next one. From the first report on PLATFORM_HEALTH is sent beside
+ * HEALTH, and any of the faults raises LEVER_FAULT_PLATFORM. Without one nothing of it is sent. */
 void lever_platform(lever_t *lever, const lever_platform_t *platform);
+
+/* --- torque ---------------------------------------------------------------------------------------------------- */
+
+/* All torque for the motor leaves through one gate: finite, then torque_limit, torque_slew, torque_rms over one second.
+ * It is open while all of this holds; otherwise torque fades to exactly zero within 50 ms:
+ *   - mode RUN or FROZEN, or COAST for as long as the next line allows;
+ *   - a sample with a valid theta or theta_dot came within 20 ms or three sample periods, whichever is longer;
+ *   - the sample clock advances;
+ *   - a COMMAND, or lever_command(), was accepted within the last second of sample time: repeat one (keep-alive);
+ *   - the platform reports none of ROM, SELF_TEST, WATCHDOG.
+ * Opening takes dither_fade. */
+
+/* No sample came for elapsed_us since the last lever_step(), lever_update() or lever_idle(), by the port's own clock
+ * [us]. The estimate stays; the gate ages, and while torque is not yet zero a MOTOR_COMMAND becomes due: fetch it with
+ * lever_next_frame(). Call it when no sample has come for about 5 ms, and again each 5 ms or so. */
+void lever_idle(lever_t *lever, uint32_t elapsed_us);
 
 /* --- CAN ------------------------------------------------------------------------------------------------------- */
 
@@ -277,7 +305,7 @@ enum lever_frame_result {
     LEVER_FRAME_IGNORED = 0, /* not for us */
     LEVER_FRAME_TAKEN = 1,   /* ours, and more is needed */
     LEVER_FRAME_SAMPLE = 2,  /* completed a sample: call lever_step() now */
-    LEVER_FRAME_REFUSED = 3  /* ours, but corrupt, repeated, late or not understood; counted */
+    LEVER_FRAME_REFUSED = 3  /* ours, but corrupt, repeated, late, not understood or not accepted; counted */
 };
 
 /* Takes a received frame. BASE_SAMPLE completes the sample of its counter, with or without its LEVER_SAMPLE, so send
@@ -287,9 +315,10 @@ enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *fram
 /* lever_update() with the sample that lever_on_frame() has completed; without one it does nothing. Returns the mode. */
 enum lever_mode lever_step(lever_t *lever);
 
-/* The next frame to send; false when there is none left. MOTOR_COMMAND comes first. Every step ends with one
- * STATE_ESTIMATE, so who has received that has everything the step gives. Frames not fetched before the next step are
- * replaced by newer ones. */
+/* The next frame to send; false when there is none left. Fetch after lever_step(), after every frame taken or refused
+ * (a COMMAND is answered) and after lever_idle(). MOTOR_COMMAND comes first. Every step ends with one STATE_ESTIMATE,
+ * so who has received that has everything the step gives. Frames not fetched before the next step are replaced by newer
+ * ones. */
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 
 #ifdef __cplusplus

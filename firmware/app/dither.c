@@ -5,11 +5,11 @@
 
 #define HIGHEST 0.1f     /* greatest corner, in samples^-1: what the integration below is good for */
 #define SEED 2463534242u /* any but 0 (Marsaglia 2003) */
-#define SETTLING 16384u  /* samples of the impulse response that are summed up */
 
 /* Butterworth low-pass of second order behind the high-pass of detrend.h, by semi-implicit Euler. */
-static float filter(dither_t *dither, float in, float period)
+static float filter(dither_t *dither, float in)
 {
+    const float period = dither->period;
     const float deviation = detrend_step(&dither->high_pass, in, &dither->low, period);
     const float force =
         (dither->high.square * (deviation - dither->low_pass)) - (dither->high.damping * dither->low_pass_rate);
@@ -29,49 +29,86 @@ static float uniform(uint32_t *state)
     return ((float)(x >> 8) * 1.1920929e-7f) - 1.0f;
 }
 
-/* White noise of variance 1/3 through the band has variance 1/3 of the energy of its impulse response. */
-static float band_energy(const dither_t *dither, float period)
+/* Both filters above have the denominator z^2 - (2 - a - d) z + (1 - d), with a = (w T)^2 and d = sqrt(2) w T of their
+ * corner. Its squared magnitude at z = exp(jv) is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(v/2), and with s = j tan(v/2)
+ * that is |p[2] s^2 + p[1] s + p[0]|^2 / (1 - s^2)^2. */
+static void denominator_of(float p[3], const detrend_corner_t *corner, float period)
 {
-    dither_t copy = *dither;
-    float energy = 0.0f;
-    for (uint32_t i = 0u; i < SETTLING; i++) {
-        const float response = filter(&copy, (i == 0u) ? 1.0f : 0.0f, period);
-        energy += response * response;
-    }
-    return energy;
+    const float a = corner->square * period * period;
+    const float d = corner->damping * period;
+    p[0] = a;
+    p[2] = sqrtf((a * (a + (4.0f * d))) + (16.0f * (1.0f - d)));
+    p[1] = sqrtf(2.0f * a * (a + (2.0f * d) + p[2]));
 }
 
-void dither_init(dither_t *dither, float low, float high, float period, float limit, float fade)
+/* Variance of white noise of variance 1 behind both filters: 32 b^2 times Phillips' integral I4 of (s^3 + s^2) over the
+ * product of both denominators (James, Nichols, Phillips 1947), b = (w T)^2 of the low-pass. Exact; every term is
+ * positive, so that float does. */
+static float band_variance(const dither_t *dither)
+{
+    float p[3];
+    float q[3];
+    denominator_of(p, &dither->low, dither->period);
+    denominator_of(q, &dither->high, dither->period);
+    const float b = q[0];
+    const float d1 = (p[1] * q[0]) + (p[0] * q[1]);
+    const float d3 = (p[2] * q[1]) + (p[1] * q[2]);
+    const float apart = (p[2] * q[0]) - (p[0] * q[2]);
+    const float numerator = (d1 * p[2] * q[2]) + (p[1] * q[0] * ((p[2] * q[0]) + (p[1] * q[1]))) +
+                            (p[0] * q[1] * ((p[1] * q[1]) + (p[0] * q[2])));
+    const float determinant = p[1] * q[1] * ((apart * apart) + (d3 * d1));
+    return 16.0f * b * b * (numerator / (p[2] * q[2] * determinant));
+}
+
+void dither_init(dither_t *dither, float low, float high, float period, float rms_most, float fade)
 {
     const float highest = HIGHEST / period;
-    (void)memset(dither, 0, sizeof *dither);
     dither->low = detrend_corner((low < highest) ? low : highest);
     dither->high = detrend_corner((high < highest) ? high : highest);
-    dither->limit = limit;
-    dither->fade = fade;
+    dither->period = period;
+    dither->scale = sqrtf(3.0f / band_variance(dither)); /* uniform() has a variance of 1/3 */
+    dither->rms_most = rms_most;
+    dither->fade = fade / period;
+    dither_reset(dither);
+}
+
+void dither_reset(dither_t *dither)
+{
+    detrend_start(&dither->high_pass, 0.0f);
+    dither->low_pass = 0.0f;
+    dither->low_pass_rate = 0.0f;
+    dither->target = 0.0f;
+    dither->level = 0.0f;
+    dither->slope = 0.0f;
     dither->noise = SEED;
-    dither->scale = sqrtf(3.0f / band_energy(dither, period));
 }
 
-void dither_set(dither_t *dither, float rms)
+void dither_set(dither_t *dither, float rms, bool at_once)
 {
-    dither->target = (rms < dither->limit) ? rms : dither->limit;
-    dither->slope = (dither->fade > 0.0f) ? (fabsf(dither->target - dither->level) / dither->fade) : 1.0e6f;
+    const float change = fabsf(((rms < dither->rms_most) ? rms : dither->rms_most) - dither->level);
+    dither->target = (rms < dither->rms_most) ? rms : dither->rms_most;
+    dither->slope = (!at_once && (dither->fade > 1.0f)) ? (change / dither->fade) : change;
 }
 
-void dither_step(dither_t *dither, float period)
+/* The level goes to its target by at most the slope. */
+static void fade(dither_t *dither)
 {
-    const float step = dither->slope * period;
     const float left = dither->target - dither->level;
-    if (fabsf(left) <= step) {
+    if (fabsf(left) <= dither->slope) {
         dither->level = dither->target;
     } else {
-        dither->level += (left > 0.0f) ? step : -step;
+        dither->level += (left > 0.0f) ? dither->slope : -dither->slope;
     }
-    const float noise = filter(dither, uniform(&dither->noise), period);
-    const float torque = dither->level * dither->scale * noise;
-    const float above = (torque > dither->limit) ? dither->limit : torque;
-    dither->torque = (above < -dither->limit) ? -dither->limit : above;
+}
+
+float dither_step(dither_t *dither)
+{
+    float torque = 0.0f;
+    if (dither_is_on(dither)) {
+        fade(dither);
+        torque = dither->level * dither->scale * filter(dither, uniform(&dither->noise));
+    }
+    return torque;
 }
 
 bool dither_is_on(const dither_t *dither)

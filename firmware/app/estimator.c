@@ -88,7 +88,6 @@ void estimator_init(estimator_t *estimator, const lever_config_t *config)
     estimator->setup.preload = config->preload;
     estimator->setup.estimator = config->estimator;
     estimator->setup.adaptation = config->adaptation;
-    dither_init(&estimator->dither, s->dither_low, s->dither_high, s->sample_period, s->dither_limit, s->dither_fade);
     start_over(estimator);
 }
 
@@ -111,8 +110,7 @@ bool estimator_command(estimator_t *estimator, const lever_command_t *command)
                        is_choice(command->model, (uint8_t)LEVER_MODEL_COUNT) &&
                        is_choice(command->preload, (uint8_t)LEVER_PRELOAD_COUNT) &&
                        is_choice(command->estimator, (uint8_t)LEVER_ESTIMATOR_COUNT) &&
-                       is_choice(command->adaptation, (uint8_t)LEVER_ADAPTATION_COUNT) &&
-                       (command->dither_rms >= 0.0f) && (command->dither_rms <= OTHER_MOST);
+                       is_choice(command->adaptation, (uint8_t)LEVER_ADAPTATION_COUNT);
     if (known) {
         setup_t *setup = &estimator->setup;
         const setup_t last = *setup;
@@ -129,9 +127,6 @@ bool estimator_command(estimator_t *estimator, const lever_command_t *command)
         }
         if ((command->request == (uint8_t)LEVER_REQUEST_RUN) || (command->request == (uint8_t)LEVER_REQUEST_FREEZE)) {
             estimator->frozen = (command->request == (uint8_t)LEVER_REQUEST_FREEZE);
-        }
-        if (command->dither_rms < (float)LEVER_KEEP) {
-            dither_set(&estimator->dither, command->dither_rms);
         }
     }
     return known;
@@ -179,7 +174,6 @@ static taken_t take_sample(estimator_t *estimator, const lever_sample_t *sample)
     faults |= torque ? 0u : (uint32_t)LEVER_FAULT_TORQUE;
     faults |= base ? 0u : (uint32_t)LEVER_FAULT_BASE;
     faults |= estimator->communication_fault ? (uint32_t)LEVER_FAULT_COMMUNICATION : 0u;
-    faults |= (estimator->platform.faults != 0u) ? (uint32_t)LEVER_FAULT_PLATFORM : 0u;
     estimator->faults = (uint16_t)faults;
     estimator->communication_fault = false;
     return taken;
@@ -364,9 +358,6 @@ static void correct(estimator_t *estimator, const measurement_t *measurement, fl
     faults |= (estimator->followed.innovation_mean > INNOVATION_TOLERATED) ? (uint32_t)LEVER_FAULT_INNOVATION : 0u;
     estimator->faults = (uint16_t)faults;
     estimator->mode = mode_of(estimator, measured);
-    if (estimator->mode == LEVER_MODE_FAULT) {
-        dither_set(&estimator->dither, 0.0f);
-    }
 }
 
 /* Number of sample periods in `elapsed`, at least one. */
@@ -434,9 +425,8 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
         estimator->late_series_us = 0u;
         estimator->samples++;
         take_and_step(estimator, sample, elapsed);
-        dither_step(&estimator->dither, elapsed);
     } else {
-        /* late: counted above, otherwise ignored */
+        estimator->faults = (uint16_t)LEVER_FAULT_CLOCK; /* late: counted above, otherwise ignored */
     }
     return estimator->mode;
 }
@@ -456,15 +446,22 @@ static model_step_t step_at_trim(const estimator_t *estimator)
     return step;
 }
 
-void estimator_derive(const estimator_t *estimator, derived_t *derived, bool begin)
+void estimator_parameters(const estimator_t *estimator, float p[LEVER_PARAMETERS])
+{
+    (void)memcpy(p, estimator->dual.parameters.p, sizeof estimator->dual.parameters.p);
+}
+
+void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_PARAMETERS])
+{
+    parameter_filter_sigma(&estimator->dual.parameters, sigma);
+}
+
+void estimator_derive(const estimator_t *estimator, derived_t *derived)
 {
     const model_step_t step = step_at_trim(estimator);
     const parameter_filter_t *parameters = &estimator->dual.parameters;
-    if (begin) {
-        derived_begin(derived, parameters, model_of(estimator), &estimator->constants, &step);
-    } else {
-        derived_end(derived, parameters, model_of(estimator), &estimator->constants, &step);
-    }
+    derived_begin(derived, parameters, model_of(estimator), &estimator->constants, &step);
+    derived_end(derived, parameters, model_of(estimator), &estimator->constants, &step);
 }
 
 /* Standard deviation of state i. While its level waits for samples, what moves slower than trim_corner is not predicted: a
@@ -493,8 +490,7 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
     parameter_filter_correlation(&dual->parameters, estimate->parameter_correlation);
 
     derived_t derived;
-    estimator_derive(estimator, &derived, true);
-    estimator_derive(estimator, &derived, false);
+    estimator_derive(estimator, &derived);
     estimate->natural_frequency = derived.mean.natural_frequency;
     estimate->natural_frequency_sigma = sqrtf(derived.variance.natural_frequency);
     estimate->damping_ratio = derived.mean.damping_ratio;
@@ -511,13 +507,6 @@ void estimator_health(const estimator_t *estimator, lever_health_t *health)
     health->late = estimator->late;
     health->recoveries = estimator->recoveries;
     health->excitation = sqrtf(estimator->followed.excitation_square);
-    health->dither = estimator->dither.torque;
-}
-
-void estimator_platform(estimator_t *estimator, const lever_platform_t *platform)
-{
-    estimator->platform = *platform;
-    estimator->has_platform = true;
 }
 
 const char *lever_parameter_name(uint8_t model, uint32_t index)

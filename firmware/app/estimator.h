@@ -2,7 +2,6 @@
 #ifndef APP_ESTIMATOR_H
 #define APP_ESTIMATOR_H
 
-#include "app/dither.h"
 #include "app/learning.h"
 #include "app/levels.h"
 #include "app/prior.h"
@@ -46,15 +45,11 @@ typedef struct estimator {
     float last_tau_m;
     float z_ddot; /* the same as levels.h counts them */
     float tau_m;
-    derived_t derived; /* for publication */
-    float nis;         /* of the last sample */
+    float nis; /* of the last sample */
     uint8_t nis_size;
     bool frozen;
     uint16_t faults;
     bool communication_fault; /* reported by the CAN side for the next sample */
-    bool has_platform;
-    lever_platform_t platform; /* the port's last report, if there was one */
-    dither_t dither;
     uint32_t samples;
     uint32_t lost;
     uint32_t corrupt;
@@ -65,17 +60,21 @@ typedef struct estimator {
 /* Starts from a checked configuration, whose settings are used as long as the instance is; all counts are zero. */
 void estimator_init(estimator_t *estimator, const lever_config_t *config);
 
-/* The functions of lever_cdkf.h of the same names. */
+/* The functions of lever_cdkf.h of the same names. A command's dither_rms is not looked at; health is but for torque, gate, and
+ * the faults of machine and bus. */
 enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample);
 bool estimator_command(estimator_t *estimator, const lever_command_t *command);
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate);
-void estimator_platform(estimator_t *estimator, const lever_platform_t *platform);
 
 /* State i of the estimate as the sensors see it: theta [rad], theta_dot [rad/s]. */
 float estimator_state(const estimator_t *estimator, uint32_t i);
 
-/* The part of the estimate that is derived from the parameters, in two parts of about equal cost: begin, then the rest. */
-void estimator_derive(const estimator_t *estimator, derived_t *derived, bool begin);
+/* The parameters of the model and their standard deviations, in their units. */
+void estimator_parameters(const estimator_t *estimator, float p[LEVER_PARAMETERS]);
+void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_PARAMETERS]);
+
+/* The part of the estimate that is derived from the parameters. */
+void estimator_derive(const estimator_t *estimator, derived_t *derived);
 
 void estimator_health(const estimator_t *estimator, lever_health_t *health);
 

@@ -1,14 +1,10 @@
-/* The façade: an instance is an estimator and its CAN side, in memory of the caller. */
-#include "app/estimator.h"
-#include "app/link.h"
-#include "lever_cdkf.h"
+/* The façade: an instance in memory of the caller, and how its parts work together. */
+#include "app/instance.h"
 
 #include <stddef.h>
+#include <string.h>
 
-struct lever {
-    estimator_t estimator;
-    link_t link;
-};
+#define DITHER_MOST 1.0e4f /* plausible [N m] */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -19,20 +15,119 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
     if ((memory != NULL) && (config != NULL) && (lever_config_check(config) == NULL)) {
         /* cppcheck-suppress misra-c2012-11.5 ; D4 */
         lever = (lever_t *)(void *)memory; /* storage of the caller, as large and aligned as an instance */
+        const lever_settings_t *s = &config->settings;
+        const float rms_most = (s->torque_rms < s->torque_limit) ? s->torque_rms : s->torque_limit;
+        (void)memset(lever, 0, sizeof *lever);
         estimator_init(&lever->estimator, config);
-        link_init(&lever->link);
+        dither_init(&lever->dither, s->dither_low, s->dither_high, s->sample_period, rms_most, s->dither_fade);
+        torque_gate_init(&lever->gate, s);
+        link_init(&lever->link, s);
     }
     return lever;
 }
 
+/* --- samples ------------------------------------------------------------------------------------------------------ */
+
+/* COAST is closed by torque_sample_t.measured, once it has lasted. */
+static bool permits_torque(const lever_t *lever)
+{
+    const uint32_t broken =
+        (uint32_t)LEVER_PLATFORM_ROM | (uint32_t)LEVER_PLATFORM_SELF_TEST | (uint32_t)LEVER_PLATFORM_WATCHDOG;
+    const enum lever_mode mode = lever->estimator.mode;
+    return (mode >= LEVER_MODE_RUN) && (mode <= LEVER_MODE_FROZEN) && ((lever->platform.faults & broken) == 0u);
+}
+
+enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
+{
+    const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
+    estimator_t *estimator = &lever->estimator;
+    const uint32_t last_us = estimator->time_us;
+    const bool starts = (estimator->mode == LEVER_MODE_INIT);
+    const enum lever_mode mode = estimator_update(estimator, sample);
+    const uint32_t faults = estimator->faults;
+    const torque_sample_t torque = {.elapsed_us = starts ? lever->gate.period_us : (estimator->time_us - last_us),
+        .advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u),
+        .measured = ((faults & blind) != blind),
+        .permitted = permits_torque(lever)};
+    torque_gate_step(&lever->gate, dither_step(&lever->dither), &torque);
+    return mode;
+}
+
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample)
 {
-    return estimator_update(&lever->estimator, sample);
+    return instance_update(lever, sample);
+}
+
+void lever_idle(lever_t *lever, uint32_t elapsed_us)
+{
+    link_idle(lever, elapsed_us);
+    torque_gate_idle(&lever->gate, elapsed_us);
+}
+
+bool instance_is_driving(const lever_t *lever)
+{
+    return (lever->gate.torque != 0.0f) || (lever->gate.open && dither_is_on(&lever->dither));
+}
+
+/* --- commands ----------------------------------------------------------------------------------------------------- */
+
+/* Something that IDENTITY says. */
+static bool is_changed(const lever_t *lever, const setup_t *before, float rms_before)
+{
+    const setup_t *setup = &lever->estimator.setup;
+    return (setup->model != before->model) || (setup->preload != before->preload) ||
+           (setup->estimator != before->estimator) || (setup->adaptation != before->adaptation) ||
+           (lever->dither.target < rms_before) || (lever->dither.target > rms_before);
+}
+
+/* Carries out what is not refused for the mode. Returns false, and changes nothing, when a value is not known. */
+static bool carry_out(lever_t *lever, const lever_command_t *command)
+{
+    const setup_t before = lever->estimator.setup;
+    const float rms_before = lever->dither.target;
+    const bool plausible = (command->dither_rms >= 0.0f) && (command->dither_rms <= DITHER_MOST);
+    const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
+    if (known) {
+        torque_gate_keep_alive(&lever->gate);
+        if (command->request == (uint8_t)LEVER_REQUEST_RESET) {
+            dither_reset(&lever->dither);
+        }
+        if (command->dither_rms < (float)LEVER_KEEP) {
+            dither_set(&lever->dither, command->dither_rms, !lever->gate.open);
+        }
+        if (is_changed(lever, &before, rms_before)) {
+            lever->link.pages |= (uint8_t)(1u << (uint32_t)MESSAGE_PAGE_CHOICES);
+        }
+    }
+    return known;
+}
+
+enum message_result instance_command(lever_t *lever, const lever_command_t *command)
+{
+    enum message_result result = MESSAGE_RESULT_ACCEPTED;
+    if ((lever->estimator.mode == LEVER_MODE_FAULT) && (command->request != (uint8_t)LEVER_REQUEST_RESET)) {
+        result = MESSAGE_RESULT_FAULT_MODE;
+    } else if (!carry_out(lever, command)) {
+        result = MESSAGE_RESULT_UNKNOWN_VALUE;
+    } else {
+        /* accepted */
+    }
+    return result;
 }
 
 bool lever_command(lever_t *lever, const lever_command_t *command)
 {
-    return estimator_command(&lever->estimator, command);
+    return instance_command(lever, command) == MESSAGE_RESULT_ACCEPTED;
+}
+
+/* --- what is known ------------------------------------------------------------------------------------------------ */
+
+uint32_t instance_faults(const lever_t *lever)
+{
+    uint32_t faults = lever->estimator.faults;
+    faults |= (lever->platform.faults != 0u) ? (uint32_t)LEVER_FAULT_PLATFORM : 0u;
+    faults |= (lever->link.duplicate_us != 0u) ? (uint32_t)LEVER_FAULT_DUPLICATE : 0u;
+    return faults;
 }
 
 void lever_estimate(const lever_t *lever, lever_estimate_t *estimate)
@@ -43,24 +138,30 @@ void lever_estimate(const lever_t *lever, lever_estimate_t *estimate)
 void lever_health(const lever_t *lever, lever_health_t *health)
 {
     estimator_health(&lever->estimator, health);
+    health->faults = instance_faults(lever);
+    health->torque = lever->gate.torque;
+    health->gate_open = lever->gate.open;
 }
 
 void lever_platform(lever_t *lever, const lever_platform_t *platform)
 {
-    estimator_platform(&lever->estimator, platform);
+    lever->platform = *platform;
+    lever->has_platform = true;
 }
+
+/* --- CAN ---------------------------------------------------------------------------------------------------------- */
 
 enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *frame)
 {
-    return link_on_frame(&lever->link, &lever->estimator, frame);
+    return link_on_frame(lever, frame);
 }
 
 enum lever_mode lever_step(lever_t *lever)
 {
-    return link_step(&lever->link, &lever->estimator);
+    return link_step(lever);
 }
 
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame)
 {
-    return link_next_frame(&lever->link, &lever->estimator, frame);
+    return link_next_frame(lever, frame);
 }

@@ -1,39 +1,33 @@
 #include "app/link.h"
 
-#include <math.h>
+#include "app/instance.h"
+
 #include <string.h>
 
-/* The order in which frames are fetched: the motor first, STATE_ESTIMATE last. */
-enum output {
-    OUTPUT_MOTOR_COMMAND,
-    OUTPUT_PARAMETERS,
-    OUTPUT_SIGMA,
-    OUTPUT_DYNAMICS,
-    OUTPUT_HEALTH,
-    OUTPUT_PLATFORM,
-    OUTPUT_STATE_ESTIMATE
-};
+#define BIT(output) ((uint32_t)1u << (uint32_t)(output))
+#define EVERY_PAGE ((1u << (uint32_t)MESSAGE_PAGE_COUNT) - 1u)
+#define IDENTITY_US 1000000u
+#define DUPLICATE_US 2000000u
+#define HALF_TURN_OF_TIME 0x80000000u
+#define LONG_AGO_US 0x40000000u
 
-#define BIT(output) (1u << (uint32_t)(output))
-/* What is done one after the other in each publish_period: messages that are sent, and what DYNAMICS is to say. */
-enum part {
-    PART_HEALTH,
-    PART_SIGMA,
-    PART_PARAMETERS,
-    PART_DERIVE_BEGIN,
-    PART_DERIVE_END,
-    PART_PLATFORM,
-    PART_DYNAMICS,
-    PARTS
-};
+/* The divided messages, in the order in which they are sent in each publish_period. */
+static const uint16_t parts[] = {(uint16_t)BIT(OUTPUT_HEALTH), (uint16_t)BIT(OUTPUT_PARAMETERS),
+    (uint16_t)BIT(OUTPUT_SIGMA), (uint16_t)BIT(OUTPUT_DYNAMICS), (uint16_t)BIT(OUTPUT_LINK_HEALTH),
+    (uint16_t)BIT(OUTPUT_PLATFORM)};
+#define PARTS ((uint32_t)(sizeof(parts) / sizeof(parts[0])))
 
-static const uint8_t data_ids[LINK_OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_PILOT_PARAMETERS_DATA_ID,
-    MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID, MESSAGE_HEALTH_DATA_ID,
-    MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_STATE_ESTIMATE_DATA_ID};
+static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_COMMAND_ACK_DATA_ID,
+    MESSAGE_PILOT_PARAMETERS_DATA_ID, MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID,
+    MESSAGE_HEALTH_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID,
+    MESSAGE_STATE_ESTIMATE_DATA_ID};
 
-/* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame that
- * is repeated or one step late (which a sample's time would tell, too). */
+/* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame
+ * that is repeated or one step late (which a sample's time would tell, too). */
 static const e2e_tolerance_t tolerance = {13u, 14u, 0u};
+
+/* Of commands few may be missing, so that one that is sent again later, of the last dozen, is told from a new one. */
+static const e2e_tolerance_t command_tolerance = {3u, 14u, 0u};
 
 /* A new session of the sender: its counters may start anywhere. */
 static void start_session(link_t *link)
@@ -41,23 +35,30 @@ static void start_session(link_t *link)
     e2e_receiver_init(&link->lever_receiver, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, tolerance);
     e2e_receiver_init(&link->base_receiver, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, tolerance);
     link->has_lever_sample = false;
-    link->has_published = false;
+    link->set_us = LONG_AGO_US;
+    link->parts = (uint8_t)PARTS;
 }
 
-void link_init(link_t *link)
+void link_init(link_t *link, const lever_settings_t *settings)
 {
+    const float period_us = (settings->sample_period * 1.0e6f) + 0.5f;
+    const float publish_us = (settings->publish_period * 1.0e6f) + 0.5f;
     (void)memset(link, 0, sizeof *link);
-    e2e_receiver_init(&link->command_receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, tolerance);
+    link->period_us = (uint32_t)period_us;
+    link->publish_us = (uint32_t)publish_us;
+    link->identity_us = LONG_AGO_US;
+    link->settings_crc = lever_settings_crc(settings);
+    e2e_receiver_init(&link->command_receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, command_tolerance);
     start_session(link);
 }
 
 /* --- in -------------------------------------------------------------------------------------------------------- */
 
-/* E2E check; counts what is refused. An event may come in any order: its sequence is checked by nobody. */
-static bool accept(e2e_receiver_t *receiver, estimator_t *estimator, const lever_frame_t *frame, bool event)
+/* E2E check; counts what is refused. */
+static bool accept(e2e_receiver_t *receiver, estimator_t *estimator, const lever_frame_t *frame)
 {
     const e2e_status_t status = e2e_check(receiver, frame);
-    const bool usable = event ? (status != E2E_CRC_ERROR) : e2e_is_usable(status);
+    const bool usable = e2e_is_usable(status);
     if (status == E2E_CRC_ERROR) {
         estimator->corrupt++;
     } else if (!usable) {
@@ -98,32 +99,91 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     return LEVER_FRAME_SAMPLE;
 }
 
-static enum lever_frame_result on_command(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
+/* The sequence of commands: a second after the last accepted one it may start anywhere. A refused one leaves it. */
+static bool is_in_sequence(lever_t *lever, const lever_frame_t *frame)
 {
-    lever_command_t command;
-    const bool done = message_command_decode(&command, frame) && estimator_command(estimator, &command);
-    estimator->corrupt += done ? 0u : 1u;
-    if (done && (command.request == (uint8_t)LEVER_REQUEST_RESET)) {
-        start_session(link);
+    e2e_receiver_t *receiver = &lever->link.command_receiver;
+    if (torque_gate_is_abandoned(&lever->gate)) {
+        e2e_receiver_init(receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, command_tolerance);
     }
-    return done ? LEVER_FRAME_TAKEN : LEVER_FRAME_REFUSED;
+    const e2e_receiver_t before = *receiver;
+    const bool in_sequence = e2e_is_usable(e2e_check(receiver, frame));
+    if (!in_sequence) {
+        *receiver = before;
+    }
+    return in_sequence;
 }
 
-enum lever_frame_result link_on_frame(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
+/* Does what the frame asks for and says what became of it; with a correct CRC. */
+static enum message_result obey(lever_t *lever, const lever_frame_t *frame)
 {
+    lever_command_t command = {.dither_rms = 0.0f};
+    enum message_result result = MESSAGE_RESULT_SEQUENCE;
+    (void)message_command_decode(&command, frame);
+    if (!is_in_sequence(lever, frame)) {
+        lever->estimator.late++;
+    } else {
+        result = instance_command(lever, &command);
+        lever->estimator.corrupt += (result == MESSAGE_RESULT_ACCEPTED) ? 0u : 1u;
+        if ((result == MESSAGE_RESULT_ACCEPTED) && (command.request == (uint8_t)LEVER_REQUEST_RESET)) {
+            start_session(&lever->link);
+        }
+    }
+    return result;
+}
+
+static bool is_intact(const lever_frame_t *frame, enum message_data_id data_id)
+{
+    e2e_receiver_t receiver;
+    e2e_receiver_init(&receiver, (uint8_t)data_id, tolerance);
+    return e2e_check(&receiver, frame) == E2E_INITIAL;
+}
+
+static enum lever_frame_result on_command(lever_t *lever, const lever_frame_t *frame)
+{
+    link_t *link = &lever->link;
+    enum lever_frame_result outcome = LEVER_FRAME_REFUSED;
+    if (is_intact(frame, MESSAGE_COMMAND_DATA_ID)) {
+        const enum message_result result = obey(lever, frame);
+        link->command_counter = e2e_counter(frame);
+        link->command_result = (uint8_t)result;
+        link->due |= (uint16_t)BIT(OUTPUT_COMMAND_ACK);
+        outcome = (result == MESSAGE_RESULT_ACCEPTED) ? LEVER_FRAME_TAKEN : LEVER_FRAME_REFUSED;
+    } else {
+        lever->estimator.corrupt++;
+    }
+    return outcome;
+}
+
+/* Nobody but an estimator sends this, and what an instance sends it does not receive. */
+static enum lever_frame_result on_identity(lever_t *lever, const lever_frame_t *frame)
+{
+    const bool intact = is_intact(frame, MESSAGE_IDENTITY_DATA_ID);
+    if (intact) {
+        lever->link.duplicate_us = DUPLICATE_US;
+    } else {
+        lever->estimator.corrupt++;
+    }
+    return intact ? LEVER_FRAME_TAKEN : LEVER_FRAME_REFUSED;
+}
+
+enum lever_frame_result link_on_frame(lever_t *lever, const lever_frame_t *frame)
+{
+    link_t *link = &lever->link;
+    estimator_t *estimator = &lever->estimator;
     enum lever_frame_result result = LEVER_FRAME_REFUSED;
     if (frame->id == (uint32_t)MESSAGE_LEVER_SAMPLE_ID) {
-        if (accept(&link->lever_receiver, estimator, frame, false)) {
+        if (accept(&link->lever_receiver, estimator, frame)) {
             result = on_lever_sample(link, frame);
         }
     } else if (frame->id == (uint32_t)MESSAGE_BASE_SAMPLE_ID) {
-        if (accept(&link->base_receiver, estimator, frame, false)) {
+        if (accept(&link->base_receiver, estimator, frame)) {
             result = on_base_sample(link, estimator, frame);
         }
     } else if (frame->id == (uint32_t)MESSAGE_COMMAND_ID) {
-        if (accept(&link->command_receiver, estimator, frame, true)) {
-            result = on_command(link, estimator, frame);
-        }
+        result = on_command(lever, frame);
+    } else if (frame->id == (uint32_t)MESSAGE_IDENTITY_ID) {
+        result = on_identity(lever, frame);
     } else {
         result = LEVER_FRAME_IGNORED;
     }
@@ -135,175 +195,97 @@ enum lever_frame_result link_on_frame(link_t *link, estimator_t *estimator, cons
 
 /* --- step ------------------------------------------------------------------------------------------------------ */
 
-/* Does the next part of a set; returns the message that is due by that, as a bit. */
-static uint32_t go_on_publishing(link_t *link, estimator_t *estimator)
+/* The divided messages that are due, as bits. A set of them is spread evenly over publish_period, so that no sample has
+ * to answer with all of them. */
+static uint32_t divided_due(link_t *link)
 {
     uint32_t due = 0u;
-    switch ((enum part)link->published) {
-    case PART_HEALTH:
-        due = BIT(OUTPUT_HEALTH);
-        break;
-    case PART_PARAMETERS:
-        due = BIT(OUTPUT_PARAMETERS);
-        break;
-    case PART_SIGMA:
-        due = BIT(OUTPUT_SIGMA);
-        break;
-    case PART_DERIVE_BEGIN:
-        estimator_derive(estimator, &estimator->derived, true);
-        break;
-    case PART_DERIVE_END:
-        estimator_derive(estimator, &estimator->derived, false);
-        break;
-    case PART_DYNAMICS:
-        due = BIT(OUTPUT_DYNAMICS);
-        break;
-    case PART_PLATFORM:
-        due = estimator->has_platform ? BIT(OUTPUT_PLATFORM) : 0u;
-        break;
-    case PARTS:
-    default:
-        break;
-    }
-    link->published++;
-    return due;
-}
-
-/* The divided messages that are due, as bits. A set of them is spread evenly over publish_period, so that no sample has to
- * answer with all of them. */
-static uint32_t divided_due(link_t *link, estimator_t *estimator)
-{
-    const float rounded = (estimator->setup.settings->publish_period * 1.0e6f) + 0.5f;
-    const uint32_t period_us = (uint32_t)rounded;
-    uint32_t due = 0u;
-    if (!link->has_published || ((link->sample.time_us - link->published_us) >= period_us)) {
-        while (link->has_published && (link->published < (uint32_t)PARTS)) { /* of the set before */
-            due |= go_on_publishing(link, estimator);
+    if (link->set_us >= link->publish_us) {
+        for (; link->parts < (uint8_t)PARTS; link->parts++) { /* of the set before */
+            due |= parts[link->parts];
         }
-        link->has_published = true;
-        link->published_us = link->sample.time_us;
-        link->published = 0u;
+        link->set_us = 0u;
+        link->parts = 0u;
     }
-    const uint32_t elapsed_us = link->sample.time_us - link->published_us;
-    while ((link->published < (uint32_t)PARTS) && ((elapsed_us * (uint32_t)PARTS) >= (period_us * link->published))) {
-        due |= go_on_publishing(link, estimator);
+    for (; (link->parts < (uint8_t)PARTS) && ((link->set_us * PARTS) >= (link->publish_us * link->parts));
+        link->parts++) {
+        due |= parts[link->parts];
     }
     return due;
 }
 
-enum lever_mode link_step(link_t *link, estimator_t *estimator)
+/* Time for publication is that of the samples; while their clock stands, a sample is a sample period. */
+static void pass_time(link_t *link, uint32_t time_us)
 {
+    const uint32_t step_us = time_us - link->time_us;
+    const bool advances = (step_us != 0u) && (step_us < HALF_TURN_OF_TIME);
+    const uint32_t elapsed_us = advances ? step_us : link->period_us;
+    link->time_us = time_us;
+    link->set_us += elapsed_us;
+    link->identity_us += elapsed_us;
+    link->duplicate_us -= (elapsed_us < link->duplicate_us) ? elapsed_us : link->duplicate_us;
+    if (link->identity_us >= IDENTITY_US) {
+        link->identity_us = 0u;
+        link->pages = (uint8_t)EVERY_PAGE;
+    }
+}
+
+enum lever_mode link_step(lever_t *lever)
+{
+    link_t *link = &lever->link;
     if (link->has_sample) {
-        const bool dithers = dither_is_on(&estimator->dither); /* a step may end that, not begin it */
+        const bool was_driving = instance_is_driving(lever);
         link->has_sample = false;
-        (void)estimator_update(estimator, &link->sample);
-        uint32_t due = BIT(OUTPUT_STATE_ESTIMATE) | divided_due(link, estimator);
-        if (dithers) {
-            due |= BIT(OUTPUT_MOTOR_COMMAND);
-        }
-        link->due = (uint8_t)(link->due | due);
+        (void)instance_update(lever, &link->sample);
+        pass_time(link, link->sample.time_us);
+        link->latched |= instance_faults(lever);
+        uint32_t due = BIT(OUTPUT_STATE_ESTIMATE) | divided_due(link);
+        due |= (was_driving || instance_is_driving(lever)) ? BIT(OUTPUT_MOTOR_COMMAND) : 0u;
+        due |= (link->pages != 0u) ? BIT(OUTPUT_IDENTITY) : 0u;
+        due &= lever->has_platform ? UINT32_MAX : ~BIT(OUTPUT_PLATFORM);
+        link->due = (uint16_t)(link->due | due);
     }
-    return estimator->mode;
+    return lever->estimator.mode;
+}
+
+void link_idle(lever_t *lever, uint32_t elapsed_us)
+{
+    link_t *link = &lever->link;
+    link->duplicate_us -= (elapsed_us < link->duplicate_us) ? elapsed_us : link->duplicate_us;
+    if (instance_is_driving(lever)) {
+        link->due |= (uint16_t)BIT(OUTPUT_MOTOR_COMMAND);
+    }
 }
 
 /* --- out ------------------------------------------------------------------------------------------------------- */
 
-static bool encode_motor_command(const estimator_t *estimator, lever_frame_t *frame)
+/* The first message that is due, of some. */
+static uint32_t first_of(uint32_t due)
 {
-    message_motor_command_t message;
-    message.model = estimator->setup.model;
-    message.torque = estimator->dither.torque;
-    message.dither = estimator->dither.torque;
-    return message_motor_command_encode(frame, &message);
-}
-
-static bool encode_parameters(const estimator_t *estimator, lever_frame_t *frame)
-{
-    message_pilot_parameters_t message;
-    message.model = estimator->setup.model;
-    (void)memcpy(message.parameter, estimator->dual.parameters.p, sizeof message.parameter);
-    return message_pilot_parameters_encode(frame, &message);
-}
-
-static bool encode_sigma(const estimator_t *estimator, lever_frame_t *frame)
-{
-    message_pilot_sigma_t message;
-    message.model = estimator->setup.model;
-    parameter_filter_sigma(&estimator->dual.parameters, message.sigma);
-    return message_pilot_sigma_encode(frame, &message);
-}
-
-static bool encode_dynamics(const estimator_t *estimator, lever_frame_t *frame)
-{
-    const derived_t *derived = &estimator->derived;
-    message_pilot_dynamics_t message;
-    message.model = estimator->setup.model;
-    message.natural_frequency = derived->mean.natural_frequency;
-    message.natural_frequency_sigma = sqrtf(derived->variance.natural_frequency);
-    message.damping_ratio = derived->mean.damping_ratio;
-    message.damping_ratio_sigma = sqrtf(derived->variance.damping_ratio);
-    return message_pilot_dynamics_encode(frame, &message);
-}
-
-static bool encode_health(const estimator_t *estimator, lever_frame_t *frame)
-{
-    message_health_t message;
-    lever_health_t health;
-    estimator_health(estimator, &health);
-    message.model = estimator->setup.model;
-    message.mode = (uint8_t)health.mode;
-    message.faults = health.faults;
-    message.lost = (uint8_t)(health.lost & 0xFFu);
-    message.corrupt = (uint8_t)(health.corrupt & 0xFFu);
-    message.late = (uint8_t)(health.late & 0xFFu);
-    message.excitation = health.excitation;
-    return message_health_encode(frame, &message);
-}
-
-static bool encode_platform(const estimator_t *estimator, lever_frame_t *frame)
-{
-    const lever_platform_t *platform = &estimator->platform;
-    message_platform_health_t message;
-    message.model = estimator->setup.model;
-    message.faults = platform->faults;
-    message.transmit_errors = platform->transmit_errors;
-    message.receive_errors = platform->receive_errors;
-    message.bus_offs = platform->bus_offs;
-    message.overruns = (uint8_t)(platform->overruns & 0xFFu);
-    message.dropped = (uint8_t)(platform->dropped & 0xFFu);
-    return message_platform_health_encode(frame, &message);
-}
-
-static bool encode_state_estimate(const estimator_t *estimator, lever_frame_t *frame)
-{
-    message_state_estimate_t message;
-    message.model = estimator->setup.model;
-    message.theta = estimator_state(estimator, 0u);
-    message.theta_dot = estimator_state(estimator, 1u);
-    message.nis = estimator->nis;
-    return message_state_estimate_encode(frame, &message);
-}
-
-static bool (*const encoders[LINK_OUTPUTS])(const estimator_t *, lever_frame_t *) = {encode_motor_command,
-    encode_parameters, encode_sigma, encode_dynamics, encode_health, encode_platform, encode_state_estimate};
-
-bool link_next_frame(link_t *link, const estimator_t *estimator, lever_frame_t *frame)
-{
-    bool sent = false;
     uint32_t output = 0u;
-    uint32_t due = link->due; /* from `output` on */
-    while ((due != 0u) && !sent) {
-        const bool is_due = ((due & 1u) != 0u);
-        due >>= 1u;
-        if (is_due) {
-            link->due = (uint8_t)(due << (output + 1u));
-            sent = encoders[output](estimator, frame);
-            if (sent) {
-                e2e_protect(frame, data_ids[output], link->counter[output]);
-                link->counter[output] = (uint8_t)((link->counter[output] + 1u) & 15u);
-            }
+    if (due == BIT(OUTPUT_STATE_ESTIMATE)) {
+        output = (uint32_t)OUTPUT_STATE_ESTIMATE; /* mostly */
+    } else {
+        for (uint32_t rest = due; (rest & 1u) == 0u; rest >>= 1u) {
+            output++;
         }
-        output++;
+    }
+    return output;
+}
+
+bool link_next_frame(lever_t *lever, lever_frame_t *frame)
+{
+    link_t *link = &lever->link;
+    bool sent = false;
+    while ((link->due != 0u) && !sent) {
+        const uint32_t due = link->due;
+        const uint32_t output = first_of(due);
+        link->due = (uint16_t)(due & (due - 1u)); /* all but the lowest bit */
+        sent = link_encode(lever, (enum link_output)output, frame);
+        if (sent) {
+            e2e_protect(frame, data_ids[output], link->counter[output]);
+            link->counter[output] = (uint8_t)((link->counter[output] + 1u) & 15u);
+        }
     }
     return sent;
 }

@@ -2,7 +2,6 @@
 #ifndef APP_LINK_H
 #define APP_LINK_H
 
-#include "app/estimator.h"
 #include "can/e2e.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
@@ -10,7 +9,20 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { LINK_OUTPUTS = 7 }; /* messages that are sent */
+/* Messages that are sent, in the order in which they are fetched: the motor first, STATE_ESTIMATE last. */
+enum link_output {
+    OUTPUT_MOTOR_COMMAND,
+    OUTPUT_COMMAND_ACK,
+    OUTPUT_PARAMETERS,
+    OUTPUT_SIGMA,
+    OUTPUT_DYNAMICS,
+    OUTPUT_HEALTH,
+    OUTPUT_LINK_HEALTH,
+    OUTPUT_PLATFORM,
+    OUTPUT_IDENTITY,
+    OUTPUT_STATE_ESTIMATE,
+    OUTPUTS
+};
 
 typedef struct link {
     e2e_receiver_t lever_receiver;
@@ -19,20 +31,33 @@ typedef struct link {
     message_lever_sample_t lever_sample; /* waiting for its BASE_SAMPLE */
     uint8_t lever_counter;
     bool has_lever_sample;
-    lever_sample_t sample; /* complete, waiting for lever_step() */
     bool has_sample;
-    uint32_t published_us; /* sample time at which the last set of divided messages began */
-    uint8_t published;     /* how many of it are out, or due */
-    bool has_published;
-    uint8_t due;                   /* messages still to fetch, a bit each */
-    uint8_t counter[LINK_OUTPUTS]; /* E2E counter of the next frame of each */
+    lever_sample_t sample; /* complete, waiting for lever_step() */
+    uint32_t period_us;    /* of a sample, nominal */
+    uint32_t publish_us;   /* publish_period */
+    uint32_t time_us;      /* of the last sample, late or not */
+    uint32_t set_us;       /* since the last set of divided messages began */
+    uint32_t identity_us;  /* since IDENTITY was last begun */
+    uint32_t duplicate_us; /* time for which to report another estimator */
+    uint32_t latched;      /* faults since the last HEALTH */
+    uint32_t settings_crc;
+    uint16_t due;            /* messages still to fetch, a bit each */
+    uint8_t parts;           /* how many of the set are out, or due */
+    uint8_t pages;           /* of IDENTITY still to send, a bit each */
+    uint8_t command_counter; /* of the last COMMAND, and what became of it */
+    uint8_t command_result;
+    uint8_t counter[OUTPUTS]; /* E2E counter of the next frame of each */
 } link_t;
 
-void link_init(link_t *link);
+void link_init(link_t *link, const lever_settings_t *settings);
 
 /* The functions of lever_cdkf.h of the same names. */
-enum lever_frame_result link_on_frame(link_t *link, estimator_t *estimator, const lever_frame_t *frame);
-enum lever_mode link_step(link_t *link, estimator_t *estimator);
-bool link_next_frame(link_t *link, const estimator_t *estimator, lever_frame_t *frame);
+enum lever_frame_result link_on_frame(lever_t *lever, const lever_frame_t *frame);
+enum lever_mode link_step(lever_t *lever);
+void link_idle(lever_t *lever, uint32_t elapsed_us);
+bool link_next_frame(lever_t *lever, lever_frame_t *frame);
+
+/* Encodes a message that is due, as the instance is now. */
+bool link_encode(lever_t *lever, enum link_output output, lever_frame_t *frame);
 
 #endif

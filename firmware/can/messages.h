@@ -1,20 +1,22 @@
 /* The messages of lever.dbc as structs, and their way into and out of an 8-byte payload.
  *
- * A struct has the signals of its message under the DBC's names, in the DBC's units; resolution and range are the DBC's.
- * CRC and counter are the business of e2e.h: encode, then e2e_protect(); e2e_check(), then decode.
+ * A struct has the signals of its message under the DBC's names, in the DBC's units; resolution and range are the
+ * DBC's. CRC and counter are the business of e2e.h: encode, then e2e_protect(); e2e_check(), then decode.
  *
  * ..._encode() writes identifier, length and all payload bits (unused ones, CRC and counter as 0) and returns true, or
  * returns false and leaves the frame untouched.
- *   - Physical values are rounded to the nearest count, half away from zero (cantools: half to even), and saturate at
- *     the limits of the signal, infinities too. NaN is refused. The value is scaled in single precision, which can
+ *   - Physical values are rounded to the nearest count, half to even. The value is scaled in single precision, which can
  *     decide only a value within 0.004 counts of a tie.
+ *   - A value that is NaN or does not fit its signal is sent as "not available": a smaller one would be wrong, and a
+ *     standard deviation confident. In LEVER_SAMPLE and BASE_SAMPLE its flag says so, too.
  *   - Codes, flags and counts too large for their field are refused: the nearest code would mean something else.
- *   - A value whose flag is false is not read, and sent as 0.
+ *   - An input whose flag is false is not read, and sent as 0.
  * ..._decode() returns true, or false and leaves the message untouched when identifier or length is not the message's,
- * or its model not known. Each value is the float nearest to the DBC's decimal value, so encoding it gives the same bits
- * again. Codes are not judged here.
+ * or its model or page not known. Each value is the float nearest to the DBC's decimal value, so encoding it gives the
+ * same bits again; one that is not available is NaN, and in LEVER_SAMPLE and BASE_SAMPLE its flag false. Codes are not
+ * judged here.
  *
- * Cost on a Cortex-M4F at -Os: at most 250 instructions to encode and 120 to decode a message.
+ * Cost on a Cortex-M4F at -Os: at most 250 instructions to encode and 200 to decode a message.
  */
 #ifndef CAN_MESSAGES_H
 #define CAN_MESSAGES_H
@@ -23,6 +25,8 @@
 #include <stdint.h>
 
 #include "lever_cdkf.h"
+
+enum { MESSAGE_CONTRACT = 2 }; /* VERSION of the DBC */
 
 enum message_id {
     MESSAGE_LEVER_SAMPLE_ID = 0x110,
@@ -34,7 +38,10 @@ enum message_id {
     MESSAGE_PILOT_DYNAMICS_ID = 0x213,
     MESSAGE_HEALTH_ID = 0x214,
     MESSAGE_MOTOR_COMMAND_ID = 0x215,
-    MESSAGE_PLATFORM_HEALTH_ID = 0x216
+    MESSAGE_PLATFORM_HEALTH_ID = 0x216,
+    MESSAGE_IDENTITY_ID = 0x217,
+    MESSAGE_COMMAND_ACK_ID = 0x218,
+    MESSAGE_LINK_HEALTH_ID = 0x219
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -48,7 +55,10 @@ enum message_data_id {
     MESSAGE_PILOT_DYNAMICS_DATA_ID = 97,
     MESSAGE_HEALTH_DATA_ID = 113,
     MESSAGE_MOTOR_COMMAND_DATA_ID = 129,
-    MESSAGE_PLATFORM_HEALTH_DATA_ID = 145
+    MESSAGE_PLATFORM_HEALTH_DATA_ID = 145,
+    MESSAGE_IDENTITY_DATA_ID = 161,
+    MESSAGE_COMMAND_ACK_DATA_ID = 177,
+    MESSAGE_LINK_HEALTH_DATA_ID = 193
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -74,7 +84,9 @@ typedef struct message_base_sample {
 bool message_base_sample_encode(lever_frame_t *frame, const message_base_sample_t *message);
 bool message_base_sample_decode(message_base_sample_t *message, const lever_frame_t *frame);
 
-typedef lever_command_t message_command_t; /* what lever_command() takes */
+typedef lever_command_t
+    message_command_t; /* what lever_command() takes; a dither_rms beyond 65.534 is sent, and comes, as
+                                              65.535: keep. A negative one or NaN is refused */
 
 bool message_command_encode(lever_frame_t *frame, const message_command_t *message);
 bool message_command_decode(message_command_t *message, const lever_frame_t *frame);
@@ -82,10 +94,11 @@ bool message_command_decode(message_command_t *message, const lever_frame_t *fra
 /* --- from the estimator ---------------------------------------------------------------------------------------- */
 
 typedef struct message_state_estimate {
-    float theta;     /* [rad] */
-    float theta_dot; /* [rad/s] */
-    float nis;       /* [1] */
-    uint8_t model;   /* enum lever_model, here and below */
+    float theta;       /* [rad] */
+    float theta_dot;   /* [rad/s] */
+    float innovation;  /* normalised: sqrt(NIS) [1]; NaN without measurement */
+    uint16_t time_low; /* low 16 bits of the sample time [us] */
+    bool valid;        /* the estimate may be used */
 } message_state_estimate_t;
 
 bool message_state_estimate_encode(lever_frame_t *frame, const message_state_estimate_t *message);
@@ -94,7 +107,8 @@ bool message_state_estimate_decode(message_state_estimate_t *message, const leve
 /* The parameters of the model in their order: for the lever m_p [kg], c_p [N s/m], k_p [N/m]. */
 typedef struct message_pilot_parameters {
     float parameter[LEVER_PARAMETERS];
-    uint8_t model; /* not known: refused in both directions */
+    uint8_t model; /* enum lever_model, here and below; not known: refused in both directions */
+    bool valid;    /* as above, here and below */
 } message_pilot_parameters_t;
 
 bool message_pilot_parameters_encode(lever_frame_t *frame, const message_pilot_parameters_t *message);
@@ -104,6 +118,7 @@ bool message_pilot_parameters_decode(message_pilot_parameters_t *message, const 
 typedef struct message_pilot_sigma {
     float sigma[LEVER_PARAMETERS];
     uint8_t model; /* not known: refused in both directions */
+    bool valid;
 } message_pilot_sigma_t;
 
 bool message_pilot_sigma_encode(lever_frame_t *frame, const message_pilot_sigma_t *message);
@@ -115,6 +130,7 @@ typedef struct message_pilot_dynamics {
     float damping_ratio;           /* [1] */
     float damping_ratio_sigma;     /* [1] */
     uint8_t model;
+    bool valid;
 } message_pilot_dynamics_t;
 
 bool message_pilot_dynamics_encode(lever_frame_t *frame, const message_pilot_dynamics_t *message);
@@ -122,12 +138,9 @@ bool message_pilot_dynamics_decode(message_pilot_dynamics_t *message, const leve
 
 typedef struct message_health {
     float excitation; /* [rad/s] */
-    uint16_t faults;  /* of enum lever_fault; 12 bits */
+    uint32_t faults;  /* of enum lever_fault, present since the last HEALTH; 24 bits */
     uint8_t mode;     /* enum lever_mode */
-    uint8_t lost;     /* the low eight bits of the counts of lever_health_t */
-    uint8_t corrupt;
-    uint8_t late;
-    uint8_t model;
+    uint8_t restarts; /* the low eight bits of lever_health_t.recoveries */
 } message_health_t;
 
 bool message_health_encode(lever_frame_t *frame, const message_health_t *message);
@@ -136,7 +149,9 @@ bool message_health_decode(message_health_t *message, const lever_frame_t *frame
 typedef struct message_motor_command {
     float torque; /* [N m] */
     float dither; /* the part of torque that is identification dither [N m] */
+    uint16_t time_low;
     uint8_t model;
+    bool valid; /* the torque gate is open */
 } message_motor_command_t;
 
 bool message_motor_command_encode(lever_frame_t *frame, const message_motor_command_t *message);
@@ -150,9 +165,62 @@ typedef struct message_platform_health {
     uint8_t overruns;
     uint8_t dropped;
     uint8_t model;
+    bool valid;
 } message_platform_health_t;
 
 bool message_platform_health_encode(lever_frame_t *frame, const message_platform_health_t *message);
 bool message_platform_health_decode(message_platform_health_t *message, const lever_frame_t *frame);
+
+enum message_page { MESSAGE_PAGE_VERSION = 0, MESSAGE_PAGE_SETTINGS = 1, MESSAGE_PAGE_CHOICES = 2, MESSAGE_PAGE_COUNT };
+
+/* One page of it: only that page's members are sent, and what is received leaves the others 0. */
+typedef struct message_identity {
+    uint8_t page;           /* enum message_page; not known: refused in both directions */
+    uint8_t firmware_major; /* page 0 */
+    uint8_t firmware_minor;
+    uint8_t firmware_patch;
+    uint8_t contract;      /* VERSION of the DBC */
+    uint32_t settings_crc; /* page 1: lever_settings_crc() */
+    uint8_t model;         /* page 2 */
+    uint8_t preload;
+    uint8_t estimator;
+    uint8_t adaptation;
+    float dither_rms; /* as commanded [N m] */
+} message_identity_t;
+
+bool message_identity_encode(lever_frame_t *frame, const message_identity_t *message);
+bool message_identity_decode(message_identity_t *message, const lever_frame_t *frame);
+
+enum message_result {
+    MESSAGE_RESULT_ACCEPTED = 0,
+    MESSAGE_RESULT_UNKNOWN_VALUE = 1,
+    MESSAGE_RESULT_SEQUENCE = 2,   /* repeated, or too old */
+    MESSAGE_RESULT_FAULT_MODE = 3, /* in LEVER_MODE_FAULT only a reset is accepted */
+    MESSAGE_RESULT_COUNT
+};
+
+typedef struct message_command_ack {
+    uint8_t command_counter; /* of the COMMAND that this answers */
+    uint8_t result;          /* enum message_result */
+    uint8_t model;           /* the choices as they stand now, here and below */
+    uint8_t preload;
+    uint8_t estimator;
+    uint8_t adaptation;
+    float dither_rms; /* [N m] */
+} message_command_ack_t;
+
+bool message_command_ack_encode(lever_frame_t *frame, const message_command_ack_t *message);
+bool message_command_ack_decode(message_command_ack_t *message, const lever_frame_t *frame);
+
+typedef struct message_link_health {
+    uint16_t lost; /* the low 16 bits of the counts of lever_health_t */
+    uint16_t corrupt;
+    uint16_t late;
+    uint8_t model;
+    bool valid;
+} message_link_health_t;
+
+bool message_link_health_encode(lever_frame_t *frame, const message_link_health_t *message);
+bool message_link_health_decode(message_link_health_t *message, const lever_frame_t *frame);
 
 #endif

@@ -1,0 +1,36 @@
+/* An instance: the estimator, the torque that it asks of the motor, its CAN side, and what its port reports. */
+#ifndef APP_INSTANCE_H
+#define APP_INSTANCE_H
+
+#include "app/dither.h"
+#include "app/estimator.h"
+#include "app/link.h"
+#include "app/torque_gate.h"
+#include "can/messages.h"
+#include "lever_cdkf.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct lever {
+    estimator_t estimator;
+    dither_t dither;
+    torque_gate_t gate;
+    link_t link;
+    lever_platform_t platform; /* the port's last report, if there was one */
+    bool has_platform;
+};
+
+/* One sample, by struct or from the bus. */
+enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample);
+
+/* Carries a command out, or says why not and changes nothing. */
+enum message_result instance_command(lever_t *lever, const lever_command_t *command);
+
+/* Bits of enum lever_fault: of the last sample, of the machine, and of the bus. */
+uint32_t instance_faults(const lever_t *lever);
+
+/* Torque is not zero, or may become so. */
+bool instance_is_driving(const lever_t *lever);
+
+#endif

@@ -1,0 +1,172 @@
+/* What each message to send says of an instance. */
+#include "app/instance.h"
+#include "app/link.h"
+
+#include <math.h>
+
+/* --- shared by the messages --------------------------------------------------------------------------------------- */
+
+static bool is_finite(float value)
+{
+    return fabsf(value) <= 3.0e38f; /* NaN is not */
+}
+
+static bool are_finite(const float value[LEVER_PARAMETERS])
+{
+    return is_finite(value[0]) && is_finite(value[1]) && is_finite(value[2]);
+}
+
+/* The estimate may be used, but for a value that is not finite. */
+static bool is_estimating(const lever_t *lever)
+{
+    const enum lever_mode mode = lever->estimator.mode;
+    return (mode >= LEVER_MODE_RUN) && (mode <= LEVER_MODE_FROZEN) &&
+           ((lever->estimator.faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
+}
+
+static uint16_t low_16(uint32_t value)
+{
+    return (uint16_t)(value & 0xFFFFu);
+}
+
+/* --- messages ----------------------------------------------------------------------------------------------------- */
+
+static bool encode_motor_command(lever_t *lever, lever_frame_t *frame)
+{
+    const float torque = lever->gate.torque;
+    const message_motor_command_t message = {.torque = torque,
+        .dither = torque, /* there is no other yet */
+        .time_low = low_16(lever->estimator.time_us),
+        .model = lever->estimator.setup.model,
+        .valid = lever->gate.open};
+    return message_motor_command_encode(frame, &message);
+}
+
+static bool encode_command_ack(lever_t *lever, lever_frame_t *frame)
+{
+    const setup_t *setup = &lever->estimator.setup;
+    const message_command_ack_t message = {.command_counter = lever->link.command_counter,
+        .result = lever->link.command_result,
+        .model = setup->model,
+        .preload = setup->preload,
+        .estimator = setup->estimator,
+        .adaptation = setup->adaptation,
+        .dither_rms = lever->dither.target};
+    return message_command_ack_encode(frame, &message);
+}
+
+static bool encode_parameters(lever_t *lever, lever_frame_t *frame)
+{
+    message_pilot_parameters_t message;
+    estimator_parameters(&lever->estimator, message.parameter);
+    message.model = lever->estimator.setup.model;
+    message.valid = is_estimating(lever) && are_finite(message.parameter);
+    return message_pilot_parameters_encode(frame, &message);
+}
+
+static bool encode_sigma(lever_t *lever, lever_frame_t *frame)
+{
+    message_pilot_sigma_t message;
+    estimator_parameter_sigma(&lever->estimator, message.sigma);
+    message.model = lever->estimator.setup.model;
+    message.valid = is_estimating(lever) && are_finite(message.sigma);
+    return message_pilot_sigma_encode(frame, &message);
+}
+
+static bool encode_dynamics(lever_t *lever, lever_frame_t *frame)
+{
+    derived_t derived;
+    message_pilot_dynamics_t message;
+    estimator_derive(&lever->estimator, &derived);
+    message.natural_frequency = derived.mean.natural_frequency;
+    message.natural_frequency_sigma = sqrtf(derived.variance.natural_frequency);
+    message.damping_ratio = derived.mean.damping_ratio;
+    message.damping_ratio_sigma = sqrtf(derived.variance.damping_ratio);
+    message.model = lever->estimator.setup.model;
+    message.valid =
+        is_estimating(lever) && is_finite(message.natural_frequency_sigma) && is_finite(message.damping_ratio_sigma);
+    return message_pilot_dynamics_encode(frame, &message);
+}
+
+static bool encode_health(lever_t *lever, lever_frame_t *frame)
+{
+    lever_health_t health;
+    lever_health(lever, &health);
+    const message_health_t message = {.excitation = health.excitation,
+        .faults = lever->link.latched,
+        .mode = (uint8_t)health.mode,
+        .restarts = (uint8_t)(health.recoveries & 0xFFu)};
+    lever->link.latched = 0u;
+    return message_health_encode(frame, &message);
+}
+
+static bool encode_link_health(lever_t *lever, lever_frame_t *frame)
+{
+    const estimator_t *estimator = &lever->estimator;
+    const message_link_health_t message = {.lost = low_16(estimator->lost),
+        .corrupt = low_16(estimator->corrupt),
+        .late = low_16(estimator->late),
+        .model = estimator->setup.model,
+        .valid = is_estimating(lever)};
+    return message_link_health_encode(frame, &message);
+}
+
+static bool encode_platform(lever_t *lever, lever_frame_t *frame)
+{
+    const lever_platform_t *platform = &lever->platform;
+    const message_platform_health_t message = {.faults = platform->faults,
+        .transmit_errors = platform->transmit_errors,
+        .receive_errors = platform->receive_errors,
+        .bus_offs = platform->bus_offs,
+        .overruns = (uint8_t)(platform->overruns & 0xFFu),
+        .dropped = (uint8_t)(platform->dropped & 0xFFu),
+        .model = lever->estimator.setup.model,
+        .valid = is_estimating(lever)};
+    return message_platform_health_encode(frame, &message);
+}
+
+/* The first page that is still to be sent. */
+static bool encode_identity(lever_t *lever, lever_frame_t *frame)
+{
+    link_t *link = &lever->link;
+    const setup_t *setup = &lever->estimator.setup;
+    uint8_t page = 0u;
+    while ((page < ((uint8_t)MESSAGE_PAGE_COUNT - 1u)) && ((link->pages & (1u << page)) == 0u)) {
+        page++;
+    }
+    link->pages &= (uint8_t)~(1u << page);
+    const message_identity_t message = {.page = page,
+        .firmware_major = (uint8_t)LEVER_VERSION_MAJOR,
+        .firmware_minor = (uint8_t)LEVER_VERSION_MINOR,
+        .firmware_patch = (uint8_t)LEVER_VERSION_PATCH,
+        .contract = (uint8_t)MESSAGE_CONTRACT,
+        .settings_crc = link->settings_crc,
+        .model = setup->model,
+        .preload = setup->preload,
+        .estimator = setup->estimator,
+        .adaptation = setup->adaptation,
+        .dither_rms = lever->dither.target};
+    return message_identity_encode(frame, &message);
+}
+
+static bool encode_state_estimate(lever_t *lever, lever_frame_t *frame)
+{
+    const estimator_t *estimator = &lever->estimator;
+    message_state_estimate_t message;
+    message.theta = estimator_state(estimator, 0u);
+    message.theta_dot = estimator_state(estimator, 1u);
+    message.innovation = (estimator->nis_size != 0u) ? sqrtf(estimator->nis) : NAN;
+    message.time_low = low_16(estimator->time_us);
+    message.valid = is_estimating(lever) && is_finite(message.theta) && is_finite(message.theta_dot);
+    return message_state_estimate_encode(frame, &message);
+}
+
+/* In the order of enum link_output. */
+static bool (*const encoders[OUTPUTS])(lever_t *lever, lever_frame_t *frame) = {encode_motor_command,
+    encode_command_ack, encode_parameters, encode_sigma, encode_dynamics, encode_health, encode_link_health,
+    encode_platform, encode_identity, encode_state_estimate};
+
+bool link_encode(lever_t *lever, enum link_output output, lever_frame_t *frame)
+{
+    return encoders[output](lever, frame);
+}

@@ -1,0 +1,119 @@
+/* The torque gate by itself: no request, setting or course of events lets out more than its limits. */
+#include "app/torque_gate.h"
+
+#include "watch.h"
+
+static lever_config_t config;
+static uint32_t seed;
+
+void setUp(void)
+{
+    lever_config_default(&config);
+    config.settings.dither_fade = 0.1f;
+    seed = 1u;
+}
+
+void tearDown(void)
+{
+}
+
+static float uniform(void)
+{
+    seed = (seed * 1664525u) + 1013904223u;
+    return (float)(seed >> 8u) / 16777216.0f;
+}
+
+static float random_request(uint32_t kind, uint32_t k)
+{
+    const float values[] = {(((k / 100u) % 2u) == 0u) ? 100.0f : -100.0f, 1.0e30f,
+        ((k % 7u) == 0u) ? NAN : (20.0f * (uniform() - 0.5f)), ((k % 5u) == 0u) ? -INFINITY : 3.0f,
+        0.5f * sinf(0.02f * (float)k), (uniform() < 0.01f) ? -1.0e38f : 1.0f};
+    return values[kind % 6u];
+}
+
+static lever_settings_t random_settings(void)
+{
+    lever_settings_t settings = config.settings;
+    settings.sample_period = 1.0e-4f * powf(200.0f, uniform());
+    settings.torque_limit = 10.0f * uniform();
+    settings.torque_slew = powf(1.0e5f, uniform());
+    settings.torque_rms = (uniform() < 0.1f) ? 0.0f : (5.0f * uniform());
+    settings.dither_fade = 0.2f * uniform();
+    return settings;
+}
+
+static void test_no_request_passes_a_limit_at_any_settings(void)
+{
+    uint32_t open = 0u;
+    for (uint32_t run = 0u; run < 300u; run++) {
+        const lever_settings_t settings = random_settings();
+        torque_gate_t gate;
+        torque_gate_init(&gate, &settings);
+        watch_start(&settings);
+        for (uint32_t k = 0u; k < (3000000u / gate.period_us); k++) {
+            const torque_sample_t sample = {gate.period_us, true, true, (uniform() > 0.002f)};
+            if ((k % 20u) == 0u) {
+                torque_gate_keep_alive(&gate);
+            }
+            torque_gate_step(&gate, random_request(run, k), &sample);
+            watch_torque(gate.torque, gate.period_us, gate.gain > 0.0f);
+            open += gate.open ? 1u : 0u;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(100000u, open);
+}
+
+/* Gaps, silence that the port tells of, outputs that are missing, clocks that stand, commands that end: at random. */
+static void test_no_course_of_events_passes_a_limit(void)
+{
+    for (uint32_t run = 0u; run < 300u; run++) {
+        torque_gate_t gate;
+        lever_settings_t settings = random_settings();
+        settings.sample_period = 1.0e-3f;
+        torque_gate_init(&gate, &settings);
+        watch_start(&settings);
+        for (uint32_t k = 0u; k < 5000u; k++) {
+            const float event = uniform();
+            uint32_t elapsed_us = 1000u;
+            if (event < 0.02f) {
+                const uint32_t idle_us = (uint32_t)(20000.0f * uniform());
+                torque_gate_idle(&gate, idle_us);
+                watch_torque(gate.torque, idle_us, gate.gain > 0.0f);
+                elapsed_us += idle_us;
+            } else if (event < 0.03f) {
+                elapsed_us = (uint32_t)(40000.0f * uniform());
+            } else if (event < 0.04f) {
+                torque_gate_keep_alive(&gate);
+            } else {
+                /* a good sample */
+            }
+            const torque_sample_t sample = {elapsed_us, (event < 0.999f), (event < 0.9f), true};
+            const uint32_t real_us = sample.advances ? elapsed_us : gate.period_us;
+            const uint32_t left_us = (real_us > gate.counted) ? (real_us - gate.counted) : 0u;
+            torque_gate_step(&gate, random_request(run, k), &sample);
+            watch_torque(gate.torque, left_us, gate.gain > 0.0f);
+        }
+    }
+}
+
+static void test_what_is_within_the_limits_passes_as_it_is(void)
+{
+    torque_gate_t gate;
+    torque_gate_init(&gate, &config.settings);
+    torque_gate_keep_alive(&gate);
+    for (uint32_t k = 0u; k < 900u; k++) {
+        const torque_sample_t sample = {1000u, true, true, true};
+        const float asked = 0.6f * sinf(0.04f * (float)k);
+        torque_gate_step(&gate, asked, &sample);
+        TEST_ASSERT_TRUE((k < 101u) || (gate.torque == asked));
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_no_request_passes_a_limit_at_any_settings);
+    RUN_TEST(test_no_course_of_events_passes_a_limit);
+    RUN_TEST(test_what_is_within_the_limits_passes_as_it_is);
+    return UNITY_END();
+}
