@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.library import enum_names, ffi
+from lever_cdkf.host_tools.library import enum_names
 from lever_cdkf.host_tools.native import Config
 from numpy.typing import NDArray
 
@@ -37,10 +37,8 @@ CALLED_ONCE = ("lever_init", "lever_command", "lever_platform", "lever_estimate"
 
 _TOOLCHAIN_PACKAGES = "gcc-arm-none-eabi libnewlib-arm-none-eabi"
 _TIME_LIMIT_S = 120.0
-_INTRO = struct.Struct("<8I")
-_RECORD = np.dtype(
-    [("ticks", "<u4"), ("stack", "<u2"), ("faults", "<u2"), ("mode", "u1"), ("frames", "u1"), ("reserved", "<u2")]
-)
+_INTRO = struct.Struct("<10I")
+_RECORD = np.dtype([("ticks", "<u4"), ("faults", "<u4"), ("stack", "<u2"), ("mode", "u1"), ("frames", "u1")])
 
 
 @dataclass(frozen=True)
@@ -63,6 +61,8 @@ class Run:
     faults: NDArray[np.int64]
     frames: NDArray[np.int64]
     """Frames sent."""
+    init: int
+    """Instructions of lever_init()."""
     estimate: bytes
     """lever_estimate_t after the last sample."""
 
@@ -158,12 +158,12 @@ def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) 
 
 def _read(data: bytes, count: int) -> Run:
     """What the image wrote. Raises LeverError when its own loop was not timed right, or something is missing."""
-    empty, calibration, rounds, *stacks = _INTRO.unpack_from(data)
+    empty, calibration, rounds, *stacks, init, estimate_bytes = _INTRO.unpack_from(data)
     looped = (calibration - empty) / TICKS_AN_INSTRUCTION
     if abs(looped - 2 * rounds) > 1.0:
         raise LeverError(f"QEMU's clock is off: a loop of {2 * rounds} instructions was timed as {looped:.1f}")
     end = _INTRO.size + count * _RECORD.itemsize
-    if len(data) != end + ffi.sizeof("lever_estimate_t"):
+    if len(data) != end + estimate_bytes:
         raise LeverError(f"the image wrote {len(data)} bytes of results for {count} samples: it is not of this version")
     records = np.frombuffer(data[_INTRO.size : end], _RECORD)
     instructions = np.rint((records["ticks"].astype(np.int64) - empty) / TICKS_AN_INSTRUCTION)
@@ -175,6 +175,7 @@ def _read(data: bytes, count: int) -> Run:
         loop_instructions=2 * rounds,
         loop_measured=looped,
         calls_stack=once,
+        init=round((init - empty) / TICKS_AN_INSTRUCTION),
         estimate=data[end:],
         **whole,
     )

@@ -90,7 +90,7 @@ def budget(elf: Path, firmware: Path, runs: dict[Case, Run], tell: Tell = _silen
         "compiler": image.compiler(),
         "calibration": _calibration(runs),
         "instructions": _instructions(runs),
-        "instructions_after_gap": _after_gap(elf),
+        "instructions_after_gap": {each: after_gap(elf, "lever", each) for each in ESTIMATORS},
         "floating_point_operations": _operations(elf, tell),
         **_bytes(elf),
         **_stack(elf, firmware, runs),
@@ -105,11 +105,10 @@ def _instructions(runs: dict[Case, Run]) -> dict[str, Any]:
     return instructions
 
 
-def _after_gap(elf: Path) -> dict[str, int]:
-    """The dearest call there is: the first sample after a gap, lever model."""
-    cut, first = record("lever").without(GAP_S), round(GAP_S[0] * 1e3)
-    runs = {estimator: image.run(elf, cut, "lever", estimator, "update") for estimator in ESTIMATORS}
-    return {estimator: int(run.instructions[first]) for estimator, run in runs.items()}
+def after_gap(elf: Path, model: str, estimator: str) -> int:
+    """Instructions of the dearest call there is: the first sample after a gap. Raises LeverError."""
+    run = image.run(elf, record(model).without(GAP_S), model, estimator, "update")
+    return int(run.instructions[round(GAP_S[0] * 1e3)])
 
 
 def _operations(elf: Path, tell: Tell) -> dict[str, Any]:

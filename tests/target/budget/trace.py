@@ -29,8 +29,8 @@ _SYST_CVR = 0xE000E018
 _BREAKPOINT = 7  # the engine's number of the exception that semihosting uses
 _SYS_WRITE0, _SYS_WRITE, _SYS_GET_CMDLINE, _SYS_EXIT = 0x04, 0x05, 0x15, 0x18
 _RECORDS = 1024  # that the image keeps before it writes them
-_MEASURED_BEFORE = 2
-"""The image measures nothing, then a loop, before the first sample."""
+_MEASURED_BEFORE = 3
+"""The image measures nothing, a loop and lever_init() before the first sample."""
 
 _INSTRUCTION = re.compile(r"^\s*([0-9a-f]+):\t(\S+)(?:\t([^@;\n]*))?", re.MULTILINE)
 _SYMBOL = re.compile(r"^([0-9a-f]+) ([0-9a-f]+) [tT] (\S+)$", re.MULTILINE)

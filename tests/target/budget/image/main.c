@@ -45,15 +45,16 @@ typedef struct intro {
     uint32_t platform_stack;
     uint32_t estimate_stack;
     uint32_t health_stack;
+    uint32_t init_ticks;
+    uint32_t estimate_bytes; /* of the lever_estimate_t at the end */
 } intro_t;
 
 typedef struct record {
     uint32_t ticks;
+    uint32_t faults;
     uint16_t stack; /* bytes that the measured calls took at most */
-    uint16_t faults;
     uint8_t mode;
     uint8_t frames; /* sent */
-    uint16_t reserved;
 } record_t;
 
 /* A header_t, and behind it the samples: image.ld, and QEMU's loader. */
@@ -134,7 +135,6 @@ static void keep(lever_t *lever, uint32_t ticks, uint16_t stack, uint32_t frames
     record->faults = health.faults;
     record->mode = (uint8_t)health.mode;
     record->frames = (uint8_t)frames;
-    record->reserved = 0u;
     record_count++;
     if (record_count == (sizeof records / sizeof records[0])) {
         flush();
@@ -235,13 +235,16 @@ static void take_argument(char *word, lever_config_t *config, lever_command_t *c
 }
 
 /* The instance as the arguments want it; measures the stack of the calls that are made once. */
-static lever_t *begin(const lever_config_t *config, const lever_command_t *command, intro_t *intro)
+static lever_t *start(const lever_config_t *config, const lever_command_t *command, intro_t *intro)
 {
     lever_health_t health;
     lever_estimate_t estimate;
     paint_stack();
+    const uint32_t begin = SYST_CVR;
     lever_t *lever = lever_init(&memory, config);
+    const uint32_t end = SYST_CVR;
     intro->init_stack = stack_used();
+    intro->init_ticks = elapsed(begin, end);
     if (lever == NULL) {
         semihosting_exit(lever_config_check(config));
     }
@@ -260,6 +263,7 @@ static lever_t *begin(const lever_config_t *config, const lever_command_t *comma
     paint_stack();
     lever_health(lever, &health);
     intro->health_stack = stack_used();
+    intro->estimate_bytes = sizeof estimate;
     return lever;
 }
 
@@ -283,7 +287,7 @@ int main(void)
     }
     output = semihosting_create(path);
     intro_t intro = calibrate();
-    lever_t *lever = begin(&config, &command, &intro);
+    lever_t *lever = start(&config, &command, &intro);
     semihosting_write(output, &intro, sizeof intro);
     if (strcmp(what, "tick") == 0) {
         tick_all(lever);
