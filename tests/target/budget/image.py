@@ -67,7 +67,7 @@ class Run:
     """lever_estimate_t after the last sample."""
 
 
-def _run(command: list[str], what: str, hint: str = "") -> str:
+def run_command(command: list[str], what: str, hint: str = "") -> str:
     """The output of a finished command. Raises LeverError with the last lines of a failed one."""
     try:
         result = subprocess.run(
@@ -90,7 +90,7 @@ def tool(name: str) -> str:
 
 def run_tool(name: str, *arguments: str | Path) -> str:
     """The output of a program of the cross toolchain. Raises LeverError."""
-    return _run([tool(name), *(str(argument) for argument in arguments)], name, _TOOLCHAIN_PACKAGES)
+    return run_command([tool(name), *(str(argument) for argument in arguments)], name, _TOOLCHAIN_PACKAGES)
 
 
 def call_graph(elf: Path) -> Path:
@@ -124,10 +124,10 @@ def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED, process
         fcntl.flock(lock, fcntl.LOCK_EX)
         configure = ["cmake", "-S", str(SOURCE), "-B", str(folder), toolchain, *settings]
         try:
-            _run(configure, "configuring the image")
+            run_command(configure, "configuring the image")
         except LeverError:  # as after a change of the toolchain file, which CMake refuses to take over
-            _run([*configure, "--fresh"], "configuring the image")
-        _run(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
+            run_command([*configure, "--fresh"], "configuring the image")
+        run_command(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
     return folder / "budget.elf"
 
 
@@ -152,7 +152,7 @@ def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) 
         command = ["qemu-system-arm", "-M", MACHINE, "-nographic", "-monitor", "none", "-serial", "none"]
         command += ["-icount", "shift=3,sleep=off", "-semihosting-config", semihosting, "-kernel", str(elf)]
         command += ["-device", f"loader,file={samples},addr={SAMPLES_ADDRESS:#x},force-raw=on"]
-        _run(command, f"the image in QEMU ({estimator}, {model}, {form})", "qemu-system-arm")
+        run_command(command, f"the image in QEMU ({estimator}, {model}, {form})", "qemu-system-arm")
         return _read(output.read_bytes(), len(recording.samples))
 
 

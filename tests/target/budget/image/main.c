@@ -23,6 +23,7 @@
 #define SYST_MASK 0xFFFFFFu
 
 #define CALIBRATION_ROUNDS 100000u /* of two instructions each */
+#define SAMPLES_A_COMMAND 500u
 #define PAINT 0xC5A5C5A5u
 #define PAINTED_WORDS 1024u /* below the stack pointer: more than any call of the core may take */
 
@@ -153,11 +154,20 @@ static const void *first_sample(void)
     return samples_in_flash + sizeof(header_t);
 }
 
-static void update_all(lever_t *lever)
+/* The torque gate closes when no command comes for a second. */
+static void keep_alive(lever_t *lever, const lever_command_t *command, uint32_t sample)
+{
+    if ((sample % SAMPLES_A_COMMAND) == 0u) {
+        (void)lever_command(lever, command);
+    }
+}
+
+static void update_all(lever_t *lever, const lever_command_t *command)
 {
     const lever_sample_t *samples = (const lever_sample_t *)first_sample();
     const uint32_t count = sample_count();
     for (uint32_t i = 0u; i < count; i++) {
+        keep_alive(lever, command, i);
         paint_stack();
         const uint32_t begin = SYST_CVR;
         (void)lever_update(lever, &samples[i]);
@@ -168,7 +178,7 @@ static void update_all(lever_t *lever)
 }
 
 /* As port/embedded/loop.c does it. */
-static void tick_all(lever_t *lever)
+static void tick_all(lever_t *lever, const lever_command_t *command)
 {
     const wire_frame_t *wire = (const wire_frame_t *)first_sample();
     const uint32_t count = sample_count();
@@ -182,6 +192,7 @@ static void tick_all(lever_t *lever)
             in[k].length = 8u;
             (void)memcpy(in[k].data, frame->data, sizeof in[k].data);
         }
+        keep_alive(lever, command, i);
         paint_stack();
         const uint32_t begin = SYST_CVR;
         (void)lever_on_frame(lever, &in[0]);
@@ -290,9 +301,9 @@ int main(void)
     lever_t *lever = start(&config, &command, &intro);
     semihosting_write(output, &intro, sizeof intro);
     if (strcmp(what, "tick") == 0) {
-        tick_all(lever);
+        tick_all(lever, &command);
     } else {
-        update_all(lever);
+        update_all(lever, &command);
     }
     flush();
     lever_estimate_t estimate;
