@@ -1,7 +1,7 @@
 """Settings files, which `lever settings` prints and `lever_can --settings` reads: a configuration as text.
 
-One `name = value` a line, `#` starts a comment, the last of two equal names counts. Names are those of
-settings_table(), in its units, and the four choices:
+One `name = value` a line, `#` starts a comment, the last of two equal names counts; firmware/port/linux/settings.h has
+the grammar, to the byte. Names are those of settings_table(), in its units, and the four choices:
 
     preload = trim           # one of fixed, trim
     theta_noise = 0.002      # [rad] standard deviation of a theta sample
@@ -10,6 +10,7 @@ settings_table(), in its units, and the four choices:
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,20 +22,24 @@ from .library import enum_names
 Assignments = Mapping[str, str | float]
 """Values by name, of settings (float) and choices (str)."""
 
+_BOM = b"\xef\xbb\xbf"
+_BLANK = " \t"
+_LINE_BYTES = 510
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
 
 def parse_assignment(text: str) -> tuple[str, str | float]:
     """Name and checked value of the text `name = value`. Raises SettingsError."""
-    name, equals, value = (part.strip() for part in text.partition("="))
+    name, equals, value = (part.strip(_BLANK) for part in text.partition("="))
     if not equals:
         raise SettingsError(f"{name!r} has no '=': write name = value")
     if name in CHOICES:
         choice_value(f"lever_{name}", name, value)
         return name, value
     row = setting(name)
-    try:
-        number = float(value)
-    except ValueError:
-        raise SettingsError(f"{name} = {value!r} is not a number (give it in {row.unit}, without the unit)") from None
+    if _NUMBER.fullmatch(value) is None:
+        raise SettingsError(f"{name} = {value!r} is not a number (give it in {row.unit}, without the unit)")
+    number = float(value)
     row.check(number)
     return name, number
 
@@ -42,21 +47,26 @@ def parse_assignment(text: str) -> tuple[str, str | float]:
 def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:
     """What a settings file sets. Raises SettingsError with file and line."""
     try:
-        lines = Path(path).read_text(encoding="utf-8").splitlines()
+        content = Path(path).read_bytes()
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise SettingsError(f"{path}: is not a text file") from None
     assignments: dict[str, str | float] = {}
-    for number, line in enumerate(lines, start=1):
-        content = line.partition("#")[0].strip()
-        if content:
-            try:
-                name, value = parse_assignment(content)
-            except SettingsError as error:
-                raise SettingsError(f"{path}:{number}: {error}") from None
-            assignments[name] = value
+    for number, line in enumerate(content.removeprefix(_BOM).split(b"\n"), start=1):
+        assignments |= _parse_line(line.removesuffix(b"\r"), f"{path}:{number}")
     return assignments
+
+
+def _parse_line(line: bytes, place: str) -> dict[str, str | float]:
+    """What a line assigns, if anything. Raises SettingsError."""
+    text = line.partition(b"#")[0].decode(errors="backslashreplace").strip(_BLANK)
+    try:
+        if b"\0" in line:
+            raise SettingsError("is not text")
+        if len(line) > _LINE_BYTES:
+            raise SettingsError(f"the line is longer than {_LINE_BYTES} bytes")
+        return dict([parse_assignment(text)]) if text else {}
+    except SettingsError as error:
+        raise SettingsError(f"{place}: {error}") from None
 
 
 def make_config(assignments: Assignments) -> Config:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.config import Config, settings_table
-from lever_cdkf.host_tools.settings_file import format_config
+from lever_cdkf.host_tools.config import CHOICES, Config, settings_table, single
+from lever_cdkf.host_tools.settings_file import format_config, read_assignments
+from python.host.settings_corpus import corpus
 from quality import tools
 
 pytestmark = pytest.mark.requires("cmake")
@@ -31,12 +34,13 @@ int main(void)
 """
 
 
-def configure(settings: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def configure(settings: str | bytes, folder: Path) -> subprocess.CompletedProcess[str]:
     """CMake's script that writes lever_build.h into a folder, for a settings file with that text."""
-    (folder / "my.settings").write_text(settings, encoding="utf-8")
+    (folder / "my.settings").write_bytes(settings.encode() if isinstance(settings, str) else settings)
     script = SCRIPT.format(firmware=tools.FIRMWARE, settings=folder / "my.settings", header=folder / "lever_build.h")
     (folder / "script.cmake").write_text(script)
-    return subprocess.run(["cmake", "-P", folder / "script.cmake"], capture_output=True, text=True, check=False)
+    command = ["cmake", "-P", str(folder / "script.cmake")]
+    return subprocess.run(command, capture_output=True, text=True, errors="backslashreplace", check=False)
 
 
 def other_than_default() -> Config:
@@ -62,8 +66,8 @@ def test_a_build_starts_with_the_values_of_the_file(tmp_path: Path, build_dir: P
     shown = tools.run([tmp_path / "show"]).stdout.split()
     pointer = config.pointer
     assert shown[:4] == [str(getattr(pointer, what)) for what in ("model", "preload", "estimator", "adaptation")]
-    assert [float(value) for value in shown[4:]] == [
-        pytest.approx(getattr(pointer.settings, row.name), rel=1e-8) for row in settings_table()
+    assert [single(float(value)) for value in shown[4:]] == [
+        getattr(pointer.settings, row.name) for row in settings_table()
     ]
 
 
@@ -72,15 +76,16 @@ def test_a_build_starts_with_the_values_of_the_file(tmp_path: Path, build_dir: P
     [
         ("theta_noise = 9", "my.settings:2: theta_noise = 9 is out of range: from 1.0e-7 to 0.2 rad"),
         ("theta_noise = 1e-8", "theta_noise = 1e-8 is out of range"),
-        ("m_p = 3 kg", "my.settings:2: m_p = 3kg is not a number (give it in kg, without the unit)"),
-        ("m_p = 1e-3.5", "is not a number"),
-        ("m_p = nan", "is not a number"),
+        ("m_p = 3 kg", "my.settings:2: m_p = 3 kg is not understood: write name = value"),
+        ("m_p = nan", "my.settings:2: m_p = nan is not a number (give it in kg, without the unit)"),
         ("theta_nois = 1", "my.settings:2: unknown setting theta_nois; `lever settings` lists them all"),
-        ("theta_noise 1", "my.settings:2: theta_noise1 is not understood: write name = value"),
+        ("theta_noise 1", "my.settings:2: theta_noise 1 is not understood: write name = value"),
         ("model = levers", "my.settings:2: model = levers is not known; `lever settings` lists what is"),
         ("adaptation = count", "adaptation = count is not known"),
-        ("[settings]", "my.settings: is not a settings file: write name = value"),
-        ("m_p = 3; k_p = 4", "is not a settings file"),
+        ("[settings]", "my.settings:2: [settings] is not understood: write name = value"),
+        ("m_p = 3; k_p = 4", "my.settings:2: m_p = 3; k_p = 4 is not understood"),
+        ("m_p = 3" + 504 * " ", "my.settings:2: the line is longer than 510 bytes"),
+        ("\0", "my.settings: is not text"),
     ],
 )
 def test_what_is_wrong_ends_the_configuration_with_its_place(line: str, told: str, tmp_path: Path) -> None:
@@ -88,6 +93,26 @@ def test_what_is_wrong_ends_the_configuration_with_its_place(line: str, told: st
     assert done.returncode != 0
     assert told in " ".join(done.stderr.split())
     assert not (tmp_path / "lever_build.h").exists()
+
+
+def canonical(assignments: Mapping[str, str | float]) -> dict[str, str | float]:
+    """Choices as they are, numbers in single precision."""
+    return {name: value if name in CHOICES else single(float(value)) for name, value in assignments.items()}
+
+
+def test_it_takes_what_the_other_readers_take(tmp_path: Path) -> None:
+    wrong = []
+    for verdict, content in corpus():
+        done = configure(content, tmp_path)
+        if (done.returncode == 0) != (verdict == "good"):
+            wrong.append((verdict, content, done.stderr))
+        elif verdict == "good":
+            header = (tmp_path / "lever_build.h").read_text()
+            found: dict[str, str | float] = dict(re.findall(r"config->settings\.(\w+) = \(float\)(\S+);", header))
+            for name, enumerator in re.findall(r"config->(\w+) = \(uint8_t\)(\w+);", header):
+                found[name] = enumerator.lower().removeprefix(f"lever_{name}_")
+            assert canonical(found) == canonical(read_assignments(tmp_path / "my.settings")), content
+    assert not wrong
 
 
 def test_without_a_file_the_defaults_stay(tmp_path: Path) -> None:

@@ -2,14 +2,24 @@
 
 #include "port/linux/settings.h"
 
-#include <ctype.h>
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { LINE_BYTES = 512, CHOICE_VALUES = 4 };
+#define BOM "\xEF\xBB\xBF"
+#define BLANK " \t"
+
+enum { BOM_BYTES = 3, LINE_BYTES = 510, CHOICE_VALUES = 4 };
+
+/* A line without its LF; what does not fit into the text is not kept, but counted. */
+typedef struct line {
+    char text[BOM_BYTES + LINE_BYTES + 2]; /* CR and NUL */
+    size_t length;
+    bool has_nul;
+} line_t;
 
 /* A choice: its names in the order of its enum, and where it is in the configuration. */
 typedef struct choice {
@@ -70,21 +80,51 @@ static bool set_choice(lever_config_t *config, const choice_t *choice, const cha
     return refuse(error, "%s: \"%s\" is not known; it can be %s", choice->name, value, names);
 }
 
+static const char *after_digits(const char *text)
+{
+    return text + strspn(text, "0123456789");
+}
+
+static const char *after_sign(const char *text)
+{
+    return ((*text == '+') || (*text == '-')) ? (text + 1) : text;
+}
+
+/* Whether the text is a number of the grammar; strtod() takes more. */
+static bool is_number(const char *text)
+{
+    const char *begin = after_sign(text);
+    const char *end = after_digits(begin);
+    bool good = end != begin;
+
+    if (*end == '.') {
+        const char *fraction = end + 1;
+        end = after_digits(fraction);
+        good = good || (end != fraction);
+    }
+    if (good && ((*end == 'e') || (*end == 'E'))) {
+        const char *exponent = after_sign(end + 1);
+        end = after_digits(exponent);
+        good = end != exponent;
+    }
+    return good && (*end == '\0');
+}
+
 static bool set_number(lever_config_t *config, uint32_t index, const char *value, settings_error_t *error)
 {
     const lever_setting_t *setting = lever_setting(index);
-    char *end = NULL;
-    const float number = strtof(value, &end);
+    const double number = strtod(value, NULL);
 
-    if ((end == value) || (*end != '\0') || !isfinite(number)) {
+    if (!is_number(value)) {
         return refuse(
             error, "%s: \"%s\" is not a number (give it in %s, without the unit)", setting->name, value, setting->unit);
     }
-    if ((number < setting->least) || (number > setting->greatest)) {
-        return refuse(error, "%s: %g is out of range, which is %g to %g %s", setting->name, (double)number,
+    const float rounded = (fabs(number) <= (double)FLT_MAX) ? (float)number : INFINITY;
+    if (!((rounded >= setting->least) && (rounded <= setting->greatest))) {
+        return refuse(error, "%s: %g is out of range, which is %g to %g %s", setting->name, number,
             (double)setting->least, (double)setting->greatest, setting->unit);
     }
-    (void)memcpy((uint8_t *)&config->settings + (index * sizeof number), &number, sizeof number);
+    (void)memcpy((uint8_t *)&config->settings + (index * sizeof rounded), &rounded, sizeof rounded);
     return true;
 }
 
@@ -103,27 +143,25 @@ bool settings_set(lever_config_t *config, const char *name, const char *value, s
     return refuse(error, "\"%s\" is not a setting; lever_can --help lists them", name);
 }
 
-/* Cuts the white space off both ends, in place. */
+/* Cuts the blanks off both ends, in place. */
 static char *trim(char *text)
 {
-    char *end = text + strlen(text);
+    char *begin = text + strspn(text, BLANK);
+    char *end = begin + strlen(begin);
 
-    while (isspace((unsigned char)*text) != 0) {
-        text++;
-    }
-    while ((end > text) && (isspace((unsigned char)end[-1]) != 0)) {
+    while ((end > begin) && (strchr(BLANK, end[-1]) != NULL)) {
         end--;
     }
     *end = '\0';
-    return text;
+    return begin;
 }
 
 bool settings_assign(lever_config_t *config, const char *text, settings_error_t *error)
 {
-    char name[LINE_BYTES];
+    char name[LINE_BYTES + 1];
 
     if (strlen(text) >= sizeof name) {
-        return refuse(error, "longer than %d characters", LINE_BYTES - 1);
+        return refuse(error, "longer than %d characters", LINE_BYTES);
     }
     (void)memcpy(name, text, strlen(text) + 1u);
     char *value = strchr(name, '=');
@@ -134,20 +172,56 @@ bool settings_assign(lever_config_t *config, const char *text, settings_error_t 
     return settings_set(config, trim(name), trim(value + 1), error);
 }
 
+/* Reads a line; false at the end of the file, when the line is what was left. */
+static bool read_line(FILE *file, line_t *line)
+{
+    int byte = getc(file);
+
+    (void)memset(line, 0, sizeof *line);
+    while ((byte != EOF) && (byte != '\n')) {
+        if (line->length < (sizeof line->text - 1u)) {
+            line->text[line->length] = (char)byte;
+        }
+        line->has_nul = line->has_nul || (byte == 0);
+        line->length++;
+        byte = getc(file);
+    }
+    return byte != EOF;
+}
+
+/* Takes what one line says; `is_first`: it may begin with a byte order mark. */
+static bool take_line(lever_config_t *config, line_t *line, bool is_first, settings_error_t *error)
+{
+    const size_t skipped = (is_first && (strncmp(line->text, BOM, BOM_BYTES) == 0)) ? (size_t)BOM_BYTES : 0u;
+    char *text = &line->text[skipped];
+    size_t length = line->length - skipped;
+
+    if (line->has_nul) {
+        return refuse(error, "is not text");
+    }
+    if ((length > 0u) && (length <= (size_t)LINE_BYTES + 1u) && (text[length - 1u] == '\r')) {
+        length--;
+    }
+    if (length > (size_t)LINE_BYTES) {
+        return refuse(error, "the line is longer than %d bytes", LINE_BYTES);
+    }
+    text[length] = '\0';
+    text[strcspn(text, "#")] = '\0';
+    text = trim(text);
+    return (*text == '\0') || settings_assign(config, text, error);
+}
+
 bool settings_read(lever_config_t *config, FILE *file, const char *path, settings_error_t *error)
 {
-    char line[LINE_BYTES];
+    line_t line;
     settings_error_t reason;
     uint32_t number = 0u;
+    bool is_more = true;
 
-    while (fgets(line, (int)sizeof line, file) != NULL) {
+    while (is_more) {
+        is_more = read_line(file, &line);
         number++;
-        if ((strchr(line, '\n') == NULL) && (feof(file) == 0)) {
-            return refuse(error, "%.200s:%u: the line is longer than %d characters", path, number, LINE_BYTES - 2);
-        }
-        line[strcspn(line, "#")] = '\0';
-        const char *text = trim(line);
-        if ((*text != '\0') && !settings_assign(config, text, &reason)) {
+        if (!take_line(config, &line, number == 1u, &reason)) {
             return refuse(error, "%.200s:%u: %.280s", path, number, reason.text);
         }
     }

@@ -1,14 +1,24 @@
-"""Settings files: what is written is read back, by Python and by lever_can, and errors name file and line."""
+"""Settings files: what is written is read back, errors name file and line, and Python and lever_can read the same.
+
+The latter on the files of settings_corpus.txt, on which tests/quality/test_build_settings.py tries CMake, and on
+thousands that are made of them at random.
+"""
 
 from __future__ import annotations
 
+import random
+import shutil
+import struct
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+from lever_cdkf.host_tools.config import CHOICES, choice_value, single
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.native import Config, settings_table
 from lever_cdkf.host_tools.settings_file import format_config, make_config, parse_assignment, read_assignments
+from python.host.settings_corpus import corpus
 
 
 def odd_config() -> Config:
@@ -34,7 +44,7 @@ def test_form() -> None:
     assert lines[1].split() == ["preload", "=", "trim", "#", "one", "of", "fixed,", "trim"]
     line = next(line for line in lines if line.startswith("theta_noise "))
     assert " ".join(line.split()) == "theta_noise = 0.001 # [rad] standard deviation of a theta sample"
-    assert max(map(len, lines)) < 500  # the longest that lever_can reads
+    assert max(len(line.encode()) for line in lines) <= 510
 
 
 def test_lever_can_reads_it(tmp_path: Path, build_dir: Path) -> None:
@@ -66,7 +76,7 @@ def test_comments_order_and_spaces(tmp_path: Path) -> None:
         ("= 3", "unknown setting ''; `lever settings` lists them all"),
         ("m_q = 3", "unknown setting 'm_q'; did you mean m_p?"),
         ("m_p = 1e9", "m_p = 1000000000.0 is out of range: it must be a number from 0.3 to 10 kg ("),
-        ("m_p = nan", "m_p = nan is out of range"),
+        ("m_p = nan", "m_p = 'nan' is not a number"),
         ("preload = 1", "preload = '1' is not known; allowed: fixed, trim"),
     ],
 )
@@ -86,6 +96,92 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_assignments(tmp_path / "none")
     with pytest.raises(SettingsError, match="cannot be read: Is a directory"):
         read_assignments(tmp_path)
-    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SettingsError, match="binary: is not a text file"):
+    (tmp_path / "binary").write_bytes(b"\n\xff\xfe\x00")
+    with pytest.raises(SettingsError, match="binary:2: is not text"):
         read_assignments(tmp_path / "binary")
+
+
+# --- one grammar ---
+
+RANDOM_FILES = 5000
+
+
+def bits(assignments: dict[str, str | float]) -> str:
+    """What settings_reader.c prints for the defaults with these assignments."""
+    values = {**Config().choices, **{row.name: row.default for row in settings_table()}, **assignments}
+    choices = [str(choice_value(f"lever_{what}", what, str(values[what]))) for what in CHOICES]
+    numbers = [struct.pack(">f", single(float(values[row.name]))).hex() for row in settings_table()]
+    return " ".join(["good", *choices, *numbers])
+
+
+def read_by_python(files: Iterable[bytes], folder: Path) -> list[str]:
+    """As settings_reader.c prints it; only "bad" of what is refused."""
+    read = []
+    path = folder / "it"
+    for content in files:
+        path.write_bytes(content)
+        try:
+            read.append(bits(read_assignments(path)))
+        except SettingsError:
+            read.append("bad")
+    return read
+
+
+@pytest.fixture(scope="module")
+def reader(root: Path, build_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """settings_reader.c with the sources of lever_can."""
+    program = tmp_path_factory.mktemp("reader") / "settings_reader"
+    libraries = [build_dir / f"firmware/lib{name}.a" for name in ("lever_port_linux", "lever_cdkf")]
+    if not all(library.is_file() for library in libraries):
+        pytest.skip(f"no {libraries[0].name} in {build_dir}: cmake --build {build_dir}")
+    compiler = next(name for name in ("cc", "gcc", "clang") if shutil.which(name))
+    source = root / "tests/python/host/settings_reader.c"
+    subprocess.run(
+        [compiler, "-std=c99", "-I", root / "firmware", source, *libraries, "-lm", "-o", program], check=True
+    )
+    return program
+
+
+def read_by_c(files: Iterable[bytes], reader: Path) -> list[str]:
+    joined = b"".join(b"%d\n%s" % (len(content), content) for content in files)
+    lines = subprocess.run([reader], input=joined, capture_output=True, check=True).stdout.split(b"\n")[:-1]
+    return [line.decode() if line.startswith(b"good") else "bad" for line in lines]
+
+
+PIECES = [b" ", b"\t", b"\n", b"\r\n", b"=", b"#", b"\0", b".", b"e", b"+", b"-", b"_", *(b"%d" % n for n in range(10))]
+PIECES += [b"m_p", b"preload", b"\n# ", b"E-1", b"0x", b"nan", b"inf", b"1e999", b"\xef\xbb\xbf", b"\xc2\x85"]
+
+
+def mutated(content: bytes, generator: random.Random) -> bytes:
+    """With pieces put in, taken out or exchanged in one or two places."""
+    for _ in range(generator.randint(1, 2)):
+        place = generator.randint(0, len(content))
+        piece = generator.choice((b"", generator.choice(PIECES), generator.choice(PIECES), generator.randbytes(1)))
+        piece *= generator.choice((1, 1, 1, 2, 500))
+        content = content[:place] + piece + content[place + generator.randint(0, 1) :]
+    return content
+
+
+def assert_the_same(files: list[bytes], by_python: list[str], by_c: list[str]) -> None:
+    different = [pair for pair in zip(files, by_python, by_c, strict=True) if pair[1] != pair[2]]
+    assert not different, f"{len(different)} files, such as {different[0]}"
+
+
+@pytest.mark.requires("cc|gcc|clang")
+def test_python_and_c_take_the_corpus_as_it_says(reader: Path, tmp_path: Path) -> None:
+    verdicts, files = (list(column) for column in zip(*corpus(), strict=True))
+    by_python, by_c = read_by_python(files, tmp_path), read_by_c(files, reader)
+    for verdict, content, *read in zip(verdicts, files, by_python, by_c, strict=True):
+        assert [each.split()[0] for each in read] == 2 * ["bad" if verdict == "bad" else "good"], content
+    assert_the_same(files, by_python, by_c)
+
+
+@pytest.mark.requires("cc|gcc|clang")
+def test_python_and_c_read_random_files_alike(reader: Path, tmp_path: Path) -> None:
+    generator = random.Random(1)
+    good, bad = ([content for verdict, content in corpus() if (verdict == "bad") == is_bad] for is_bad in (False, True))
+    seeds = 3 * good + bad
+    files = [mutated(generator.choice(seeds), generator) for _ in range(RANDOM_FILES)]
+    by_python = read_by_python(files, tmp_path)
+    assert 0.05 < sum(read != "bad" for read in by_python) / RANDOM_FILES < 0.5
+    assert_the_same(files, by_python, read_by_c(files, reader))

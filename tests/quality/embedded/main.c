@@ -1,18 +1,24 @@
-/* Feeds a lively series of samples to the estimator and prints every estimate as hexadecimal bits: two builds that
- * compute alike print alike. The samples come from single-precision arithmetic under the same compiler flags.
+/* Feeds a lively series of samples to the estimator and prints every estimate as hexadecimal bits, and every frame: two
+ * builds that compute alike print alike. The samples come from single-precision arithmetic under the same compiler flags.
  *
  *     embedded SAMPLES
  *
  * One run for each choice of preload and adaptation, and one for each model and estimator; a line is: run, sample, mode, then
- * the bits of the estimate. */
+ * the bits of the estimate. Then one run over the bus for each model and estimator; a line is: "bus", run, sample, then the
+ * frames that were sent. The last line says whether self_test() passed. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "can/e2e.h"
+#include "can/messages.h"
 #include "lever_cdkf.h"
+#include "port/embedded/self_test.h"
 
-#define PERIOD 1.0e-3f /* [s] */
+#define PERIOD 1.0e-3f         /* [s] */
+#define SAMPLES_A_COMMAND 500u /* the motor's torque needs one each second */
+#define DITHER 0.3f            /* [N m] */
 
 /* An arm and lever of 3.5 Hz and damping ratio 0.3 about a trim of 0.35 rad, shaken by the base and the motor. */
 typedef struct arm {
@@ -78,16 +84,23 @@ static void print_estimate(const lever_estimate_t *estimate)
     (void)printf(" %u\n", estimate->nis_size);
 }
 
-static void run(const lever_config_t *config, uint32_t samples)
+static lever_t *start(const lever_config_t *config)
 {
     static lever_memory_t memory;
-    arm_t arm = {1u, 0.0f, 0.0f, 0.0f, 0.0f};
-
     lever_t *lever = lever_init(&memory, config);
+
     if (lever == NULL) {
         (void)fprintf(stderr, "embedded: refused: %s\n", lever_config_check(config));
         exit(1);
     }
+    return lever;
+}
+
+static void run(const lever_config_t *config, uint32_t samples)
+{
+    arm_t arm = {1u, 0.0f, 0.0f, 0.0f, 0.0f};
+    lever_t *lever = start(config);
+
     for (uint32_t index = 0u; index < samples; index++) {
         lever_estimate_t estimate;
         const lever_sample_t sample = next_sample(&arm, index);
@@ -96,6 +109,72 @@ static void run(const lever_config_t *config, uint32_t samples)
         (void)printf("%u.%u.%u.%u %" PRIu32 " %u", config->model, config->estimator, config->preload,
             config->adaptation, index, (unsigned int)mode);
         print_estimate(&estimate);
+    }
+}
+
+static void send_command(lever_t *lever, uint32_t index)
+{
+    const message_command_t command = {(uint8_t)LEVER_REQUEST_NONE, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP,
+        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, DITHER};
+    lever_frame_t frame;
+
+    if (message_command_encode(&frame, &command)) {
+        e2e_protect(&frame, (uint8_t)MESSAGE_COMMAND_DATA_ID, (uint8_t)((index / SAMPLES_A_COMMAND) % 16u));
+        (void)lever_on_frame(lever, &frame);
+    }
+}
+
+static void send_sample(lever_t *lever, const lever_sample_t *sample, uint32_t index)
+{
+    const message_lever_sample_t of_lever = {.theta = sample->theta,
+        .theta_dot = sample->theta_dot,
+        .tau_m = sample->tau_m,
+        .theta_valid = sample->theta_valid,
+        .theta_dot_valid = sample->theta_dot_valid,
+        .tau_m_valid = sample->tau_m_valid};
+    const message_base_sample_t of_base = {
+        .time_us = sample->time_us, .z_ddot = sample->z_ddot, .z_ddot_valid = sample->z_ddot_valid};
+    lever_frame_t frame;
+
+    if (message_lever_sample_encode(&frame, &of_lever)) {
+        e2e_protect(&frame, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, (uint8_t)(index % 16u));
+        (void)lever_on_frame(lever, &frame);
+    }
+    if (message_base_sample_encode(&frame, &of_base)) {
+        e2e_protect(&frame, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, (uint8_t)(index % 16u));
+        (void)lever_on_frame(lever, &frame);
+    }
+}
+
+static void print_frame(const lever_frame_t *frame)
+{
+    (void)printf(" %03" PRIX32 "#", frame->id);
+    for (uint32_t i = 0u; i < frame->length; i++) {
+        (void)printf("%02X", frame->data[i]);
+    }
+}
+
+static void run_bus(const lever_config_t *config, uint32_t samples)
+{
+    const lever_platform_t platform = {.overruns = 1u};
+    arm_t arm = {1u, 0.0f, 0.0f, 0.0f, 0.0f};
+    lever_t *lever = start(config);
+
+    lever_platform(lever, &platform);
+    for (uint32_t index = 0u; index < samples; index++) {
+        const lever_sample_t sample = next_sample(&arm, index);
+        lever_frame_t frame;
+
+        if ((index % SAMPLES_A_COMMAND) == 0u) {
+            send_command(lever, index);
+        }
+        send_sample(lever, &sample, index);
+        (void)lever_step(lever);
+        (void)printf("bus %u.%u %" PRIu32, config->model, config->estimator, index);
+        while (lever_next_frame(lever, &frame)) {
+            print_frame(&frame);
+        }
+        (void)printf("\n");
     }
 }
 
@@ -114,10 +193,15 @@ int main(int argc, char **argv)
     }
     lever_config_default(&config);
     const uint8_t estimators = (uint8_t)LEVER_ESTIMATOR_COUNT;
-    for (uint8_t choice = 1u; choice < (uint8_t)((uint8_t)LEVER_MODEL_COUNT * estimators); choice++) {
+    for (uint8_t choice = 0u; choice < (uint8_t)((uint8_t)LEVER_MODEL_COUNT * estimators); choice++) {
         config.model = choice / estimators;
         config.estimator = choice % estimators;
-        run(&config, samples);
+        if (choice > 0u) {
+            run(&config, samples);
+        }
+        run_bus(&config, samples);
     }
+    lever_memory_t memory;
+    (void)printf("self test %s\n", self_test(&memory) ? "passed" : "failed");
     return 0;
 }

@@ -9,7 +9,7 @@ from pathlib import Path
 sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from lever_cdkf.host_tools.errors import LeverError  # noqa: E402
-from target.budget import hot_spots, image, report  # noqa: E402
+from target.budget import hot_spots, image, quick, report  # noqa: E402
 from target.budget.recording import MODELS  # noqa: E402
 
 _BUILD = Path(__file__).resolve().parents[3] / "build/target"
@@ -19,6 +19,7 @@ run; bytes of code and of an instance; the most stack that a call can take.
 """
 _EPILOG = """\
 examples:
+  python tests/target/budget quick
   python tests/target/budget table
   python tests/target/budget table --check --firmware ../other/firmware --build /tmp/other
   python tests/target/budget profile --estimator joint --worst
@@ -56,9 +57,12 @@ def _parser() -> argparse.ArgumentParser:
         help="of the port, to --accept (%(default)s)",
     )
     table.set_defaults(run=report.run)
-    profile = what.add_parser("profile", parents=[common], help="where the instructions of a step go")
-    profile.add_argument("--model", choices=MODELS, default=MODELS[0], help="default: %(default)s")
-    profile.add_argument("--estimator", choices=image.ESTIMATORS, default="dual", help="default: %(default)s")
+    case = argparse.ArgumentParser(add_help=False)
+    case.add_argument("--model", choices=MODELS, default=MODELS[0], help="default: %(default)s")
+    case.add_argument("--estimator", choices=image.ESTIMATORS, default="dual", help="default: %(default)s")
+    brief = what.add_parser("quick", parents=[common, case], help="one model and one estimator, in a few seconds")
+    brief.set_defaults(run=quick.run)
+    profile = what.add_parser("profile", parents=[common, case], help="where the instructions of a step go")
     profile.add_argument(
         "--form", choices=image.FORMS, default="update", help="lever_update() alone (the default), or the whole tick"
     )

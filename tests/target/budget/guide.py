@@ -41,23 +41,22 @@ def _find(text: str, name: str) -> re.Match[str]:
 
 def instructions(values: Values) -> str:
     """The table of instructions a sample."""
-    lines = ["| | mean | worst, running | worst, first 2 s |", "|---|---|---|---|"]
-    for estimator in ESTIMATORS:
-        for model in MODELS:
-            what = f"`lever_update()`, {estimator}, `{model}`"
-            lines += [_counts(what, f"instructions.{estimator}.{model}", values)]
-    for estimator in ESTIMATORS:
-        case = f"instructions.tick.{estimator}.lever"
-        lines.append(_counts(f"the whole turn for a sample, {estimator}, `lever`", case, values))
+    lines = ["| | mean | worst, running | worst, first 2 s | cycles, mean |", "|---|---|---|---|---|"]
+    pairs = [(estimator, model) for estimator in ESTIMATORS for model in MODELS]
+    cases = {f"`lever_update()`, {estimator}, `{model}`": f"{estimator}.{model}" for estimator, model in pairs}
+    cases |= {f"the whole turn for a sample, {each}, `lever`": f"tick.{each}.lever" for each in ESTIMATORS}
+    lines += [_counts(what, case, values) for what, case in cases.items()]
     for estimator in ESTIMATORS:
         most = values[f"instructions_after_gap.{estimator}"]
-        lines.append(f"| `lever_update()`, {estimator}, `lever`, first sample after a gap | | {most:,.0f} | |")
+        lines.append(f"| `lever_update()`, {estimator}, `lever`, first sample after a gap | | {most:,.0f} | | |")
+    lines.append(f"| `lever_init()`, once | {values['init.instructions']:,.0f} | | | {values['init.cycles']:,.0f} |")
     return "\n".join(lines) + "\n"
 
 
 def _counts(what: str, case: str, values: Values) -> str:
-    numbers = (f"{values[f'{case}.{each}']:,.0f}" for each in ("mean", "worst", "start_up_worst"))
-    return f"| {what} | {' | '.join(numbers)} |"
+    numbers = [values[f"instructions.{case}.{each}"] for each in ("mean", "worst", "start_up_worst")]
+    cells = (f"{number:,.0f}" for number in (*numbers, values[f"cycles.{case}.mean"]))
+    return f"| {what} | {' | '.join(cells)} |"
 
 
 def memory(values: Values) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import subprocess
-from collections import Counter
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -12,10 +11,12 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.tables import Row, Tables, print_tables
+from numpy.typing import NDArray
 
 from . import image
+from .cycles import Instruction
 from .recording import record
-from .trace import Instruction, Trace, disassemble, functions, trace
+from .trace import Trace, disassemble, functions, trace
 
 
 def run(args: argparse.Namespace) -> int:
@@ -25,13 +26,15 @@ def run(args: argparse.Namespace) -> int:
     elf = image.build(args.build, args.firmware, args.flags)
     traced = trace(elf, recording, args.model, args.estimator, args.form, first, last)
     chosen = _choose(traced, args.worst)
-    instructions, operations = traced.instructions[chosen], traced.operations[chosen]
+    instructions, operations, cycles = (
+        each[chosen] for each in (traced.instructions, traced.operations, traced.cycles)
+    )
     print(
         f"{args.estimator} {args.model} {args.form}: {len(chosen)} samples from {(first + chosen[0]) * 1e-3:.3f} s on, "
-        f"mean {instructions.mean():.1f} instructions and {operations.mean():.1f} floating-point operations, "
-        f"{instructions.min()} to {instructions.max()} instructions"
+        f"mean {instructions.mean():.1f} instructions, {cycles.mean():.1f} cycles and {operations.mean():.1f} "
+        f"floating-point operations, {instructions.min()} to {instructions.max()} instructions"
     )
-    print_tables(tables(elf, [traced.executed[i] for i in chosen], args.lines), args.json)
+    print_tables(tables(elf, traced, chosen, args.lines), args.json)
     return 0
 
 
@@ -49,6 +52,10 @@ def _window(text: str, count: int) -> tuple[int, int]:
 def _choose(traced: Trace, worst: bool) -> list[int]:
     """Indices of the samples that are looked at."""
     return [int(np.argmax(traced.instructions))] if worst else list(range(len(traced.instructions)))
+
+
+Spent = NDArray[np.float64]
+"""Instructions, cycles and floating-point operations a step."""
 
 
 @dataclass(frozen=True)
@@ -115,35 +122,32 @@ def _place(file: str) -> str:
     return "/".join(file.split("/")[-2:])
 
 
-def tables(elf: Path, executed: list[Counter[int]], lines: int) -> Tables:
-    """Instructions and floating-point operations, as means over the samples; `lines` of the source, the busiest."""
-    steps = len(executed)
-    total: Counter[int] = Counter()
-    for seen in executed:
-        total.update(seen)
+def tables(elf: Path, traced: Trace, samples: list[int], lines: int) -> Tables:
+    """Instructions, cycles and floating-point operations, as means over the samples; `lines` of the source, the
+    busiest."""
+    total, cycles = traced.executed(samples)
     code = disassemble(elf)
     frames = _frames(elf, sorted(total))
     symbols = functions(elf)
-    by: dict[str, dict[str, list[float]]] = {"function": {}, "inlined": {}, "inclusive": {}, "line": {}, "kind": {}}
-
-    def add(table: str, key: str, times: int, operations: int) -> None:
-        entry = by[table].setdefault(key, [0.0, 0.0])
-        entry[0] += times / steps
-        entry[1] += times * operations / steps
+    by: dict[str, dict[str, Spent]] = {"function": {}, "inlined": {}, "inclusive": {}, "line": {}, "kind": {}}
 
     for address, times in total.items():
         instruction = code[address]
-        operations = instruction.operations
+        spent = np.array([times, cycles[address], times * instruction.operations]) / len(samples)
+
+        def add(table: str, key: str, spent: Spent = spent) -> None:
+            by[table][key] = by[table].get(key, 0.0) + spent
+
         symbol = next((name for begin, size, name in symbols if begin <= address < begin + size), "?")
         stack = frames[address]
-        add("function", f"{symbol} ({_place(stack[-1].file)})", times, operations)
-        add("inlined", f"{stack[0].function} ({_place(stack[0].file)})", times, operations)
+        add("function", f"{symbol} ({_place(stack[-1].file)})")
+        add("inlined", f"{stack[0].function} ({_place(stack[0].file)})")
         for function in {frame.function for frame in stack}:
-            add("inclusive", function, times, operations)
+            add("inclusive", function)
         inner = stack[0]
-        add("line", f"{_place(inner.file)}:{inner.line}  {_source(inner.file, inner.line)}", times, operations)
-        add("kind", _kind(instruction), times, operations)
-    whole = sum(total.values()) / steps
+        add("line", f"{_place(inner.file)}:{inner.line}  {_source(inner.file, inner.line)}")
+        add("kind", _kind(instruction))
+    whole = sum(cycles.values()) / len(samples)
     titles = {
         "function": "By function (what was inlined into it included, what it calls not)",
         "inclusive": "By function, itself wherever it was inlined and what was inlined into it",
@@ -154,15 +158,17 @@ def tables(elf: Path, executed: list[Counter[int]], lines: int) -> Tables:
     return {title: _rows(by[name], whole, lines if name == "line" else None) for name, title in titles.items()}
 
 
-def _rows(entries: dict[str, list[float]], whole: float, most: int | None) -> list[Row]:
-    ordered = sorted(entries.items(), key=lambda entry: -entry[1][0])[:most]
+def _rows(entries: dict[str, Spent], whole: float, most: int | None) -> list[Row]:
+    """`whole`: cycles a step."""
+    ordered = sorted(entries.items(), key=lambda entry: -entry[1][1])[:most]
     return [
         {
-            "instructions a step": round(instructions, 1),
-            "share [%]": round(100.0 * instructions / whole, 1),
-            "float operations": round(operations, 1),
+            "instructions a step": round(float(instructions), 1),
+            "cycles": round(float(cycles), 1),
+            "share [%]": round(100.0 * float(cycles) / whole, 1),
+            "float operations": round(float(operations), 1),
             "where": name,
         }
-        for name, (instructions, operations) in ordered
+        for name, (instructions, cycles, operations) in ordered
         if instructions >= 0.05
     ]

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.library import enum_names, ffi
+from lever_cdkf.host_tools.library import enum_names
 from lever_cdkf.host_tools.native import Config
 from numpy.typing import NDArray
 
@@ -37,10 +37,8 @@ CALLED_ONCE = ("lever_init", "lever_command", "lever_platform", "lever_estimate"
 
 _TOOLCHAIN_PACKAGES = "gcc-arm-none-eabi libnewlib-arm-none-eabi"
 _TIME_LIMIT_S = 120.0
-_INTRO = struct.Struct("<8I")
-_RECORD = np.dtype(
-    [("ticks", "<u4"), ("stack", "<u2"), ("faults", "<u2"), ("mode", "u1"), ("frames", "u1"), ("reserved", "<u2")]
-)
+_INTRO = struct.Struct("<10I")
+_RECORD = np.dtype([("ticks", "<u4"), ("faults", "<u4"), ("stack", "<u2"), ("mode", "u1"), ("frames", "u1")])
 
 
 @dataclass(frozen=True)
@@ -63,11 +61,13 @@ class Run:
     faults: NDArray[np.int64]
     frames: NDArray[np.int64]
     """Frames sent."""
+    init: int
+    """Instructions of lever_init()."""
     estimate: bytes
     """lever_estimate_t after the last sample."""
 
 
-def _run(command: list[str], what: str, hint: str = "") -> str:
+def run_command(command: list[str], what: str, hint: str = "") -> str:
     """The output of a finished command. Raises LeverError with the last lines of a failed one."""
     try:
         result = subprocess.run(
@@ -90,7 +90,7 @@ def tool(name: str) -> str:
 
 def run_tool(name: str, *arguments: str | Path) -> str:
     """The output of a program of the cross toolchain. Raises LeverError."""
-    return _run([tool(name), *(str(argument) for argument in arguments)], name, _TOOLCHAIN_PACKAGES)
+    return run_command([tool(name), *(str(argument) for argument in arguments)], name, _TOOLCHAIN_PACKAGES)
 
 
 def call_graph(elf: Path) -> Path:
@@ -124,10 +124,10 @@ def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED, process
         fcntl.flock(lock, fcntl.LOCK_EX)
         configure = ["cmake", "-S", str(SOURCE), "-B", str(folder), toolchain, *settings]
         try:
-            _run(configure, "configuring the image")
+            run_command(configure, "configuring the image")
         except LeverError:  # as after a change of the toolchain file, which CMake refuses to take over
-            _run([*configure, "--fresh"], "configuring the image")
-        _run(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
+            run_command([*configure, "--fresh"], "configuring the image")
+        run_command(["cmake", "--build", str(folder), "--parallel", "2"], "building the image")
     return folder / "budget.elf"
 
 
@@ -152,18 +152,18 @@ def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) 
         command = ["qemu-system-arm", "-M", MACHINE, "-nographic", "-monitor", "none", "-serial", "none"]
         command += ["-icount", "shift=3,sleep=off", "-semihosting-config", semihosting, "-kernel", str(elf)]
         command += ["-device", f"loader,file={samples},addr={SAMPLES_ADDRESS:#x},force-raw=on"]
-        _run(command, f"the image in QEMU ({estimator}, {model}, {form})", "qemu-system-arm")
+        run_command(command, f"the image in QEMU ({estimator}, {model}, {form})", "qemu-system-arm")
         return _read(output.read_bytes(), len(recording.samples))
 
 
 def _read(data: bytes, count: int) -> Run:
     """What the image wrote. Raises LeverError when its own loop was not timed right, or something is missing."""
-    empty, calibration, rounds, *stacks = _INTRO.unpack_from(data)
+    empty, calibration, rounds, *stacks, init, estimate_bytes = _INTRO.unpack_from(data)
     looped = (calibration - empty) / TICKS_AN_INSTRUCTION
     if abs(looped - 2 * rounds) > 1.0:
         raise LeverError(f"QEMU's clock is off: a loop of {2 * rounds} instructions was timed as {looped:.1f}")
     end = _INTRO.size + count * _RECORD.itemsize
-    if len(data) != end + ffi.sizeof("lever_estimate_t"):
+    if len(data) != end + estimate_bytes:
         raise LeverError(f"the image wrote {len(data)} bytes of results for {count} samples: it is not of this version")
     records = np.frombuffer(data[_INTRO.size : end], _RECORD)
     instructions = np.rint((records["ticks"].astype(np.int64) - empty) / TICKS_AN_INSTRUCTION)
@@ -175,6 +175,7 @@ def _read(data: bytes, count: int) -> Run:
         loop_instructions=2 * rounds,
         loop_measured=looped,
         calls_stack=once,
+        init=round((init - empty) / TICKS_AN_INSTRUCTION),
         estimate=data[end:],
         **whole,
     )

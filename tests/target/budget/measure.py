@@ -12,15 +12,12 @@ import numpy as np
 from lever_cdkf.host_tools.library import enum_names
 from numpy.typing import NDArray
 
-from . import image, sizes, stack, trace
+from . import cycles, image, sizes, stack, trace
 from .image import ESTIMATORS, FORMS, Run
 from .recording import MODELS, Recording, record
 
 START_UP_S = 2.0
 """Until then the estimator starts up: it aligns, the dither fades in, caution_time passes. Counted by itself."""
-TRACED = (2048, 2347)
-"""First and last sample whose floating-point operations are counted: thirty learning periods in steady running."""
-
 GAP_S = (10.0, 10.4)
 """Where samples are left out, to see what the first one after a gap takes; less than gap_limit."""
 
@@ -40,7 +37,7 @@ _FACADE = re.compile(r"^[a-z_][\w ]*[ *](lever_\w+)\(", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Count:
-    """Instructions a sample over a recording: in mode run after START_UP_S, and before that."""
+    """Instructions or cycles a sample over a recording: in mode run after START_UP_S, and before that."""
 
     mean: float
     median: float
@@ -50,17 +47,23 @@ class Count:
     start_up_worst: int
 
     @staticmethod
-    def of(run: Run, time: NDArray[np.float64]) -> Count:
-        """Of a run over samples at the times [s]."""
-        steady = (run.mode == _RUNNING) & (time >= START_UP_S)
-        counted = run.instructions[steady]
+    def of(spent: NDArray[np.int64], run: Run, time: NDArray[np.float64]) -> Count:
+        """Of what each sample of a run took, at the times [s]."""
+        steady = is_steady(run, time)
+        counted = spent[steady]
         return Count(
             mean=round(float(counted.mean()), 1),
             median=float(np.median(counted)),
             worst=int(counted.max()),
             worst_s=float(time[steady][counted.argmax()]),
-            start_up_worst=int(run.instructions[time < START_UP_S].max()),
+            start_up_worst=int(spent[time < START_UP_S].max()),
         )
+
+
+def is_steady(run: Run, time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether each sample, at its time [s], is one of steady running."""
+    steady: NDArray[np.bool_] = (run.mode == _RUNNING) & (time >= START_UP_S)
+    return steady
 
 
 def sample_times(recording: Recording) -> NDArray[np.float64]:
@@ -89,43 +92,55 @@ def budget(elf: Path, firmware: Path, runs: dict[Case, Run], tell: Tell = _silen
         "processor": "Cortex-M4F, as QEMU's netduinoplus2 has it",
         "compiler": image.compiler(),
         "calibration": _calibration(runs),
-        "instructions": _instructions(runs),
-        "instructions_after_gap": _after_gap(elf),
-        "floating_point_operations": _operations(elf, tell),
+        "cycle_model": cycles.MODEL,
+        **_spent(elf, runs, tell),
+        "init": _init(elf, runs),
         **_bytes(elf),
         **_stack(elf, firmware, runs),
     }
 
 
-def _instructions(runs: dict[Case, Run]) -> dict[str, Any]:
-    instructions: dict[str, Any] = {}
-    for (estimator, model, form), run in runs.items():
-        place = instructions.setdefault("tick", {}) if form == "tick" else instructions
-        place.setdefault(estimator, {})[model] = vars(Count.of(run, sample_times(record(model))))
-    return instructions
+def _spent(elf: Path, runs: dict[Case, Run], tell: Tell) -> dict[str, Any]:
+    """Instructions as QEMU counts them, cycles and floating-point operations by the trace."""
+    spent: dict[str, Any] = {"instructions": {"tick": {}}, "cycles": {"tick": {}}, "floating_point_operations": {}}
+    for done, ((estimator, model, form), run) in enumerate(runs.items()):
+        tell(done, len(runs), f"{estimator} {model} {form} in Unicorn")
+        time = sample_times(record(model))
+        traced = trace.trace(elf, record(model), model, estimator, form, 0, len(time) - 1)
+        for what, counted in (("instructions", run.instructions), ("cycles", traced.cycles)):
+            place = spent[what]["tick"] if form == "tick" else spent[what]
+            place.setdefault(estimator, {})[model] = vars(Count.of(counted, run, time))
+        if form == "update":
+            place = spent["floating_point_operations"].setdefault(estimator, {})
+            place[model] = _operations(traced, is_steady(run, time))
+    gaps = {each: after_gap(elf, "lever", each) for each in ESTIMATORS}
+    spent["instructions_after_gap"] = {each: instructions for each, (instructions, _) in gaps.items()}
+    spent["cycles_after_gap"] = {each: cycles for each, (_, cycles) in gaps.items()}
+    return spent
 
 
-def _after_gap(elf: Path) -> dict[str, int]:
-    """The dearest call there is: the first sample after a gap, lever model."""
-    cut, first = record("lever").without(GAP_S), round(GAP_S[0] * 1e3)
-    runs = {estimator: image.run(elf, cut, "lever", estimator, "update") for estimator in ESTIMATORS}
-    return {estimator: int(run.instructions[first]) for estimator, run in runs.items()}
+def after_gap(elf: Path, model: str, estimator: str) -> tuple[int, int]:
+    """Instructions and cycles of the dearest call there is: the first sample after a gap. Raises LeverError."""
+    cut, first = record(model).without(GAP_S), round(GAP_S[0] * 1e3)
+    run = image.run(elf, cut, model, estimator, "update")
+    traced = trace.trace(elf, cut, model, estimator, "update", first, first)
+    return int(run.instructions[first]), int(traced.cycles[0])
 
 
-def _operations(elf: Path, tell: Tell) -> dict[str, Any]:
-    """Of lever_update(), executed in the samples TRACED: the floor under its instructions, and how far that is away."""
-    operations: dict[str, Any] = {}
-    cases = [(estimator, model) for estimator in ESTIMATORS for model in MODELS]
-    for done, (estimator, model) in enumerate(cases):
-        tell(done, len(cases), f"{estimator} {model} in Unicorn")
-        found = trace.trace(elf, record(model), model, estimator, "update", *TRACED)
-        mean = float(found.operations.mean())
-        operations.setdefault(estimator, {})[model] = {
-            "mean": round(mean, 1),
-            "worst": int(found.operations.max()),
-            "instructions_per_operation": round(float(found.instructions.mean()) / mean, 3),
-        }
-    return operations
+def _init(elf: Path, runs: dict[Case, Run]) -> dict[str, int]:
+    """Of lever_init(), which is called once."""
+    traced = trace.trace(elf, record("lever"), "lever", "dual", "update", trace.INIT, trace.INIT)
+    return {"instructions": runs["dual", "lever", "update"].init, "cycles": int(traced.cycles[0])}
+
+
+def _operations(traced: trace.Trace, steady: NDArray[np.bool_]) -> dict[str, float]:
+    """The floor under the instructions of lever_update(), and how far that is away."""
+    operations, mean = traced.operations[steady], float(traced.operations[steady].mean())
+    return {
+        "mean": round(mean, 1),
+        "worst": int(operations.max()),
+        "instructions_per_operation": round(float(traced.instructions[steady].mean()) / mean, 3),
+    }
 
 
 def _calibration(runs: dict[Case, Run]) -> dict[str, float]:

@@ -74,10 +74,12 @@ def tables(budget: dict[str, Any]) -> Tables:
         {"function": name, "stack [bytes]": entry["bytes"], "deepest chain": " > ".join(entry["chain"])}
         for name, entry in budget["stack"].items()
     ]
+    model = [{"instruction": what, "cycles": str(cost)} for what, cost in budget["cycle_model"].items()]
     files = [{"file": file, "text": size} for file, size in budget["files"].items()]
     return {
         "How it was measured": measured,
-        "Instructions a sample": _instructions(budget),
+        "Instructions and cycles a sample": _spent(budget),
+        "Model of the cycles": model,
         "Memory": memory,
         "Code by file [bytes]": files,
         "Stack by function": stack,
@@ -96,29 +98,34 @@ _BYTES = {
 }
 
 
-def _instructions(budget: dict[str, Any]) -> list[Row]:
-    instructions = budget["instructions"]
+def _spent(budget: dict[str, Any]) -> list[Row]:
     rows: list[Row] = []
-    for what, place in (("lever_update()", instructions), ("whole tick", instructions["tick"])):
+    for what, form in (("lever_update()", ""), ("whole tick", "tick")):
+        instructions, cycles = (budget[each][form] if form else budget[each] for each in ("instructions", "cycles"))
         for estimator in image.ESTIMATORS:
-            for model, entry in place[estimator].items():
-                row: dict[str, Any] = {
-                    "measured": what,
-                    "estimator": estimator,
-                    "model": model,
-                    "mean": entry["mean"],
-                    "median": entry["median"],
-                    "worst": entry["worst"],
-                    "at [s]": entry["worst_s"],
-                    "worst / mean": round(entry["worst"] / entry["mean"], 3),
-                    f"worst before {measure.START_UP_S:g} s": entry["start_up_worst"],
-                }
-                operations = budget["floating_point_operations"][estimator][model] if place is instructions else {}
-                row["floating-point operations"] = operations.get("mean")
-                row["instructions / operation"] = operations.get("instructions_per_operation")
-                rows.append(row)
+            for model, entry in instructions[estimator].items():
+                operations = {} if form else budget["floating_point_operations"][estimator][model]
+                rows.append(
+                    {
+                        "measured": what,
+                        "estimator": estimator,
+                        "model": model,
+                        "mean": entry["mean"],
+                        "median": entry["median"],
+                        "worst": entry["worst"],
+                        "at [s]": entry["worst_s"],
+                        f"worst before {measure.START_UP_S:g} s": entry["start_up_worst"],
+                        "cycles, mean": cycles[estimator][model]["mean"],
+                        "cycles, worst": cycles[estimator][model]["worst"],
+                        "floating-point operations": operations.get("mean"),
+                        "instructions / operation": operations.get("instructions_per_operation"),
+                    }
+                )
+    blank = dict.fromkeys(rows[0], None)
     gap = f"after a gap of {measure.GAP_S[1] - measure.GAP_S[0]:.1f} s"
     for estimator, most in budget["instructions_after_gap"].items():
-        blank = dict.fromkeys(rows[0], None)
-        rows.append({**blank, "measured": gap, "estimator": estimator, "model": "lever", "worst": most})
+        cost = {"worst": most, "cycles, worst": budget["cycles_after_gap"][estimator]}
+        rows.append({**blank, "measured": gap, "estimator": estimator, "model": "lever", **cost})
+    once = {"worst": budget["init"]["instructions"], "cycles, worst": budget["init"]["cycles"]}
+    rows.append({**blank, "measured": "lever_init()", **once})
     return rows

@@ -128,7 +128,9 @@ static void test_what_is_wrong_is_said(void)
         "theta_noise = 1 mrad", "theta_noise: \"1 mrad\" is not a number (give it in rad, without the unit)");
     assert_refused("theta_noise =", "theta_noise: \"\" is not a number (give it in rad, without the unit)");
     assert_refused("theta_noise = nan", "theta_noise: \"nan\" is not a number (give it in rad, without the unit)");
-    assert_refused("gap_limit = 1e99", "gap_limit: \"1e99\" is not a number (give it in s, without the unit)");
+    assert_refused(
+        "theta_noise = 0x1p-9", "theta_noise: \"0x1p-9\" is not a number (give it in rad, without the unit)");
+    assert_refused("gap_limit = 1e99", "gap_limit: 1e+99 is out of range, which is 0.01 to 1 s");
     assert_refused("preload = loose", "preload: \"loose\" is not known; it can be fixed, trim");
     assert_refused("preload =", "preload: \"\" is not known; it can be fixed, trim");
 }
@@ -139,12 +141,13 @@ static void test_an_assignment_that_is_too_long_is_an_error(void)
 
     (void)memset(text, '=', sizeof text);
     text[sizeof text - 1u] = '\0';
-    assert_refused(text, "longer than 511 characters");
+    assert_refused(text, "longer than 510 characters");
 }
 
-static void test_a_file_may_have_comments_blanks_and_either_line_ending(void)
+static void test_a_file_may_have_a_byte_order_mark_comments_blanks_and_either_line_ending(void)
 {
-    static const char text[] = "# a comment\n\n  theta_noise=0.003 # [rad] why\r\n\tm_p = 3\npreload = fixed";
+    static const char text[] =
+        "\xEF\xBB\xBF# a comment\n\n  theta_noise=0.003 # [rad] why\r\n\tm_p = 3\npreload = fixed";
 
     TEST_ASSERT_TRUE_MESSAGE(read_text(text, sizeof text - 1u), error.text);
     TEST_ASSERT_EQUAL_FLOAT(0.003f, config.settings.theta_noise);
@@ -176,7 +179,15 @@ static void test_a_line_that_is_too_long_is_an_error(void)
     (void)memset(text, ' ', sizeof text);
     (void)memcpy(text, "m_p = 3\n", 8u);
     TEST_ASSERT_FALSE(read_text(text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING("lever.txt:2: the line is longer than 510 characters", error.text);
+    TEST_ASSERT_EQUAL_STRING("lever.txt:2: the line is longer than 510 bytes", error.text);
+}
+
+static void test_a_nul_is_an_error(void)
+{
+    static const char text[] = "m_p = 3\n# \0\n";
+
+    TEST_ASSERT_FALSE(read_text(text, sizeof text - 1u));
+    TEST_ASSERT_EQUAL_STRING("lever.txt:2: is not text", error.text);
 }
 
 static void test_a_file_that_cannot_be_read_is_an_error(void)
@@ -213,10 +224,11 @@ int main(void)
     RUN_TEST(test_every_value_of_a_choice_has_a_name);
     RUN_TEST(test_what_is_wrong_is_said);
     RUN_TEST(test_an_assignment_that_is_too_long_is_an_error);
-    RUN_TEST(test_a_file_may_have_comments_blanks_and_either_line_ending);
+    RUN_TEST(test_a_file_may_have_a_byte_order_mark_comments_blanks_and_either_line_ending);
     RUN_TEST(test_the_last_of_two_equal_names_counts);
     RUN_TEST(test_an_error_in_a_file_says_where);
     RUN_TEST(test_a_line_that_is_too_long_is_an_error);
+    RUN_TEST(test_a_nul_is_an_error);
     RUN_TEST(test_a_file_that_cannot_be_read_is_an_error);
     RUN_TEST(test_what_is_written_reads_back_the_same);
     return UNITY_END();

@@ -23,6 +23,7 @@
 #define SYST_MASK 0xFFFFFFu
 
 #define CALIBRATION_ROUNDS 100000u /* of two instructions each */
+#define SAMPLES_A_COMMAND 500u
 #define PAINT 0xC5A5C5A5u
 #define PAINTED_WORDS 1024u /* below the stack pointer: more than any call of the core may take */
 
@@ -45,15 +46,16 @@ typedef struct intro {
     uint32_t platform_stack;
     uint32_t estimate_stack;
     uint32_t health_stack;
+    uint32_t init_ticks;
+    uint32_t estimate_bytes; /* of the lever_estimate_t at the end */
 } intro_t;
 
 typedef struct record {
     uint32_t ticks;
+    uint32_t faults;
     uint16_t stack; /* bytes that the measured calls took at most */
-    uint16_t faults;
     uint8_t mode;
     uint8_t frames; /* sent */
-    uint16_t reserved;
 } record_t;
 
 /* A header_t, and behind it the samples: image.ld, and QEMU's loader. */
@@ -134,7 +136,6 @@ static void keep(lever_t *lever, uint32_t ticks, uint16_t stack, uint32_t frames
     record->faults = health.faults;
     record->mode = (uint8_t)health.mode;
     record->frames = (uint8_t)frames;
-    record->reserved = 0u;
     record_count++;
     if (record_count == (sizeof records / sizeof records[0])) {
         flush();
@@ -153,11 +154,20 @@ static const void *first_sample(void)
     return samples_in_flash + sizeof(header_t);
 }
 
-static void update_all(lever_t *lever)
+/* The torque gate closes when no command comes for a second. */
+static void keep_alive(lever_t *lever, const lever_command_t *command, uint32_t sample)
+{
+    if ((sample % SAMPLES_A_COMMAND) == 0u) {
+        (void)lever_command(lever, command);
+    }
+}
+
+static void update_all(lever_t *lever, const lever_command_t *command)
 {
     const lever_sample_t *samples = (const lever_sample_t *)first_sample();
     const uint32_t count = sample_count();
     for (uint32_t i = 0u; i < count; i++) {
+        keep_alive(lever, command, i);
         paint_stack();
         const uint32_t begin = SYST_CVR;
         (void)lever_update(lever, &samples[i]);
@@ -168,7 +178,7 @@ static void update_all(lever_t *lever)
 }
 
 /* As port/embedded/loop.c does it. */
-static void tick_all(lever_t *lever)
+static void tick_all(lever_t *lever, const lever_command_t *command)
 {
     const wire_frame_t *wire = (const wire_frame_t *)first_sample();
     const uint32_t count = sample_count();
@@ -182,6 +192,7 @@ static void tick_all(lever_t *lever)
             in[k].length = 8u;
             (void)memcpy(in[k].data, frame->data, sizeof in[k].data);
         }
+        keep_alive(lever, command, i);
         paint_stack();
         const uint32_t begin = SYST_CVR;
         (void)lever_on_frame(lever, &in[0]);
@@ -235,13 +246,16 @@ static void take_argument(char *word, lever_config_t *config, lever_command_t *c
 }
 
 /* The instance as the arguments want it; measures the stack of the calls that are made once. */
-static lever_t *begin(const lever_config_t *config, const lever_command_t *command, intro_t *intro)
+static lever_t *start(const lever_config_t *config, const lever_command_t *command, intro_t *intro)
 {
     lever_health_t health;
     lever_estimate_t estimate;
     paint_stack();
+    const uint32_t begin = SYST_CVR;
     lever_t *lever = lever_init(&memory, config);
+    const uint32_t end = SYST_CVR;
     intro->init_stack = stack_used();
+    intro->init_ticks = elapsed(begin, end);
     if (lever == NULL) {
         semihosting_exit(lever_config_check(config));
     }
@@ -260,6 +274,7 @@ static lever_t *begin(const lever_config_t *config, const lever_command_t *comma
     paint_stack();
     lever_health(lever, &health);
     intro->health_stack = stack_used();
+    intro->estimate_bytes = sizeof estimate;
     return lever;
 }
 
@@ -283,12 +298,12 @@ int main(void)
     }
     output = semihosting_create(path);
     intro_t intro = calibrate();
-    lever_t *lever = begin(&config, &command, &intro);
+    lever_t *lever = start(&config, &command, &intro);
     semihosting_write(output, &intro, sizeof intro);
     if (strcmp(what, "tick") == 0) {
-        tick_all(lever);
+        tick_all(lever, &command);
     } else {
-        update_all(lever);
+        update_all(lever, &command);
     }
     flush();
     lever_estimate_t estimate;
