@@ -38,6 +38,11 @@
 extern "C" {
 #endif
 
+/* Semantic version of API, wire and settings: firmware/CHANGELOG.md says what changed. */
+#define LEVER_VERSION_MAJOR 0
+#define LEVER_VERSION_MINOR 2
+#define LEVER_VERSION_PATCH 0
+
 /* --- configuration --------------------------------------------------------------------------------------------- */
 
 /* Model of arm and lever: see firmware/model. */
@@ -263,6 +268,13 @@ typedef struct lever_platform {
 /* Takes the port's report, which stands until the next one. From the first report on PLATFORM_HEALTH is sent beside HEALTH,
  * and any of the faults raises LEVER_FAULT_PLATFORM. Without one nothing of it is sent. */
 void lever_platform(lever_t *lever, const lever_platform_t *platform);
+
+/* --- torque ---------------------------------------------------------------------------------------------------- */
+
+/* No sample came for elapsed_us since the last lever_step(), lever_update() or lever_idle(), by the port's own clock [us]. The
+ * estimate stays; the gate ages, and while torque is not yet zero a MOTOR_COMMAND becomes due: fetch it with
+ * lever_next_frame(). Call it when no sample has come for about 5 ms, and again each 5 ms or so. */
+void lever_idle(lever_t *lever, uint32_t elapsed_us);
 
 /* --- CAN ------------------------------------------------------------------------------------------------------- */
 

@@ -3,6 +3,7 @@
 #include "app/link.h"
 #include "lever_cdkf.h"
 
+#include <math.h>
 #include <stddef.h>
 
 struct lever {
@@ -63,4 +64,17 @@ enum lever_mode lever_step(lever_t *lever)
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame)
 {
     return link_next_frame(&lever->link, &lever->estimator, frame);
+}
+
+/* Stands for the torque gate: 50 ms in ten steps. */
+void lever_idle(lever_t *lever, uint32_t elapsed_us)
+{
+    dither_t *dither = &lever->estimator.dither;
+    if (dither->torque != 0.0f) {
+        dither_set(dither, 0.0f);
+        dither->level = 0.0f;
+        dither->torque = (elapsed_us < 50000u) ? (0.5f * dither->torque) : 0.0f;
+        dither->torque = (fabsf(dither->torque) < 0.001f) ? 0.0f : dither->torque;
+        lever->link.due |= 1u;
+    }
 }

@@ -34,7 +34,8 @@ enum message_id {
     MESSAGE_PILOT_DYNAMICS_ID = 0x213,
     MESSAGE_HEALTH_ID = 0x214,
     MESSAGE_MOTOR_COMMAND_ID = 0x215,
-    MESSAGE_PLATFORM_HEALTH_ID = 0x216
+    MESSAGE_PLATFORM_HEALTH_ID = 0x216,
+    MESSAGE_IDENTITY_ID = 0x217
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
