@@ -5,13 +5,14 @@
 #include <string.h>
 
 #include "lever_cdkf.h"
-#include "port/linux/loop.h"
 #include "port/linux/options.h"
+#include "port/linux/reconnect.h"
 #include "port/linux/settings.h"
 #include "port/linux/slcan_host.h"
 #include "port/linux/slcan_peer.h"
 #include "port/linux/socketcan.h"
 #include "port/linux/stop.h"
+#include "port/loop.h"
 
 enum { EXIT_GOOD = 0, EXIT_BAD_INTERFACE = 1, EXIT_BAD_USAGE = 2 };
 
@@ -20,8 +21,12 @@ typedef struct session {
     socketcan_t socketcan; /* of these three, the one that options->medium says */
     slcan_host_t slcan_host;
     slcan_peer_t slcan_peer;
-    transport_t transport;
+    const char *reason; /* of it: what is wrong */
+    reconnect_t reconnect;
+    port_t port; /* of it, reconnected */
     loop_t loop;
+    bool was_down; /* what print_changes() has printed last */
+    enum lever_mode mode;
 } session_t;
 
 static void print_bus_state(void *context, const char *words)
@@ -31,22 +36,27 @@ static void print_bus_state(void *context, const char *words)
     (void)fprintf(stderr, "lever_can: %s: %s\n", session->options->interface, words);
 }
 
-static void print_event(void *context, enum loop_event event)
+/* What has changed in the last turn. */
+static void print_changes(session_t *session)
 {
     static const char *const modes[] = {"init", "align", "run", "coast", "frozen", "fault"};
-    const session_t *session = context;
-    const char *interface = session->options->interface;
+    const char *const interface = session->options->interface;
 
-    if (event == LOOP_EVENT_DOWN) {
-        (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
-            session->transport.reason(session->transport.self));
-    } else if (event == LOOP_EVENT_UP) {
-        (void)fprintf(stderr, "lever_can: %s: link restored\n", interface);
-    } else if (session->options->verbose) {
-        (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", interface, modes[session->loop.mode],
-            session->loop.totals.samples);
-    } else {
-        /* a change of mode interests only who asks for it */
+    if (session->reconnect.is_down != session->was_down) {
+        session->was_down = session->reconnect.is_down;
+        if (session->was_down) {
+            (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
+                session->reason);
+        } else {
+            (void)fprintf(stderr, "lever_can: %s: link restored\n", interface);
+        }
+    }
+    if (session->loop.mode != session->mode) {
+        session->mode = session->loop.mode;
+        if (session->options->verbose) {
+            (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", interface, modes[session->mode],
+                session->loop.totals.samples);
+        }
     }
 }
 
@@ -74,28 +84,31 @@ static void print_totals(const session_t *session, const lever_t *lever)
         session->options->interface, totals->received, totals->sent, totals->samples, health.lost, health.corrupt,
         health.late);
     print_losses(session);
-    (void)printf(", %u unsent, %" PRIu64 " send retries, %" PRIu64 " outages\n", session->loop.has_unsent ? 1u : 0u,
-        totals->retries, totals->outages);
+    (void)printf(", %u unsent, %" PRIu64 " held, %" PRIu64 " stale, %" PRIu64 " outages\n",
+        session->loop.is_held ? 1u : 0u, totals->held, totals->stale, session->reconnect.outages);
 }
 
-/* Opens the medium and fills in the transport, whose reason() says what is wrong if that fails. */
+/* Opens the medium and makes the loop's port of it; session->reason says what is wrong if that fails. */
 static bool open_medium(session_t *session, int stop)
 {
     const char *const interface = session->options->interface;
+    enum port_result (*restore)(void *self) = slcan_peer_restore;
+    port_t medium = slcan_peer_port(&session->slcan_peer);
     bool good = false;
 
+    session->reason = session->slcan_peer.tty.reason;
     switch (session->options->medium) {
     case OPTIONS_MEDIUM_SLCAN:
         good = slcan_host_open(&session->slcan_host, interface, stop);
-        session->transport = slcan_host_transport(&session->slcan_host);
+        medium = slcan_host_port(&session->slcan_host);
+        restore = slcan_host_restore;
+        session->reason = session->slcan_host.tty.reason;
         break;
     case OPTIONS_MEDIUM_PTY:
         good = slcan_peer_open_pty(&session->slcan_peer, interface, stop);
-        session->transport = slcan_peer_transport(&session->slcan_peer);
         break;
     case OPTIONS_MEDIUM_SERIAL:
         good = slcan_peer_open_device(&session->slcan_peer, interface, stop);
-        session->transport = slcan_peer_transport(&session->slcan_peer);
         break;
     case OPTIONS_MEDIUM_CAN:
     case OPTIONS_MEDIUM_NONE:
@@ -103,9 +116,12 @@ static bool open_medium(session_t *session, int stop)
         good = socketcan_open(&session->socketcan, interface, stop);
         session->socketcan.on_bus_state = print_bus_state;
         session->socketcan.context = session;
-        session->transport = socketcan_transport(&session->socketcan);
+        medium = socketcan_port(&session->socketcan);
+        restore = socketcan_restore;
+        session->reason = session->socketcan.reason;
         break;
     }
+    session->port = reconnect_port(&session->reconnect, &medium, restore);
     return good;
 }
 
@@ -129,8 +145,13 @@ static void close_medium(session_t *session)
 
 static void print_reason(const session_t *session)
 {
-    (void)fprintf(
-        stderr, "lever_can: %s: %s\n", session->options->interface, session->transport.reason(session->transport.self));
+    (void)fprintf(stderr, "lever_can: %s: %s\n", session->options->interface, session->reason);
+}
+
+/* Whether the estimator's host is at the other end of a line. */
+static bool is_adapter(const options_t *options)
+{
+    return (options->medium == OPTIONS_MEDIUM_PTY) || (options->medium == OPTIONS_MEDIUM_SERIAL);
 }
 
 static int run(const options_t *options)
@@ -149,16 +170,21 @@ static int run(const options_t *options)
         close_medium(&session);
         return EXIT_BAD_INTERFACE;
     }
-    loop_init(&session.loop, &session.transport, lever);
-    session.loop.on_event = print_event;
-    session.loop.context = &session;
+    loop_init(&session.loop, &session.port, lever,
+        is_adapter(options) ? LOOP_DROP : LOOP_HOLD); /* a bus is waited for, a host that does not read is not */
+    session.loop.lock_step = options->lock_step;
     if (options->verbose) {
         settings_write(&options->config, stdout);
     }
     (void)printf("lever_can: %s: ready\n", options->interface);
     (void)fflush(stdout);
 
-    const bool good = loop_run(&session.loop);
+    enum port_result result = PORT_DONE;
+    while (result == PORT_DONE) {
+        result = loop_turn(&session.loop);
+        print_changes(&session);
+    }
+    const bool good = result == PORT_NOTHING;
     if (!good) {
         print_reason(&session);
     }

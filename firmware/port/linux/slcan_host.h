@@ -1,4 +1,4 @@
-/* A transport on which this program is the host of an SLCAN adapter: a USB-serial one, say, with a real CAN bus behind it.
+/* A port on which this program is the host of an SLCAN adapter: a USB-serial one, say, with a real CAN bus behind it.
  *
  * It closes the adapter's channel, sets 1 Mbit/s, opens it, and closes it at the end. It does not wait for the adapter's
  * answers, because not every adapter gives them; it counts those that refuse.
@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "port/linux/transport.h"
+#include "port/port.h"
 #include "port/linux/tty.h"
 #include "port/slcan/slcan.h"
 
@@ -26,7 +26,10 @@ bool slcan_host_open(slcan_host_t *host, const char *device, int stop);
 /* Closes the channel and releases what open has taken; also right after a failed open. */
 void slcan_host_close(slcan_host_t *host);
 
-/* The callbacks; the result refers to `host`, which must outlive it. */
-transport_t slcan_host_transport(slcan_host_t *host);
+/* The port; it refers to `host`, which must outlive it. */
+port_t slcan_host_port(slcan_host_t *host);
+
+/* One attempt to bring the link back, for reconnect.h; `self` is the slcan_host_t. */
+enum port_result slcan_host_restore(void *self);
 
 #endif

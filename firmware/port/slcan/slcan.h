@@ -29,6 +29,14 @@
 
 #include "lever_cdkf.h"
 
+/* What our adapters answer to V, two digits each: hardware 10, and the first two numbers of the version. */
+#define SLCAN_TEXT(number) #number
+#define SLCAN_VERSION_TEXT(major, minor) "10" SLCAN_TEXT(major) SLCAN_TEXT(minor)
+#define SLCAN_VERSION SLCAN_VERSION_TEXT(LEVER_VERSION_MAJOR, LEVER_VERSION_MINOR)
+#if (LEVER_VERSION_MAJOR > 9) || (LEVER_VERSION_MINOR > 9)
+#error "SLCAN has a digit each for the version"
+#endif
+
 /* A frame of either kind. `frame.id` has 29 bits when it is extended; a remote frame has a length, but no data. */
 typedef struct slcan_frame {
     lever_frame_t frame;

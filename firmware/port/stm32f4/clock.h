@@ -1,4 +1,5 @@
-/* The clock tree: 168 MHz from the crystal; if that fails from the internal oscillator; if that fails 16 MHz without PLL. */
+/* The clock tree: 168 MHz from the crystal; if that, or the PLL on it, does not start, from the internal oscillator; if that fails,
+ * too, 16 MHz without PLL. */
 #ifndef LEVER_PORT_STM32F4_CLOCK_H
 #define LEVER_PORT_STM32F4_CLOCK_H
 
@@ -40,7 +41,8 @@ typedef struct clock_rates {
 /* Sets the clocks up, from their state after reset. Bounded: 30 ms if nothing answers. */
 clock_rates_t clock_start(void);
 
-/* Interrupt of the clock security system: the crystal has failed. Resets, to start from the internal oscillator. */
+/* Interrupt of the clock security system: the crystal has failed. Resets, to start from the internal oscillator until the next
+ * power-on. */
 void clock_failure_interrupt(void);
 
 #endif

@@ -113,6 +113,11 @@ bool usart_write(const void *bytes, uint32_t length)
     return taken;
 }
 
+uint32_t usart_waiting_ms(void)
+{
+    return (10u * 1000u * ring_used(&waiting)) / (uint32_t)LEVER_STM32_BAUD;
+}
+
 uint32_t usart_overruns(void)
 {
     return overruns;
