@@ -25,8 +25,6 @@ typedef struct session {
     reconnect_t reconnect;
     port_t port; /* of it, reconnected */
     loop_t loop;
-    bool was_down; /* what print_changes() has printed last */
-    enum lever_mode mode;
 } session_t;
 
 static void print_bus_state(void *context, const char *words)
@@ -36,28 +34,36 @@ static void print_bus_state(void *context, const char *words)
     (void)fprintf(stderr, "lever_can: %s: %s\n", session->options->interface, words);
 }
 
-/* What has changed in the last turn. */
-static void print_changes(session_t *session)
+static void print_link(void *context, bool is_down)
 {
-    static const char *const modes[] = {"init", "align", "run", "coast", "frozen", "fault"};
+    const session_t *session = context;
     const char *const interface = session->options->interface;
 
-    if (session->reconnect.is_down != session->was_down) {
-        session->was_down = session->reconnect.is_down;
-        if (session->was_down) {
-            (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
-                session->reason);
-        } else {
-            (void)fprintf(stderr, "lever_can: %s: link restored\n", interface);
+    if (is_down) {
+        (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
+            session->reason);
+    } else {
+        (void)fprintf(stderr, "lever_can: %s: link restored\n", interface);
+    }
+}
+
+/* Turns the loop until it is to end (PORT_NOTHING) or cannot go on. */
+static enum port_result run_loop(session_t *session)
+{
+    static const char *const modes[] = {"init", "align", "run", "coast", "frozen", "fault"};
+    const loop_t *const loop = &session->loop;
+    enum lever_mode mode = loop->mode;
+    enum port_result result = PORT_DONE;
+
+    while (result == PORT_DONE) {
+        result = loop_turn(&session->loop);
+        if (session->options->verbose && (loop->mode != mode)) {
+            mode = loop->mode;
+            (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", session->options->interface,
+                modes[mode], loop->totals.samples);
         }
     }
-    if (session->loop.mode != session->mode) {
-        session->mode = session->loop.mode;
-        if (session->options->verbose) {
-            (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", interface, modes[session->mode],
-                session->loop.totals.samples);
-        }
-    }
+    return result;
 }
 
 /* What the medium itself has lost or refused. */
@@ -122,6 +128,8 @@ static bool open_medium(session_t *session, int stop)
         break;
     }
     session->port = reconnect_port(&session->reconnect, &medium, restore);
+    session->reconnect.on_change = print_link;
+    session->reconnect.context = session;
     return good;
 }
 
@@ -179,12 +187,7 @@ static int run(const options_t *options)
     (void)printf("lever_can: %s: ready\n", options->interface);
     (void)fflush(stdout);
 
-    enum port_result result = PORT_DONE;
-    while (result == PORT_DONE) {
-        result = loop_turn(&session.loop);
-        print_changes(&session);
-    }
-    const bool good = result == PORT_NOTHING;
+    const bool good = run_loop(&session) == PORT_NOTHING;
     if (!good) {
         print_reason(&session);
     }

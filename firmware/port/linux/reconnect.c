@@ -1,5 +1,6 @@
 #include "port/linux/reconnect.h"
 
+#include <stddef.h>
 #include <string.h>
 
 static uint32_t now_us(void *self)
@@ -18,6 +19,14 @@ static uint32_t remaining_ms(reconnect_t *reconnect)
     return (elapsed_us < pause_us) ? ((pause_us - elapsed_us + 999u) / 1000u) : 0u;
 }
 
+static void change(reconnect_t *reconnect, bool is_down)
+{
+    reconnect->is_down = is_down;
+    if (reconnect->on_change != NULL) {
+        reconnect->on_change(reconnect->context, is_down);
+    }
+}
+
 /* PORT_DONE: the link is there, if need be after an attempt to restore it. */
 static enum port_result restored(reconnect_t *reconnect)
 {
@@ -27,7 +36,9 @@ static enum port_result restored(reconnect_t *reconnect)
         result = PORT_NOTHING;
     } else if (reconnect->is_down) {
         result = reconnect->restore(reconnect->medium.self);
-        reconnect->is_down = result != PORT_DONE;
+        if (result == PORT_DONE) {
+            change(reconnect, false);
+        }
         reconnect->tried_us = now_us(reconnect);
         reconnect->pause_ms =
             (reconnect->pause_ms < (RECONNECT_LAST_MS / 2)) ? (2u * reconnect->pause_ms) : RECONNECT_LAST_MS;
@@ -42,7 +53,7 @@ static enum port_result restored(reconnect_t *reconnect)
 static enum port_result said(reconnect_t *reconnect, enum port_result result)
 {
     if (result == PORT_DOWN) {
-        reconnect->is_down = true;
+        change(reconnect, true);
         reconnect->outages++;
         reconnect->pause_ms = RECONNECT_FIRST_MS;
         reconnect->tried_us = now_us(reconnect);

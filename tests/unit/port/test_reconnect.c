@@ -107,8 +107,19 @@ static void pauses_double_up_to_a_bound(void)
     TEST_ASSERT_EQUAL_UINT64(1u, reconnect.outages);
 }
 
+static int changes;
+
+static void count_change(void *context, bool is_down)
+{
+    TEST_ASSERT_EQUAL_PTR(&medium, context);
+    TEST_ASSERT_EQUAL_INT((changes % 2) == 0, is_down);
+    changes++;
+}
+
 static void a_restored_link_goes_on_and_may_be_lost_anew(void)
 {
+    reconnect.on_change = count_change;
+    reconnect.context = &medium;
     for (uint64_t outage = 1u; outage <= 3u; outage++) {
         medium.says = PORT_DOWN;
         TEST_ASSERT_EQUAL_INT(PORT_NOTHING, port.send(port.self, &frame));
@@ -119,6 +130,7 @@ static void a_restored_link_goes_on_and_may_be_lost_anew(void)
         TEST_ASSERT_EQUAL_INT(PORT_DONE, port.send(port.self, &frame));
         TEST_ASSERT_FALSE(reconnect.is_down);
     }
+    TEST_ASSERT_EQUAL_INT(6, changes);
 }
 
 static void a_link_beyond_repair_breaks_the_port(void)
