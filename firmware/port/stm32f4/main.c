@@ -23,16 +23,11 @@ typedef struct loss {
     bool shown;
 } loss_t;
 
-/* What runs; the port's `self`. */
-typedef struct machine {
-    loop_t loop;
-    uint8_t faults_at_start; /* of enum lever_platform_fault */
-    loss_t overruns;
-    loss_t dropped;
-} machine_t;
-
 static lever_memory_t memory;
-static machine_t machine;
+static loop_t loop;
+static uint8_t faults_at_start; /* of enum lever_platform_fault */
+static loss_t overruns;
+static loss_t dropped;
 
 /* --- port.h: what is not the transport's -------------------------------------------------------------------------- */
 
@@ -52,15 +47,15 @@ static bool is_shown(loss_t *loss, uint32_t count, uint32_t now_ms)
 
 static void report_status(void *self, lever_platform_t *status)
 {
-    machine_t *const it = self;
     const uint32_t now_ms = tick_ms();
 
+    (void)self;
     (void)memset(status, 0, sizeof *status);
     transport_status(status);
-    status->dropped = (uint16_t)(status->dropped + (uint32_t)it->loop.totals.stale);
-    status->faults |= it->faults_at_start;
-    status->faults |= is_shown(&it->overruns, status->overruns, now_ms) ? (uint8_t)LEVER_PLATFORM_OVERRUN : 0u;
-    status->faults |= is_shown(&it->dropped, status->dropped, now_ms) ? (uint8_t)LEVER_PLATFORM_DROPPED : 0u;
+    status->dropped = (uint16_t)(status->dropped + (uint32_t)loop.totals.stale);
+    status->faults |= faults_at_start;
+    status->faults |= is_shown(&overruns, status->overruns, now_ms) ? (uint8_t)LEVER_PLATFORM_OVERRUN : 0u;
+    status->faults |= is_shown(&dropped, status->dropped, now_ms) ? (uint8_t)LEVER_PLATFORM_DROPPED : 0u;
 }
 
 /* Every interrupt ends it, and the tick is one. Interrupts are off between the look and the sleep, so that none comes between
@@ -85,7 +80,6 @@ static uint32_t now_us(void *self)
 }
 
 static const port_t port = {
-    .self = &machine,
     .receive = transport_receive,
     .send = transport_send,
     .wait = wait_frame,
@@ -124,14 +118,14 @@ int main(void)
 {
     const clock_rates_t rates = clock_start();
 
-    machine.faults_at_start = test_all(&rates);
+    faults_at_start = test_all(&rates);
     lever_t *lever = configure();
     tick_start(rates.core_hz);
     transport_start(&rates);
     watchdog_tighten(); /* not before: at 16 MHz lever_init() may take longer than the loop may */
     if (lever != NULL) {
-        loop_init(&machine.loop, &port, lever, LOOP_DROP);
-        while (loop_turn(&machine.loop) == PORT_DONE) {
+        loop_init(&loop, &port, lever, LOOP_DROP);
+        while (loop_turn(&loop) == PORT_DONE) {
             watchdog_kick();
         }
     }

@@ -157,7 +157,7 @@ def test_watchdog_is_fed_with_and_without_samples(talk: Talk, board: Board) -> N
 def test_watchdog_resets_a_loop_that_hangs(talk: Talk, board: Board) -> None:
     """Interrupts still work, and must not keep the watchdog quiet."""
     assert talk.report("PLATFORM_HEALTH")["faults"] == 0
-    repair = board.machine.patch("embedded_turn", HANG)
+    repair = board.machine.patch("loop_turn", HANG)
     hung_at = board.schedule.now
     board.peer.send(*sample(talk.next))
     assert board.machine.run(1000 * MS, lambda: bool(board.machine.resets))
