@@ -50,7 +50,8 @@ typedef struct loop {
     const port_t *port;
     lever_t *lever;
     enum loop_policy policy;
-    bool lock_step; /* time is that of the samples alone, nothing is ever stale: for simulations, never beside a motor */
+    bool
+        lock_step; /* time is that of the samples alone, nothing is ever stale: for simulations, never beside a motor */
     enum lever_mode mode; /* after the last sample */
     loop_totals_t totals;
     bool is_held;        /* `frame` waits for room */

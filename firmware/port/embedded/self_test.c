@@ -33,12 +33,13 @@ static uint32_t crc_of_frame(uint32_t crc, const lever_frame_t *frame)
 /* Up to nis it consists of words. */
 static uint32_t crc_of_estimate(uint32_t crc, const lever_estimate_t *estimate)
 {
-    uint32_t words[offsetof(lever_estimate_t, nis_size) / sizeof(uint32_t)];
+    const uint8_t *const bytes = (const uint8_t *)estimate;
     uint32_t result = crc;
 
-    (void)memcpy(words, estimate, sizeof words);
-    for (uint32_t i = 0u; i < (uint32_t)(sizeof words / sizeof words[0]); i++) {
-        result = crc_of_word(result, words[i]);
+    for (size_t at = 0u; at < offsetof(lever_estimate_t, nis_size); at += sizeof(uint32_t)) {
+        uint32_t word = 0u;
+        (void)memcpy(&word, &bytes[at], sizeof word);
+        result = crc_of_word(result, word);
     }
     return result;
 }

@@ -40,7 +40,7 @@ static const char help[] =
     "\n"
     "Options take effect in the order given. SIGINT (Ctrl-C) or SIGTERM ends it with a line of totals and status 0.\n"
     "If the interface goes down or away, or the host hangs up, it waits and goes on with the estimate as it was.\n"
-    "Without --lock-step torque fades to zero when no sample comes, and a MOTOR_COMMAND older than 20 ms is not sent.\n"
+    "Without --lock-step torque fades to zero when no sample comes, and a MOTOR_COMMAND older than 20 ms is dropped.\n"
     "Exit status 1: the interface cannot be used; 2: the command line or a settings file is wrong.\n"
     "\n"
     "A session on a virtual interface:\n"

@@ -14,13 +14,14 @@ enum reconnect_limits {
 };
 
 typedef struct reconnect {
-    port_t medium;                            /* whose receive() and send() may say PORT_DOWN */
-    enum port_result (*restore)(void *self);  /* of the medium, one attempt: PORT_DONE, PORT_DOWN (still lost) or PORT_BROKEN */
+    port_t medium; /* whose receive() and send() may say PORT_DOWN */
+    enum port_result (*restore)(
+        void *self); /* of the medium, one attempt: PORT_DONE, PORT_DOWN (still lost) or PORT_BROKEN */
     void (*on_change)(void *context, bool is_down); /* the link was lost or restored; NULL: nobody listens */
     void *context;
     bool is_down;
     uint32_t pause_ms;
-    uint32_t tried_us;  /* last attempt, or when the link was lost */
+    uint32_t tried_us; /* last attempt, or when the link was lost */
     uint64_t outages;
 } reconnect_t;
 

@@ -9,8 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "port/port.h"
 #include "port/linux/tty.h"
+#include "port/port.h"
 #include "port/slcan/slcan.h"
 
 typedef struct slcan_host {

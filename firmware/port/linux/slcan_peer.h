@@ -8,8 +8,8 @@
 
 #include <stdbool.h>
 
-#include "port/port.h"
 #include "port/linux/tty.h"
+#include "port/port.h"
 #include "port/slcan/slcan.h"
 
 typedef struct slcan_peer {

@@ -25,7 +25,7 @@ typedef struct tty {
     uint32_t out_length;
     uint8_t in[TTY_IN_BYTES];
     uint8_t out[TTY_OUT_BYTES]; /* not yet written */
-    char reason[256]; /* of the last failure, in words */
+    char reason[256];           /* of the last failure, in words */
 } tty_t;
 
 /* Makes a pseudo-terminal, and at `link` a symbolic link to it, which must not exist yet, or be one that a killed process has left

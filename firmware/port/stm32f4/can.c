@@ -34,9 +34,9 @@ static volatile uint8_t receive_bytes[RECEIVE_BYTES];
 static volatile uint8_t transmit_bytes[TRANSMIT_BYTES];
 static ring_t received = {.bytes = receive_bytes, .size = RECEIVE_BYTES};
 static ring_t waiting = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
-static volatile can_counts_t counts; /* each written by one interrupt, or with interrupts off */
-static volatile bool off;            /* the bus */
-static volatile uint32_t time_ms;    /* of the last can_poll() */
+static volatile can_counts_t counts;     /* each written by one interrupt, or with interrupts off */
+static volatile bool off;                /* the bus */
+static volatile uint32_t time_ms;        /* of the last can_poll() */
 static uint32_t since_ms[CAN_MAILBOXES]; /* of the frame in each */
 
 /* --- start ------------------------------------------------------------------------------------------------------- */

@@ -165,7 +165,7 @@ enum can_bits {
     CAN_TSR_CODE_LOWEST = 24,
     CAN_TSR_TME0 = BIT(26), /* of mailbox 0; the next ones follow */
     CAN_TSR_TME = 7 << 26,
-    CAN_RFR_FMP = 3,       /* field */
+    CAN_RFR_FMP = 3, /* field */
     CAN_RFR_FOVR = BIT(4),
     CAN_RFR_RFOM = BIT(5),
     CAN_IER_TMEIE = BIT(0),

@@ -25,17 +25,17 @@ typedef struct machine {
     lever_frame_t sent[FRAMES];
     int received;
     int sends;
-    int refusals;      /* each frame finds no room so often */
-    int refused;       /* the present frame */
-    int turns_left;    /* waits until wait() asks to end */
+    int refusals;   /* each frame finds no room so often */
+    int refused;    /* the present frame */
+    int turns_left; /* waits until wait() asks to end */
     int waits;
     bool waited_for_frame;
     int32_t timeout_ms; /* of the last wait */
     bool is_broken;
     uint32_t clock_us;
     lever_platform_t platform;
-    uint32_t answer_id;    /* each frame is answered with such a one besides; 0: with none */
-    int answered;          /* frames */
+    uint32_t answer_id; /* each frame is answered with such a one besides; 0: with none */
+    int answered;       /* frames */
     uint32_t idles;
     uint32_t idle_us; /* sum of them */
     loop_t loop;

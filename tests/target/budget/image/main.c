@@ -167,7 +167,7 @@ static void update_all(lever_t *lever)
     }
 }
 
-/* As port/embedded/loop.c does it. */
+/* As port/loop.c does it. */
 static void tick_all(lever_t *lever)
 {
     const wire_frame_t *wire = (const wire_frame_t *)first_sample();
