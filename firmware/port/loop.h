@@ -1,4 +1,5 @@
-/* The loop of every port: frames from a port (port.h) into the estimator, its answers back. No operating system, no globals.
+/* The loop of every port: frames from a port (port.h) into the estimator, its answers back. No operating system, no
+ * globals.
  *
  *     port_t port = ...;                       // the machine's, see port.h
  *     loop_t loop;
@@ -9,10 +10,10 @@
  *
  * Guarantees, given a port that keeps its contract:
  *  - what a frame is answered with goes out, in order, once, before the next frame is received;
- *  - without room a frame is held and nothing is received, so that the medium holds the samples back, or it is dropped and
- *    counted: the policy;
- *  - a MOTOR_COMMAND whose sample was, or may have been, received more than PORT_STALE_MS ago is dropped and counted, whatever
- *    the policy;
+ *  - without room a frame is held and nothing is received, so that the medium holds the samples back, or it is dropped
+ *    and counted: the policy;
+ *  - a MOTOR_COMMAND whose sample was, or may have been, received more than PORT_STALE_MS ago is dropped and counted,
+ *    whatever the policy;
  *  - when no sample comes the estimator is told each LOOP_IDLE_MS, so that its torque fades;
  *  - wait() is called within LOOP_BATCH frames, also under full load.
  */
@@ -63,11 +64,12 @@ typedef struct loop {
     uint32_t batch;      /* frames since the last call of wait() */
 } loop_t;
 
-/* Prepares a loop between `port` and `lever`; both must outlive it. Supervised: set lock_step afterwards where it must be. */
+/* Prepares a loop between `port` and `lever`; both must outlive it. Supervised: set lock_step afterwards where it must
+ * be. */
 void loop_init(loop_t *loop, const port_t *port, lever_t *lever, enum loop_policy policy);
 
-/* One turn: sends what is held, takes at most one frame, steps if it completes a sample, sends every answer; waits when there is
- * nothing to do. PORT_DONE: call again. PORT_NOTHING: wait() has asked to end. Negative: the port's error. */
+/* One turn: sends what is held, takes at most one frame, steps if it completes a sample, sends every answer; waits when
+ * there is nothing to do. PORT_DONE: call again. PORT_NOTHING: wait() has asked to end. Negative: the port's error. */
 enum port_result loop_turn(loop_t *loop);
 
 #endif

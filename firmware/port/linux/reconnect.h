@@ -1,5 +1,5 @@
-/* A port whose link may be lost: it says PORT_NOTHING meanwhile, and tries from time to time to restore the link. The estimator
- * behind it only sees that no sample comes. */
+/* A port whose link may be lost: it says PORT_NOTHING meanwhile, and tries from time to time to restore the link. The
+ * estimator behind it only sees that no sample comes. */
 #ifndef LEVER_PORT_RECONNECT_H
 #define LEVER_PORT_RECONNECT_H
 
@@ -25,7 +25,8 @@ typedef struct reconnect {
     uint64_t outages;
 } reconnect_t;
 
-/* The port that restores `medium`; it refers to `reconnect`, which must outlive it. Set on_change and context afterwards. */
+/* The port that restores `medium`; it refers to `reconnect`, which must outlive it. Set on_change and context
+ * afterwards. */
 port_t reconnect_port(reconnect_t *reconnect, const port_t *medium, enum port_result (*restore)(void *self));
 
 #endif

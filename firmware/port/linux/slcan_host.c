@@ -5,8 +5,8 @@
 #include "can/messages.h"
 #include "port/linux/clock.h"
 
-/* Ends what the adapter may have had of a line, and goes on the bus at 1 Mbit/s. The first C is refused if the channel was
- * closed, which is as good. */
+/* Ends what the adapter may have had of a line, and goes on the bus at 1 Mbit/s. The first C is refused if the channel
+ * was closed, which is as good. */
 static const char opening[] = "\r\rC\rS8\rO\r";
 static const char closing[] = "C\r";
 

@@ -1,7 +1,9 @@
-/* A port on which this program is an SLCAN adapter (port/slcan/slcan.h): its host, such as python-can's slcan or slcand,
- * is at the other end of a pseudo-terminal or serial line, and hears and feeds the estimator as if that were on a bus.
+/* A port on which this program is an SLCAN adapter (port/slcan/slcan.h): its host, such as python-can's slcan or
+ * slcand, is at the other end of a pseudo-terminal or serial line, and hears and feeds the estimator as if that were on
+ * a bus.
  *
- * What the host does not read finds no room, and is counted in peer->slcan.counts: for a loop that drops it (LOOP_DROP).
+ * What the host does not read finds no room, and is counted in peer->slcan.counts: for a loop that drops it
+ * (LOOP_DROP).
  */
 #ifndef LEVER_PORT_SLCAN_PEER_H
 #define LEVER_PORT_SLCAN_PEER_H

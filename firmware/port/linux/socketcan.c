@@ -82,8 +82,8 @@ static enum port_result find_interface(socketcan_t *socketcan, int *index)
     return PORT_DONE;
 }
 
-/* Only the frames that the estimator takes, and the error frames that tell of a change of condition (passing bus errors come by the
- * thousand). Own frames do not come back: that is the kernel's default, CAN_RAW_RECV_OWN_MSGS off. */
+/* Only the frames that the estimator takes, and the error frames that tell of a change of condition (passing bus errors
+ * come by the thousand). Own frames do not come back: that is the kernel's default, CAN_RAW_RECV_OWN_MSGS off. */
 static bool set_options(const socketcan_t *socketcan)
 {
     static const uint32_t inputs[] = PORT_INPUTS;

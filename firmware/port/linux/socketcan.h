@@ -27,8 +27,8 @@ bool socketcan_open(socketcan_t *socketcan, const char *interface, int stop);
 /* Releases what open has taken; also right after a failed open. */
 void socketcan_close(socketcan_t *socketcan);
 
-/* The port; it refers to `socketcan`, which must outlive it. What the kernel has taken of it can no longer be dropped: a queue
- * of ten frames on a usual CAN interface (txqueuelen). */
+/* The port; it refers to `socketcan`, which must outlive it. What the kernel has taken of it can no longer be dropped:
+ * a queue of ten frames on a usual CAN interface (txqueuelen). */
 port_t socketcan_port(socketcan_t *socketcan);
 
 /* One attempt to bring the link back, for reconnect.h; `self` is the socketcan_t. */

@@ -78,8 +78,8 @@ static bool is_later(struct timespec one, struct timespec other)
     return (one.tv_sec != other.tv_sec) ? (one.tv_sec > other.tv_sec) : (one.tv_nsec > other.tv_nsec);
 }
 
-/* Whether a killed process has left `link` behind. Its pseudo-terminal ended with it, and the number may have been given to
- * another since: to ours, or to one that is younger than the link. */
+/* Whether a killed process has left `link` behind. Its pseudo-terminal ended with it, and the number may have been
+ * given to another since: to ours, or to one that is younger than the link. */
 static bool is_left_behind(const char *link, const char *slave)
 {
     struct stat state;
@@ -197,8 +197,8 @@ void tty_close(tty_t *tty)
 
 /* --- bytes ------------------------------------------------------------------------------------------------------- */
 
-/* What a read or write that could not be done means. A pseudo-terminal that nobody has open any more gives EIO, an adapter
- * that was unplugged EIO, ENXIO or ENODEV. */
+/* What a read or write that could not be done means. A pseudo-terminal that nobody has open any more gives EIO, an
+ * adapter that was unplugged EIO, ENXIO or ENODEV. */
 static enum port_result failure(tty_t *tty)
 {
     if ((errno == EAGAIN) || (errno == EINTR)) {

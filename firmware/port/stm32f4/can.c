@@ -50,7 +50,8 @@ static void start_pins(void)
     pin_to_peripheral(&gpiob, PIN_TRANSMIT, FUNCTION_CAN);
 }
 
-/* RM0090 32.7.4: a bank of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames match. */
+/* RM0090 32.7.4: a bank of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames
+ * match. */
 static uint32_t filter_word(uint32_t id, uint32_t next_id)
 {
     return FIELD(next_id, 16 + 5) | FIELD(id, 5);

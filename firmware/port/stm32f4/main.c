@@ -58,8 +58,8 @@ static void report_status(void *self, lever_platform_t *status)
     status->faults |= is_shown(&dropped, status->dropped, now_ms) ? (uint8_t)LEVER_PLATFORM_DROPPED : 0u;
 }
 
-/* Every interrupt ends it, and the tick is one. Interrupts are off between the look and the sleep, so that none comes between
- * them; it ends the sleep all the same. */
+/* Every interrupt ends it, and the tick is one. Interrupts are off between the look and the sleep, so that none comes
+ * between them; it ends the sleep all the same. */
 static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
 {
     (void)self;
@@ -98,8 +98,8 @@ static lever_t *configure(void)
     return lever_init(&memory, &config);
 }
 
-/* Nothing here stops the estimator: it says what is wrong, and who depends on it decides. Each step takes less than the 0.35 s
- * that the watchdog allows at the least, at 16 MHz, too. */
+/* Nothing here stops the estimator: it says what is wrong, and who depends on it decides. Each step takes less than the
+ * 0.35 s that the watchdog allows at the least, at 16 MHz, too. */
 static uint8_t test_all(const clock_rates_t *rates)
 {
     uint32_t faults = rates->crystal ? 0u : (uint32_t)LEVER_PLATFORM_CLOCK;

@@ -1,7 +1,8 @@
-/* The registers that this port uses, after RM0090 (reference manual of the STM32F405) and PM0214 (Cortex-M4 programming manual).
+/* The registers that this port uses, after RM0090 (reference manual of the STM32F405) and PM0214 (Cortex-M4 programming
+ * manual).
  *
- * Each peripheral is an object that registers.ld puts at its address, so that no code makes pointers out of numbers, and a
- * test on the host can put ordinary memory there. Names are the manuals'; sections stand beside each struct.
+ * Each peripheral is an object that registers.ld puts at its address, so that no code makes pointers out of numbers,
+ * and a test on the host can put ordinary memory there. Names are the manuals'; sections stand beside each struct.
  */
 #ifndef LEVER_PORT_STM32F4_REGISTERS_H
 #define LEVER_PORT_STM32F4_REGISTERS_H

@@ -1,4 +1,5 @@
-/* USART1 on PA9 (transmit) and PA10 (receive), 8 bits, no parity, 1 stop bit: RM0090 30. Rings between interrupt and loop. */
+/* USART1 on PA9 (transmit) and PA10 (receive), 8 bits, no parity, 1 stop bit: RM0090 30. Rings between interrupt and
+ * loop. */
 #ifndef LEVER_PORT_STM32F4_USART_H
 #define LEVER_PORT_STM32F4_USART_H
 

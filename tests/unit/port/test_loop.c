@@ -299,7 +299,8 @@ static void only_a_motor_command_goes_stale(void)
     }
 }
 
-/* The process was stopped for 3 s, say, and samples from then wait: no torque is asked for until one is known to be new. */
+/* The process was stopped for 3 s, say, and samples from then wait: no torque is asked for until one is known to be
+ * new. */
 static void a_motor_command_to_an_old_sample_is_stale(void)
 {
     machine.received = INPUTS;

@@ -1,5 +1,5 @@
-/* What of the STM32F405 port is arithmetic: addresses, PLL, bit timing; and its drivers on registers that are plain memory here.
- * How they do on a bxCAN that behaves like one: tests/target. */
+/* What of the STM32F405 port is arithmetic: addresses, PLL, bit timing; and its drivers on registers that are plain
+ * memory here. How they do on a bxCAN that behaves like one: tests/target. */
 #include <stddef.h>
 #include <string.h>
 
@@ -73,8 +73,8 @@ static void pll_reaches_168_mhz_from_every_crystal(void)
     }
 }
 
-/* By hand from RM0090 32.7.7: 42 MHz / 2 is 21 quanta a bit, 1 + 15 before the sample point (76.2 %) and 5 after it; 16 MHz is
- * 16 quanta, 1 + 11 (75 %) and 4. The jump width is 4. */
+/* By hand from RM0090 32.7.7: 42 MHz / 2 is 21 quanta a bit, 1 + 15 before the sample point (76.2 %) and 5 after it; 16
+ * MHz is 16 quanta, 1 + 11 (75 %) and 4. The jump width is 4. */
 static void bit_timing_is_what_one_gets_by_hand(void)
 {
     TEST_ASSERT_EQUAL_HEX32(0x034E0001u, BIT_TIMING_BTR(42000000));

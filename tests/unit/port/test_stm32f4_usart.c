@@ -1,5 +1,5 @@
-/* USART1 of the STM32F405 port and SLCAN on it, on registers that are plain memory here: what is read stays there, and what is
- * written is read back. */
+/* USART1 of the STM32F405 port and SLCAN on it, on registers that are plain memory here: what is read stays there, and
+ * what is written is read back. */
 #include <string.h>
 
 #include "port/stm32f4/transport_slcan.c" /* NOLINT(bugprone-suspicious-include): with memory for the registers */
