@@ -1,12 +1,14 @@
 /* CAN1 as a bxCAN at 1 Mbit/s on PB8 (receive) and PB9 (transmit): RM0090 32.
  *
  * Received: only data frames with the identifiers of PORT_INPUTS, through a ring that the interrupt fills. When the
- * FIFO or the ring is full the newest frame is lost, so that what is there stays in order, and counted. Sent: in the
- * order of the calls, through a ring that the interrupt empties into the three mailboxes. They are sent by order of
- * request (TXFP), not by identifier: STATE_ESTIMATE, the end of a step, has a lower identifier than what precedes it. A
- * frame that could not be sent for PORT_STALE_MS, and all that wait when the bus goes off, are dropped and counted: a
- * MOTOR_COMMAND must not come out long after its sample. Bus-off: the controller comes back by itself after 128 times
- * 11 recessive bits (ABOM), as ISO 11898-1 has it.
+ * FIFO or the ring is full the newest frame is lost, so that what is there stays in order, and counted.
+ *
+ * Sent: in the order of the calls, through a ring that the interrupt empties into the three mailboxes. They are sent by
+ * order of request (TXFP), not by identifier: STATE_ESTIMATE, the end of a step, has a lower identifier than what
+ * precedes it. A frame that could not be sent for PORT_STALE_MS, and all that wait when the bus goes off, are dropped
+ * and counted: a MOTOR_COMMAND must not come out long after its sample.
+ *
+ * Bus-off: the controller comes back by itself after 128 times 11 recessive bits (ABOM), as ISO 11898-1 has it.
  */
 #ifndef LEVER_PORT_STM32F4_CAN_H
 #define LEVER_PORT_STM32F4_CAN_H
