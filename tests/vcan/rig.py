@@ -233,11 +233,11 @@ class Host:
         return frames
 
     def run_with_torque(self, count: int = 400) -> None:
-        """Samples until torque is asked for: the estimator runs, and dither has faded in."""
+        """Samples until the last one is answered with torque: the estimator runs, and dither has faded in."""
         self.run(count // 2)
         self.send(DITHER)
-        asked = torques(self.run(count // 2))
-        assert any(asked[-3:]), asked[-3:]
+        self.run(count // 2)
+        wait_until(lambda: any(torques(self.run(1))), "torque")
 
     def rest(self) -> list[Frame]:
         """What comes until nothing has come for 0.2 s."""
