@@ -79,6 +79,44 @@ static void supervise(loop_t *loop, uint32_t now)
     }
 }
 
+static enum port_result exchange(loop_t *loop, uint32_t now, bool *received)
+{
+    lever_frame_t frame;
+    enum port_result result = send_answers(loop);
+
+    if (result == PORT_DONE) {
+        result = loop->port->receive(loop->port->self, &frame);
+        *received = result == PORT_DONE;
+        if (*received) {
+            take(loop, &frame, now);
+            result = send_answers(loop);
+        } else {
+            loop->empty_us = now;
+        }
+    }
+    return result;
+}
+
+/* A link that has just been lost, or is to be tried again when the pause is over. */
+static enum port_result restore(loop_t *loop, uint32_t now)
+{
+    enum port_result result = PORT_DOWN;
+
+    if (!loop->is_down) {
+        loop->totals.outages++;
+        loop->tried_us = now;
+        loop->pause_ms = LOOP_BACKOFF_FIRST_MS;
+    } else if ((now - loop->tried_us) >= (1000u * loop->pause_ms)) {
+        result = loop->port->restore(loop->port->self);
+        loop->tried_us = now;
+        loop->pause_ms = (loop->pause_ms < (LOOP_BACKOFF_LAST_MS / 2)) ? (2u * loop->pause_ms) : LOOP_BACKOFF_LAST_MS;
+    } else {
+        /* not yet */
+    }
+    loop->is_down = result == PORT_DOWN;
+    return result;
+}
+
 /* The end of a turn that has received something, or not. False: wait() asks to end. */
 static bool rest(loop_t *loop, bool received)
 {
@@ -86,7 +124,9 @@ static bool rest(loop_t *loop, bool received)
     bool going = true;
 
     loop->batch = received ? (loop->batch + 1u) : (uint32_t)LOOP_BATCH;
-    if (loop->is_held) {
+    if (loop->is_down) {
+        going = port->wait(port->self, false, LOOP_IDLE_MS);
+    } else if (loop->is_held) {
         going = port->wait(port->self, false, LOOP_RETRY_MS);
     } else if (!received) {
         going = port->wait(port->self, true, loop->lock_step ? -1 : LOOP_IDLE_MS);
@@ -113,22 +153,18 @@ void loop_init(loop_t *loop, const port_t *port, lever_t *lever, enum loop_polic
 enum port_result loop_turn(loop_t *loop)
 {
     const uint32_t now = now_us(loop);
-    lever_frame_t frame;
+    const bool was_down = loop->is_down;
     bool received = false;
+    enum port_result result = PORT_DOWN;
 
     supervise(loop, now);
-    enum port_result result = send_answers(loop);
-    if (result == PORT_DONE) {
-        result = loop->port->receive(loop->port->self, &frame);
-        if (result == PORT_DONE) {
-            received = true;
-            take(loop, &frame, now);
-            result = send_answers(loop);
-        } else {
-            loop->empty_us = now;
-        }
+    if (!was_down) {
+        result = exchange(loop, now, &received);
     }
-    if (result >= PORT_NOTHING) {
+    if ((result == PORT_DOWN) && (loop->port->restore != NULL)) {
+        result = restore(loop, now);
+    }
+    if (loop->is_down || ((result >= PORT_NOTHING) && !was_down)) {
         result = rest(loop, received) ? PORT_DONE : PORT_NOTHING;
     }
     return result;

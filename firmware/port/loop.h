@@ -15,6 +15,7 @@
  *  - a MOTOR_COMMAND whose sample was, or may have been, received more than PORT_STALE_MS ago is dropped and counted,
  *    whatever the policy;
  *  - when no sample comes the estimator is told each LOOP_IDLE_MS, so that its torque fades;
+ *  - a lost link is tried again with a bounded back-off, and leaves the estimator as it was;
  *  - wait() is called within LOOP_BATCH frames, also under full load.
  */
 #ifndef LEVER_PORT_LOOP_H
@@ -27,9 +28,11 @@
 #include "port/port.h"
 
 enum loop_limits {
-    LOOP_BATCH = 8,    /* frames received between two calls of wait() */
-    LOOP_RETRY_MS = 1, /* pause before a frame that found no room is sent again [ms] */
-    LOOP_IDLE_MS = 5   /* without a sample, until lever_idle() is called [ms] */
+    LOOP_BATCH = 8,             /* frames received between two calls of wait() */
+    LOOP_RETRY_MS = 1,          /* pause before a frame that found no room is sent again [ms] */
+    LOOP_IDLE_MS = 5,           /* without a sample, until lever_idle() is called [ms] */
+    LOOP_BACKOFF_FIRST_MS = 10, /* pauses between attempts to restore a link double from the first ... */
+    LOOP_BACKOFF_LAST_MS = 500  /* ... to the last [ms] */
 };
 
 /* What is done with a frame that finds no room. */
@@ -45,6 +48,7 @@ typedef struct loop_totals {
     uint64_t held;     /* frames that found no room at first and were kept */
     uint64_t dropped;  /* frames that found no room and were dropped */
     uint64_t stale;    /* MOTOR_COMMANDs that were too old to be sent */
+    uint64_t outages;  /* times that the link was lost */
 } loop_totals_t;
 
 typedef struct loop {
@@ -62,6 +66,9 @@ typedef struct loop {
     uint32_t empty_us;   /* when no frame waited last: what is received now came later */
     uint32_t sample_us;  /* last step, or call of lever_idle() */
     uint32_t batch;      /* frames since the last call of wait() */
+    bool is_down;        /* the link is lost */
+    uint32_t tried_us;   /* when that was, or the last attempt to restore it */
+    uint32_t pause_ms;   /* until the next one */
 } loop_t;
 
 /* Prepares a loop between `port` and `lever`; both must outlive it. Supervised: set lock_step afterwards where it must

@@ -17,7 +17,7 @@
 enum port_result {
     PORT_DONE = 1,
     PORT_NOTHING = 0, /* receive: no frame waits; send: no room for the moment, and the frame is still the caller's */
-    PORT_DOWN = -1,   /* the link is lost and may come back: linux/reconnect.h makes PORT_NOTHING of it meanwhile */
+    PORT_DOWN = -1,   /* the link is lost and may come back: the loop tries restore() from time to time */
     PORT_BROKEN = -2  /* cannot go on: the loop ends */
 };
 
@@ -44,6 +44,10 @@ typedef struct port {
 
     /* Reports the state of the machine, before each sample is stepped; NULL: it has nothing to report. */
     void (*status)(void *self, lever_platform_t *status);
+
+    /* After PORT_DOWN, one attempt to bring the link back: PORT_DONE, PORT_DOWN (still lost) or PORT_BROKEN. NULL: a link
+     * that is never down. */
+    enum port_result (*restore)(void *self);
 } port_t;
 
 enum port_limits {

@@ -6,7 +6,6 @@
 
 #include "lever_cdkf.h"
 #include "port/linux/options.h"
-#include "port/linux/reconnect.h"
 #include "port/linux/settings.h"
 #include "port/linux/slcan_host.h"
 #include "port/linux/slcan_peer.h"
@@ -22,8 +21,7 @@ typedef struct session {
     slcan_host_t slcan_host;
     slcan_peer_t slcan_peer;
     const char *reason; /* of it: what is wrong */
-    reconnect_t reconnect;
-    port_t port; /* of it, reconnected */
+    port_t port;
     loop_t loop;
 } session_t;
 
@@ -34,12 +32,11 @@ static void print_bus_state(void *context, const char *words)
     (void)fprintf(stderr, "lever_can: %s: %s\n", session->options->interface, words);
 }
 
-static void print_link(void *context, bool is_down)
+static void print_link(const session_t *session)
 {
-    const session_t *session = context;
     const char *const interface = session->options->interface;
 
-    if (is_down) {
+    if (session->loop.is_down) {
         (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
             session->reason);
     } else {
@@ -47,20 +44,29 @@ static void print_link(void *context, bool is_down)
     }
 }
 
+static void print_mode(const session_t *session)
+{
+    static const char *const modes[] = {"init", "align", "run", "coast", "frozen", "fault"};
+
+    (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", session->options->interface,
+        modes[session->loop.mode], session->loop.totals.samples);
+}
+
 /* Turns the loop until it is to end (PORT_NOTHING) or cannot go on. */
 static enum port_result run_loop(session_t *session)
 {
-    static const char *const modes[] = {"init", "align", "run", "coast", "frozen", "fault"};
-    const loop_t *const loop = &session->loop;
-    enum lever_mode mode = loop->mode;
+    loop_t *const loop = &session->loop;
     enum port_result result = PORT_DONE;
 
     while (result == PORT_DONE) {
-        result = loop_turn(&session->loop);
+        const enum lever_mode mode = loop->mode;
+        const bool was_down = loop->is_down;
+        result = loop_turn(loop);
+        if (loop->is_down != was_down) {
+            print_link(session);
+        }
         if (session->options->verbose && (loop->mode != mode)) {
-            mode = loop->mode;
-            (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", session->options->interface,
-                modes[mode], loop->totals.samples);
+            print_mode(session);
         }
     }
     return result;
@@ -91,23 +97,21 @@ static void print_totals(const session_t *session, const lever_t *lever)
         health.late);
     print_losses(session);
     (void)printf(", %u unsent, %" PRIu64 " held, %" PRIu64 " stale, %" PRIu64 " outages\n",
-        session->loop.is_held ? 1u : 0u, totals->held, totals->stale, session->reconnect.outages);
+        session->loop.is_held ? 1u : 0u, totals->held, totals->stale, totals->outages);
 }
 
-/* Opens the medium and makes the loop's port of it; session->reason says what is wrong if that fails. */
+/* Opens the medium and gets its port; session->reason says what is wrong if that fails. */
 static bool open_medium(session_t *session, int stop)
 {
     const char *const interface = session->options->interface;
-    enum port_result (*restore)(void *self) = slcan_peer_restore;
-    port_t medium = slcan_peer_port(&session->slcan_peer);
     bool good = false;
 
+    session->port = slcan_peer_port(&session->slcan_peer);
     session->reason = session->slcan_peer.tty.reason;
     switch (session->options->medium) {
     case OPTIONS_MEDIUM_SLCAN:
         good = slcan_host_open(&session->slcan_host, interface, stop);
-        medium = slcan_host_port(&session->slcan_host);
-        restore = slcan_host_restore;
+        session->port = slcan_host_port(&session->slcan_host);
         session->reason = session->slcan_host.tty.reason;
         break;
     case OPTIONS_MEDIUM_PTY:
@@ -122,14 +126,10 @@ static bool open_medium(session_t *session, int stop)
         good = socketcan_open(&session->socketcan, interface, stop);
         session->socketcan.on_bus_state = print_bus_state;
         session->socketcan.context = session;
-        medium = socketcan_port(&session->socketcan);
-        restore = socketcan_restore;
+        session->port = socketcan_port(&session->socketcan);
         session->reason = session->socketcan.reason;
         break;
     }
-    session->port = reconnect_port(&session->reconnect, &medium, restore);
-    session->reconnect.on_change = print_link;
-    session->reconnect.context = session;
     return good;
 }
 

@@ -70,15 +70,7 @@ static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
     return tty_wait(&host->tty, for_frame, timeout_ms);
 }
 
-port_t slcan_host_port(slcan_host_t *host)
-{
-    const port_t port = {
-        .self = host, .receive = receive_frame, .send = send_frame, .wait = wait_frame, .now_us = clock_now_us};
-
-    return port;
-}
-
-enum port_result slcan_host_restore(void *self)
+static enum port_result restore_link(void *self)
 {
     slcan_host_t *host = self;
     const enum port_result result = tty_restore(&host->tty);
@@ -88,4 +80,16 @@ enum port_result slcan_host_restore(void *self)
         (void)tty_put(&host->tty, opening, sizeof opening - 1u);
     }
     return result;
+}
+
+port_t slcan_host_port(slcan_host_t *host)
+{
+    const port_t port = {.self = host,
+        .receive = receive_frame,
+        .send = send_frame,
+        .wait = wait_frame,
+        .now_us = clock_now_us,
+        .restore = restore_link};
+
+    return port;
 }

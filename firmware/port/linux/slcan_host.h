@@ -30,7 +30,4 @@ void slcan_host_close(slcan_host_t *host);
 /* The port; it refers to `host`, which must outlive it. */
 port_t slcan_host_port(slcan_host_t *host);
 
-/* One attempt to bring the link back, for reconnect.h; `self` is the slcan_host_t. */
-enum port_result slcan_host_restore(void *self);
-
 #endif

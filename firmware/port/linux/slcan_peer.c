@@ -74,17 +74,21 @@ static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
     return tty_wait(&peer->tty, for_frame, timeout_ms);
 }
 
-port_t slcan_peer_port(slcan_peer_t *peer)
-{
-    const port_t port = {
-        .self = peer, .receive = receive_frame, .send = send_frame, .wait = wait_frame, .now_us = clock_now_us};
-
-    return port;
-}
-
-enum port_result slcan_peer_restore(void *self)
+static enum port_result restore_link(void *self)
 {
     slcan_peer_t *peer = self;
 
     return tty_restore(&peer->tty);
+}
+
+port_t slcan_peer_port(slcan_peer_t *peer)
+{
+    const port_t port = {.self = peer,
+        .receive = receive_frame,
+        .send = send_frame,
+        .wait = wait_frame,
+        .now_us = clock_now_us,
+        .restore = restore_link};
+
+    return port;
 }

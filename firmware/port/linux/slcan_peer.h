@@ -29,7 +29,4 @@ void slcan_peer_close(slcan_peer_t *peer);
 /* The port; it refers to `peer`, which must outlive it and stay where it is since it was opened. */
 port_t slcan_peer_port(slcan_peer_t *peer);
 
-/* One attempt to bring the link back, for reconnect.h; `self` is the slcan_peer_t. */
-enum port_result slcan_peer_restore(void *self);
-
 #endif

@@ -282,7 +282,7 @@ static bool is_bound_to(const socketcan_t *socketcan, int index)
     return (getsockname(socketcan->socket, (struct sockaddr *)&address, &size) == 0) && (address.can_ifindex == index);
 }
 
-enum port_result socketcan_restore(void *self)
+static enum port_result restore_link(void *self)
 {
     socketcan_t *socketcan = self;
     int index = 0;
@@ -309,8 +309,12 @@ static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
 
 port_t socketcan_port(socketcan_t *socketcan)
 {
-    const port_t port = {
-        .self = socketcan, .receive = receive_frame, .send = send_frame, .wait = wait_frame, .now_us = clock_now_us};
+    const port_t port = {.self = socketcan,
+        .receive = receive_frame,
+        .send = send_frame,
+        .wait = wait_frame,
+        .now_us = clock_now_us,
+        .restore = restore_link};
 
     return port;
 }

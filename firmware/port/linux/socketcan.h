@@ -31,7 +31,4 @@ void socketcan_close(socketcan_t *socketcan);
  * a queue of ten frames on a usual CAN interface (txqueuelen). */
 port_t socketcan_port(socketcan_t *socketcan);
 
-/* One attempt to bring the link back, for reconnect.h; `self` is the socketcan_t. */
-enum port_result socketcan_restore(void *self);
-
 #endif

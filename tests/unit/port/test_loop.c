@@ -30,8 +30,10 @@ typedef struct machine {
     int turns_left; /* waits until wait() asks to end */
     int waits;
     bool waited_for_frame;
-    int32_t timeout_ms; /* of the last wait */
-    bool is_broken;
+    int32_t timeout_ms;        /* of the last wait */
+    enum port_result says;     /* receive and send, unless it is PORT_DONE */
+    enum port_result restored; /* restore */
+    int attempts;
     uint32_t clock_us;
     lever_platform_t platform;
     uint32_t answer_id; /* each frame is answered with such a one besides; 0: with none */
@@ -71,8 +73,8 @@ static enum port_result receive(void *self, lever_frame_t *frame)
 {
     machine_t *it = self;
 
-    if (it->is_broken) {
-        return PORT_BROKEN;
+    if (it->says != PORT_DONE) {
+        return it->says;
     }
     if (it->received == INPUTS) {
         return PORT_NOTHING;
@@ -86,6 +88,9 @@ static enum port_result send(void *self, const lever_frame_t *frame)
 {
     machine_t *it = self;
 
+    if (it->says != PORT_DONE) {
+        return it->says;
+    }
     if (it->refused < it->refusals) {
         it->refused++;
         return PORT_NOTHING;
@@ -107,6 +112,15 @@ static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
     it->clock_us += (timeout_ms > 0) ? (1000u * (uint32_t)timeout_ms) : 0u;
     it->turns_left--;
     return it->turns_left > 0;
+}
+
+static enum port_result restore_link(void *self)
+{
+    machine_t *it = self;
+
+    it->attempts++;
+    it->says = (it->restored == PORT_DONE) ? PORT_DONE : it->says;
+    return it->restored;
 }
 
 static uint32_t machine_us(void *self)
@@ -148,6 +162,7 @@ static void start(machine_t *it, port_t *its_port, enum loop_policy policy, floa
     for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
         make_sample(&it->input[2u * k], k, z_ddot);
     }
+    it->says = PORT_DONE;
     it->turns_left = FOREVER;
     it->clock_us = 0xFFFFFF00u; /* wraps soon */
     *its_port = (port_t){.self = it, .receive = receive, .send = send, .wait = wait_frame, .now_us = machine_us};
@@ -393,11 +408,74 @@ static void a_request_to_end_is_seen_under_full_load(void)
     TEST_ASSERT_EQUAL_INT32(0, machine.timeout_ms);
 }
 
-static void a_broken_port_ends_it(void)
+/* A link that is lost while the loop receives, or holds a frame, and comes back: nothing is lost or sent twice. */
+static void an_outage_leaves_everything_as_it_was(void)
 {
-    machine.is_broken = true;
+    port.restore = restore_link;
+    for (int i = 1; machine.received < INPUTS; i++) {
+        (void)turn(&machine);
+        if ((i % 50) == 0) {
+            machine.refusals = ((i % 100) == 0) ? 1 : 0;
+            machine.says = PORT_DOWN;
+            machine.restored = PORT_DONE;
+        }
+    }
+    machine.refusals = 0;
+    turn_until_empty(&machine);
+    assert_all_answered(&machine);
+    TEST_ASSERT_GREATER_THAN_UINT64(10u, machine.loop.totals.outages);
+    TEST_ASSERT_EQUAL_UINT64(machine.attempts, machine.loop.totals.outages);
+}
+
+static void pauses_of_an_outage_double_up_to_a_bound(void)
+{
+    static const uint32_t pauses_ms[] = {10u, 20u, 40u, 80u, 160u, 320u, 500u, 500u, 500u};
+    uint32_t since_us = machine.clock_us;
+
+    port.restore = restore_link;
+    machine.says = PORT_DOWN;
+    machine.restored = PORT_DOWN;
+    for (int i = 0; i < (int)(sizeof pauses_ms / sizeof pauses_ms[0]); i++) {
+        while (machine.attempts == i) {
+            TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
+            TEST_ASSERT_TRUE(machine.loop.is_down);
+            TEST_ASSERT_FALSE(machine.waited_for_frame);
+        }
+        TEST_ASSERT_EQUAL_UINT32(pauses_ms[i], (machine.loop.tried_us - since_us) / 1000u);
+        since_us = machine.loop.tried_us;
+    }
+    TEST_ASSERT_EQUAL_UINT64(1u, machine.loop.totals.outages);
+    TEST_ASSERT_GREATER_THAN_UINT32(400u, machine.idles); /* torque fades meanwhile */
+    machine.turns_left = 1;
+    TEST_ASSERT_EQUAL_INT(PORT_NOTHING, turn(&machine)); /* a request to end is seen */
+}
+
+/* Whoever prints that waits for no frame first, which may never come in lock-step. */
+static void the_turn_that_restores_a_link_ends_at_once(void)
+{
+    port.restore = restore_link;
+    machine.loop.lock_step = true;
+    machine.says = PORT_DOWN;
+    (void)turn(&machine);
+    const int waits = machine.waits;
+    machine.clock_us += 10000u;
+    machine.restored = PORT_DONE;
+    TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
+    TEST_ASSERT_FALSE(machine.loop.is_down);
+    TEST_ASSERT_EQUAL_INT(waits, machine.waits);
+}
+
+static void what_is_beyond_repair_ends_it(void)
+{
+    machine.says = PORT_BROKEN;
     TEST_ASSERT_EQUAL_INT(PORT_BROKEN, turn(&machine));
-    TEST_ASSERT_EQUAL_INT(0, machine.waits);
+    machine.says = PORT_DOWN; /* with nobody to restore it */
+    TEST_ASSERT_EQUAL_INT(PORT_DOWN, turn(&machine));
+    port.restore = restore_link;
+    (void)turn(&machine);
+    machine.restored = PORT_BROKEN;
+    machine.clock_us += 10000u;
+    TEST_ASSERT_EQUAL_INT(PORT_BROKEN, turn(&machine));
 }
 
 static void the_state_of_the_machine_reaches_the_bus(void)
@@ -428,7 +506,10 @@ int main(void)
     RUN_TEST(in_lock_step_time_is_that_of_the_samples);
     RUN_TEST(torque_fades_when_no_sample_comes);
     RUN_TEST(a_request_to_end_is_seen_under_full_load);
-    RUN_TEST(a_broken_port_ends_it);
+    RUN_TEST(an_outage_leaves_everything_as_it_was);
+    RUN_TEST(pauses_of_an_outage_double_up_to_a_bound);
+    RUN_TEST(the_turn_that_restores_a_link_ends_at_once);
+    RUN_TEST(what_is_beyond_repair_ends_it);
     RUN_TEST(the_state_of_the_machine_reaches_the_bus);
     return UNITY_END();
 }
