@@ -139,7 +139,7 @@ def test_fifo_overrun_is_counted_and_shown(talk: Talk, board: Board, frames: int
     assert report["overruns"] == min(1, lost), "once for a series, as RM0090's FOVR tells no more"
     assert int(report["faults"]) == (lib.LEVER_PLATFORM_OVERRUN if lost else 0)
     health = talk.report("HEALTH")
-    assert bool(int(health["faults"]) & lib.LEVER_FAULT_PLATFORM) == bool(lost)
+    assert health["fault_platform"] == bool(lost)
 
 
 def test_watchdog_is_fed_with_and_without_samples(talk: Talk, board: Board) -> None:
