@@ -130,7 +130,9 @@ static const named_speed_t *read_speed(const char *text)
     char *end = NULL;
     const unsigned long baud = strtoul(text, &end, 10);
 
-    return ((isdigit((unsigned char)text[0]) != 0) && (*end == '\0')) ? find_speed((uint32_t)baud) : NULL;
+    return ((isdigit((unsigned char)text[0]) != 0) && (*end == '\0') && (baud <= UINT32_MAX))
+               ? find_speed((uint32_t)baud)
+               : NULL;
 }
 
 /* Splits DEVICE[:BAUD] into path and speed. The path may hold colons, as those of /dev/serial/by-path do. */
