@@ -13,9 +13,11 @@ import time
 from pathlib import Path
 
 import pytest
+from lever_cdkf.host_tools import codec
 from vcan import rig
 
 SAMPLES = 250
+HEALTH, IDENTITY, LINK_HEALTH = 0x214, 0x217, 0x219
 
 
 def refusal(program: Path, interface: str) -> str:
@@ -174,7 +176,7 @@ def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, interface:
         subprocess.run(["cansend", interface, frame], check=True)
     answers += host.run(20)
     samples = 20 * (len(foreign) + len(broken) + 1)
-    tell_of_them = (0x214, 0x219)  # HEALTH and LINK_HEALTH
+    tell_of_them = (HEALTH, LINK_HEALTH)
     answers, expected = ([f for f in each if f[0] not in tell_of_them] for each in (answers, rig.in_process(samples)))
     assert answers == expected
     totals = process.stop()
@@ -204,14 +206,15 @@ def test_a_motor_command_does_not_wait_for_the_interface(start: rig.Starter, int
     host.bus.shutdown()
 
 
-@pytest.mark.requires("cansend")
-def test_another_estimator_on_the_bus_is_heard(start: rig.Starter, interface: str) -> None:
+def test_another_estimator_on_the_bus_is_noticed(start: rig.Starter, interface: str) -> None:
     """Its IDENTITY passes the receive filter."""
     process = start()
-    subprocess.run(["cansend", interface, "217#0000000000000000"], check=True)
     host = rig.Host.on(interface)
-    host.run(1)
-    assert process.stop()["frames in"] == 3
+    answers = host.run(20)
+    host.send(next(frame for frame in answers if frame[0] == IDENTITY))
+    health = [codec.decode(*frame)[1] for frame in host.run(200) if frame[0] == HEALTH]
+    assert any(each["fault_duplicate"] for each in health)
+    assert process.stop()["frames in"] == 2 * 220 + 1
     host.bus.shutdown()
 
 
