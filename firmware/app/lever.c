@@ -1,6 +1,7 @@
 /* The façade: an instance in memory of the caller, and how its parts work together. */
 #include "app/instance.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 

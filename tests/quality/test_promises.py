@@ -18,10 +18,10 @@ MAY_INCLUDE = {
     "app": {"app", "filter", "can", "model", "math"},
 }
 PORT_MAY_INCLUDE = {
-    "linux": {"port/linux", "port/slcan", "can/messages.h"},
+    "linux": {"port", "port/linux", "port/slcan", "can/messages.h"},
     "slcan": {"port/slcan"},
     "embedded": {"port/embedded"},
-    "stm32f4": {"port/stm32f4", "port/embedded", "port/slcan", "can/messages.h"},
+    "stm32f4": {"port", "port/stm32f4", "port/embedded", "port/slcan", "can/messages.h"},
 }
 SYSTEM_HEADERS = {"math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 LIBRARY_FUNCTIONS = {"memcpy", "memmove", "memset", "sqrtf"}

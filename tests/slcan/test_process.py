@@ -36,8 +36,8 @@ def link(tmp_path: Path) -> Path:
 def start(build_dir: Path, tmp_path: Path) -> Iterator[Start]:
     """start(medium, name, *options): lever_can, ended after the test."""
     with ExitStack() as stack:
-        yield lambda medium, name, *options: stack.enter_context(
-            rig.LeverCan(build_dir / "lever_can", str(name), options, tmp_path, medium)
+        yield lambda medium, name, *options, supervised=False: stack.enter_context(
+            rig.LeverCan(build_dir / "lever_can", str(name), options, tmp_path, medium, supervised=supervised)
         )
 
 
@@ -136,7 +136,7 @@ def test_a_host_that_never_reads_is_not_waited_for(start: Start, link: Path) -> 
         totals = process.stop()
     assert totals["samples"] == 4000
     assert totals["dropped"] > 0
-    assert totals["lost"] == totals["unsent"] == totals["send retries"] == 0
+    assert totals["lost"] == totals["unsent"] == totals["held"] == 0
 
 
 def bytes_read(process: rig.LeverCan) -> int:
@@ -185,6 +185,65 @@ def test_a_link_that_was_left_behind_is_replaced_and_a_file_is_not(start: Start,
     assert result.returncode == 1
     assert result.stderr == f"lever_can: {link}: cannot make the link to the pseudo-terminal: File exists\n"
     assert link.read_text() == "precious"
+
+
+def test_it_starts_again_after_it_was_killed(start: Start, link: Path) -> None:
+    """The number of its pseudo-terminal is free then, and given to the next one that is opened: ours, or another."""
+    for taken in (False, False, True):
+        process = start("pty", link)
+        process.process.kill()
+        process.process.wait()
+        time.sleep(0.05)  # file systems tell times that are this far apart
+        other = os.openpty() if taken else ()
+        again = start("pty", link)
+        there = host(link)
+        assert there.run(20) == rig.in_process(20)
+        there.bus.shutdown()
+        for file in other:
+            os.close(file)
+        again.process.kill()
+        again.process.wait()
+
+
+def test_a_link_that_is_in_use_is_not_taken_away(start: Start, link: Path, build_dir: Path) -> None:
+    process = start("pty", link)
+    process.process.send_signal(signal.SIGSTOP)
+    command = [str(build_dir / "lever_can"), "--pty", str(link)]
+    assert subprocess.run(command, capture_output=True, timeout=rig.PATIENCE_S).returncode == 1
+    process.process.send_signal(signal.SIGCONT)
+    there = host(link)
+    assert there.run(20) == rig.in_process(20)
+    there.bus.shutdown()
+    process.stop()
+
+
+# --- torque, by the clock -----------------------------------------------------------------------------------------
+
+
+def test_torque_ends_when_samples_do(start: Start, link: Path) -> None:
+    process = start("pty", link, supervised=True)
+    there = host(link)
+    there.run_with_torque()
+    asked = rig.torques(there.rest())
+    assert asked[-1] == 0.0
+    there.bus.shutdown()
+    assert process.stop()["unsent"] == 0
+
+
+def test_samples_from_before_a_stop_move_no_motor(start: Start, link: Path) -> None:
+    process = start("pty", link, supervised=True)
+    there = host(link)
+    there.run_with_torque()
+    process.process.send_signal(signal.SIGSTOP)
+    for sample in rig.samples(there.samples_sent, 20):
+        for frame in sample:
+            there.send(frame)
+    time.sleep(0.1)
+    process.process.send_signal(signal.SIGCONT)
+    answers = [frame for _ in range(20) for frame in there.answer()]
+    assert not any(rig.torques(answers))
+    there.bus.shutdown()
+    process.stop()
 
 
 # --- on a serial device -------------------------------------------------------------------------------------------
@@ -246,6 +305,17 @@ def test_it_waits_for_an_adapter_that_is_unplugged(start: Start, link: Path) -> 
     process.wait_for("link restored")
     assert process.stop()["samples"] == 2
     with suppress(OSError):
+        line.unplug()
+
+
+@pytest.mark.parametrize("name", ["pci-0000:00:14.0-usb-0:2:1.0-port0", "tty:9600"])
+def test_a_path_may_hold_colons(start: Start, tmp_path: Path, name: str) -> None:
+    """As those in /dev/serial/by-path do; 9600 is no rate where it belongs to the name."""
+    for rate in ("", ":921600"):
+        line = Line(tmp_path / name)
+        process = start("slcan", f"{tmp_path / name}{rate}")
+        assert line.read_until(b"O\r") == b"\r\rC\rS8\rO\r"
+        process.stop()
         line.unplug()
 
 

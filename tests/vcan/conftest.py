@@ -122,4 +122,6 @@ def interface() -> Iterator[str]:
 def start(build_dir: Path, tmp_path: Path, interface: str) -> Iterator[rig.Starter]:
     """Starts lever_can on the interface with further options, and ends what is left of it after the test."""
     with ExitStack() as stack:
-        yield lambda *options: stack.enter_context(rig.LeverCan(build_dir / "lever_can", interface, options, tmp_path))
+        yield lambda *options, supervised=False: stack.enter_context(
+            rig.LeverCan(build_dir / "lever_can", interface, options, tmp_path, supervised=supervised)
+        )

@@ -8,7 +8,7 @@ import re
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -87,10 +87,18 @@ class LeverCan:
     """The process lever_can, from when it is ready to the end of the context."""
 
     def __init__(
-        self, program: Path, interface: str, options: Sequence[str], folder: Path, medium: str = "can"
+        self,
+        program: Path,
+        interface: str,
+        options: Sequence[str],
+        folder: Path,
+        medium: str = "can",
+        *,
+        supervised: bool = False,
     ) -> None:
         settings = [f"--set={name}={value}" for name, value in SETTINGS.items()]
-        command = [str(program), f"--{medium}", interface, *settings, *options]
+        clock = [] if supervised else ["--lock-step"]
+        command = [str(program), f"--{medium}", interface, *clock, *settings, *options]
         self._stdout = folder / "stdout"
         self._stderr = folder / "stderr"
         with self._stdout.open("wb") as stdout, self._stderr.open("wb") as stderr:
@@ -131,6 +139,26 @@ class LeverCan:
 
 
 Starter = Callable[..., LeverCan]
+
+MOTOR_COMMAND = 0x215
+DITHER: Frame = (
+    0x120,
+    codec.encode(
+        "COMMAND",
+        0,
+        {
+            "request": "none",
+            **dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep"),
+            "dither_rms": 0.3,
+        },
+    ),
+)
+"""The command that makes the estimator ask for torque."""
+
+
+def torques(answers: Iterable[Frame]) -> list[float]:
+    """What the MOTOR_COMMANDs among them ask for [N m]."""
+    return [codec.decode(*frame)[1]["torque"] for frame in answers if frame[0] == MOTOR_COMMAND]
 
 
 def samples(first: int, count: int) -> Iterator[tuple[Frame, Frame]]:
@@ -203,6 +231,18 @@ class Host:
             assert message is not None, f"no STATE_ESTIMATE within {PATIENCE_S:g} s after {frames}"
             frames.append((message.arbitration_id, bytes(message.data)))
         return frames
+
+    def run_with_torque(self, count: int = 400) -> None:
+        """Samples until the last one is answered with torque: the estimator runs, and dither has faded in."""
+        self.run(count // 2)
+        self.send(DITHER)
+        self.run(count // 2)
+        wait_until(lambda: any(torques(self.run(1))), "torque")
+
+    def rest(self) -> list[Frame]:
+        """What comes until nothing has come for 0.2 s."""
+        messages = iter(lambda: self.bus.recv(0.2), None)
+        return [(message.arbitration_id, bytes(message.data)) for message in messages if message is not None]
 
     def nothing_more(self) -> bool:
         """Whether no further frame comes."""

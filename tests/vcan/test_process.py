@@ -13,9 +13,11 @@ import time
 from pathlib import Path
 
 import pytest
+from lever_cdkf.host_tools import codec
 from vcan import rig
 
 SAMPLES = 250
+HEALTH, IDENTITY, LINK_HEALTH = 0x214, 0x217, 0x219
 
 
 def refusal(program: Path, interface: str) -> str:
@@ -148,7 +150,7 @@ def test_no_frame_is_dropped_when_the_interface_has_no_room(start: rig.Starter, 
     answers = host.run(SAMPLES)
     assert host.nothing_more()
     totals = process.stop()
-    assert totals["send retries"] > 0
+    assert totals["held"] > 0
     assert totals["frames out"] == len(answers)
     assert totals["unsent"] == 0
     assert answers == rig.in_process(SAMPLES, publish_period=0.002)
@@ -174,12 +176,45 @@ def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, interface:
         subprocess.run(["cansend", interface, frame], check=True)
     answers += host.run(20)
     samples = 20 * (len(foreign) + len(broken) + 1)
-    health = 0x214  # tells of the broken ones
-    assert [frame for frame in answers if frame[0] != health] == [f for f in rig.in_process(samples) if f[0] != health]
+    tell_of_them = (HEALTH, LINK_HEALTH)
+    answers, expected = ([f for f in each if f[0] not in tell_of_them] for each in (answers, rig.in_process(samples)))
+    assert answers == expected
     totals = process.stop()
     assert totals["samples"] == samples
     assert totals["corrupt"] == len(broken)
     assert totals["frames in"] == 2 * samples + len(broken)
+    host.bus.shutdown()
+
+
+def test_a_motor_command_does_not_wait_for_the_interface(start: rig.Starter, interface: str) -> None:
+    """Stopped, the process has a sample to answer when the interface goes down. Once this was sent 3 s later."""
+    process = start(supervised=True)
+    host = rig.Host.on(interface)
+    host.run_with_torque()
+    process.process.send_signal(signal.SIGSTOP)
+    for frame in next(rig.samples(host.samples_sent, 1)):
+        host.send(frame)
+    rig.ip("link", "set", interface, "down")
+    process.process.send_signal(signal.SIGCONT)
+    process.wait_for("link lost")
+    time.sleep(0.2)
+    rig.ip("link", "set", interface, "up")
+    host.reopen(interface)  # before the next attempt to restore the link
+    process.wait_for("link restored")
+    assert not any(rig.torques(host.rest()))
+    process.stop()
+    host.bus.shutdown()
+
+
+def test_another_estimator_on_the_bus_is_noticed(start: rig.Starter, interface: str) -> None:
+    """Its IDENTITY passes the receive filter."""
+    process = start()
+    host = rig.Host.on(interface)
+    answers = host.run(20)
+    host.send(next(frame for frame in answers if frame[0] == IDENTITY))
+    health = [codec.decode(*frame)[1] for frame in host.run(200) if frame[0] == HEALTH]
+    assert any(each["fault_duplicate"] for each in health)
+    assert process.stop()["frames in"] == 2 * 220 + 1
     host.bus.shutdown()
 
 

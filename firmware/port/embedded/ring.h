@@ -1,8 +1,9 @@
 /* A ring buffer of bytes between an interrupt and the loop: one side puts, the other gets, and neither waits or locks.
  *
- * A record (a byte, a line, a frame) goes in whole or not at all. The indices count for ever and wrap at 2^32; the side that
- * puts writes `put` only, the side that gets writes `got` only, each after the bytes. Everything shared is volatile, so that
- * a compiler keeps this order; a single core sees its own in order. Several cores would need barriers.
+ * A record (a byte, a line, a frame) goes in whole or not at all. The indices count for ever and wrap at 2^32; the side
+ * that puts writes `put` only, the side that gets writes `got` only, each after the bytes. Everything shared is
+ * volatile, so that a compiler keeps this order; a single core sees its own in order. Several cores would need
+ * barriers.
  */
 #ifndef LEVER_PORT_EMBEDDED_RING_H
 #define LEVER_PORT_EMBEDDED_RING_H

@@ -17,9 +17,31 @@ static lever_t *start(lever_memory_t *memory, lever_config_t *config, uint8_t es
     return lever_init(memory, config);
 }
 
+/* Of a word as four bytes, the lowest first, whatever this machine's order is. */
+static uint32_t crc_of_word(uint32_t crc, uint32_t word)
+{
+    const uint8_t bytes[4] = {(uint8_t)word, (uint8_t)(word >> 8), (uint8_t)(word >> 16), (uint8_t)(word >> 24)};
+
+    return crc32_update(crc, bytes, sizeof bytes);
+}
+
 static uint32_t crc_of_frame(uint32_t crc, const lever_frame_t *frame)
 {
-    return crc32_update(crc32_update(crc, &frame->id, sizeof frame->id), frame->data, frame->length);
+    return crc32_update(crc_of_word(crc, frame->id), frame->data, frame->length);
+}
+
+/* Up to nis it consists of words. */
+static uint32_t crc_of_estimate(uint32_t crc, const lever_estimate_t *estimate)
+{
+    const uint8_t *const bytes = (const uint8_t *)estimate;
+    uint32_t result = crc;
+
+    for (size_t at = 0u; at < offsetof(lever_estimate_t, nis_size); at += sizeof(uint32_t)) {
+        uint32_t word = 0u;
+        (void)memcpy(&word, &bytes[at], sizeof word);
+        result = crc_of_word(result, word);
+    }
+    return result;
 }
 
 static uint32_t crc_of_run(lever_t *lever)
@@ -40,7 +62,7 @@ static uint32_t crc_of_run(lever_t *lever)
         }
     }
     lever_estimate(lever, &estimate);
-    return crc32_update(crc, &estimate, offsetof(lever_estimate_t, nis_size)); /* words only, up to here: no padding */
+    return crc_of_estimate(crc, &estimate);
 }
 
 bool self_test(lever_memory_t *memory)

@@ -5,13 +5,13 @@
 #include <string.h>
 
 #include "lever_cdkf.h"
-#include "port/linux/loop.h"
 #include "port/linux/options.h"
 #include "port/linux/settings.h"
 #include "port/linux/slcan_host.h"
 #include "port/linux/slcan_peer.h"
 #include "port/linux/socketcan.h"
 #include "port/linux/stop.h"
+#include "port/loop.h"
 
 enum { EXIT_GOOD = 0, EXIT_BAD_INTERFACE = 1, EXIT_BAD_USAGE = 2 };
 
@@ -20,7 +20,8 @@ typedef struct session {
     socketcan_t socketcan; /* of these three, the one that options->medium says */
     slcan_host_t slcan_host;
     slcan_peer_t slcan_peer;
-    transport_t transport;
+    const char *reason; /* of it: what is wrong */
+    port_t port;
     loop_t loop;
 } session_t;
 
@@ -31,23 +32,44 @@ static void print_bus_state(void *context, const char *words)
     (void)fprintf(stderr, "lever_can: %s: %s\n", session->options->interface, words);
 }
 
-static void print_event(void *context, enum loop_event event)
+static void print_link(const session_t *session)
+{
+    const char *const interface = session->options->interface;
+
+    if (session->loop.is_down) {
+        (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
+            session->reason);
+    } else {
+        (void)fprintf(stderr, "lever_can: %s: link restored\n", interface);
+    }
+}
+
+static void print_mode(const session_t *session)
 {
     static const char *const modes[] = {"init", "align", "run", "coast", "frozen", "fault"};
-    const session_t *session = context;
-    const char *interface = session->options->interface;
 
-    if (event == LOOP_EVENT_DOWN) {
-        (void)fprintf(stderr, "lever_can: %s: link lost (%s); waiting for it with the estimate kept\n", interface,
-            session->transport.reason(session->transport.self));
-    } else if (event == LOOP_EVENT_UP) {
-        (void)fprintf(stderr, "lever_can: %s: link restored\n", interface);
-    } else if (session->options->verbose) {
-        (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", interface, modes[session->loop.mode],
-            session->loop.totals.samples);
-    } else {
-        /* a change of mode interests only who asks for it */
+    (void)fprintf(stderr, "lever_can: %s: mode %s at sample %" PRIu64 "\n", session->options->interface,
+        modes[session->loop.mode], session->loop.totals.samples);
+}
+
+/* Turns the loop until it is to end (PORT_NOTHING) or cannot go on. */
+static enum port_result run_loop(session_t *session)
+{
+    loop_t *const loop = &session->loop;
+    enum port_result result = PORT_DONE;
+
+    while (result == PORT_DONE) {
+        const enum lever_mode mode = loop->mode;
+        const bool was_down = loop->is_down;
+        result = loop_turn(loop);
+        if (loop->is_down != was_down) {
+            print_link(session);
+        }
+        if (session->options->verbose && (loop->mode != mode)) {
+            print_mode(session);
+        }
     }
+    return result;
 }
 
 /* What the medium itself has lost or refused. */
@@ -74,28 +96,29 @@ static void print_totals(const session_t *session, const lever_t *lever)
         session->options->interface, totals->received, totals->sent, totals->samples, health.lost, health.corrupt,
         health.late);
     print_losses(session);
-    (void)printf(", %u unsent, %" PRIu64 " send retries, %" PRIu64 " outages\n", session->loop.has_unsent ? 1u : 0u,
-        totals->retries, totals->outages);
+    (void)printf(", %u unsent, %" PRIu64 " held, %" PRIu64 " stale, %" PRIu64 " outages\n",
+        session->loop.is_held ? 1u : 0u, totals->held, totals->stale, totals->outages);
 }
 
-/* Opens the medium and fills in the transport, whose reason() says what is wrong if that fails. */
+/* Opens the medium and gets its port; session->reason says what is wrong if that fails. */
 static bool open_medium(session_t *session, int stop)
 {
     const char *const interface = session->options->interface;
     bool good = false;
 
+    session->port = slcan_peer_port(&session->slcan_peer);
+    session->reason = session->slcan_peer.tty.reason;
     switch (session->options->medium) {
     case OPTIONS_MEDIUM_SLCAN:
         good = slcan_host_open(&session->slcan_host, interface, stop);
-        session->transport = slcan_host_transport(&session->slcan_host);
+        session->port = slcan_host_port(&session->slcan_host);
+        session->reason = session->slcan_host.tty.reason;
         break;
     case OPTIONS_MEDIUM_PTY:
         good = slcan_peer_open_pty(&session->slcan_peer, interface, stop);
-        session->transport = slcan_peer_transport(&session->slcan_peer);
         break;
     case OPTIONS_MEDIUM_SERIAL:
         good = slcan_peer_open_device(&session->slcan_peer, interface, stop);
-        session->transport = slcan_peer_transport(&session->slcan_peer);
         break;
     case OPTIONS_MEDIUM_CAN:
     case OPTIONS_MEDIUM_NONE:
@@ -103,7 +126,8 @@ static bool open_medium(session_t *session, int stop)
         good = socketcan_open(&session->socketcan, interface, stop);
         session->socketcan.on_bus_state = print_bus_state;
         session->socketcan.context = session;
-        session->transport = socketcan_transport(&session->socketcan);
+        session->port = socketcan_port(&session->socketcan);
+        session->reason = session->socketcan.reason;
         break;
     }
     return good;
@@ -129,8 +153,13 @@ static void close_medium(session_t *session)
 
 static void print_reason(const session_t *session)
 {
-    (void)fprintf(
-        stderr, "lever_can: %s: %s\n", session->options->interface, session->transport.reason(session->transport.self));
+    (void)fprintf(stderr, "lever_can: %s: %s\n", session->options->interface, session->reason);
+}
+
+/* Whether the estimator's host is at the other end of a line. */
+static bool is_adapter(const options_t *options)
+{
+    return (options->medium == OPTIONS_MEDIUM_PTY) || (options->medium == OPTIONS_MEDIUM_SERIAL);
 }
 
 static int run(const options_t *options)
@@ -149,16 +178,16 @@ static int run(const options_t *options)
         close_medium(&session);
         return EXIT_BAD_INTERFACE;
     }
-    loop_init(&session.loop, &session.transport, lever);
-    session.loop.on_event = print_event;
-    session.loop.context = &session;
+    loop_init(&session.loop, &session.port, lever,
+        is_adapter(options) ? LOOP_DROP : LOOP_HOLD); /* a bus is waited for, a host that does not read is not */
+    session.loop.lock_step = options->lock_step;
     if (options->verbose) {
         settings_write(&options->config, stdout);
     }
     (void)printf("lever_can: %s: ready\n", options->interface);
     (void)fflush(stdout);
 
-    const bool good = loop_run(&session.loop);
+    const bool good = run_loop(&session) == PORT_NOTHING;
     if (!good) {
         print_reason(&session);
     }

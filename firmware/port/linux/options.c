@@ -9,10 +9,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#ifndef LEVER_VERSION
-#define LEVER_VERSION "(unversioned build)"
-#endif
-
 static const char help[] =
     "lever_can: estimates a pilot's mass, damping and stiffness on the collective lever, on a CAN interface.\n"
     "\n"
@@ -38,24 +34,26 @@ static const char help[] =
     "  --preload NAME       where the springs rest: fixed, or at a trim angle that is followed\n"
     "  --estimator NAME     how state and parameters are estimated together\n"
     "  --adaptation NAME    how the parameter noise is set\n"
+    "  --lock-step          time is that of the samples alone: for simulations that may pause; never beside a motor\n"
     "  --verbose            also print all settings, and every change of mode\n"
     "  --help, --version    print this, or the version, and exit\n"
     "\n"
     "Options take effect in the order given. SIGINT (Ctrl-C) or SIGTERM ends it with a line of totals and status 0.\n"
     "If the interface goes down or away, or the host hangs up, it waits and goes on with the estimate as it was.\n"
+    "Without --lock-step torque fades to zero when no sample comes, and a MOTOR_COMMAND older than 20 ms is dropped.\n"
     "Exit status 1: the interface cannot be used; 2: the command line or a settings file is wrong.\n"
     "\n"
     "A session on a virtual interface:\n"
     "\n"
     "    sudo modprobe vcan\n"
     "    sudo ip link add dev vcan0 type vcan && sudo ip link set vcan0 up\n"
-    "    lever_can --can vcan0 --set theta_noise=0.002 &\n"
+    "    lever_can --can vcan0 --lock-step --set theta_noise=0.002 &\n"
     "    candump -L vcan0 > session.log &             # watch or record everything on the bus\n"
     "    lever sim steady --interface socketcan --channel vcan0\n"
     "\n"
     "The same without a kernel that has CAN:\n"
     "\n"
-    "    lever_can --pty lever0 --set theta_noise=0.002 &\n"
+    "    lever_can --pty lever0 --lock-step --set theta_noise=0.002 &\n"
     "    lever sim steady --interface slcan --channel lever0\n"
     "\n";
 
@@ -70,6 +68,7 @@ static const struct option known[] = {
     {"preload", required_argument, NULL, '='},
     {"estimator", required_argument, NULL, '='},
     {"adaptation", required_argument, NULL, '='},
+    {"lock-step", no_argument, NULL, 'k'},
     {"verbose", no_argument, NULL, 'v'},
     {"help", no_argument, NULL, 'h'},
     {"version", no_argument, NULL, 'V'},
@@ -128,6 +127,9 @@ static bool read_option(options_t *options, int option, const char *name, const 
         break;
     case '=':
         good = settings_set(&options->config, name, argument, error);
+        break;
+    case 'k':
+        options->lock_step = true;
         break;
     case 'v':
         options->verbose = true;
@@ -194,5 +196,5 @@ void options_print_help(void)
 
 void options_print_version(void)
 {
-    (void)puts("lever_can " LEVER_VERSION);
+    (void)printf("lever_can %d.%d.%d\n", LEVER_VERSION_MAJOR, LEVER_VERSION_MINOR, LEVER_VERSION_PATCH);
 }

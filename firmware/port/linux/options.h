@@ -22,6 +22,7 @@ typedef struct options {
     enum options_medium medium;
     const char *interface; /* its name; of argv */
     bool verbose;
+    bool lock_step;        /* see loop.h */
     lever_config_t config; /* checked */
 } options_t;
 

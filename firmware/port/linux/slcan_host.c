@@ -2,8 +2,11 @@
 
 #include <string.h>
 
-/* Ends what the adapter may have had of a line, and goes on the bus at 1 Mbit/s. The first C is refused if the channel was
- * closed, which is as good. */
+#include "can/messages.h"
+#include "port/linux/clock.h"
+
+/* Ends what the adapter may have had of a line, and goes on the bus at 1 Mbit/s. The first C is refused if the channel
+ * was closed, which is as good. */
 static const char opening[] = "\r\rC\rS8\rO\r";
 static const char closing[] = "C\r";
 
@@ -22,17 +25,15 @@ void slcan_host_close(slcan_host_t *host)
     tty_close(&host->tty);
 }
 
-/* --- callbacks --------------------------------------------------------------------------------------------------- */
-
-static enum transport_result receive_frame(void *self, lever_frame_t *frame)
+static enum port_result receive_frame(void *self, lever_frame_t *frame)
 {
     slcan_host_t *host = self;
     slcan_frame_t received;
     uint8_t byte = 0u;
 
     for (uint32_t bytes = 0u; bytes < (uint32_t)TTY_IN_BYTES; bytes++) {
-        const enum transport_result result = tty_take(&host->tty, &byte);
-        if (result != TRANSPORT_OK) {
+        const enum port_result result = tty_take(&host->tty, &byte);
+        if (result != PORT_DONE) {
             return result;
         }
         const enum slcan_end end = slcan_line_take(&host->line, byte);
@@ -42,35 +43,24 @@ static enum transport_result receive_frame(void *self, lever_frame_t *frame)
         if ((end == SLCAN_CR) && slcan_read_frame(&host->line, true, &received) && !received.extended &&
             !received.remote) {
             *frame = received.frame;
-            return TRANSPORT_OK;
+            return PORT_DONE;
         }
     }
-    return TRANSPORT_EMPTY;
+    return PORT_NOTHING;
 }
 
-static enum transport_result send_frame(void *self, const lever_frame_t *frame)
+static enum port_result send_frame(void *self, const lever_frame_t *frame)
 {
     slcan_host_t *host = self;
     const slcan_frame_t sent = {.frame = *frame};
     char text[SLCAN_LINE_BYTES];
 
-    if (!tty_put(&host->tty, text, slcan_write_frame(&sent, SLCAN_NO_TIME, text))) {
-        return TRANSPORT_FULL;
+    if (((frame->id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && tty_is_slow(&host->tty)) ||
+        !tty_put(&host->tty, text, slcan_write_frame(&sent, SLCAN_NO_TIME, text))) {
+        return PORT_NOTHING;
     }
     host->has_sent = true;
-    return TRANSPORT_OK;
-}
-
-static enum transport_result restore_link(void *self)
-{
-    slcan_host_t *host = self;
-    const enum transport_result result = tty_restore(&host->tty);
-
-    if (result == TRANSPORT_OK) {
-        (void)memset(&host->line, 0, sizeof host->line);
-        (void)tty_put(&host->tty, opening, sizeof opening - 1u);
-    }
-    return result;
+    return PORT_DONE;
 }
 
 static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
@@ -80,23 +70,26 @@ static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
     return tty_wait(&host->tty, for_frame, timeout_ms);
 }
 
-static const char *last_reason(void *self)
+static enum port_result restore_link(void *self)
 {
-    const slcan_host_t *host = self;
+    slcan_host_t *host = self;
+    const enum port_result result = tty_restore(&host->tty);
 
-    return host->tty.reason;
+    if (result == PORT_DONE) {
+        (void)memset(&host->line, 0, sizeof host->line);
+        (void)tty_put(&host->tty, opening, sizeof opening - 1u);
+    }
+    return result;
 }
 
-transport_t slcan_host_transport(slcan_host_t *host)
+port_t slcan_host_port(slcan_host_t *host)
 {
-    const transport_t transport = {
-        .self = host,
+    const port_t port = {.self = host,
         .receive = receive_frame,
         .send = send_frame,
-        .restore = restore_link,
         .wait = wait_frame,
-        .reason = last_reason,
-    };
+        .now_us = clock_now_us,
+        .restore = restore_link};
 
-    return transport;
+    return port;
 }

@@ -1,7 +1,7 @@
-/* A transport on which this program is the host of an SLCAN adapter: a USB-serial one, say, with a real CAN bus behind it.
+/* A port on which this program is the host of an SLCAN adapter: a USB-serial one, say, with a real CAN bus behind it.
  *
- * It closes the adapter's channel, sets 1 Mbit/s, opens it, and closes it at the end. It does not wait for the adapter's
- * answers, because not every adapter gives them; it counts those that refuse.
+ * It closes the adapter's channel, sets 1 Mbit/s, opens it, and closes it at the end. It does not wait for the
+ * adapter's answers, because not every adapter gives them; it counts those that refuse.
  */
 #ifndef LEVER_PORT_SLCAN_HOST_H
 #define LEVER_PORT_SLCAN_HOST_H
@@ -9,8 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "port/linux/transport.h"
 #include "port/linux/tty.h"
+#include "port/port.h"
 #include "port/slcan/slcan.h"
 
 typedef struct slcan_host {
@@ -20,13 +20,14 @@ typedef struct slcan_host {
     uint32_t refused; /* answers of the adapter that refuse (BEL), since the first frame was sent */
 } slcan_host_t;
 
-/* Opens `device` as tty_open_device() does, and the channel of the adapter there; host->tty.reason says what is wrong. */
+/* Opens `device` as tty_open_device() does, and the channel of the adapter there; host->tty.reason says what is
+ * wrong. */
 bool slcan_host_open(slcan_host_t *host, const char *device, int stop);
 
 /* Closes the channel and releases what open has taken; also right after a failed open. */
 void slcan_host_close(slcan_host_t *host);
 
-/* The callbacks; the result refers to `host`, which must outlive it. */
-transport_t slcan_host_transport(slcan_host_t *host);
+/* The port; it refers to `host`, which must outlive it. */
+port_t slcan_host_port(slcan_host_t *host);
 
 #endif

@@ -1,15 +1,17 @@
-/* A transport on which this program is an SLCAN adapter (port/slcan/slcan.h): its host, such as python-can's slcan or slcand,
- * is at the other end of a pseudo-terminal or serial line, and hears and feeds the estimator as if that were on a bus.
+/* A port on which this program is an SLCAN adapter (port/slcan/slcan.h): its host, such as python-can's slcan or
+ * slcand, is at the other end of a pseudo-terminal or serial line, and hears and feeds the estimator as if that were on
+ * a bus.
  *
- * It never waits for the host: what finds no room is dropped and counted, in peer->slcan.counts.
+ * What the host does not read finds no room, and is counted in peer->slcan.counts: for a loop that drops it
+ * (LOOP_DROP).
  */
 #ifndef LEVER_PORT_SLCAN_PEER_H
 #define LEVER_PORT_SLCAN_PEER_H
 
 #include <stdbool.h>
 
-#include "port/linux/transport.h"
 #include "port/linux/tty.h"
+#include "port/port.h"
 #include "port/slcan/slcan.h"
 
 typedef struct slcan_peer {
@@ -24,7 +26,7 @@ bool slcan_peer_open_device(slcan_peer_t *peer, const char *device, int stop);
 /* Releases what open has taken; also right after a failed open. */
 void slcan_peer_close(slcan_peer_t *peer);
 
-/* The callbacks; the result refers to `peer`, which must outlive it and stay where it is since it was opened. */
-transport_t slcan_peer_transport(slcan_peer_t *peer);
+/* The port; it refers to `peer`, which must outlive it and stay where it is since it was opened. */
+port_t slcan_peer_port(slcan_peer_t *peer);
 
 #endif

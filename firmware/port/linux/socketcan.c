@@ -17,8 +17,12 @@
 #include <linux/if_arp.h>
 
 #include "can/messages.h"
+#include "port/linux/clock.h"
 
-enum { RECEIVE_BUFFER_BYTES = 4 * 1024 * 1024 }; /* about 4000 waiting frames: seconds of a full 1 Mbit/s bus */
+enum {
+    RECEIVE_BUFFER_BYTES = 4 * 1024 * 1024, /* about 4000 waiting frames: seconds of a full 1 Mbit/s bus */
+    MOST_SKIPPED = 64                       /* error frames in one call of receive_frame() */
+};
 
 static void explain(socketcan_t *socketcan, const char *format, ...)
 {
@@ -45,7 +49,7 @@ static void explain_no_socket(socketcan_t *socketcan)
 }
 
 /* Finds the index of the interface and makes sure that it is a CAN interface and up. */
-static enum transport_result find_interface(socketcan_t *socketcan, int *index)
+static enum port_result find_interface(socketcan_t *socketcan, int *index)
 {
     struct ifreq request;
 
@@ -60,29 +64,29 @@ static enum transport_result find_interface(socketcan_t *socketcan, int *index)
         } else {
             explain(socketcan, "%s", strerror(errno));
         }
-        return TRANSPORT_DOWN;
+        return PORT_DOWN;
     }
     if (request.ifr_hwaddr.sa_family != ARPHRD_CAN) {
         explain(socketcan, "not a CAN interface");
-        return TRANSPORT_DOWN;
+        return PORT_DOWN;
     }
     if ((ioctl(socketcan->socket, SIOCGIFFLAGS, &request) != 0) || ((request.ifr_flags & IFF_UP) == 0)) {
         explain(socketcan, "the interface is down; bring it up by: ip link set %s up", socketcan->interface);
-        return TRANSPORT_DOWN;
+        return PORT_DOWN;
     }
     if (ioctl(socketcan->socket, SIOCGIFINDEX, &request) != 0) {
         explain(socketcan, "%s", strerror(errno));
-        return TRANSPORT_DOWN;
+        return PORT_DOWN;
     }
     *index = request.ifr_ifindex;
-    return TRANSPORT_OK;
+    return PORT_DONE;
 }
 
-/* Only our input frames, and the error frames that tell of a change of condition (passing bus errors come by the
- * thousand). Own frames do not come back: that is the kernel's default, CAN_RAW_RECV_OWN_MSGS off. */
+/* Only the frames that the estimator takes, and the error frames that tell of a change of condition (passing bus errors
+ * come by the thousand). Own frames do not come back: that is the kernel's default, CAN_RAW_RECV_OWN_MSGS off. */
 static bool set_options(const socketcan_t *socketcan)
 {
-    static const uint32_t inputs[] = {MESSAGE_LEVER_SAMPLE_ID, MESSAGE_BASE_SAMPLE_ID, MESSAGE_COMMAND_ID};
+    static const uint32_t inputs[] = PORT_INPUTS;
     struct can_filter filter[sizeof inputs / sizeof inputs[0]];
     const can_err_mask_t errors = CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED;
     const int count_overflow = 1;
@@ -101,28 +105,28 @@ static bool set_options(const socketcan_t *socketcan)
            (setsockopt(socketcan->socket, SOL_SOCKET, SO_RXQ_OVFL, &count_overflow, sizeof count_overflow) == 0);
 }
 
-static enum transport_result open_socket(socketcan_t *socketcan)
+static enum port_result open_socket(socketcan_t *socketcan)
 {
     struct sockaddr_can address;
     int index = 0;
-    enum transport_result result = TRANSPORT_DOWN;
+    enum port_result result = PORT_DOWN;
 
     socketcan->socket = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
     if (socketcan->socket < 0) {
         explain_no_socket(socketcan);
-        return TRANSPORT_BROKEN;
+        return PORT_BROKEN;
     }
     result = find_interface(socketcan, &index);
-    if (result == TRANSPORT_OK) {
+    if (result == PORT_DONE) {
         (void)memset(&address, 0, sizeof address);
         address.can_family = AF_CAN;
         address.can_ifindex = index;
         if (!set_options(socketcan) || (bind(socketcan->socket, (struct sockaddr *)&address, sizeof address) != 0)) {
             explain(socketcan, "cannot listen: %s", strerror(errno));
-            result = TRANSPORT_DOWN;
+            result = PORT_DOWN;
         }
     }
-    if (result != TRANSPORT_OK) {
+    if (result != PORT_DONE) {
         socketcan_close(socketcan);
     }
     return result;
@@ -138,7 +142,7 @@ bool socketcan_open(socketcan_t *socketcan, const char *interface, int stop)
         return false;
     }
     (void)memcpy(socketcan->interface, interface, strlen(interface) + 1u);
-    return open_socket(socketcan) == TRANSPORT_OK;
+    return open_socket(socketcan) == PORT_DONE;
 }
 
 void socketcan_close(socketcan_t *socketcan)
@@ -151,12 +155,12 @@ void socketcan_close(socketcan_t *socketcan)
 
 /* --- callbacks --------------------------------------------------------------------------------------------------- */
 
-static enum transport_result failure(socketcan_t *socketcan)
+static enum port_result failure(socketcan_t *socketcan)
 {
     const int error = errno;
 
     explain(socketcan, "%s", strerror(error));
-    return ((error == ENETDOWN) || (error == ENODEV) || (error == ENXIO)) ? TRANSPORT_DOWN : TRANSPORT_BROKEN;
+    return ((error == ENETDOWN) || (error == ENODEV) || (error == ENXIO)) ? PORT_DOWN : PORT_BROKEN;
 }
 
 /* The most serious condition that an error frame tells of, in words; NULL when there is none. */
@@ -208,37 +212,51 @@ static void count_overflow(socketcan_t *socketcan, struct msghdr *message)
     }
 }
 
-static enum transport_result receive_frame(void *self, lever_frame_t *frame)
+/* Reads the next frame; one of another size becomes an error frame that tells of nothing. */
+static enum port_result read_frame(socketcan_t *socketcan, struct can_frame *received)
 {
-    socketcan_t *socketcan = self;
-    struct can_frame received;
     union {
         struct cmsghdr aligned;
         uint8_t bytes[CMSG_SPACE(sizeof(uint32_t))];
     } control;
-    struct iovec part = {.iov_base = &received, .iov_len = sizeof received};
+    struct iovec part = {.iov_base = received, .iov_len = sizeof *received};
     struct msghdr message = {
         .msg_iov = &part, .msg_iovlen = 1u, .msg_control = &control, .msg_controllen = sizeof control};
 
     const ssize_t size = recvmsg(socketcan->socket, &message, 0);
     if (size < 0) {
-        return ((errno == EAGAIN) || (errno == EINTR)) ? TRANSPORT_EMPTY : failure(socketcan);
+        return ((errno == EAGAIN) || (errno == EINTR)) ? PORT_NOTHING : failure(socketcan);
     }
     count_overflow(socketcan, &message);
-    if ((size_t)size != sizeof received) {
-        return TRANSPORT_EMPTY;
+    if ((size_t)size != sizeof *received) {
+        received->can_id = CAN_ERR_FLAG;
     }
-    if ((received.can_id & CAN_ERR_FLAG) != 0u) {
-        take_error_frame(socketcan, &received);
-        return TRANSPORT_EMPTY;
-    }
-    frame->id = received.can_id & CAN_SFF_MASK;
-    frame->length = received.can_dlc;
-    (void)memcpy(frame->data, received.data, sizeof frame->data);
-    return TRANSPORT_OK;
+    return PORT_DONE;
 }
 
-static enum transport_result send_frame(void *self, const lever_frame_t *frame)
+static enum port_result receive_frame(void *self, lever_frame_t *frame)
+{
+    socketcan_t *socketcan = self;
+    struct can_frame received;
+    enum port_result result = PORT_DONE;
+
+    for (uint32_t skipped = 0u; skipped < (uint32_t)MOST_SKIPPED; skipped++) {
+        result = read_frame(socketcan, &received);
+        if ((result != PORT_DONE) || ((received.can_id & CAN_ERR_FLAG) == 0u)) {
+            break;
+        }
+        take_error_frame(socketcan, &received);
+        result = PORT_NOTHING;
+    }
+    if (result == PORT_DONE) {
+        frame->id = received.can_id & CAN_SFF_MASK;
+        frame->length = received.can_dlc;
+        (void)memcpy(frame->data, received.data, sizeof frame->data);
+    }
+    return result;
+}
+
+static enum port_result send_frame(void *self, const lever_frame_t *frame)
 {
     socketcan_t *socketcan = self;
     struct can_frame sent;
@@ -248,10 +266,10 @@ static enum transport_result send_frame(void *self, const lever_frame_t *frame)
     sent.can_dlc = frame->length;
     (void)memcpy(sent.data, frame->data, sizeof sent.data);
     if (send(socketcan->socket, &sent, sizeof sent, 0) == (ssize_t)sizeof sent) {
-        return TRANSPORT_OK;
+        return PORT_DONE;
     }
     const bool full = (errno == ENOBUFS) || (errno == EAGAIN) || (errno == EINTR) || (errno == ENOMEM);
-    return full ? TRANSPORT_FULL : failure(socketcan);
+    return full ? PORT_NOTHING : failure(socketcan);
 }
 
 /* A socket outlives its interface going down and up, but is unbound for good when the interface is deleted. */
@@ -264,14 +282,14 @@ static bool is_bound_to(const socketcan_t *socketcan, int index)
     return (getsockname(socketcan->socket, (struct sockaddr *)&address, &size) == 0) && (address.can_ifindex == index);
 }
 
-static enum transport_result restore_link(void *self)
+static enum port_result restore_link(void *self)
 {
     socketcan_t *socketcan = self;
     int index = 0;
 
     if (socketcan->socket >= 0) {
-        const enum transport_result result = find_interface(socketcan, &index);
-        if ((result != TRANSPORT_OK) || is_bound_to(socketcan, index)) {
+        const enum port_result result = find_interface(socketcan, &index);
+        if ((result != PORT_DONE) || is_bound_to(socketcan, index)) {
             return result;
         }
         socketcan_close(socketcan);
@@ -289,23 +307,14 @@ static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
     return (watched[0].revents & POLLIN) == 0;
 }
 
-static const char *last_reason(void *self)
+port_t socketcan_port(socketcan_t *socketcan)
 {
-    const socketcan_t *socketcan = self;
-
-    return socketcan->reason;
-}
-
-transport_t socketcan_transport(socketcan_t *socketcan)
-{
-    const transport_t transport = {
-        .self = socketcan,
+    const port_t port = {.self = socketcan,
         .receive = receive_frame,
         .send = send_frame,
-        .restore = restore_link,
         .wait = wait_frame,
-        .reason = last_reason,
-    };
+        .now_us = clock_now_us,
+        .restore = restore_link};
 
-    return transport;
+    return port;
 }

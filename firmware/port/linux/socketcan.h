@@ -1,4 +1,4 @@
-/* A transport over a SocketCAN interface: classic frames with 11-bit identifiers, through a raw socket. */
+/* A port over a SocketCAN interface: classic frames with 11-bit identifiers, through a raw socket. */
 #ifndef LEVER_PORT_SOCKETCAN_H
 #define LEVER_PORT_SOCKETCAN_H
 
@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "port/linux/transport.h"
+#include "port/port.h"
 
 typedef struct socketcan {
     char interface[IF_NAMESIZE];
@@ -17,7 +17,7 @@ typedef struct socketcan {
     const char *bus_state;       /* the last condition of the bus that was reported, NULL: none */
     void (*on_bus_state)(void *context, const char *words); /* bus-off and the like, once a change; may be NULL */
     void *context;
-    char reason[256];
+    char reason[256]; /* of the last failure, in words; never empty after one */
 } socketcan_t;
 
 /* Opens `interface` ("vcan0"), which must exist and be up. `stop` is a descriptor, see stop.h. Returns false when that
@@ -27,7 +27,8 @@ bool socketcan_open(socketcan_t *socketcan, const char *interface, int stop);
 /* Releases what open has taken; also right after a failed open. */
 void socketcan_close(socketcan_t *socketcan);
 
-/* The callbacks; the result refers to `socketcan`, which must outlive it. */
-transport_t socketcan_transport(socketcan_t *socketcan);
+/* The port; it refers to `socketcan`, which must outlive it. What the kernel has taken of it can no longer be dropped:
+ * a queue of ten frames on a usual CAN interface (txqueuelen). */
+port_t socketcan_port(socketcan_t *socketcan);
 
 #endif

@@ -2,6 +2,7 @@
 
 #include "port/linux/tty.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -11,6 +12,7 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -71,13 +73,34 @@ static bool make_raw(const tty_t *tty)
     return tcsetattr(tty->file, TCSANOW, &mode) == 0;
 }
 
-/* Makes the link, in the place of one that a process which was killed has left behind. */
-static bool make_link(tty_t *tty, const char *link)
+static bool is_later(struct timespec one, struct timespec other)
+{
+    return (one.tv_sec != other.tv_sec) ? (one.tv_sec > other.tv_sec) : (one.tv_nsec > other.tv_nsec);
+}
+
+/* Whether a killed process has left `link` behind. Its pseudo-terminal ended with it, and the number may have been
+ * given to another since: to ours, or to one that is younger than the link. */
+static bool is_left_behind(const char *link, const char *slave)
 {
     struct stat state;
+    struct stat target;
+    struct stat own;
+    bool is_left = false;
+
+    if ((lstat(link, &state) == 0) && S_ISLNK(state.st_mode)) {
+        is_left = stat(link, &target) != 0;
+        if (!is_left && (stat(slave, &own) == 0) && (major(target.st_rdev) == major(own.st_rdev))) {
+            is_left = (target.st_rdev == own.st_rdev) || is_later(target.st_ctim, state.st_ctim);
+        }
+    }
+    return is_left;
+}
+
+static bool make_link(tty_t *tty, const char *link)
+{
     const char *const slave = ptsname(tty->file);
 
-    if ((lstat(link, &state) == 0) && S_ISLNK(state.st_mode) && (stat(link, &state) != 0)) {
+    if ((slave != NULL) && is_left_behind(link, slave)) {
         (void)unlink(link);
     }
     if ((slave == NULL) || (symlink(slave, link) != 0)) {
@@ -101,22 +124,36 @@ bool tty_open_pty(tty_t *tty, const char *link, int stop)
     return make_link(tty, link);
 }
 
-/* Splits DEVICE[:BAUD] into path and speed. */
+/* The speed that a text names; NULL: none. */
+static const named_speed_t *read_speed(const char *text)
+{
+    char *end = NULL;
+    const unsigned long baud = strtoul(text, &end, 10);
+
+    return ((isdigit((unsigned char)text[0]) != 0) && (*end == '\0') && (baud <= UINT32_MAX))
+               ? find_speed((uint32_t)baud)
+               : NULL;
+}
+
+/* Splits DEVICE[:BAUD] into path and speed. The path may hold colons, as those of /dev/serial/by-path do. */
 static bool read_device(tty_t *tty, const char *device)
 {
     const char *const colon = strrchr(device, ':');
-    const size_t length = (colon == NULL) ? strlen(device) : (size_t)(colon - device);
 
-    if ((length == 0u) || (length >= sizeof tty->path)) {
+    if ((device[0] == '\0') || (colon == device) || (strlen(device) >= sizeof tty->path)) {
         return explain(tty, "the path of a device has 1 to %zu characters", sizeof tty->path - 1u);
     }
-    (void)memcpy(tty->path, device, length);
+    (void)memcpy(tty->path, device, strlen(device) + 1u);
     tty->baud = TTY_BAUD;
-    if (colon != NULL) {
-        char *end = NULL;
-        tty->baud = (uint32_t)strtoul(&colon[1], &end, 10);
-        if ((*end != '\0') || (find_speed(tty->baud) == NULL)) {
+    if ((colon != NULL) && (access(device, F_OK) != 0)) {
+        const named_speed_t *const speed = read_speed(&colon[1]);
+        tty->path[colon - device] = '\0';
+        if (speed != NULL) {
+            tty->baud = speed->baud;
+        } else if (access(tty->path, F_OK) == 0) {
             return explain(tty, "\"%s\" is not a usual baud rate, such as 115200, 921600 or 1000000", &colon[1]);
+        } else {
+            tty->path[colon - device] = ':'; /* which open_device() does not find */
         }
     }
     return true;
@@ -162,24 +199,24 @@ void tty_close(tty_t *tty)
 
 /* --- bytes ------------------------------------------------------------------------------------------------------- */
 
-/* What a read or write that could not be done means. A pseudo-terminal that nobody has open any more gives EIO, an adapter
- * that was unplugged EIO, ENXIO or ENODEV. */
-static enum transport_result failure(tty_t *tty)
+/* What a read or write that could not be done means. A pseudo-terminal that nobody has open any more gives EIO, an
+ * adapter that was unplugged EIO, ENXIO or ENODEV. */
+static enum port_result failure(tty_t *tty)
 {
     if ((errno == EAGAIN) || (errno == EINTR)) {
-        return TRANSPORT_EMPTY;
+        return PORT_NOTHING;
     }
     if ((errno == EIO) || (errno == ENXIO) || (errno == ENODEV)) {
         (void)explain(tty, tty->is_pty ? "the host has hung up" : "the device is gone");
-        return TRANSPORT_DOWN;
+        return PORT_DOWN;
     }
     (void)explain(tty, "%s", strerror(errno));
-    return TRANSPORT_BROKEN;
+    return PORT_BROKEN;
 }
 
-enum transport_result tty_flush(tty_t *tty)
+enum port_result tty_flush(tty_t *tty)
 {
-    enum transport_result result = TRANSPORT_OK;
+    enum port_result result = PORT_DONE;
 
     if (tty->out_length > 0u) {
         const ssize_t written = write(tty->file, tty->out, tty->out_length);
@@ -190,10 +227,10 @@ enum transport_result tty_flush(tty_t *tty)
             result = failure(tty);
         }
     }
-    return (result == TRANSPORT_EMPTY) ? TRANSPORT_OK : result;
+    return (result == PORT_NOTHING) ? PORT_DONE : result;
 }
 
-static enum transport_result fill(tty_t *tty)
+static enum port_result fill(tty_t *tty)
 {
     const ssize_t count = read(tty->file, tty->in, sizeof tty->in);
 
@@ -202,27 +239,27 @@ static enum transport_result fill(tty_t *tty)
     }
     if (count == 0) {
         errno = EIO; /* the end of a device that is gone */
-        return tty->is_pty ? TRANSPORT_EMPTY : failure(tty);
+        return tty->is_pty ? PORT_NOTHING : failure(tty);
     }
     tty->in_next = 0u;
     tty->in_length = (uint32_t)count;
-    return TRANSPORT_OK;
+    return PORT_DONE;
 }
 
-enum transport_result tty_take(tty_t *tty, uint8_t *byte)
+enum port_result tty_take(tty_t *tty, uint8_t *byte)
 {
     if (tty->in_next == tty->in_length) {
-        enum transport_result result = tty_flush(tty);
-        if (result == TRANSPORT_OK) {
+        enum port_result result = tty_flush(tty);
+        if (result == PORT_DONE) {
             result = fill(tty);
         }
-        if (result != TRANSPORT_OK) {
+        if (result != PORT_DONE) {
             return result;
         }
     }
     *byte = tty->in[tty->in_next];
     tty->in_next++;
-    return TRANSPORT_OK;
+    return PORT_DONE;
 }
 
 bool tty_put(tty_t *tty, const char *text, uint32_t length)
@@ -238,21 +275,33 @@ bool tty_put(tty_t *tty, const char *text, uint32_t length)
     return has_room;
 }
 
-enum transport_result tty_restore(tty_t *tty)
+bool tty_is_slow(tty_t *tty)
+{
+    int queued = 0;
+
+    (void)tty_flush(tty);
+    if (tty->is_pty || (ioctl(tty->file, TIOCOUTQ, &queued) != 0)) {
+        return tty->out_length > 0u;
+    }
+    const uint32_t bits = 10u * (tty->out_length + (uint32_t)queued);
+    return bits > ((tty->baud * (uint32_t)PORT_STALE_MS) / 1000u);
+}
+
+enum port_result tty_restore(tty_t *tty)
 {
     struct pollfd watched = {.fd = tty->file, .events = POLLIN};
 
     tty->out_length = 0u;
     if (tty->is_pty) {
         (void)poll(&watched, 1u, 0);
-        return ((watched.revents & POLLHUP) == 0) ? TRANSPORT_OK : TRANSPORT_DOWN;
+        return ((watched.revents & POLLHUP) == 0) ? PORT_DONE : PORT_DOWN;
     }
     close_file(tty);
     if (!open_device(tty)) {
         close_file(tty);
-        return TRANSPORT_DOWN;
+        return PORT_DOWN;
     }
-    return TRANSPORT_OK;
+    return PORT_DONE;
 }
 
 bool tty_wait(tty_t *tty, bool for_byte, int32_t timeout_ms)

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "port/linux/transport.h"
+#include "port/port.h"
 
 enum tty_limits {
     TTY_IN_BYTES = 4096,
@@ -25,34 +25,40 @@ typedef struct tty {
     uint32_t out_length;
     uint8_t in[TTY_IN_BYTES];
     uint8_t out[TTY_OUT_BYTES]; /* not yet written */
-    char reason[256];
+    char reason[256];           /* of the last failure, in words */
 } tty_t;
 
-/* Makes a pseudo-terminal, and at `link` a symbolic link to it, which must not exist yet, or be a link that was left behind.
- * `stop` is a descriptor, see stop.h. Returns false when that cannot be done; tty->reason then says, in one line, what is
- * wrong and what to do. */
+/* Makes a pseudo-terminal, and at `link` a symbolic link to it, which must not exist yet, or be one that a killed
+ * process has left behind. `stop` is a descriptor, see stop.h. Returns false when that cannot be done; tty->reason then
+ * says, in one line, what is wrong and what to do. */
 bool tty_open_pty(tty_t *tty, const char *link, int stop);
 
-/* The same for a serial device, "/dev/ttyUSB0" or "/dev/ttyUSB0:921600", with 8 data bits, no parity and one stop bit. */
+/* The same for a serial device with 8 data bits, no parity and one stop bit: "/dev/ttyUSB0" or "/dev/ttyUSB0:921600",
+ * where what follows the last colon is a usual baud rate and the whole is no path that exists. */
 bool tty_open_device(tty_t *tty, const char *device, int stop);
 
 /* Releases what open has taken, the link too; also right after a failed open. */
 void tty_close(tty_t *tty);
 
-/* Takes the next byte: OK, EMPTY, DOWN (the other end has hung up, the device is unplugged) or BROKEN. What has been put is
- * handed to the system before EMPTY is said, at the latest. */
-enum transport_result tty_take(tty_t *tty, uint8_t *byte);
+/* Takes the next byte: PORT_DONE, PORT_NOTHING, PORT_DOWN (the other end has hung up, the device is unplugged) or
+ * PORT_BROKEN. What has been put is handed to the system before PORT_NOTHING is said, at the latest. */
+enum port_result tty_take(tty_t *tty, uint8_t *byte);
 
 /* Puts `length` bytes, whole, or none of them (false) when there is no room. */
 bool tty_put(tty_t *tty, const char *text, uint32_t length);
 
+/* Whether what is put now would leave later than PORT_STALE_MS: too much waits here, and in the driver at its baud
+ * rate. What a pseudo-terminal holds is its reader's. */
+bool tty_is_slow(tty_t *tty);
+
 /* Hands over what was put as far as the system takes it at once. */
-enum transport_result tty_flush(tty_t *tty);
+enum port_result tty_flush(tty_t *tty);
 
-/* After DOWN: OK when the other end is there again, DOWN or BROKEN. What was on its way is forgotten. */
-enum transport_result tty_restore(tty_t *tty);
+/* After PORT_DOWN: PORT_DONE when the other end is there again, PORT_DOWN or PORT_BROKEN. What was on its way is
+ * forgotten. */
+enum port_result tty_restore(tty_t *tty);
 
-/* As in transport.h. */
+/* As wait of port.h. */
 bool tty_wait(tty_t *tty, bool for_byte, int32_t timeout_ms);
 
 #endif

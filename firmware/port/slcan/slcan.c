@@ -167,8 +167,8 @@ static bool passes(uint32_t bits, uint32_t code, uint32_t mask)
 }
 
 /* Dual filter mode, as in the CAN232. Codes AC0 to AC3 are the bytes of the word, the first in the highest. Standard
- * frames: filter 1 is AC0, AC1 and the low half of AC3 (identifier, RTR, first data byte), filter 2 the rest (identifier,
- * RTR). Extended: each is the upper 16 bits of the identifier. */
+ * frames: filter 1 is AC0, AC1 and the low half of AC3 (identifier, RTR, first data byte), filter 2 the rest
+ * (identifier, RTR). Extended: each is the upper 16 bits of the identifier. */
 static bool is_accepted(const slcan_t *slcan, const slcan_frame_t *frame)
 {
     const uint32_t code = slcan->acceptance_code;

@@ -1,4 +1,5 @@
-/* SLCAN: CAN frames as lines of text, the LAWICEL protocol (CAN232 and CANUSB manuals). No I/O, no clock, no heap; nothing waits.
+/* SLCAN: CAN frames as lines of text, the LAWICEL protocol (CAN232 and CANUSB manuals). No I/O, no clock, no heap;
+ * nothing waits.
  *
  * Two things live here. The peer (slcan_t) is an adapter as seen by its host: it takes the host's bytes, gives the
  * frames in them to its caller and answers every command; estimator ports use it. The lines themselves (slcan_line_t,
@@ -17,8 +18,8 @@
  *     MXXXXXXXX, m…   acceptance code, mask (of an SJA1000)    closed        CR
  *     (nothing)       an empty line                            always        CR
  *
- * and BEL to everything else: an unknown command, a malformed or too long line, a command in the wrong state, such as the
- * second O of python-can. The bit rate is 1 Mbit/s until told otherwise, so that O does not need an S before it.
+ * and BEL to everything else: an unknown command, a malformed or too long line, a command in the wrong state, such as
+ * the second O of python-can. The bit rate is 1 Mbit/s until told otherwise, so that O does not need an S before it.
  * Hexadecimal digits of either case are read, capitals written. A LF after a CR is skipped.
  */
 #ifndef LEVER_PORT_SLCAN_H
@@ -28,6 +29,14 @@
 #include <stdint.h>
 
 #include "lever_cdkf.h"
+
+/* What our adapters answer to V, two digits each: hardware 10, and the first two numbers of the version. */
+#define SLCAN_TEXT(number) #number
+#define SLCAN_VERSION_TEXT(major, minor) "10" SLCAN_TEXT(major) SLCAN_TEXT(minor)
+#define SLCAN_VERSION SLCAN_VERSION_TEXT(LEVER_VERSION_MAJOR, LEVER_VERSION_MINOR)
+#if (LEVER_VERSION_MAJOR > 9) || (LEVER_VERSION_MINOR > 9)
+#error "SLCAN has a digit each for the version"
+#endif
 
 /* A frame of either kind. `frame.id` has 29 bits when it is extended; a remote frame has a length, but no data. */
 typedef struct slcan_frame {
@@ -61,12 +70,12 @@ enum slcan_end {
 /* Takes the next byte. A line stays as it is until the byte after it. A LF at the start of a line is skipped. */
 enum slcan_end slcan_line_take(slcan_line_t *line, uint8_t byte);
 
-/* Reads the frame in t, T, r, R lines, with or without a time stamp if `may_have_time`. False, with `frame` undefined, if
- * it is anything else, or not exactly such a line. */
+/* Reads the frame in t, T, r, R lines, with or without a time stamp if `may_have_time`. False, with `frame` undefined,
+ * if it is anything else, or not exactly such a line. */
 bool slcan_read_frame(const slcan_line_t *line, bool may_have_time, slcan_frame_t *frame);
 
-/* Writes a frame, with its time stamp [ms] or SLCAN_NO_TIME, as a line with CR (and no 0 at the end); returns its length.
- * Of an identifier the lowest 11 or 29 bits count; a length above 8 is taken as 8. */
+/* Writes a frame, with its time stamp [ms] or SLCAN_NO_TIME, as a line with CR (and no 0 at the end); returns its
+ * length. Of an identifier the lowest 11 or 29 bits count; a length above 8 is taken as 8. */
 uint32_t slcan_write_frame(const slcan_frame_t *frame, uint16_t time_stamp, char text[SLCAN_LINE_BYTES]);
 
 /* --- the peer -------------------------------------------------------------------------------------------------- */
@@ -86,7 +95,8 @@ typedef struct slcan_identity {
 
 enum slcan_channel { SLCAN_CHANNEL_CLOSED = 0, SLCAN_CHANNEL_OPEN = 1, SLCAN_CHANNEL_LISTEN = 2 };
 
-/* Bits of the status flags (answer to F). The peer itself sets the first and DATA_OVERRUN, for a frame that found no room. */
+/* Bits of the status flags (answer to F). The peer itself sets the first and DATA_OVERRUN, for a frame that found no
+ * room. */
 enum slcan_status {
     SLCAN_STATUS_RECEIVE_FULL = 0x01,
     SLCAN_STATUS_TRANSMIT_FULL = 0x02,
@@ -122,12 +132,13 @@ typedef struct slcan {
 /* A peer with its channel closed, no time stamps, and everything accepted. */
 void slcan_init(slcan_t *slcan, const slcan_sink_t *sink, const slcan_identity_t *identity);
 
-/* Takes a byte from the host; when it ends a line, this is carried out and answered. Returns true when the line was a frame,
- * which then is in `frame`, acknowledged, and the caller's. Bounded, and never waits. */
+/* Takes a byte from the host; when it ends a line, this is carried out and answered. Returns true when the line was a
+ * frame, which then is in `frame`, acknowledged, and the caller's. Bounded, and never waits. */
 bool slcan_take(slcan_t *slcan, uint8_t byte, slcan_frame_t *frame);
 
 /* Sends a frame to the host; `time_ms` [ms] is any clock's, for hosts that want time stamps. Returns false if it was
- * dropped for lack of room. True also when the channel is closed or the acceptance filter keeps it back: nobody wants it. */
+ * dropped for lack of room. True also when the channel is closed or the acceptance filter keeps it back: nobody wants
+ * it. */
 bool slcan_send(slcan_t *slcan, const slcan_frame_t *frame, uint32_t time_ms);
 
 /* Forgets what has been received of a line, and closes the channel: the host has gone. */

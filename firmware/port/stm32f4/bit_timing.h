@@ -1,8 +1,9 @@
 /* CAN bit timing at 1 Mbit/s from the clock of CAN1, at compile time: RM0090 32.7.7.
  *
- * A bit is a synchronisation quantum, segment 1 of 1 to 16 quanta, at the end of which it is sampled, and segment 2 of 1 to 8.
- * The prescaler is the least that leaves at most 25 quanta, segment 2 a quarter of them, so that the sample point is at 75 %
- * or just after: what CiA 301 asks at 1 Mbit/s. The jump width is as large as may be (at most 4, at most segment 2).
+ * A bit is a synchronisation quantum, segment 1 of 1 to 16 quanta, at the end of which it is sampled, and segment 2 of
+ * 1 to 8. The prescaler is the least that leaves at most 25 quanta, segment 2 a quarter of them, so that the sample
+ * point is at 75 % or just after: what CiA 301 asks at 1 Mbit/s. The jump width is as large as may be (at most 4, at
+ * most segment 2).
  */
 #ifndef LEVER_PORT_STM32F4_BIT_TIMING_H
 #define LEVER_PORT_STM32F4_BIT_TIMING_H

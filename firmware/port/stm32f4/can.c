@@ -2,6 +2,7 @@
 
 #include "can/messages.h"
 #include "port/embedded/ring.h"
+#include "port/port.h"
 #include "port/stm32f4/bit_timing.h"
 #include "port/stm32f4/pins.h"
 #include "port/stm32f4/processor.h"
@@ -12,10 +13,17 @@
 #error "no bit timing for 1 Mbit/s from the clock of CAN1"
 #endif
 
+/* A frame to send. */
+typedef struct queued {
+    lever_frame_t frame;
+    uint32_t since_ms;
+} queued_t;
+
 enum {
     FRAME_BYTES = sizeof(lever_frame_t),
-    RECEIVE_BYTES = 32 * FRAME_BYTES,  /* 16 samples */
-    TRANSMIT_BYTES = 16 * FRAME_BYTES, /* two steps with all their frames */
+    QUEUED_BYTES = sizeof(queued_t),
+    RECEIVE_BYTES = 32 * FRAME_BYTES, /* 16 samples */
+    TRANSMIT_BYTES = 512,             /* two steps with all their frames */
     MODE_POLLS = 10000,
     FUNCTION_CAN = 9, /* alternate function of PB8 and PB9: data sheet, table 9 */
     PIN_RECEIVE = 8,
@@ -26,9 +34,10 @@ static volatile uint8_t receive_bytes[RECEIVE_BYTES];
 static volatile uint8_t transmit_bytes[TRANSMIT_BYTES];
 static ring_t received = {.bytes = receive_bytes, .size = RECEIVE_BYTES};
 static ring_t waiting = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
-static volatile can_counts_t counts; /* each written by one interrupt, or with interrupts off */
-static volatile uint32_t sent;       /* frames, since the start */
-static volatile bool off;            /* the bus */
+static volatile can_counts_t counts;     /* each written by one interrupt, or with interrupts off */
+static volatile bool off;                /* the bus */
+static volatile uint32_t time_ms;        /* of the last can_poll() */
+static uint32_t since_ms[CAN_MAILBOXES]; /* of the frame in each */
 
 /* --- start ------------------------------------------------------------------------------------------------------- */
 
@@ -41,7 +50,8 @@ static void start_pins(void)
     pin_to_peripheral(&gpiob, PIN_TRANSMIT, FUNCTION_CAN);
 }
 
-/* RM0090 32.7.4: a bank of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames match. */
+/* RM0090 32.7.4: a bank of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames
+ * match. */
 static uint32_t filter_word(uint32_t id, uint32_t next_id)
 {
     return FIELD(next_id, 16 + 5) | FIELD(id, 5);
@@ -49,13 +59,15 @@ static uint32_t filter_word(uint32_t id, uint32_t next_id)
 
 static void start_filter(void)
 {
+    static const uint32_t inputs[4] = PORT_INPUTS;
+
     can1.FMR |= CAN_FMR_FINIT;
     can1.FA1R = 0u;
     can1.FM1R = BIT(0); /* bank 0: a list ... */
     can1.FS1R = 0u;     /* ... of 16-bit identifiers ... */
     can1.FFA1R = 0u;    /* ... into FIFO 0 */
-    can1.FR[0][0] = filter_word(MESSAGE_LEVER_SAMPLE_ID, MESSAGE_BASE_SAMPLE_ID);
-    can1.FR[0][1] = filter_word(MESSAGE_COMMAND_ID, MESSAGE_COMMAND_ID); /* a list has no empty place */
+    can1.FR[0][0] = filter_word(inputs[0], inputs[1]);
+    can1.FR[0][1] = filter_word(inputs[2], inputs[3]);
     can1.FA1R = BIT(0);
     can1.FMR &= ~(uint32_t)CAN_FMR_FINIT;
 }
@@ -134,14 +146,33 @@ static void write_mailbox(can_mailbox_t *mailbox, const lever_frame_t *frame)
     mailbox->IR |= CAN_IR_TXRQ;
 }
 
+static bool is_stale(uint32_t since)
+{
+    return (time_ms - since) >= (uint32_t)PORT_STALE_MS;
+}
+
+/* The next frame that is still worth sending; drops those that are not. */
+static bool next_waiting(queued_t *next)
+{
+    bool found = false;
+
+    while (!found && ring_get(&waiting, next, QUEUED_BYTES)) {
+        found = !is_stale(next->since_ms);
+        counts.dropped += found ? 0u : 1u;
+    }
+    return found;
+}
+
 /* Fills empty mailboxes (RM0090 32.7.1). From the interrupt, or with interrupts off. */
 static void fill_mailboxes(void)
 {
-    lever_frame_t frame;
+    queued_t next;
 
     for (uint32_t i = 0u; i < (uint32_t)CAN_MAILBOXES; i++) {
-        if (((can1.TSR & CAN_TSR_TME) != 0u) && ring_get(&waiting, &frame, FRAME_BYTES)) {
-            write_mailbox(&can1.transmit[(can1.TSR >> CAN_TSR_CODE_LOWEST) & 3u], &frame);
+        if (((can1.TSR & CAN_TSR_TME) != 0u) && next_waiting(&next)) {
+            const uint32_t mailbox = (can1.TSR >> CAN_TSR_CODE_LOWEST) & 3u;
+            since_ms[mailbox] = next.since_ms;
+            write_mailbox(&can1.transmit[mailbox], &next.frame);
         }
     }
 }
@@ -149,7 +180,7 @@ static void fill_mailboxes(void)
 /* Takes back what is in mailboxes and ring; a frame on the bus at the moment is finished. With interrupts off. */
 static void drop_all(void)
 {
-    const uint32_t frames = ring_used(&waiting) / (uint32_t)FRAME_BYTES;
+    const uint32_t frames = ring_used(&waiting) / (uint32_t)QUEUED_BYTES;
 
     counts.dropped += frames;
     ring_clear(&waiting);
@@ -164,44 +195,39 @@ void can_transmit_interrupt(void)
     for (uint32_t mailbox = 0u; mailbox < (uint32_t)CAN_MAILBOXES; mailbox++) {
         if ((status & FIELD(CAN_TSR_RQCP0, 8u * mailbox)) != 0u) {
             can1.TSR = FIELD(CAN_TSR_RQCP0, 8u * mailbox);
-            if ((status & FIELD(CAN_TSR_TXOK0, 8u * mailbox)) != 0u) {
-                sent++;
-            } else {
-                counts.dropped++;
-            }
+            counts.dropped += ((status & FIELD(CAN_TSR_TXOK0, 8u * mailbox)) != 0u) ? 0u : 1u;
         }
     }
     fill_mailboxes();
 }
 
-void can_send(const lever_frame_t *frame)
+bool can_send(const lever_frame_t *frame)
 {
+    const queued_t queued = {.frame = *frame, .since_ms = time_ms};
+
     interrupts_off();
-    if (!off && ring_put(&waiting, frame, FRAME_BYTES)) {
+    const bool taken = !off && ring_put(&waiting, &queued, QUEUED_BYTES);
+    if (taken) {
         fill_mailboxes();
     } else {
         counts.dropped++;
     }
     interrupts_on();
+    return taken;
 }
 
+/* RM0090 32.7.1: what is taken back raises the interrupt, which counts it. */
 void can_poll(uint32_t now_ms)
 {
-    static uint32_t sent_before;
-    static uint32_t since_ms; /* nothing has waited, or something was sent */
-
     interrupts_off();
+    time_ms = now_ms;
     if ((can1.ESR & CAN_ESR_BOFF) == 0u) {
         off = false;
     }
-    if ((sent != sent_before) || ((can1.TSR & CAN_TSR_TME) == CAN_TSR_TME)) {
-        sent_before = sent;
-        since_ms = now_ms;
-    } else if ((now_ms - since_ms) >= (uint32_t)CAN_STALE_MS) {
-        drop_all();
-        since_ms = now_ms;
-    } else {
-        /* not yet */
+    for (uint32_t mailbox = 0u; mailbox < (uint32_t)CAN_MAILBOXES; mailbox++) {
+        if (((can1.TSR & FIELD(CAN_TSR_TME0, mailbox)) == 0u) && is_stale(since_ms[mailbox])) {
+            can1.TSR = FIELD(CAN_TSR_ABRQ0, 8u * mailbox);
+        }
     }
     interrupts_on();
 }

@@ -1,11 +1,13 @@
 /* CAN1 as a bxCAN at 1 Mbit/s on PB8 (receive) and PB9 (transmit): RM0090 32.
  *
- * Received: only data frames with the three identifiers of our inputs, through a ring that the interrupt fills. When the FIFO
- * or the ring is full the newest frame is lost, so that what is there stays in order, and counted.
- * Sent: in the order of the calls, through a ring that the interrupt empties into the three mailboxes. They are sent by order
- * of request (TXFP), not by identifier: STATE_ESTIMATE, the end of a step, has a lower identifier than what precedes it.
- * Frames that could not be sent for CAN_STALE_MS, and all that wait when the bus goes off, are dropped and counted:
- * a motor command must not come out long after its sample.
+ * Received: only data frames with the identifiers of PORT_INPUTS, through a ring that the interrupt fills. When the
+ * FIFO or the ring is full the newest frame is lost, so that what is there stays in order, and counted.
+ *
+ * Sent: in the order of the calls, through a ring that the interrupt empties into the three mailboxes. They are sent by
+ * order of request (TXFP), not by identifier: STATE_ESTIMATE, the end of a step, has a lower identifier than what
+ * precedes it. A frame that could not be sent for PORT_STALE_MS, and all that wait when the bus goes off, are dropped
+ * and counted: a MOTOR_COMMAND must not come out long after its sample.
+ *
  * Bus-off: the controller comes back by itself after 128 times 11 recessive bits (ABOM), as ISO 11898-1 has it.
  */
 #ifndef LEVER_PORT_STM32F4_CAN_H
@@ -16,8 +18,6 @@
 
 #include "lever_cdkf.h"
 #include "port/stm32f4/clock.h"
-
-enum { CAN_STALE_MS = 20 };
 
 /* Since the start; each wraps at 2^32. */
 typedef struct can_counts {
@@ -42,10 +42,11 @@ bool can_receive(lever_frame_t *frame);
 /* Whether can_receive() has a frame. */
 bool can_has_received(void);
 
-/* Queues a frame for transmission, or drops it when there is no room or no bus. */
-void can_send(const lever_frame_t *frame);
+/* Queues a frame for transmission; false, counting it as dropped, when there is no room or no bus. */
+bool can_send(const lever_frame_t *frame);
 
-/* What no interrupt tells: drops frames that wait too long. To be called each millisecond or more often. */
+/* What no interrupt tells: the time, by which frames that wait too long are dropped. To be called each millisecond or
+ * more often. */
 void can_poll(uint32_t now_ms);
 
 can_counts_t can_counts(void);

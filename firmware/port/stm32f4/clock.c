@@ -11,6 +11,10 @@ enum {
     PLL_Q = 7 /* 48 MHz for peripherals that are not used: within what they bear */
 };
 
+/* CRYSTAL_FAILED: it has, since power-on. Survives the reset that follows. */
+static uint32_t crystal_state __attribute__((section(".noinit")));
+#define CRYSTAL_FAILED 0xC4157A1Fu
+
 /* RM0090 3.5.1 (table 10): 5 wait states at 168 MHz and 2.7 to 3.6 V; caches and prefetch hide most of them. */
 static bool slow_flash_down(void)
 {
@@ -18,12 +22,14 @@ static bool slow_flash_down(void)
     return wait_for(&flash.ACR, FLASH_ACR_LATENCY, 5u, SWITCH_POLLS);
 }
 
-/* RM0090 7.2.3 and 7.3.2. P = 2 is coded as 0. */
+/* RM0090 7.2.3 and 7.3.2: set up while it is off. P = 2 is coded as 0. */
 static bool start_pll(bool crystal)
 {
     const uint32_t m = crystal ? (uint32_t)CLOCK_PLL_M(LEVER_STM32_HSE_MHZ) : (uint32_t)CLOCK_PLL_M(CLOCK_HSI_MHZ);
     const uint32_t n = crystal ? (uint32_t)CLOCK_PLL_N(LEVER_STM32_HSE_MHZ) : (uint32_t)CLOCK_PLL_N(CLOCK_HSI_MHZ);
 
+    rcc.CR &= ~(uint32_t)RCC_CR_PLLON;
+    (void)wait_for(&rcc.CR, RCC_CR_PLLRDY, 0u, PLL_POLLS);
     rcc.PLLCFGR = m | FIELD(n, 6) | FIELD(PLL_Q, 24) | (crystal ? (uint32_t)RCC_PLLCFGR_PLLSRC_HSE : 0u);
     rcc.CR |= RCC_CR_PLLON;
     return wait_for(&rcc.CR, RCC_CR_PLLRDY, RCC_CR_PLLRDY, PLL_POLLS);
@@ -43,26 +49,34 @@ static bool switch_to_pll(void)
     return false;
 }
 
+static bool run_from_pll(bool crystal)
+{
+    return start_pll(crystal) && slow_flash_down() && switch_to_pll();
+}
+
 clock_rates_t clock_start(void)
 {
     clock_rates_t rates = {.core_hz = CLOCK_RAW_HZ, .apb1_hz = CLOCK_RAW_HZ, .apb2_hz = CLOCK_RAW_HZ};
 
     rcc.APB1ENR |= RCC_APB1_PWR;
     pwr.CR |= PWR_CR_VOS; /* RM0090 5.4.1: scale 1, needed above 144 MHz */
-    rcc.CR |= RCC_CR_HSEON;
-    const bool crystal = wait_for(&rcc.CR, RCC_CR_HSERDY, RCC_CR_HSERDY, CRYSTAL_POLLS);
-    if (!crystal) {
-        rcc.CR &= ~(uint32_t)RCC_CR_HSEON;
+    if ((rcc.CSR & RCC_CSR_PORRSTF) != 0u) {
+        crystal_state = 0u;
     }
-    if (start_pll(crystal) && slow_flash_down() && switch_to_pll()) {
+    rcc.CR |= RCC_CR_HSEON;
+    if ((crystal_state != CRYSTAL_FAILED) && wait_for(&rcc.CR, RCC_CR_HSERDY, RCC_CR_HSERDY, CRYSTAL_POLLS)) {
+        rates.crystal = run_from_pll(true);
+    }
+    rates.pll = rates.crystal || run_from_pll(false);
+    if (rates.pll) {
         rates.core_hz = CLOCK_PLL_CORE_HZ;
         rates.apb1_hz = CLOCK_PLL_APB1_HZ;
         rates.apb2_hz = CLOCK_PLL_APB2_HZ;
-        rates.pll = true;
-        rates.crystal = crystal;
     }
     if (rates.crystal) {
         rcc.CR |= RCC_CR_CSSON; /* RM0090 7.2.7 */
+    } else {
+        rcc.CR &= ~(uint32_t)RCC_CR_HSEON;
     }
     return rates;
 }
@@ -70,6 +84,7 @@ clock_rates_t clock_start(void)
 void clock_failure_interrupt(void)
 {
     rcc.CIR |= RCC_CIR_CSSC;
+    crystal_state = CRYSTAL_FAILED;
     scb.AIRCR = SCB_AIRCR_RESET;
     synchronise();
 }

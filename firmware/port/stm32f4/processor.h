@@ -1,4 +1,5 @@
-/* Instructions that C has no words for (PM0214 3.10), and interrupts on and off around what they share with the loop. */
+/* Instructions that C has no words for (PM0214 3.10), and interrupts on and off around what they share with the
+ * loop. */
 #ifndef LEVER_PORT_STM32F4_PROCESSOR_H
 #define LEVER_PORT_STM32F4_PROCESSOR_H
 
@@ -16,7 +17,8 @@ static inline void interrupts_on(void)
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
-/* Sleeps until an interrupt asks for attention, also while interrupts are off: then it is served when they are on again. */
+/* Sleeps until an interrupt asks for attention, also while interrupts are off: then it is served when they are on
+ * again. */
 static inline void wait_for_interrupt(void)
 {
     __asm__ volatile("dsb\n\twfi" ::: "memory");

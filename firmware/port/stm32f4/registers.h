@@ -1,7 +1,8 @@
-/* The registers that this port uses, after RM0090 (reference manual of the STM32F405) and PM0214 (Cortex-M4 programming manual).
+/* The registers that this port uses, after RM0090 (reference manual of the STM32F405) and PM0214 (Cortex-M4 programming
+ * manual).
  *
- * Each peripheral is an object that registers.ld puts at its address, so that no code makes pointers out of numbers, and a
- * test on the host can put ordinary memory there. Names are the manuals'; sections stand beside each struct.
+ * Each peripheral is an object that registers.ld puts at its address, so that no code makes pointers out of numbers,
+ * and a test on the host can put ordinary memory there. Names are the manuals'; sections stand beside each struct.
  */
 #ifndef LEVER_PORT_STM32F4_REGISTERS_H
 #define LEVER_PORT_STM32F4_REGISTERS_H
@@ -56,6 +57,7 @@ enum rcc_bits {
     RCC_APB1_PWR = BIT(28),
     RCC_APB2_USART1 = BIT(4),
     RCC_CSR_RMVF = BIT(24),
+    RCC_CSR_PORRSTF = BIT(27),
     RCC_CSR_IWDGRSTF = BIT(29)
 };
 
@@ -159,10 +161,12 @@ enum can_bits {
     CAN_MSR_ERRI = BIT(2),
     CAN_TSR_RQCP0 = BIT(0), /* this and the next of mailbox 0; mailbox m has them 8 m higher */
     CAN_TSR_TXOK0 = BIT(1),
+    CAN_TSR_ABRQ0 = BIT(7),  /* the same */
     CAN_TSR_ABRQ = 0x808080, /* one bit for each mailbox */
     CAN_TSR_CODE_LOWEST = 24,
-    CAN_TSR_TME = 7 << 26, /* one bit for each mailbox */
-    CAN_RFR_FMP = 3,       /* field */
+    CAN_TSR_TME0 = BIT(26), /* of mailbox 0; the next ones follow */
+    CAN_TSR_TME = 7 << 26,
+    CAN_RFR_FMP = 3, /* field */
     CAN_RFR_FOVR = BIT(4),
     CAN_RFR_RFOM = BIT(5),
     CAN_IER_TMEIE = BIT(0),

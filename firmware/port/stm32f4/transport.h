@@ -1,5 +1,4 @@
-/* What frames travel over: CAN (transport_can.c) or text (transport_slcan.c). An image is linked with one of them, which also
- * supplies port_receive() and port_send(). */
+/* What frames travel over: CAN (transport_can.c) or text (transport_slcan.c). An image is linked with one of them. */
 #ifndef LEVER_PORT_STM32F4_TRANSPORT_H
 #define LEVER_PORT_STM32F4_TRANSPORT_H
 
@@ -7,26 +6,22 @@
 #include <stdint.h>
 
 #include "lever_cdkf.h"
+#include "port/port.h"
 #include "port/stm32f4/clock.h"
-
-/* Counts since the start, and the state of the bus now. */
-typedef struct transport_status {
-    uint32_t overruns;
-    uint32_t dropped;
-    uint32_t bus_offs;
-    uint8_t transmit_errors;
-    uint8_t receive_errors;
-    bool bus_off;
-} transport_status_t;
 
 void transport_start(const clock_rates_t *rates);
 
-/* Whether something has been received that port_receive() has not yet looked at. */
+/* receive and send of port.h. */
+enum port_result transport_receive(void *self, lever_frame_t *frame);
+enum port_result transport_send(void *self, const lever_frame_t *frame);
+
+/* Whether something has been received that transport_receive() has not yet looked at. */
 bool transport_has_received(void);
 
-/* Called in each turn of the loop. */
+/* What no interrupt tells. To be called each millisecond or more often. */
 void transport_poll(uint32_t now_ms);
 
-transport_status_t transport_status(void);
+/* Fills in the state of the bus, and what has been lost since the start. */
+void transport_status(lever_platform_t *status);
 
 #endif

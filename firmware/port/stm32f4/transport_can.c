@@ -1,10 +1,21 @@
-#include "port/embedded/port.h"
 #include "port/stm32f4/can.h"
 #include "port/stm32f4/transport.h"
 
 void transport_start(const clock_rates_t *rates)
 {
     can_start(rates);
+}
+
+enum port_result transport_receive(void *self, lever_frame_t *frame)
+{
+    (void)self;
+    return can_receive(frame) ? PORT_DONE : PORT_NOTHING;
+}
+
+enum port_result transport_send(void *self, const lever_frame_t *frame)
+{
+    (void)self;
+    return can_send(frame) ? PORT_DONE : PORT_NOTHING;
 }
 
 bool transport_has_received(void)
@@ -17,28 +28,15 @@ void transport_poll(uint32_t now_ms)
     can_poll(now_ms);
 }
 
-transport_status_t transport_status(void)
+void transport_status(lever_platform_t *status)
 {
     const can_counts_t counts = can_counts();
     const can_errors_t errors = can_errors();
-    const transport_status_t status = {
-        .overruns = counts.overruns,
-        .dropped = counts.dropped,
-        .bus_offs = counts.bus_offs,
-        .transmit_errors = errors.transmit,
-        .receive_errors = errors.receive,
-        .bus_off = errors.bus_off,
-    };
 
-    return status;
-}
-
-bool port_receive(lever_frame_t *frame)
-{
-    return can_receive(frame);
-}
-
-void port_send(const lever_frame_t *frame)
-{
-    can_send(frame);
+    status->faults |= errors.bus_off ? (uint8_t)LEVER_PLATFORM_BUS_OFF : 0u;
+    status->transmit_errors = errors.transmit;
+    status->receive_errors = errors.receive;
+    status->bus_offs = (uint8_t)counts.bus_offs;
+    status->overruns = (uint16_t)counts.overruns;
+    status->dropped = (uint16_t)counts.dropped;
 }

@@ -1,4 +1,4 @@
-#include "port/embedded/port.h"
+#include "can/messages.h"
 #include "port/slcan/slcan.h"
 #include "port/stm32f4/tick.h"
 #include "port/stm32f4/transport.h"
@@ -15,7 +15,7 @@ static bool put(void *self, const char *text, uint32_t length)
 void transport_start(const clock_rates_t *rates)
 {
     static const slcan_sink_t sink = {.self = 0, .put = put};
-    static const slcan_identity_t identity = {.version = LEVER_SLCAN_VERSION, .serial = "F405"};
+    static const slcan_identity_t identity = {.version = SLCAN_VERSION, .serial = "F405"};
 
     slcan_init(&peer, &sink, &identity);
     usart_start(rates);
@@ -38,32 +38,37 @@ void transport_poll(uint32_t now_ms)
     }
 }
 
-transport_status_t transport_status(void)
+void transport_status(lever_platform_t *status)
 {
-    const transport_status_t status = {.overruns = usart_overruns(), .dropped = peer.counts.dropped};
-
-    return status;
+    status->overruns = (uint16_t)usart_overruns();
+    status->dropped = (uint16_t)peer.counts.dropped;
 }
 
 /* Only data frames with 11-bit identifiers are the estimator's; the others were good SLCAN, and end here. */
-bool port_receive(lever_frame_t *frame)
+enum port_result transport_receive(void *self, lever_frame_t *frame)
 {
     uint8_t byte = 0u;
     slcan_frame_t received;
     bool found = false;
 
+    (void)self;
     while (!found && usart_read(&byte)) {
         if (slcan_take(&peer, byte, &received)) {
             *frame = received.frame;
             found = !received.extended && !received.remote;
         }
     }
-    return found;
+    return found ? PORT_DONE : PORT_NOTHING;
 }
 
-void port_send(const lever_frame_t *frame)
+/* A MOTOR_COMMAND that would leave too late has no room. */
+enum port_result transport_send(void *self, const lever_frame_t *frame)
 {
     const slcan_frame_t sent = {.frame = *frame};
 
-    (void)slcan_send(&peer, &sent, tick_ms());
+    (void)self;
+    if ((frame->id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && (usart_waiting_ms() >= (uint32_t)PORT_STALE_MS)) {
+        return PORT_NOTHING;
+    }
+    return slcan_send(&peer, &sent, tick_ms()) ? PORT_DONE : PORT_NOTHING;
 }

@@ -5,7 +5,8 @@
 #include "port/stm32f4/processor.h"
 #include "port/stm32f4/registers.h"
 
-/* RM0090 30.3.4: BRR is the clock by the rate, both in whole numbers. Receivers bear 2 % in all; this end may have half. */
+/* RM0090 30.3.4: BRR is the clock by the rate, both in whole numbers. Receivers bear 2 % in all; this end may have
+ * half. */
 #define DIVIDER(clock_hz) (((clock_hz) + (LEVER_STM32_BAUD / 2)) / LEVER_STM32_BAUD)
 #define ERROR_HZ(clock_hz) ((DIVIDER(clock_hz) * LEVER_STM32_BAUD) - (clock_hz))
 #define IS_GOOD(clock_hz)                                                                                              \
@@ -43,8 +44,8 @@ void usart_start(const clock_rates_t *rates)
     nvic.ISER[INTERRUPT_USART1 / 32] = BIT(INTERRUPT_USART1 % 32);
 }
 
-/* Writes while there is room in the hardware, which is two bytes; the rest goes out by interrupt. A QEMU older than 8.2 has no
- * such interrupt, but always has room. From the interrupt, or with interrupts off. */
+/* Writes while there is room in the hardware, which is two bytes; the rest goes out by interrupt. A QEMU older than 8.2
+ * has no such interrupt, but always has room. From the interrupt, or with interrupts off. */
 static void transmit(void)
 {
     uint8_t byte = 0u;
@@ -59,9 +60,9 @@ static void transmit(void)
     }
 }
 
-/* Takes what has arrived. RM0090 30.6.1: reading SR, then DR, clears ORE too. A byte with a framing or noise error spoils its
- * line, which is refused. In QEMU the next byte may be there at once, and then raises no interrupt of its own: therefore several at
- * once, and usart_poll(). From the interrupt, or with interrupts off. */
+/* Takes what has arrived. RM0090 30.6.1: reading SR, then DR, clears ORE too. A byte with a framing or noise error
+ * spoils its line, which is refused. In QEMU the next byte may be there at once, and then raises no interrupt of its
+ * own: therefore several at once, and usart_poll(). From the interrupt, or with interrupts off. */
 static void receive(void)
 {
     for (uint32_t i = 0u; i < (uint32_t)BYTES_AT_ONCE; i++) {
@@ -111,6 +112,11 @@ bool usart_write(const void *bytes, uint32_t length)
     transmit();
     interrupts_on();
     return taken;
+}
+
+uint32_t usart_waiting_ms(void)
+{
+    return (10u * 1000u * ring_used(&waiting)) / (uint32_t)LEVER_STM32_BAUD;
 }
 
 uint32_t usart_overruns(void)

@@ -1,4 +1,5 @@
-/* USART1 on PA9 (transmit) and PA10 (receive), 8 bits, no parity, 1 stop bit: RM0090 30. Rings between interrupt and loop. */
+/* USART1 on PA9 (transmit) and PA10 (receive), 8 bits, no parity, 1 stop bit: RM0090 30. Rings between interrupt and
+ * loop. */
 #ifndef LEVER_PORT_STM32F4_USART_H
 #define LEVER_PORT_STM32F4_USART_H
 
@@ -14,7 +15,7 @@
 
 void usart_start(const clock_rates_t *rates);
 
-/* What no interrupt tells. To be called in each turn of the loop. */
+/* What no interrupt tells. To be called in each wait of the loop. */
 void usart_poll(void);
 
 /* Takes the next received byte; false when there is none. */
@@ -25,6 +26,9 @@ bool usart_has_received(void);
 
 /* Queues `length` bytes whole, or none of them (false) when there is no room; never waits. */
 bool usart_write(const void *bytes, uint32_t length);
+
+/* How long what is queued takes to leave [ms]. */
+uint32_t usart_waiting_ms(void);
 
 /* Received bytes that were lost since the start; one that the hardware lost counts one each time. */
 uint32_t usart_overruns(void);

@@ -7,7 +7,8 @@
 
 #include "port/stm32f4/registers.h"
 
-/* Reads `reg` until the bits of `mask` are `value`, at most `polls` times (each at least 4 cycles). False: they never were. */
+/* Reads `reg` until the bits of `mask` are `value`, at most `polls` times (each at least 4 cycles). False: they never
+ * were. */
 static inline bool wait_for(const reg_t *reg, uint32_t mask, uint32_t value, uint32_t polls)
 {
     bool reached = false;

@@ -3,8 +3,8 @@
 #include "port/stm32f4/registers.h"
 #include "port/stm32f4/wait.h"
 
-/* RM0090 21.3: counts down from 4095 after a reset, at a quarter of 32 kHz (17 to 47 kHz, data sheet 5.3.9): 0.35 to 0.96 s. From
- * 400 that is 34 to 94 ms. */
+/* RM0090 21.3: counts down from 4095 after a reset, at a quarter of 32 kHz (17 to 47 kHz, data sheet 5.3.9): 0.35 to
+ * 0.96 s. From 400 that is 34 to 94 ms. */
 enum { COUNTS = 400, UPDATE_POLLS = 100000 };
 
 void watchdog_start(void)

@@ -1,4 +1,4 @@
-/* The independent watchdog: resets when nobody has kicked it for 0.5 s during the self tests, or 50 ms in the loop. */
+/* The independent watchdog: resets when nobody has kicked it for 0.5 s during the start, or 50 ms in the loop. */
 #ifndef LEVER_PORT_STM32F4_WATCHDOG_H
 #define LEVER_PORT_STM32F4_WATCHDOG_H
 

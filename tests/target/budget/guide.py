@@ -77,11 +77,11 @@ def memory(values: Values) -> str:
 
 
 def port(sizes: dict[str, dict[str, Size]]) -> str:
-    """The table of the four functions, from of_port() of each transport."""
+    """The table of the callbacks, from of_port() of each transport."""
     lines = ["| | on bxCAN | as SLCAN over a USART |", "|---|---|---|"]
     for name in (*FUNCTIONS, "all"):
         cells = (f"{size.bytes:,} bytes, {size.lines} lines" for size in (sizes[each][name] for each in TRANSPORTS))
-        what = "the whole port: interrupts, start-up, clocks, self tests" if name == "all" else f"`{name}()`"
+        what = "the whole port: interrupts, start-up, clocks, self tests" if name == "all" else f"`{name}`"
         lines.append(f"| {what} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,4 @@
-"""What the four functions of port/embedded/port.h take on the STM32F405, with all they call: bytes and lines of C."""
+"""What the callbacks of port/port.h take on the STM32F405, with all they call: bytes and lines of C."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from pathlib import Path
 from .image import FIRMWARE, run_tool
 from .trace import functions
 
-FUNCTIONS = ("port_receive", "port_send", "port_status", "port_idle")
+FUNCTIONS = {
+    "receive": "transport_receive",
+    "send": "transport_send",
+    "wait": "wait_frame",
+    "status": "report_status",
+}
+"""The callbacks, and which function each is."""
 TRANSPORTS = {"can": ("transport_slcan.c", "usart.c", "slcan.c"), "slcan": ("transport_can.c", "can.c")}
 """The images, and the files that are not in each."""
 
@@ -41,9 +47,9 @@ def of_port(transport: str, elf: Path) -> dict[str, Size]:
     in_image = {name: set(_CALL.findall(body)) for name, body in _FUNCTION.findall(run_tool("objdump", "-d", elf))}
     bytes_of = {name: size for _, size, name in functions(elf) if name in bodies}
     sizes = {}
-    for name in FUNCTIONS:
+    for callback, name in FUNCTIONS.items():
         reached = _reached(name, in_image) & set(bytes_of)
-        sizes[name] = Size(
+        sizes[callback] = Size(
             sum(bytes_of[each] for each in reached), sum(lines[each] for each in _reached(name, in_source))
         )
     return sizes | {"all": Size(sum(bytes_of.values()), sum(lines.values()))}

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from target.bxcan.bus import Bus
 from target.bxcan.bxcan import BxCan
-from target.bxcan.clocks import AHB1ENR, APB1ENR, SOFTWARE, WATCHDOG, Clocks, Flash, Power
+from target.bxcan.clocks import AHB1ENR, APB1ENR, HSE, HSI, SOFTWARE, WATCHDOG, Clocks, Flash, Power
 from target.bxcan.cortex import NMI, Cortex
 from target.bxcan.pins import PORTS, Pins
 from target.bxcan.watchdog import Watchdog
@@ -57,14 +57,20 @@ class Chip:
 
     REGIONS = ((0x40000000, 0x80000), (CORE_AT, 0x1000), (0xE0042000, 0x1000))
 
-    def __init__(self, bus: Bus, hse_hz: int = 8_000_000, pll_locks: bool = True) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        hse_hz: int = 8_000_000,
+        pll_locks: tuple[int, ...] = (HSI, HSE),
+        lsi_hz: int = 32_000,
+    ) -> None:
         self.schedule = bus.schedule
         self.misuses: list[Misuse] = []
         self.on_reset: Callable[[str], None] = lambda cause: None
         self.where: Callable[[], str] = lambda: "from outside"
         self.clocks = Clocks(self.schedule, self.misuse, hse_hz, pll_locks)
         self.pins = Pins(self.misuse)
-        self.watchdog = Watchdog(self.schedule, self.misuse, lambda: self.on_reset(WATCHDOG_RESET))
+        self.watchdog = Watchdog(self.schedule, self.misuse, lambda: self.on_reset(WATCHDOG_RESET), lsi_hz)
         self.cortex = Cortex(self.schedule, self.misuse, self.clocks.hclk_hz, lambda: self.on_reset(SOFTWARE_RESET))
         self.can = BxCan(bus, self)
         self.clocks.on_can_reset = self.can.reset

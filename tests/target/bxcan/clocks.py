@@ -23,9 +23,11 @@ APB_DIVIDER = dict.fromkeys(range(4), 1) | {4: 2, 5: 4, 6: 8, 7: 16}
 
 
 class Clocks:
-    """`hse_hz` 0: a crystal that does not start; `pll_locks`: whether the PLL ever does."""
+    """`hse_hz` 0: a crystal that does not start; `pll_locks`: on which of HSI and HSE the PLL does."""
 
-    def __init__(self, schedule: Schedule, misuse: Callable[[str], None], hse_hz: int, pll_locks: bool) -> None:
+    def __init__(
+        self, schedule: Schedule, misuse: Callable[[str], None], hse_hz: int, pll_locks: tuple[int, ...]
+    ) -> None:
         self.timers = Timers(schedule)
         self.misuse = misuse
         self.hse_hz, self.pll_locks = hse_hz, pll_locks
@@ -44,6 +46,9 @@ class Clocks:
         self.vos = 1
 
     # --- frequencies -------------------------------------------------------------------------------------------
+
+    def _pll_source(self) -> int:
+        return HSE if self.registers[PLLCFGR] >> 22 & 1 else HSI
 
     def pll_hz(self) -> float:
         value = self.registers[PLLCFGR]
@@ -101,7 +106,7 @@ class Clocks:
             self._check_pll()
         for bit in (HSION, HSEON, PLLON):
             if after & ~before & bit:
-                if (bit != HSEON or self.hse_hz) and (bit != PLLON or self.pll_locks):
+                if (bit != HSEON or self.hse_hz) and (bit != PLLON or self._pll_source() in self.pll_locks):
                     self.timers.after(START_NS[bit], lambda bit=bit: self._becomes_ready(bit))  # type: ignore[misc]
             elif not after & bit:
                 self.ready &= ~bit
@@ -124,7 +129,7 @@ class Clocks:
 
     def _check_pll(self) -> None:
         value = self.registers[PLLCFGR]
-        source = HSE if value >> 22 & 1 else HSI
+        source = self._pll_source()
         if not self.ready & (HSION, HSEON)[source]:
             self.misuse("RCC: the PLL is switched on before its source is ready")
         divider = max(1, value & 0x3F)

@@ -39,7 +39,7 @@ def misuses(talk: Talk, board: Board) -> None:
 
 
 def filters(talk: Talk, board: Board) -> None:
-    test_start.test_filters_pass_our_three_identifiers_and_nothing_else(board)
+    test_start.test_filters_pass_our_identifiers_and_nothing_else(board)
 
 
 def overrun(talk: Talk, board: Board) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from lever_cdkf.host_tools.native import lib
@@ -81,7 +82,7 @@ def test_waits_for_a_dead_bus_without_hanging(make_board: MakeBoard) -> None:
 def test_the_processor_sleeps_while_there_is_nothing_to_do(board: Board) -> None:
     asleep = 0
     for _ in range(200):
-        board.run(MS // 7)
+        board.run(137_000)  # at all times between two ticks
         asleep += board.machine.is_asleep
     assert asleep > 190
 
@@ -91,11 +92,12 @@ def test_the_processor_sleeps_while_there_is_nothing_to_do(board: Board) -> None
     [
         pytest.param({}, PLL, HSE, 168, 42, id="crystal"),
         pytest.param({"hse_hz": 0}, PLL, HSI, 168, 42, id="no crystal"),
-        pytest.param({"pll_locks": False}, HSI, HSE, 16, 16, id="no PLL"),
+        pytest.param({"pll_locks": (HSI,)}, PLL, HSI, 168, 42, id="no PLL on the crystal"),
+        pytest.param({"pll_locks": ()}, HSI, HSI, 16, 16, id="no PLL"),
     ],
 )
 def test_bit_timing_from_the_clock_that_is_there(
-    make_board: MakeBoard, options: dict[str, int], source: int, pll_source: int, hclk_mhz: int, apb1_mhz: int
+    make_board: MakeBoard, options: dict[str, Any], source: int, pll_source: int, hclk_mhz: int, apb1_mhz: int
 ) -> None:
     """As the model computes them from RCC and BTR. The sample point of CiA 301 at 1 Mbit/s is 75 to 90 %."""
     board = make_board(**options)
@@ -111,7 +113,25 @@ def test_bit_timing_from_the_clock_that_is_there(
         report, health = talk.report("PLATFORM_HEALTH"), talk.report("HEALTH")
     assert report["faults"] == (0 if options == {} else lib.LEVER_PLATFORM_CLOCK)
     assert board.machine.resets == []
-    assert bool(int(health["faults"]) & lib.LEVER_FAULT_PLATFORM) == (options != {})
+    assert health["fault_platform"] == (options != {})
+
+
+def test_start_without_pll_does_not_outlast_the_fastest_watchdog(make_board: MakeBoard) -> None:
+    """LSI at 47 kHz; twice that, as an instruction takes one cycle here and nearly two in a Cortex-M4F."""
+    board = make_board(pll_locks=(), lsi_hz=2 * 47_000)
+    board.start()
+    with Talk(board) as talk:
+        assert talk.report("PLATFORM_HEALTH")["faults"] == lib.LEVER_PLATFORM_CLOCK
+    assert board.machine.resets == []
+
+
+def test_crystal_that_has_failed_is_not_trusted_until_power_on(talk: Talk, board: Board) -> None:
+    board.chip.clocks.break_crystal()
+    board.chip.clocks.hse_hz = 8 * MHZ
+    board.run(100 * MS)
+    assert [reset.cause for reset in board.machine.resets] == ["software"]
+    assert board.chip.clocks.registers[4] >> 22 & 1 == HSI
+    assert talk.report("PLATFORM_HEALTH")["faults"] == lib.LEVER_PLATFORM_CLOCK
 
 
 def test_crystal_that_fails_later_is_replaced(talk: Talk, board: Board) -> None:
@@ -124,7 +144,7 @@ def test_crystal_that_fails_later_is_replaced(talk: Talk, board: Board) -> None:
     assert talk.report("PLATFORM_HEALTH")["faults"] == lib.LEVER_PLATFORM_CLOCK
 
 
-def test_filters_pass_our_three_identifiers_and_nothing_else(board: Board) -> None:
+def test_filters_pass_our_identifiers_and_nothing_else(board: Board) -> None:
     """Every standard identifier there is, and extended ones that look like ours in one half."""
     passes = board.can.filters.match
     assert {each for each in range(0x800) if passes(Frame(each))} == INPUTS

@@ -139,7 +139,7 @@ def test_fifo_overrun_is_counted_and_shown(talk: Talk, board: Board, frames: int
     assert report["overruns"] == min(1, lost), "once for a series, as RM0090's FOVR tells no more"
     assert int(report["faults"]) == (lib.LEVER_PLATFORM_OVERRUN if lost else 0)
     health = talk.report("HEALTH")
-    assert bool(int(health["faults"]) & lib.LEVER_FAULT_PLATFORM) == bool(lost)
+    assert health["fault_platform"] == bool(lost)
 
 
 def test_watchdog_is_fed_with_and_without_samples(talk: Talk, board: Board) -> None:
@@ -157,7 +157,7 @@ def test_watchdog_is_fed_with_and_without_samples(talk: Talk, board: Board) -> N
 def test_watchdog_resets_a_loop_that_hangs(talk: Talk, board: Board) -> None:
     """Interrupts still work, and must not keep the watchdog quiet."""
     assert talk.report("PLATFORM_HEALTH")["faults"] == 0
-    repair = board.machine.patch("embedded_turn", HANG)
+    repair = board.machine.patch("loop_turn", HANG)
     hung_at = board.schedule.now
     board.peer.send(*sample(talk.next))
     assert board.machine.run(1000 * MS, lambda: bool(board.machine.resets))

@@ -1,4 +1,4 @@
-"""The independent watchdog: RM0090 chapter 21; LSI at its typical 32 kHz."""
+"""The independent watchdog: RM0090 chapter 21; LSI at its typical 32 kHz, or from 17 to 47 kHz (data sheet 5.3.9)."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ from collections.abc import Callable
 
 from target.bxcan.schedule import Schedule, Timers
 
-LSI_HZ = 32_000
 KR, PR, RLR, SR = 0, 4, 8, 0xC
 UNLOCK, FEED, START = 0x5555, 0xAAAA, 0xCCCC
-UPDATE_NS = 5 * 1_000_000_000 // LSI_HZ
+UPDATE_CYCLES = 5
 
 
 class Watchdog:
-    def __init__(self, schedule: Schedule, misuse: Callable[[str], None], expired: Callable[[], None]) -> None:
+    def __init__(
+        self, schedule: Schedule, misuse: Callable[[str], None], expired: Callable[[], None], lsi_hz: int
+    ) -> None:
         self.timers, self.schedule = Timers(schedule), schedule
         self.misuse, self.expired = misuse, expired
+        self.lsi_hz = lsi_hz
         self.feedings = 0
         self.reset()
 
@@ -26,7 +28,7 @@ class Watchdog:
         self.busy_until = {PR: 0, RLR: 0}
 
     def timeout_ns(self) -> int:
-        return (self.reload + 1) * (4 << min(self.prescaler, 6)) * 1_000_000_000 // LSI_HZ
+        return (self.reload + 1) * (4 << min(self.prescaler, 6)) * 1_000_000_000 // self.lsi_hz
 
     def _is_busy(self, register: int) -> bool:
         return self.schedule.now < self.busy_until[register]
@@ -48,7 +50,7 @@ class Watchdog:
                 self.prescaler = value & 7
             else:
                 self.reload = value & 0xFFF
-            self.busy_until[offset] = self.schedule.now + UPDATE_NS
+            self.busy_until[offset] = self.schedule.now + UPDATE_CYCLES * 1_000_000_000 // self.lsi_hz
 
     def _key(self, key: int) -> None:
         self.is_unlocked = key == UNLOCK

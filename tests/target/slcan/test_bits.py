@@ -23,8 +23,10 @@ LEVER = str(Path(sys.executable).with_name("lever"))
 SCENARIOS = {"lever": "steady", "linear_physical": "linear_physical", "linear_black_box": "linear_black_box"}
 CASES = list(itertools.product(SCENARIOS, ("dual", "joint")))
 SECONDS = 20
-ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "MOTOR_COMMAND")
+ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS")
 """The messages compared. HEALTH is not: there the board tells of itself, too."""
+TORQUE = 'torque.0={kind="noise", rms="0.3 N m", low="1 Hz", high="10 Hz"}'
+"""Known, but not asked for by the firmware: on the board that ends whenever this computer pauses for 20 ms."""
 FRAME = re.compile(r"^\((\d+\.\d+)\) \S+ ([0-9A-F]{3})#([0-9A-F]*) R$", re.MULTILINE)
 
 pytestmark = pytest.mark.requires("qemu-system-arm")
@@ -33,9 +35,10 @@ Frame = tuple[str, str, str]
 """Time, name of the message, data."""
 
 
-def overrides(estimator: str) -> list[str]:
+def overrides(model: str, estimator: str) -> list[str]:
     """A short run with the settings of the image, which are the defaults."""
-    return [f"duration={SECONDS} s", "settings={}", "limits={}", f"estimator.estimator={estimator}"]
+    torque = [] if model == "linear_black_box" else [TORQUE]
+    return [f"duration={SECONDS} s", "settings={}", "limits={}", f"estimator.estimator={estimator}", *torque]
 
 
 def estimate_frames(log: str) -> list[Frame]:
@@ -46,7 +49,7 @@ def estimate_frames(log: str) -> list[Frame]:
 
 def on_the_board(image: Path, model: str, estimator: str, out: Path) -> list[Frame]:
     """By the two commands that a user would type."""
-    changes = [f"--set={override}" for override in overrides(estimator)]
+    changes = [f"--set={override}" for override in overrides(model, estimator)]
     sim = [LEVER, "sim", SCENARIOS[model], *changes, "--interface=slcan", "--channel={channel}", f"--out={out}"]
     result = subprocess.run([LEVER, "qemu", str(image), "--", *sim], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
@@ -54,7 +57,7 @@ def on_the_board(image: Path, model: str, estimator: str, out: Path) -> list[Fra
 
 
 def in_this_process(model: str, estimator: str) -> list[Frame]:
-    wanted = scenario.load(SCENARIOS[model], overrides(estimator))
+    wanted = scenario.load(SCENARIOS[model], overrides(model, estimator))
     with commands.open_bus(wanted, "lever", "lever") as bus:
         frames = loop.run(wanted, bus).frames()
     return estimate_frames(b"".join(buslog.lines(frames, "lever")).decode())

@@ -6,6 +6,7 @@ ever ready.
 
 from __future__ import annotations
 
+import re
 import socket
 import subprocess
 import time
@@ -113,7 +114,7 @@ class Board:
         self._line.settimeout(0.2)
         end = time.monotonic() + ANSWER_TIME
         answer = b""
-        while not answer.endswith(b"V1001\r"):
+        while not re.search(rb"V10\d\d\r$", answer):
             assert time.monotonic() < end, "the image does not answer"
             self._line.sendall(b"\rV\r")
             try:

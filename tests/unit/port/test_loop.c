@@ -1,132 +1,154 @@
-/* The loop of a port against a transport that fails on purpose. What it sends must be, frame for frame, what the façade
- * gives when it is called directly with the same samples. */
+/* The loop of every port, against a port and a clock that are played here. */
 #include <string.h>
 
 #include "can/e2e.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
-#include "port/linux/loop.h"
 #include "unity.h"
 
-enum { SAMPLES = 300, FRAMES = 8 * SAMPLES, PAUSES = 64, NEVER = -1 };
+/* What the loop says to the estimator passes through here. */
+static void seen_idle(lever_t *lever, uint32_t elapsed_us);
+static bool seen_next_frame(lever_t *lever, lever_frame_t *frame);
+#define lever_idle seen_idle
+#define lever_next_frame seen_next_frame
+#include "port/loop.c" /* NOLINT(bugprone-suspicious-include) */
+#undef lever_idle
+#undef lever_next_frame
 
-/* A medium whose faults are told beforehand. Counts are of calls that would have succeeded. */
-typedef struct fake {
-    const lever_frame_t *input;
-    int inputs;
-    int received;
+enum { SAMPLES = 300, INPUTS = 2 * SAMPLES, FRAMES = 8 * SAMPLES, FOREVER = 1 << 30 };
+
+/* A machine with its estimator. */
+typedef struct machine {
+    lever_memory_t memory;
+    lever_config_t config;
+    lever_frame_t input[INPUTS];
     lever_frame_t sent[FRAMES];
+    int received;
     int sends;
-    int full_times;       /* each frame is refused as FULL so often before it is taken; NEVER: for ever */
-    int refusals;         /* of the present frame */
-    int down_at_receive;  /* this frame is preceded by a lost link */
-    int down_at_send;     /* so is this one */
-    int restore_failures; /* attempts to restore that fail */
-    int restores;
-    enum transport_result restored; /* result of the attempt after these */
-    bool endless;                   /* the last input frame is received again and again */
-    int stop_after;                 /* waits; NEVER: until the input is used up */
+    int refusals;   /* each frame finds no room so often */
+    int refused;    /* the present frame */
+    int turns_left; /* waits until wait() asks to end */
     int waits;
-    int32_t pauses[PAUSES]; /* the first timeouts of waits that were not for a frame [ms] */
-    int pauses_taken;
-    int events[3];
-} fake_t;
+    bool waited_for_frame;
+    int32_t timeout_ms;        /* of the last wait */
+    enum port_result says;     /* receive and send, unless it is PORT_DONE */
+    enum port_result restored; /* restore */
+    int attempts;
+    uint32_t clock_us;
+    lever_platform_t platform;
+    uint32_t answer_id; /* each frame is answered with such a one besides; 0: with none */
+    int answered;       /* frames */
+    uint32_t idles;
+    uint32_t idle_us; /* sum of them */
+    loop_t loop;
+} machine_t;
 
-static fake_t fake;
-static transport_t transport;
-static lever_memory_t memory;
-static loop_t loop;
-static lever_frame_t input[2 * SAMPLES];
-static lever_frame_t expected[FRAMES];
-static int expected_count;
+static machine_t machine;
+static machine_t second;
+static port_t port;
+static port_t second_port;
+static machine_t *seen; /* whose estimator is spoken to */
 
-static enum transport_result fake_receive(void *self, lever_frame_t *frame)
+static void seen_idle(lever_t *lever, uint32_t elapsed_us)
 {
-    fake_t *medium = self;
-
-    if (medium->received == medium->down_at_receive) {
-        medium->down_at_receive = NEVER;
-        return TRANSPORT_DOWN;
-    }
-    if (medium->received >= medium->inputs) {
-        if (!medium->endless) {
-            return TRANSPORT_EMPTY;
-        }
-        medium->received = medium->inputs - 1;
-    }
-    *frame = medium->input[medium->received];
-    medium->received++;
-    return TRANSPORT_OK;
+    seen->idles++;
+    seen->idle_us += elapsed_us;
+    lever_idle(lever, elapsed_us);
 }
 
-static enum transport_result fake_send(void *self, const lever_frame_t *frame)
+static bool seen_next_frame(lever_t *lever, lever_frame_t *frame)
 {
-    fake_t *medium = self;
+    bool is_answer = (seen->answer_id != 0u) && (seen->answered != seen->received);
 
-    if (medium->sends == medium->down_at_send) {
-        medium->down_at_send = NEVER;
-        return TRANSPORT_DOWN;
+    seen->answered = seen->received;
+    if (is_answer) {
+        *frame = (lever_frame_t){.id = seen->answer_id, .length = 8u};
+    } else {
+        is_answer = lever_next_frame(lever, frame);
     }
-    if ((medium->full_times == NEVER) || (medium->refusals < medium->full_times)) {
-        medium->refusals++;
-        return TRANSPORT_FULL;
-    }
-    medium->refusals = 0;
-    TEST_ASSERT_LESS_THAN_INT(FRAMES, medium->sends);
-    medium->sent[medium->sends] = *frame;
-    medium->sends++;
-    return TRANSPORT_OK;
+    return is_answer;
 }
 
-static enum transport_result fake_restore(void *self)
+static enum port_result receive(void *self, lever_frame_t *frame)
 {
-    fake_t *medium = self;
+    machine_t *it = self;
 
-    medium->restores++;
-    return (medium->restores <= medium->restore_failures) ? TRANSPORT_DOWN : medium->restored;
-}
-
-static bool fake_wait(void *self, bool for_frame, int32_t timeout_ms)
-{
-    fake_t *medium = self;
-
-    medium->waits++;
-    if (!for_frame && (medium->pauses_taken < PAUSES)) {
-        medium->pauses[medium->pauses_taken] = timeout_ms;
-        medium->pauses_taken++;
+    if (it->says != PORT_DONE) {
+        return it->says;
     }
-    if (medium->stop_after != NEVER) {
-        return medium->waits < medium->stop_after;
+    if (it->received == INPUTS) {
+        return PORT_NOTHING;
     }
-    return !(for_frame && (medium->received >= medium->inputs));
+    *frame = it->input[it->received];
+    it->received++;
+    return PORT_DONE;
 }
 
-static const char *fake_reason(void *self)
+static enum port_result send(void *self, const lever_frame_t *frame)
 {
-    (void)self;
-    return "as told";
+    machine_t *it = self;
+
+    if (it->says != PORT_DONE) {
+        return it->says;
+    }
+    if (it->refused < it->refusals) {
+        it->refused++;
+        return PORT_NOTHING;
+    }
+    TEST_ASSERT_LESS_THAN_INT(FRAMES, it->sends);
+    it->refused = 0;
+    it->sent[it->sends] = *frame;
+    it->sends++;
+    return PORT_DONE;
 }
 
-static void count_event(void *context, enum loop_event event)
+static bool wait_frame(void *self, bool for_frame, int32_t timeout_ms)
 {
-    fake_t *medium = context;
+    machine_t *it = self;
 
-    medium->events[event]++;
+    it->waits++;
+    it->waited_for_frame = for_frame;
+    it->timeout_ms = timeout_ms;
+    it->clock_us += (timeout_ms > 0) ? (1000u * (uint32_t)timeout_ms) : 0u;
+    it->turns_left--;
+    return it->turns_left > 0;
+}
+
+static enum port_result restore_link(void *self)
+{
+    machine_t *it = self;
+
+    it->attempts++;
+    it->says = (it->restored == PORT_DONE) ? PORT_DONE : it->says;
+    return it->restored;
+}
+
+static uint32_t machine_us(void *self)
+{
+    const machine_t *it = self;
+
+    return it->clock_us;
+}
+
+static void status(void *self, lever_platform_t *now)
+{
+    const machine_t *it = self;
+
+    *now = it->platform;
 }
 
 /* The pair of frames of sample k at 1 kHz, of a lever that swings at 3 Hz (triangular: no libm needed). */
-static void make_sample(lever_frame_t frames[2], uint32_t k)
+static void make_sample(lever_frame_t frames[2], uint32_t k, float z_ddot)
 {
-    const uint32_t period = 333u;
-    const float phase = (float)(k % period) / (float)period;
-    const float swing = (phase < 0.5f) ? ((4.0f * phase) - 1.0f) : (3.0f - (4.0f * phase));
+    const float phase = (float)(k % 333u) / 333.0f;
+    const bool rises = phase < 0.5f;
+    const float swing = rises ? ((4.0f * phase) - 1.0f) : (3.0f - (4.0f * phase));
     const message_lever_sample_t lever_sample = {.theta = 0.35f + (0.02f * swing),
-        .theta_dot = (phase < 0.5f) ? 0.24f : -0.24f,
-        .tau_m = 0.0f,
+        .theta_dot = rises ? 0.24f : -0.24f,
         .theta_valid = true,
         .theta_dot_valid = true,
         .tau_m_valid = true};
-    const message_base_sample_t base_sample = {.time_us = 1000u * k, .z_ddot = swing, .z_ddot_valid = true};
+    const message_base_sample_t base_sample = {.time_us = 1000u * k, .z_ddot = z_ddot * swing, .z_ddot_valid = true};
 
     TEST_ASSERT_TRUE(message_lever_sample_encode(&frames[0], &lever_sample));
     TEST_ASSERT_TRUE(message_base_sample_encode(&frames[1], &base_sample));
@@ -134,212 +156,360 @@ static void make_sample(lever_frame_t frames[2], uint32_t k)
     e2e_protect(&frames[1], MESSAGE_BASE_SAMPLE_DATA_ID, (uint8_t)(k % 16u));
 }
 
-/* The answers to `input`, from the façade alone. */
-static void compute_expected(const lever_config_t *config)
+static void start(machine_t *it, port_t *its_port, enum loop_policy policy, float z_ddot)
 {
-    lever_t *lever = lever_init(&memory, config);
-
-    expected_count = 0;
-    for (int i = 0; i < (2 * SAMPLES); i++) {
-        if (lever_on_frame(lever, &input[i]) == LEVER_FRAME_SAMPLE) {
-            (void)lever_step(lever);
-            while (lever_next_frame(lever, &expected[expected_count])) {
-                expected_count++;
-                TEST_ASSERT_LESS_THAN_INT(FRAMES, expected_count);
-            }
-        }
+    (void)memset(it, 0, sizeof *it);
+    for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
+        make_sample(&it->input[2u * k], k, z_ddot);
     }
+    it->says = PORT_DONE;
+    it->turns_left = FOREVER;
+    it->clock_us = 0xFFFFFF00u; /* wraps soon */
+    *its_port = (port_t){.self = it, .receive = receive, .send = send, .wait = wait_frame, .now_us = machine_us};
+    lever_config_default(&it->config);
+    it->config.settings.align_time = 0.05f; /* so that most of the samples are really estimated */
+    loop_init(&it->loop, its_port, lever_init(&it->memory, &it->config), policy);
+    seen = it;
 }
 
 void setUp(void)
 {
-    static lever_config_t config;
-
-    lever_config_default(&config);
-    config.settings.align_time = 0.05f; /* so that most of the samples are really estimated */
-    for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
-        make_sample(&input[2u * k], k);
-    }
-    compute_expected(&config);
-    (void)memset(&fake, 0, sizeof fake);
-    fake.input = input;
-    fake.inputs = 2 * SAMPLES;
-    fake.down_at_receive = NEVER;
-    fake.down_at_send = NEVER;
-    fake.restored = TRANSPORT_OK;
-    fake.stop_after = NEVER;
-    transport = (transport_t){.self = &fake,
-        .receive = fake_receive,
-        .send = fake_send,
-        .restore = fake_restore,
-        .wait = fake_wait,
-        .reason = fake_reason};
-    loop_init(&loop, &transport, lever_init(&memory, &config));
-    loop.on_event = count_event;
-    loop.context = &fake;
+    start(&machine, &port, LOOP_HOLD, 1.0f);
 }
 
 void tearDown(void)
 {
 }
 
-/* Everything was answered, in order, once, as if nothing had happened. */
-static void assert_all_answered(void)
+static enum port_result turn(machine_t *it)
 {
-    lever_health_t health;
+    seen = it;
+    return loop_turn(&it->loop);
+}
 
-    lever_health(loop.lever, &health);
-    TEST_ASSERT_GREATER_OR_EQUAL_INT(SAMPLES, expected_count);
-    TEST_ASSERT_EQUAL_INT(expected_count, fake.sends);
-    for (int i = 0; i < expected_count; i++) {
-        TEST_ASSERT_EQUAL_HEX32(expected[i].id, fake.sent[i].id);
-        TEST_ASSERT_EQUAL_UINT8(expected[i].length, fake.sent[i].length);
-        TEST_ASSERT_EQUAL_HEX8_ARRAY(expected[i].data, fake.sent[i].data, 8);
+static void turn_until_empty(machine_t *it)
+{
+    int longest = 100 * FRAMES;
+
+    do {
+        TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(it));
+        longest--;
+        TEST_ASSERT_GREATER_THAN_INT(0, longest);
+    } while ((it->received < INPUTS) || it->loop.is_held);
+}
+
+/* Frame for frame what the façade gives when it is called directly with the same samples. */
+static void assert_all_answered(const machine_t *it)
+{
+    lever_memory_t memory;
+    lever_frame_t expected;
+    int count = 0;
+    lever_t *lever = lever_init(&memory, &it->config);
+
+    for (int i = 0; i < INPUTS; i++) {
+        if (lever_on_frame(lever, &it->input[i]) == LEVER_FRAME_SAMPLE) {
+            (void)lever_step(lever);
+        }
+        while (lever_next_frame(lever, &expected)) {
+            TEST_ASSERT_LESS_THAN_INT(it->sends, count);
+            TEST_ASSERT_EQUAL_HEX32(expected.id, it->sent[count].id);
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(expected.data, it->sent[count].data, 8);
+            count++;
+        }
     }
-    TEST_ASSERT_EQUAL_UINT64(2 * SAMPLES, loop.totals.received);
-    TEST_ASSERT_EQUAL_UINT64(expected_count, loop.totals.sent);
-    TEST_ASSERT_EQUAL_UINT64(SAMPLES, loop.totals.samples);
-    TEST_ASSERT_EQUAL_UINT32(SAMPLES, health.samples);
-    TEST_ASSERT_EQUAL_UINT32(0u, health.lost);
-    TEST_ASSERT_FALSE(loop.has_unsent);
+    TEST_ASSERT_GREATER_THAN_INT(SAMPLES, count);
+    TEST_ASSERT_EQUAL_INT(count, it->sends);
+    TEST_ASSERT_EQUAL_UINT64(count, it->loop.totals.sent);
+    TEST_ASSERT_EQUAL_UINT64(INPUTS, it->loop.totals.received);
+    TEST_ASSERT_EQUAL_UINT64(SAMPLES, it->loop.totals.samples);
+    TEST_ASSERT_EQUAL_UINT64(0u, it->loop.totals.dropped);
+    TEST_ASSERT_EQUAL_UINT64(0u, it->loop.totals.stale);
 }
 
-static void test_it_answers_as_the_facade_does(void)
+/* Two of them in turn, of which one has twice the excitation. */
+static void several_instances_answer_as_the_facade_does(void)
 {
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    assert_all_answered();
-    TEST_ASSERT_EQUAL_UINT64(0u, loop.totals.retries);
-    TEST_ASSERT_EQUAL_UINT64(0u, loop.totals.outages);
+    start(&second, &second_port, LOOP_DROP, 2.0f);
+    while (second.received < INPUTS) {
+        (void)turn(&machine);
+        (void)turn(&second);
+    }
+    assert_all_answered(&machine);
+    assert_all_answered(&second);
+    TEST_ASSERT_NOT_EQUAL(0, memcmp(machine.sent, second.sent, sizeof machine.sent));
+    TEST_ASSERT_EQUAL_UINT64(0u, machine.loop.totals.held);
+    TEST_ASSERT_EQUAL_INT(LEVER_MODE_RUN, machine.loop.mode);
 }
 
-static void test_no_answer_is_dropped_when_there_is_no_room(void)
+static void a_held_frame_is_sent_before_anything_is_received(void)
 {
-    fake.full_times = 3;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    assert_all_answered();
-    TEST_ASSERT_EQUAL_UINT64(3 * expected_count, loop.totals.retries);
-    TEST_ASSERT_EQUAL_INT32(LOOP_RETRY_MS, fake.pauses[0]);
+    machine.refusals = 3;
+    turn_until_empty(&machine);
+    assert_all_answered(&machine);
+    TEST_ASSERT_EQUAL_UINT64(machine.sends, machine.loop.totals.held);
+
+    setUp();
+    machine.refusals = FOREVER;
+    for (int i = 0; i < 100; i++) {
+        TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
+    }
+    TEST_ASSERT_EQUAL_INT(2, machine.received);
+    TEST_ASSERT_TRUE(machine.loop.is_held);
+    TEST_ASSERT_FALSE(machine.waited_for_frame);
+    TEST_ASSERT_EQUAL_INT32(LOOP_RETRY_MS, machine.timeout_ms);
 }
 
-static void test_nothing_is_received_while_an_answer_waits_for_room(void)
+static void without_room_a_frame_is_dropped_and_counted(void)
 {
-    fake.full_times = NEVER;
-    fake.stop_after = 1000;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    TEST_ASSERT_EQUAL_INT(2, fake.received);
-    TEST_ASSERT_EQUAL_INT(0, fake.sends);
-    TEST_ASSERT_TRUE(loop.has_unsent);
+    start(&machine, &port, LOOP_DROP, 1.0f);
+    machine.refusals = FOREVER;
+    turn_until_empty(&machine);
+    TEST_ASSERT_EQUAL_INT(INPUTS, machine.received);
+    TEST_ASSERT_EQUAL_UINT64(0u, machine.loop.totals.sent);
+    TEST_ASSERT_EQUAL_UINT64(0u, machine.loop.totals.held);
+    TEST_ASSERT_EQUAL_UINT64(machine.refused, machine.loop.totals.dropped);
+    TEST_ASSERT_GREATER_THAN_UINT64(SAMPLES, machine.loop.totals.dropped);
 }
 
-static void test_it_goes_on_after_a_link_lost_while_receiving(void)
+/* A COMMAND_ACK belongs to no sample. */
+static void every_frame_may_be_answered(void)
 {
-    fake.down_at_receive = 101;
-    fake.restore_failures = 3;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    assert_all_answered();
-    TEST_ASSERT_EQUAL_UINT64(1u, loop.totals.outages);
-    TEST_ASSERT_EQUAL_INT(1, fake.events[LOOP_EVENT_DOWN]);
-    TEST_ASSERT_EQUAL_INT(1, fake.events[LOOP_EVENT_UP]);
+    machine.answer_id = 0x218u;
+    TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
+    TEST_ASSERT_EQUAL_INT(1, machine.sends);
+    TEST_ASSERT_EQUAL_HEX32(0x218u, machine.sent[0].id);
+    TEST_ASSERT_EQUAL_UINT64(0u, machine.loop.totals.samples);
 }
 
-static void test_an_answer_outlives_a_link_lost_while_sending(void)
+/* Linux sent one that was 2,999 ms old, after an outage. */
+static void only_a_motor_command_goes_stale(void)
 {
-    fake.down_at_send = 57;
-    fake.restore_failures = 1;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    assert_all_answered();
-    TEST_ASSERT_EQUAL_UINT64(1u, loop.totals.outages);
-    TEST_ASSERT_EQUAL_INT(2, fake.restores);
+    static const struct {
+        uint32_t id;
+        uint32_t held_us;
+        bool lock_step;
+        bool is_sent;
+    } rows[] = {
+        {MESSAGE_MOTOR_COMMAND_ID, 20000u, false, true},
+        {MESSAGE_MOTOR_COMMAND_ID, 20001u, false, false},
+        {MESSAGE_MOTOR_COMMAND_ID, 2999000u, false, false},
+        {MESSAGE_MOTOR_COMMAND_ID, 2999000u, true, true},
+        {MESSAGE_STATE_ESTIMATE_ID, 2999000u, false, true},
+    };
+
+    for (size_t i = 0u; i < (sizeof rows / sizeof rows[0]); i++) {
+        setUp();
+        const uint32_t received_us = machine.clock_us;
+        machine.loop.lock_step = rows[i].lock_step;
+        machine.answer_id = rows[i].id;
+        machine.refusals = 1;
+        (void)turn(&machine);
+        TEST_ASSERT_TRUE(machine.loop.is_held);
+        machine.clock_us = received_us + rows[i].held_us;
+        machine.refusals = 0;
+        machine.answer_id = 0u;
+        (void)turn(&machine);
+        TEST_ASSERT_EQUAL_INT(rows[i].is_sent, machine.sent[0].id == rows[i].id);
+        TEST_ASSERT_EQUAL_UINT64(rows[i].is_sent ? 0u : 1u, machine.loop.totals.stale);
+    }
 }
 
-static void test_the_pauses_of_an_outage_double_up_to_a_bound(void)
+/* The process was stopped for 3 s, say, and samples from then wait: no torque is asked for until one is known to be
+ * new. */
+static void a_motor_command_to_an_old_sample_is_stale(void)
 {
-    static const int32_t pauses_ms[] = {10, 20, 40, 80, 160, 320, 500, 500, 500};
-
-    fake.down_at_receive = 0;
-    fake.restore_failures = 8;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    TEST_ASSERT_EQUAL_INT(9, fake.pauses_taken);
-    TEST_ASSERT_EQUAL_INT32_ARRAY(pauses_ms, fake.pauses, 9);
-    assert_all_answered();
+    machine.received = INPUTS;
+    (void)turn(&machine);
+    machine.clock_us += 3000000u;
+    machine.received = INPUTS - 4;
+    machine.answer_id = MESSAGE_MOTOR_COMMAND_ID;
+    for (int i = 0; i < 4; i++) {
+        (void)turn(&machine);
+    }
+    TEST_ASSERT_EQUAL_UINT64(4u, machine.loop.totals.stale);
+    (void)turn(&machine); /* nothing waits any more */
+    machine.received = INPUTS - 1;
+    (void)turn(&machine);
+    TEST_ASSERT_EQUAL_UINT64(4u, machine.loop.totals.stale);
+    TEST_ASSERT_EQUAL_HEX32(MESSAGE_MOTOR_COMMAND_ID, machine.sent[machine.sends - 2].id); /* before STATE_ESTIMATE */
 }
 
-static void test_a_request_to_end_is_seen_during_an_outage(void)
+static void without_a_sample_the_estimator_is_told_each_5_ms(void)
 {
-    fake.down_at_receive = 10;
-    fake.restore_failures = 1000000;
-    fake.stop_after = 20;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    TEST_ASSERT_EQUAL_INT(20, fake.waits);
-    TEST_ASSERT_EQUAL_INT(0, fake.events[LOOP_EVENT_UP]);
+    const uint32_t since_us = machine.clock_us;
+
+    machine.received = INPUTS;
+    for (int i = 0; i < 100; i++) {
+        (void)turn(&machine);
+        TEST_ASSERT_TRUE(machine.waited_for_frame);
+        TEST_ASSERT_EQUAL_INT32(LOOP_IDLE_MS, machine.timeout_ms);
+    }
+    TEST_ASSERT_EQUAL_UINT32(99u, machine.idles); /* not yet after the last wait */
+    TEST_ASSERT_EQUAL_UINT32(machine.clock_us - since_us - 5000u, machine.idle_us);
+
+    /* Frames that are no sample do not keep it from that; samples do. */
+    for (int i = 0; i < 10; i++) {
+        machine.received = 0;
+        machine.clock_us += 5000u;
+        (void)turn(&machine);
+    }
+    TEST_ASSERT_EQUAL_UINT32(109u, machine.idles);
+    setUp();
+    for (int i = 0; i < INPUTS; i++) {
+        machine.clock_us += 500u;
+        (void)turn(&machine);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0u, machine.idles);
 }
 
-static void test_a_request_to_end_is_seen_under_full_load(void)
+static void in_lock_step_time_is_that_of_the_samples(void)
 {
-    const lever_frame_t foreign = {.id = 0x7FFu, .length = 8u};
-
-    fake.input = &foreign;
-    fake.inputs = 1;
-    fake.endless = true;
-    fake.stop_after = 1;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    TEST_ASSERT_EQUAL_UINT64(LOOP_BATCH, loop.totals.received);
-    TEST_ASSERT_EQUAL_UINT64(0u, loop.totals.samples);
-    TEST_ASSERT_EQUAL_INT(0, fake.sends);
+    machine.loop.lock_step = true;
+    machine.received = INPUTS;
+    machine.clock_us += 1000000u;
+    (void)turn(&machine);
+    TEST_ASSERT_EQUAL_UINT32(0u, machine.idles);
+    TEST_ASSERT_EQUAL_INT32(-1, machine.timeout_ms);
 }
 
-static void test_it_ends_when_the_transport_is_broken(void)
+/* The torque of a dither that is on when samples cease is zero 100 ms later at the latest, and was not cut off. */
+static void torque_fades_when_no_sample_comes(void)
 {
-    fake.down_at_send = 5;
-    fake.restored = TRANSPORT_BROKEN;
-    TEST_ASSERT_FALSE(loop_run(&loop));
-    TEST_ASSERT_EQUAL_INT(5, fake.sends);
-    TEST_ASSERT_EQUAL_INT(1, fake.restores);
+    const lever_command_t dither = {.model = LEVER_KEEP,
+        .preload = LEVER_KEEP,
+        .estimator = LEVER_KEEP,
+        .adaptation = LEVER_KEEP,
+        .dither_rms = 0.3f};
+    static const uint8_t zero[2] = {0u, 0u};
+    int motor = 0;
+
+    TEST_ASSERT_TRUE(lever_command(machine.loop.lever, &dither));
+    turn_until_empty(&machine);
+    const int answered = machine.sends;
+    for (int i = 0; i < 20; i++) {
+        (void)turn(&machine);
+    }
+    for (int i = answered; i < machine.sends; i++) {
+        motor += (machine.sent[i].id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) ? 1 : 0;
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(2, motor);
+    TEST_ASSERT_EQUAL_HEX32(MESSAGE_MOTOR_COMMAND_ID, machine.sent[machine.sends - 1].id);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(zero, &machine.sent[machine.sends - 1].data[2], 2);
 }
 
-static enum transport_result broken_receive(void *self, lever_frame_t *frame)
+static void a_request_to_end_is_seen_under_full_load(void)
 {
-    (void)self;
-    (void)frame;
-    return TRANSPORT_BROKEN;
+    machine.turns_left = 1;
+    for (int i = 1; i < LOOP_BATCH; i++) {
+        TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
+    }
+    TEST_ASSERT_EQUAL_INT(PORT_NOTHING, turn(&machine));
+    TEST_ASSERT_EQUAL_INT(1, machine.waits);
+    TEST_ASSERT_EQUAL_INT32(0, machine.timeout_ms);
 }
 
-static void test_it_ends_at_once_when_receiving_is_broken(void)
+/* A link that is lost while the loop receives, or holds a frame, and comes back: nothing is lost or sent twice. */
+static void an_outage_leaves_everything_as_it_was(void)
 {
-    transport.receive = broken_receive;
-    TEST_ASSERT_FALSE(loop_run(&loop));
-    TEST_ASSERT_EQUAL_INT(0, fake.waits);
+    port.restore = restore_link;
+    for (int i = 1; machine.received < INPUTS; i++) {
+        (void)turn(&machine);
+        if ((i % 50) == 0) {
+            machine.refusals = ((i % 100) == 0) ? 1 : 0;
+            machine.says = PORT_DOWN;
+            machine.restored = PORT_DONE;
+        }
+    }
+    machine.refusals = 0;
+    turn_until_empty(&machine);
+    assert_all_answered(&machine);
+    TEST_ASSERT_GREATER_THAN_UINT64(10u, machine.loop.totals.outages);
+    TEST_ASSERT_EQUAL_UINT64(machine.attempts, machine.loop.totals.outages);
 }
 
-static void test_it_tells_of_each_change_of_mode(void)
+static void pauses_of_an_outage_double_up_to_a_bound(void)
 {
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    TEST_ASSERT_EQUAL_INT(2, fake.events[LOOP_EVENT_MODE]); /* init to align to run */
-    TEST_ASSERT_EQUAL_INT(LEVER_MODE_RUN, loop.mode);
+    static const uint32_t pauses_ms[] = {10u, 20u, 40u, 80u, 160u, 320u, 500u, 500u, 500u};
+    uint32_t since_us = machine.clock_us;
+
+    port.restore = restore_link;
+    machine.says = PORT_DOWN;
+    machine.restored = PORT_DOWN;
+    for (int i = 0; i < (int)(sizeof pauses_ms / sizeof pauses_ms[0]); i++) {
+        while (machine.attempts == i) {
+            TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
+            TEST_ASSERT_TRUE(machine.loop.is_down);
+            TEST_ASSERT_FALSE(machine.waited_for_frame);
+        }
+        TEST_ASSERT_EQUAL_UINT32(pauses_ms[i], (machine.loop.tried_us - since_us) / 1000u);
+        since_us = machine.loop.tried_us;
+    }
+    TEST_ASSERT_EQUAL_UINT64(1u, machine.loop.totals.outages);
+    TEST_ASSERT_GREATER_THAN_UINT32(400u, machine.idles); /* torque fades meanwhile */
+    machine.turns_left = 1;
+    TEST_ASSERT_EQUAL_INT(PORT_NOTHING, turn(&machine)); /* a request to end is seen */
 }
 
-static void test_nobody_needs_to_listen(void)
+/* Whoever prints that waits for no frame first, which may never come in lock-step. */
+static void the_turn_that_restores_a_link_ends_at_once(void)
 {
-    loop.on_event = NULL;
-    fake.down_at_receive = 3;
-    TEST_ASSERT_TRUE(loop_run(&loop));
-    assert_all_answered();
+    port.restore = restore_link;
+    machine.loop.lock_step = true;
+    machine.says = PORT_DOWN;
+    (void)turn(&machine);
+    const int waits = machine.waits;
+    machine.clock_us += 10000u;
+    machine.restored = PORT_DONE;
+    TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
+    TEST_ASSERT_FALSE(machine.loop.is_down);
+    TEST_ASSERT_EQUAL_INT(waits, machine.waits);
+}
+
+static void what_is_beyond_repair_ends_it(void)
+{
+    machine.says = PORT_BROKEN;
+    TEST_ASSERT_EQUAL_INT(PORT_BROKEN, turn(&machine));
+    machine.says = PORT_DOWN; /* with nobody to restore it */
+    TEST_ASSERT_EQUAL_INT(PORT_DOWN, turn(&machine));
+    port.restore = restore_link;
+    (void)turn(&machine);
+    machine.restored = PORT_BROKEN;
+    machine.clock_us += 10000u;
+    TEST_ASSERT_EQUAL_INT(PORT_BROKEN, turn(&machine));
+}
+
+static void the_state_of_the_machine_reaches_the_bus(void)
+{
+    message_health_t health = {0};
+
+    port.status = status;
+    machine.platform.faults = LEVER_PLATFORM_BUS_OFF;
+    turn_until_empty(&machine);
+    for (int i = 0; i < machine.sends; i++) {
+        if (machine.sent[i].id == (uint32_t)MESSAGE_HEALTH_ID) {
+            TEST_ASSERT_TRUE(message_health_decode(&health, &machine.sent[i]));
+        }
+    }
+    TEST_ASSERT_BITS_HIGH(LEVER_FAULT_PLATFORM, health.faults);
 }
 
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_it_answers_as_the_facade_does);
-    RUN_TEST(test_no_answer_is_dropped_when_there_is_no_room);
-    RUN_TEST(test_nothing_is_received_while_an_answer_waits_for_room);
-    RUN_TEST(test_it_goes_on_after_a_link_lost_while_receiving);
-    RUN_TEST(test_an_answer_outlives_a_link_lost_while_sending);
-    RUN_TEST(test_the_pauses_of_an_outage_double_up_to_a_bound);
-    RUN_TEST(test_a_request_to_end_is_seen_during_an_outage);
-    RUN_TEST(test_a_request_to_end_is_seen_under_full_load);
-    RUN_TEST(test_it_ends_when_the_transport_is_broken);
-    RUN_TEST(test_it_ends_at_once_when_receiving_is_broken);
-    RUN_TEST(test_it_tells_of_each_change_of_mode);
-    RUN_TEST(test_nobody_needs_to_listen);
+    RUN_TEST(several_instances_answer_as_the_facade_does);
+    RUN_TEST(a_held_frame_is_sent_before_anything_is_received);
+    RUN_TEST(without_room_a_frame_is_dropped_and_counted);
+    RUN_TEST(every_frame_may_be_answered);
+    RUN_TEST(only_a_motor_command_goes_stale);
+    RUN_TEST(a_motor_command_to_an_old_sample_is_stale);
+    RUN_TEST(without_a_sample_the_estimator_is_told_each_5_ms);
+    RUN_TEST(in_lock_step_time_is_that_of_the_samples);
+    RUN_TEST(torque_fades_when_no_sample_comes);
+    RUN_TEST(a_request_to_end_is_seen_under_full_load);
+    RUN_TEST(an_outage_leaves_everything_as_it_was);
+    RUN_TEST(pauses_of_an_outage_double_up_to_a_bound);
+    RUN_TEST(the_turn_that_restores_a_link_ends_at_once);
+    RUN_TEST(what_is_beyond_repair_ends_it);
+    RUN_TEST(the_state_of_the_machine_reaches_the_bus);
     return UNITY_END();
 }

@@ -13,7 +13,7 @@
 #include "port/linux/socketcan.h"
 #include "unity.h"
 
-enum { MOST_WORDS = 16, WORD_BYTES = 64 };
+enum { MOST_WORDS = 20, WORD_BYTES = 64 };
 
 static options_t options;
 static settings_error_t error;
@@ -64,6 +64,7 @@ static void test_the_interface_alone_gives_the_defaults(void)
     TEST_ASSERT_EQUAL_INT(OPTIONS_RUN, options.action);
     TEST_ASSERT_EQUAL_STRING("vcan0", options.interface);
     TEST_ASSERT_FALSE(options.verbose);
+    TEST_ASSERT_FALSE(options.lock_step); /* supervised */
     TEST_ASSERT_EQUAL_MEMORY(&expected, &options.config, sizeof expected);
 }
 
@@ -88,7 +89,8 @@ static void test_each_medium_has_its_option_and_the_last_counts(void)
 static void test_choices_and_settings_reach_the_configuration(void)
 {
     TEST_ASSERT_TRUE(read_line("--can can1 --preload fixed --adaptation annealing --model lever --estimator dual "
-                               "--set m_p=3 --set theta_noise=0.002 --verbose"));
+                               "--set m_p=3 --set theta_noise=0.002 --verbose --lock-step"));
+    TEST_ASSERT_TRUE(options.lock_step);
     TEST_ASSERT_EQUAL_UINT8(LEVER_PRELOAD_FIXED, options.config.preload);
     TEST_ASSERT_EQUAL_UINT8(LEVER_ADAPTATION_ANNEALING, options.config.adaptation);
     TEST_ASSERT_EQUAL_FLOAT(3.0f, options.config.settings.m_p);

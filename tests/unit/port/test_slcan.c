@@ -1,5 +1,5 @@
-/* The SLCAN codec: lines both ways, and the peer's answer to every command in every state, after LAWICEL's manuals of the CAN232
- * and CANUSB; its acceptance filter after the data sheet of the SJA1000. */
+/* The SLCAN codec: lines both ways, and the peer's answer to every command in every state, after LAWICEL's manuals of
+ * the CAN232 and CANUSB; its acceptance filter after the data sheet of the SJA1000. */
 #include <stdio.h>
 #include <string.h>
 

@@ -1,7 +1,5 @@
-/* USART1 of the STM32F405 port and SLCAN on it, on registers that are plain memory here: what is read stays there, and what is
- * written is read back. */
-#define LEVER_SLCAN_VERSION "1001" /* the build gives it to the port */
-
+/* USART1 of the STM32F405 port and SLCAN on it, on registers that are plain memory here: what is read stays there, and
+ * what is written is read back. */
 #include <string.h>
 
 #include "port/stm32f4/transport_slcan.c" /* NOLINT(bugprone-suspicious-include): with memory for the registers */
@@ -112,30 +110,51 @@ static void only_data_frames_with_11_bit_identifiers_reach_the_estimator(void)
     lever_frame_t frame;
 
     receive_text("O\rT000001101AA\rr1108\rt111201FF\r");
-    TEST_ASSERT_TRUE(port_receive(&frame));
+    TEST_ASSERT_EQUAL_INT(PORT_DONE, transport_receive(NULL, &frame));
     TEST_ASSERT_EQUAL_HEX32(0x111, frame.id);
     TEST_ASSERT_EQUAL_UINT8(2, frame.length);
     TEST_ASSERT_EQUAL_HEX8(0xFF, frame.data[1]);
-    TEST_ASSERT_FALSE(port_receive(&frame));
+    TEST_ASSERT_EQUAL_INT(PORT_NOTHING, transport_receive(NULL, &frame));
     TEST_ASSERT_FALSE(transport_has_received());
+}
+
+/* 2,000 bytes take 20 ms at 1 Mbit/s; a line has 22. */
+static void a_motor_command_that_would_leave_late_has_no_room(void)
+{
+    static const lever_frame_t motor = {.id = 0x215u, .length = 8u};
+    static const lever_frame_t state = {.id = 0x210u, .length = 8u};
+    lever_frame_t none;
+    int lines = 0;
+
+    receive_text("O\r");
+    (void)transport_receive(NULL, &none);
+    while (transport_send(NULL, &motor) == PORT_DONE) {
+        lines++;
+    }
+    TEST_ASSERT_EQUAL_INT(2000 / 22 + 1, lines);
+    TEST_ASSERT_EQUAL_INT(PORT_DONE, transport_send(NULL, &state));
 }
 
 static void losses_are_in_the_status_and_in_the_flags(void)
 {
     static const lever_frame_t frame = {.id = 0x210u, .length = 8u};
+    lever_platform_t status = {0};
     lever_frame_t none;
 
     receive_text("O\r");
-    TEST_ASSERT_FALSE(port_receive(&none));
+    TEST_ASSERT_EQUAL_INT(PORT_NOTHING, transport_receive(NULL, &none));
     for (int i = 0; i < 200; i++) { /* nobody takes them */
-        port_send(&frame);
+        (void)transport_send(NULL, &frame);
     }
-    TEST_ASSERT_GREATER_THAN_UINT32(0u, transport_status().dropped);
+    TEST_ASSERT_EQUAL_INT(PORT_NOTHING, transport_send(NULL, &frame));
+    transport_status(&status);
+    TEST_ASSERT_GREATER_THAN_UINT32(0u, status.dropped);
     usart1.SR = BIT(3);
     usart_interrupt();
     usart1.SR = 0u;
     transport_poll(0u);
-    TEST_ASSERT_GREATER_THAN_UINT32(0u, transport_status().overruns);
+    transport_status(&status);
+    TEST_ASSERT_GREATER_THAN_UINT32(0u, status.overruns);
     TEST_ASSERT_BITS_HIGH(SLCAN_STATUS_DATA_OVERRUN, peer.status);
 }
 
@@ -148,6 +167,7 @@ int main(void)
     RUN_TEST(what_the_hardware_has_no_room_for_goes_by_interrupt);
     RUN_TEST(a_line_without_room_is_dropped_whole);
     RUN_TEST(only_data_frames_with_11_bit_identifiers_reach_the_estimator);
+    RUN_TEST(a_motor_command_that_would_leave_late_has_no_room);
     RUN_TEST(losses_are_in_the_status_and_in_the_flags);
     return UNITY_END();
 }

@@ -177,7 +177,7 @@ static void update_all(lever_t *lever, const lever_command_t *command)
     }
 }
 
-/* As port/embedded/loop.c does it. */
+/* As port/loop.c does it. */
 static void tick_all(lever_t *lever, const lever_command_t *command)
 {
     const wire_frame_t *wire = (const wire_frame_t *)first_sample();
