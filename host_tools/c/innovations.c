@@ -6,7 +6,7 @@
  */
 #include "innovations.h"
 
-#include "app/link.h"
+#include "app/instance.h"
 #include "filter/dual.h"
 #include "lever_cdkf.h"
 
@@ -93,23 +93,22 @@ bool innovation_run(
 uint32_t innovation_samples(const lever_frame_t *frames, uint32_t count, lever_sample_t *samples,
     lever_config_t *config, lever_health_t *health)
 {
-    static estimator_t estimator;
-    static link_t link;
+    static lever_memory_t memory;
     uint32_t taken = 0u;
     lever_config_default(config);
-    estimator_init(&estimator, config);
-    link_init(&link);
+    lever_t *lever = lever_init(&memory, config);
     for (uint32_t k = 0u; k < count; k++) {
-        if (link_on_frame(&link, &estimator, &frames[k]) == LEVER_FRAME_SAMPLE) {
-            samples[taken] = link.sample;
+        if (lever_on_frame(lever, &frames[k]) == LEVER_FRAME_SAMPLE) {
+            samples[taken] = lever->link.sample;
             taken++;
-            (void)link_step(&link, &estimator);
+            (void)lever_step(lever);
         }
     }
-    config->model = estimator.setup.model; /* as COMMAND frames have left them */
-    config->preload = estimator.setup.preload;
-    config->estimator = estimator.setup.estimator;
-    config->adaptation = estimator.setup.adaptation;
-    estimator_health(&estimator, health);
+    const setup_t *setup = &lever->estimator.setup; /* as COMMAND frames have left it */
+    config->model = setup->model;
+    config->preload = setup->preload;
+    config->estimator = setup->estimator;
+    config->adaptation = setup->adaptation;
+    lever_health(lever, health);
     return taken;
 }
