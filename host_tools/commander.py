@@ -47,8 +47,9 @@ class Commander:
 
 def result_of(ack: Mapping[str, float]) -> str:
     """ACCEPTED, SEQUENCE or another of the results in lever.dbc, of the fields of a COMMAND_ACK."""
-    choices = codec.message("COMMAND_ACK").get_signal_by_name("result").choices or {}
-    return str(choices.get(int(ack["result"]), f"result {int(ack['result'])}"))
+    number = int(ack["result"])
+    choices = codec.message("COMMAND_ACK").get_signal_by_name("result").choices
+    return str(choices[number]) if choices and number in choices else f"result {number}"
 
 
 def refusal(result: str) -> str:

@@ -91,5 +91,5 @@ def _signal_row(message: Message, signal: Signal) -> Row:
         "unit": signal.unit,
         "least": signal.minimum,
         "greatest": signal.maximum,
-        "meaning": choices or signal.comment,
+        "meaning": " ".join(part for part in (signal.comment, choices) if part),
     }
