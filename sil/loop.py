@@ -291,7 +291,7 @@ def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec
     start: dict[str, codec.Value] = {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}
     commands = {0: start}
     repetition = max(1, round(KEEP_ALIVE / scenario.period))
-    for (sample, rms), end in zip(changes.items(), [*list(changes)[1:], len(time)], strict=True):
+    for (sample, rms), end in zip(changes.items(), [*changes, len(time)][1:], strict=True):
         commands[sample] = {**commands.get(sample, {}), "dither_rms": rms}
         if rms > 0.0:
             commands |= {later: {} for later in range(sample + repetition, end, repetition)}
