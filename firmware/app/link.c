@@ -258,24 +258,32 @@ void link_idle(lever_t *lever, uint32_t elapsed_us)
 
 /* --- out ------------------------------------------------------------------------------------------------------- */
 
+/* The first message that is due, of some. */
+static uint32_t first_of(uint32_t due)
+{
+    uint32_t output = 0u;
+    if (due == BIT(OUTPUT_STATE_ESTIMATE)) {
+        output = (uint32_t)OUTPUT_STATE_ESTIMATE; /* mostly */
+    } else {
+        while ((due & BIT(output)) == 0u) {
+            output++;
+        }
+    }
+    return output;
+}
+
 bool link_next_frame(lever_t *lever, lever_frame_t *frame)
 {
     link_t *link = &lever->link;
     bool sent = false;
-    uint32_t output = 0u;
-    uint32_t due = link->due; /* from `output` on */
-    while ((due != 0u) && !sent) {
-        const bool is_due = ((due & 1u) != 0u);
-        due >>= 1u;
-        if (is_due) {
-            link->due = (uint16_t)(due << (output + 1u));
-            sent = link_encode(lever, (enum link_output)output, frame);
-            if (sent) {
-                e2e_protect(frame, data_ids[output], link->counter[output]);
-                link->counter[output] = (uint8_t)((link->counter[output] + 1u) & 15u);
-            }
+    while ((link->due != 0u) && !sent) {
+        const uint32_t output = first_of(link->due);
+        link->due = (uint16_t)(link->due & ~BIT(output));
+        sent = link_encode(lever, (enum link_output)output, frame);
+        if (sent) {
+            e2e_protect(frame, data_ids[output], link->counter[output]);
+            link->counter[output] = (uint8_t)((link->counter[output] + 1u) & 15u);
         }
-        output++;
     }
     return sent;
 }

@@ -41,7 +41,7 @@ void torque_gate_init(torque_gate_t *gate, const lever_settings_t *settings)
     gate->silence_us = SILENCE_PERIODS * gate->period_us;
     gate->silence_us = (gate->silence_us > SILENCE_US) ? gate->silence_us : SILENCE_US;
     gate->limit = settings->torque_limit;
-    gate->slew_step = settings->torque_slew * settings->sample_period;
+    gate->slew = settings->torque_slew * 1.0e-6f;
     gate->open_step = (fade_steps > 1.0f) ? (1.0f / fade_steps) : 1.0f;
     gate->square_most = (settings->torque_rms * settings->torque_rms) / (1.0f + (MEMORY / WINDOW));
     gate->sustained = sqrtf(gate->square_most);
@@ -108,14 +108,18 @@ static void age(torque_gate_t *gate, uint32_t elapsed_us)
 
 /* --- limits -------------------------------------------------------------------------------------------------------- */
 
-static void drive(torque_gate_t *gate, float asked)
+static void drive(torque_gate_t *gate, float asked, uint32_t elapsed_us)
 {
+    const uint32_t step_us = (elapsed_us < gate->period_us) ? elapsed_us : gate->period_us;
+    const float slew = gate->slew * (float)step_us;
     const float gain = gate->gain + gate->open_step;
     gate->gain = (gain < 1.0f) ? gain : 1.0f;
     const bool finite = (fabsf(asked) <= 3.0e38f);
     const float wanted = finite ? clamped(gate->gain * asked, gate->limit) : 0.0f;
-    const float torque = gate->torque + clamped(wanted - gate->torque, gate->slew_step);
-    gate->torque = clamped(torque, amplitude(gate));
+    const float highest = gate->torque + slew;
+    const float lowest = gate->torque - slew;
+    const float below = (wanted < highest) ? wanted : highest;
+    gate->torque = clamped((below > lowest) ? below : lowest, amplitude(gate));
 }
 
 void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *sample)
@@ -130,7 +134,7 @@ void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *s
     }
     const bool may_open = sample->advances && sample->permitted && is_fresh(gate);
     if (gate->open && may_open) {
-        drive(gate, asked);
+        drive(gate, asked, sample->elapsed_us);
     } else if (gate->open) {
         close_gate(gate);
         fade(gate, elapsed_us);
@@ -142,6 +146,7 @@ void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *s
 void torque_gate_idle(torque_gate_t *gate, uint32_t elapsed_us)
 {
     age(gate, elapsed_us);
+    gate->torque = clamped(gate->torque, amplitude(gate));
     gate->counted = later(gate->counted, elapsed_us);
 }
 

@@ -24,7 +24,7 @@
 
 typedef struct torque_gate {
     float limit;            /* [N m] */
-    float slew_step;        /* change allowed in a sample [N m] */
+    float slew;             /* [N m / us] */
     float open_step;        /* of the gain, in a sample */
     float square_most;      /* greatest mean square [N^2 m^2] */
     float sustained;        /* its root: amplitude allowed for ever [N m] */

@@ -1,21 +1,7 @@
 #include "can/messages.h"
-
 #include "can/layout.h"
 
-#include <math.h>
-#include <stddef.h>
-
-/* The layouts are those of lever.dbc; tests/python/can compares them. */
-
-#define CODE(start_bit, greatest_code) {(greatest_code), (start_bit)}
-#define UNSIGNED(start_bit, width, counts_per_unit)                                                                    \
-    {CODE(start_bit, (1u << (width)) - 1u), (counts_per_unit), 0.0f, (float)((1u << (width)) - 2u)}
-#define SIGNED(start_bit, width, counts_per_unit)                                                                      \
-    {CODE(start_bit, (1u << (width)) - 1u), (counts_per_unit), -(float)((1u << ((width) - 1u)) - 1u),                  \
-        (float)((1u << ((width) - 1u)) - 1u)}
-#define COUNT(array) ((uint8_t)(sizeof(array) / sizeof((array)[0])))
-#define LAYOUT(id, code, quantity) {(uint32_t)(id), (code), (quantity), COUNT(code), COUNT(quantity)}
-#define CODES_ONLY(id, code) {(uint32_t)(id), (code), NULL, COUNT(code), 0u}
+/* The messages that are not of every sample. Their layouts are those of lever.dbc; tests/python/can compares them. */
 
 #define MODEL CODE(12u, 7u)
 #define VALID CODE(15u, 1u)
@@ -25,69 +11,6 @@ static const float no_quantity[1] = {0.0f};
 static uint32_t bit_of(bool flag)
 {
     return flag ? 1u : 0u;
-}
-
-static bool is_available(float value)
-{
-    return value == value; /* only NaN is not */
-}
-
-/* --- LEVER_SAMPLE ------------------------------------------------------------------------------------------------- */
-
-static const place_t lever_sample_code[] = {CODE(12u, 1u), CODE(13u, 1u), CODE(14u, 1u)};
-static const quantity_t lever_sample_quantity[] = {
-    SIGNED(16u, 16u, 10000.0f), SIGNED(32u, 16u, 2000.0f), SIGNED(48u, 16u, 1000.0f)};
-static const layout_t lever_sample = LAYOUT(MESSAGE_LEVER_SAMPLE_ID, lever_sample_code, lever_sample_quantity);
-
-bool message_lever_sample_encode(lever_frame_t *frame, const message_lever_sample_t *message)
-{
-    const uint32_t code[] = {
-        bit_of(message->theta_valid), bit_of(message->theta_dot_valid), bit_of(message->tau_m_valid)};
-    const float value[] = {message->theta_valid ? message->theta : 0.0f,
-        message->theta_dot_valid ? message->theta_dot : 0.0f, message->tau_m_valid ? message->tau_m : 0.0f};
-    return layout_encode(frame, &lever_sample, code, value);
-}
-
-bool message_lever_sample_decode(message_lever_sample_t *message, const lever_frame_t *frame)
-{
-    uint32_t code[COUNT(lever_sample_code)];
-    float value[COUNT(lever_sample_quantity)];
-    const bool fits = layout_decode(code, value, &lever_sample, frame);
-    if (fits) {
-        message->theta = value[0];
-        message->theta_dot = value[1];
-        message->tau_m = value[2];
-        message->theta_valid = (code[0] != 0u) && is_available(value[0]);
-        message->theta_dot_valid = (code[1] != 0u) && is_available(value[1]);
-        message->tau_m_valid = (code[2] != 0u) && is_available(value[2]);
-    }
-    return fits;
-}
-
-/* --- BASE_SAMPLE -------------------------------------------------------------------------------------------------- */
-
-static const place_t base_sample_code[] = {CODE(12u, 1u), CODE(32u, UINT32_MAX)};
-static const quantity_t base_sample_quantity[] = {SIGNED(16u, 16u, 1000.0f)};
-static const layout_t base_sample = LAYOUT(MESSAGE_BASE_SAMPLE_ID, base_sample_code, base_sample_quantity);
-
-bool message_base_sample_encode(lever_frame_t *frame, const message_base_sample_t *message)
-{
-    const uint32_t code[] = {bit_of(message->z_ddot_valid), message->time_us};
-    const float value[] = {message->z_ddot_valid ? message->z_ddot : 0.0f};
-    return layout_encode(frame, &base_sample, code, value);
-}
-
-bool message_base_sample_decode(message_base_sample_t *message, const lever_frame_t *frame)
-{
-    uint32_t code[COUNT(base_sample_code)];
-    float value[COUNT(base_sample_quantity)];
-    const bool fits = layout_decode(code, value, &base_sample, frame);
-    if (fits) {
-        message->time_us = code[1];
-        message->z_ddot = value[0];
-        message->z_ddot_valid = (code[0] != 0u) && is_available(value[0]);
-    }
-    return fits;
 }
 
 /* --- COMMAND ------------------------------------------------------------------------------------------------------ */
@@ -114,36 +37,7 @@ bool message_command_decode(message_command_t *message, const lever_frame_t *fra
         message->preload = (uint8_t)code[2];
         message->estimator = (uint8_t)code[3];
         message->adaptation = (uint8_t)code[4];
-        message->dither_rms = is_available(value[0]) ? value[0] : 65.535f; /* keep */
-    }
-    return fits;
-}
-
-/* --- STATE_ESTIMATE ----------------------------------------------------------------------------------------------- */
-
-static const place_t state_estimate_code[] = {CODE(12u, 1u), CODE(48u, 65535u)};
-static const quantity_t state_estimate_quantity[] = {
-    UNSIGNED(13u, 8u, 8.0f), SIGNED(21u, 13u, 500.0f), SIGNED(34u, 14u, 5000.0f)};
-static const layout_t state_estimate = LAYOUT(MESSAGE_STATE_ESTIMATE_ID, state_estimate_code, state_estimate_quantity);
-
-bool message_state_estimate_encode(lever_frame_t *frame, const message_state_estimate_t *message)
-{
-    const uint32_t code[] = {bit_of(message->valid), message->time_low};
-    const float value[] = {message->innovation, message->theta_dot, message->theta};
-    return layout_encode(frame, &state_estimate, code, value);
-}
-
-bool message_state_estimate_decode(message_state_estimate_t *message, const lever_frame_t *frame)
-{
-    uint32_t code[COUNT(state_estimate_code)];
-    float value[COUNT(state_estimate_quantity)];
-    const bool fits = layout_decode(code, value, &state_estimate, frame);
-    if (fits) {
-        message->valid = (code[0] != 0u);
-        message->time_low = (uint16_t)code[1];
-        message->innovation = value[0];
-        message->theta_dot = value[1];
-        message->theta = value[2];
+        message->dither_rms = (value[0] == value[0]) ? value[0] : 65.535f; /* only NaN is not itself: keep */
     }
     return fits;
 }
@@ -279,34 +173,6 @@ bool message_health_decode(message_health_t *message, const lever_frame_t *frame
         message->faults = code[1];
         message->restarts = (uint8_t)code[2];
         message->excitation = value[0];
-    }
-    return fits;
-}
-
-/* --- MOTOR_COMMAND ------------------------------------------------------------------------------------------------ */
-
-static const place_t motor_command_code[] = {MODEL, VALID, CODE(48u, 65535u)};
-static const quantity_t motor_command_quantity[] = {SIGNED(16u, 16u, 1000.0f), SIGNED(32u, 16u, 1000.0f)};
-static const layout_t motor_command = LAYOUT(MESSAGE_MOTOR_COMMAND_ID, motor_command_code, motor_command_quantity);
-
-bool message_motor_command_encode(lever_frame_t *frame, const message_motor_command_t *message)
-{
-    const uint32_t code[] = {message->model, bit_of(message->valid), message->time_low};
-    const float value[] = {message->torque, message->dither};
-    return layout_encode(frame, &motor_command, code, value);
-}
-
-bool message_motor_command_decode(message_motor_command_t *message, const lever_frame_t *frame)
-{
-    uint32_t code[COUNT(motor_command_code)];
-    float value[COUNT(motor_command_quantity)];
-    const bool fits = layout_decode(code, value, &motor_command, frame);
-    if (fits) {
-        message->model = (uint8_t)code[0];
-        message->valid = (code[1] != 0u);
-        message->time_low = (uint16_t)code[2];
-        message->torque = value[0];
-        message->dither = value[1];
     }
     return fits;
 }

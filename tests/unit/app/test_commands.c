@@ -177,15 +177,42 @@ static void test_dither_of_keep_or_more_stays_as_it_is(void)
     lever_command_t command = rig_command();
     command.dither_rms = 0.3f;
     TEST_ASSERT_TRUE(lever_command(lever, &command));
-    (void)rig_run(&rig, lever, 2000u);
+    (void)rig_run(&rig, lever, 900u);
     command.dither_rms = (float)LEVER_KEEP;
     TEST_ASSERT_TRUE(lever_command(lever, &command));
-    (void)rig_run(&rig, lever, 2000u);
-    TEST_ASSERT_TRUE(rig_health(lever).dither != 0.0f);
+    (void)rig_run(&rig, lever, 900u);
+    TEST_ASSERT_TRUE(rig_health(lever).torque != 0.0f);
     command.dither_rms = 0.0f;
     TEST_ASSERT_TRUE(lever_command(lever, &command));
     (void)rig_run(&rig, lever, 1001u);
-    TEST_ASSERT_TRUE(rig_health(lever).dither == 0.0f);
+    TEST_ASSERT_TRUE(rig_health(lever).torque == 0.0f);
+}
+
+/* As a first run of a fresh instance has it: the same torque at the same sample. */
+static void test_reset_ends_dither_and_the_next_run_is_the_first_one_again(void)
+{
+    lever_memory_t other_memory;
+    lever_t *other = lever_init(&other_memory, &config);
+    lever_command_t on = rig_command();
+    on.dither_rms = 0.3f;
+    TEST_ASSERT_TRUE(lever_command(lever, &on));
+    (void)rig_run(&rig, lever, 900u);
+    TEST_ASSERT_TRUE(rig_health(lever).torque != 0.0f);
+    rig_request(lever, LEVER_REQUEST_RESET);
+    rig_request(other, LEVER_REQUEST_RESET); /* a command, as the other had one */
+    rig_t same = rig;
+    for (uint32_t k = 0u; k < 1200u; k++) {
+        if (k == 400u) {
+            TEST_ASSERT_TRUE(rig_health(lever).torque == 0.0f);
+            TEST_ASSERT_TRUE(lever_command(lever, &on));
+            TEST_ASSERT_TRUE(lever_command(other, &on));
+        }
+        (void)rig_run(&rig, lever, 1u);
+        (void)rig_run(&same, other, 1u);
+    }
+    rig_assert_same_estimates(lever, other);
+    TEST_ASSERT_TRUE(rig_health(other).torque != 0.0f);
+    TEST_ASSERT_TRUE(rig_health(lever).torque == rig_health(other).torque);
 }
 
 static void test_a_chosen_adaptation_starts_its_walk_anew(void)
@@ -234,6 +261,7 @@ int main(void)
     RUN_TEST(test_freeze_and_a_change_in_one_command_start_over_frozen);
     RUN_TEST(test_a_change_of_adaptation_does_not_reset);
     RUN_TEST(test_dither_of_keep_or_more_stays_as_it_is);
+    RUN_TEST(test_reset_ends_dither_and_the_next_run_is_the_first_one_again);
     RUN_TEST(test_a_chosen_adaptation_starts_its_walk_anew);
     RUN_TEST(test_a_chosen_adaptation_is_the_one_that_is_used);
     return UNITY_END();

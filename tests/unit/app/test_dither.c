@@ -1,4 +1,4 @@
-/* The identification torque: off by default, of the rms that is asked, inside its band and its limit, faded in and out. */
+/* The identification torque: off by default, of the rms that is asked, inside its band, faded in and out. */
 #include "app/dither.h"
 
 #include "rig.h"
@@ -6,10 +6,11 @@
 #define PERIOD 1.0e-3f
 
 static dither_t dither;
+static float torque; /* of the last step */
 
-static void start(double low, double high, double period, double limit, double fade)
+static void start(double low, double high, double period, double rms_most, double fade)
 {
-    dither_init(&dither, (float)low, (float)high, (float)period, (float)limit, (float)fade);
+    dither_init(&dither, (float)low, (float)high, (float)period, (float)rms_most, (float)fade);
 }
 
 void setUp(void)
@@ -21,21 +22,25 @@ void tearDown(void)
 {
 }
 
+static void ask(float rms)
+{
+    dither_set(&dither, rms, false);
+}
+
 static void step(uint32_t count)
 {
     for (uint32_t k = 0u; k < count; k++) {
-        dither_step(&dither, PERIOD);
+        torque = dither_step(&dither);
     }
 }
 
-/* Rms of the torque over the next samples; each must be finite and within the limit. */
-static double rms_over(uint32_t count, float period)
+/* Rms of the torque over the next samples. */
+static double rms_over(uint32_t count)
 {
     double square = 0.0;
     for (uint32_t k = 0u; k < count; k++) {
-        dither_step(&dither, period);
-        TEST_ASSERT_TRUE(fabsf(dither.torque) <= dither.limit);
-        square += (double)dither.torque * (double)dither.torque;
+        step(1u);
+        square += (double)torque * (double)torque;
     }
     return sqrt(square / (double)count);
 }
@@ -45,40 +50,40 @@ static double rms_over(uint32_t count, float period)
 static void test_is_off_until_it_is_asked_for(void)
 {
     TEST_ASSERT_FALSE(dither_is_on(&dither));
-    TEST_ASSERT_TRUE(rms_over(5000u, PERIOD) == 0.0);
+    TEST_ASSERT_TRUE(rms_over(5000u) == 0.0);
     TEST_ASSERT_FALSE(dither_is_on(&dither));
 }
 
 static void test_has_the_rms_that_is_asked(void)
 {
-    dither_set(&dither, 0.3f);
+    ask(0.3f);
     step(2000u);
     TEST_ASSERT_TRUE(dither_is_on(&dither));
-    TEST_ASSERT_DOUBLE_WITHIN(0.03 * 0.3, 0.3, rms_over(500000u, PERIOD)); /* 0.75 % its standard deviation */
+    TEST_ASSERT_DOUBLE_WITHIN(0.03 * 0.3, 0.3, rms_over(500000u)); /* 0.75 % its standard deviation */
 }
 
 static void test_has_no_mean(void)
 {
     double sum = 0.0;
-    dither_set(&dither, 0.3f);
+    ask(0.3f);
     step(2000u);
     for (uint32_t k = 0u; k < 200000u; k++) {
         step(1u);
-        sum += (double)dither.torque;
+        sum += (double)torque;
     }
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.0, sum / 200000.0);
 }
 
-static void test_is_the_same_in_every_run(void)
+static void test_is_the_same_after_every_reset(void)
 {
-    dither_t first;
-    dither_set(&dither, 0.3f);
+    ask(0.3f);
     step(3000u);
-    first = dither;
-    setUp();
-    dither_set(&dither, 0.3f);
+    const float first = torque;
+    dither_reset(&dither);
+    TEST_ASSERT_FALSE(dither_is_on(&dither));
+    ask(0.3f);
     step(3000u);
-    TEST_ASSERT_TRUE(first.torque == dither.torque);
+    TEST_ASSERT_TRUE(first == torque);
 }
 
 static float limit_of(const char *name, bool greatest)
@@ -99,31 +104,20 @@ static void test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow
         const float high = limit_of("dither_high", (corner & 2u) != 0u);
         const float period = limit_of("sample_period", (corner & 4u) != 0u);
         start((double)low, (double)high, (double)period, 20.0, 0.0);
-        dither_set(&dither, 0.3f);
-        (void)rms_over(200000u, period);
-        TEST_ASSERT_DOUBLE_WITHIN(0.15 * 0.3, 0.3, rms_over(2000000u, period));
+        ask(0.3f);
+        (void)rms_over(200000u);
+        TEST_ASSERT_DOUBLE_WITHIN(0.15 * 0.3, 0.3, rms_over(2000000u));
     }
 }
 
-/* --- limit --------------------------------------------------------------------------------------------------------- */
-
-static void test_never_exceeds_its_limit_though_asked_for_more(void)
+static void test_no_command_exceeds_the_greatest_rms(void)
 {
-    float greatest = 0.0f;
-    dither_set(&dither, 100.0f);
-    for (uint32_t k = 0u; k < 100000u; k++) {
-        step(1u);
-        greatest = (fabsf(dither.torque) > greatest) ? fabsf(dither.torque) : greatest;
-    }
-    TEST_ASSERT_TRUE(greatest == 1.5f); /* of both signs, as the mean shows */
+    ask(100.0f);
+    step(2000u);
     TEST_ASSERT_TRUE(dither.level == 1.5f);
-}
-
-static void test_a_limit_of_zero_is_off(void)
-{
     start(1.0, 10.0, (double)PERIOD, 0.0, 1.0);
-    dither_set(&dither, 0.3f);
-    TEST_ASSERT_TRUE(rms_over(5000u, PERIOD) == 0.0);
+    ask(0.3f);
+    TEST_ASSERT_TRUE(rms_over(5000u) == 0.0);
     TEST_ASSERT_FALSE(dither_is_on(&dither));
 }
 
@@ -131,7 +125,7 @@ static void test_a_limit_of_zero_is_off(void)
 
 static void test_fades_in_linearly_over_its_time(void)
 {
-    dither_set(&dither, 0.4f);
+    ask(0.4f);
     step(250u);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.1, (double)dither.level);
     step(500u);
@@ -142,38 +136,42 @@ static void test_fades_in_linearly_over_its_time(void)
 
 static void test_fading_in_starts_with_less_torque_than_it_ends_with(void)
 {
-    dither_set(&dither, 0.4f);
-    const double beginning = rms_over(200u, PERIOD);
+    ask(0.4f);
+    const double beginning = rms_over(200u);
     step(1000u);
-    TEST_ASSERT_TRUE(beginning < 0.3 * rms_over(20000u, PERIOD));
+    TEST_ASSERT_TRUE(beginning < 0.3 * rms_over(20000u));
 }
 
 static void test_fades_out_over_its_time_and_is_off(void)
 {
-    dither_set(&dither, 0.4f);
+    ask(0.4f);
     step(2000u);
-    dither_set(&dither, 0.0f);
+    ask(0.0f);
     step(500u);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.2, (double)dither.level);
     TEST_ASSERT_TRUE(dither_is_on(&dither));
     step(502u);
     TEST_ASSERT_FALSE(dither_is_on(&dither));
-    TEST_ASSERT_TRUE(rms_over(1000u, PERIOD) == 0.0);
+    TEST_ASSERT_TRUE(rms_over(1000u) == 0.0);
 }
 
 static void test_a_change_takes_the_whole_fade_time_however_small(void)
 {
-    dither_set(&dither, 0.4f);
+    ask(0.4f);
     step(2000u);
-    dither_set(&dither, 0.3f);
+    ask(0.3f);
     step(500u);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.35, (double)dither.level);
 }
 
-static void test_without_a_fade_time_it_is_there_at_once(void)
+static void test_without_a_fade_time_or_need_it_is_there_at_once(void)
 {
     start(1.0, 10.0, (double)PERIOD, 1.5, 0.0);
-    dither_set(&dither, 0.4f);
+    ask(0.4f);
+    step(1u);
+    TEST_ASSERT_TRUE(dither.level == 0.4f);
+    setUp();
+    dither_set(&dither, 0.4f, true);
     step(1u);
     TEST_ASSERT_TRUE(dither.level == 0.4f);
 }
@@ -191,7 +189,7 @@ static void spectrum(const double frequency[FREQUENCIES], double power[FREQUENCI
         for (uint32_t k = 0u; k < SEGMENT; k++) {
             const double turn = 6.283185307179586 * (double)k / (double)SEGMENT;
             step(1u);
-            const double value = (1.0 - cos(turn)) * (double)dither.torque;
+            const double value = (1.0 - cos(turn)) * (double)torque;
             for (uint32_t f = 0u; f < FREQUENCIES; f++) {
                 real[f] += value * cos(turn * 10.0 * frequency[f]);
                 imaginary[f] += value * sin(turn * 10.0 * frequency[f]);
@@ -208,7 +206,7 @@ static void test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyon
     const double frequency[FREQUENCIES] = {3.2, 2.5, 5.0, 1.0, 10.0, 0.1, 100.0, 300.0};
     double power[FREQUENCIES] = {0.0};
     start(1.0, 10.0, (double)PERIOD, 20.0, 0.0);
-    dither_set(&dither, 0.3f);
+    ask(0.3f);
     step(5000u);
     spectrum(frequency, power);
     TEST_ASSERT_DOUBLE_WITHIN(0.25, 1.0, power[1] / power[0]);
@@ -220,45 +218,20 @@ static void test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyon
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, 0.0, power[7] / power[0]);
 }
 
-/* --- in the estimator ---------------------------------------------------------------------------------------------- */
-
-static void test_a_command_fades_it_in_and_health_tells_the_torque(void)
-{
-    lever_memory_t memory;
-    static lever_config_t config;
-    rig_t rig = rig_typical();
-    lever_config_default(&config);
-    lever_t *lever = lever_init(&memory, &config);
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 400u));
-    TEST_ASSERT_TRUE(rig_health(lever).dither == 0.0f);
-    lever_command_t command = rig_command();
-    command.dither_rms = 0.3f;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    (void)rig_run(&rig, lever, 2000u);
-    double square = 0.0;
-    for (uint32_t k = 0u; k < 60000u; k++) {
-        (void)rig_run(&rig, lever, 1u);
-        square += (double)rig_health(lever).dither * (double)rig_health(lever).dither;
-    }
-    TEST_ASSERT_DOUBLE_WITHIN(0.1 * 0.3, 0.3, sqrt(square / 60000.0));
-}
-
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_is_off_until_it_is_asked_for);
     RUN_TEST(test_has_the_rms_that_is_asked);
     RUN_TEST(test_has_no_mean);
-    RUN_TEST(test_is_the_same_in_every_run);
+    RUN_TEST(test_is_the_same_after_every_reset);
     RUN_TEST(test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow);
-    RUN_TEST(test_never_exceeds_its_limit_though_asked_for_more);
-    RUN_TEST(test_a_limit_of_zero_is_off);
+    RUN_TEST(test_no_command_exceeds_the_greatest_rms);
     RUN_TEST(test_fades_in_linearly_over_its_time);
     RUN_TEST(test_fading_in_starts_with_less_torque_than_it_ends_with);
     RUN_TEST(test_fades_out_over_its_time_and_is_off);
     RUN_TEST(test_a_change_takes_the_whole_fade_time_however_small);
-    RUN_TEST(test_without_a_fade_time_it_is_there_at_once);
+    RUN_TEST(test_without_a_fade_time_or_need_it_is_there_at_once);
     RUN_TEST(test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyond);
-    RUN_TEST(test_a_command_fades_it_in_and_health_tells_the_torque);
     return UNITY_END();
 }

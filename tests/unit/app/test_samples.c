@@ -40,7 +40,7 @@ static void run_both(uint32_t count)
     }
 }
 
-static uint16_t faults(void)
+static uint32_t faults(void)
 {
     return rig_health(lever).faults;
 }
