@@ -98,7 +98,7 @@ enum message_result instance_command(lever_t *lever, const lever_command_t *comm
             dither_reset(&lever->dither);
         }
         if (command->dither_rms < (float)LEVER_KEEP) {
-            dither_set(&lever->dither, command->dither_rms, !lever->gate.open);
+            dither_set(&lever->dither, command->dither_rms, resets || !lever->gate.open); /* a reset closes it */
         }
         if (is_changed(lever, &before, rms_before)) {
             lever->link.pages |= (uint8_t)(1u << (uint32_t)MESSAGE_PAGE_CHOICES);
