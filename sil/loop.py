@@ -146,6 +146,8 @@ class _Link:
         self._torque = _signed_field("MOTOR_COMMAND", "torque")
         self._motor_time = codec.raw_field("MOTOR_COMMAND", "time_low")
         self._estimate_time = codec.raw_field("STATE_ESTIMATE", "time_low")
+        self._gate_open = codec.raw_field("MOTOR_COMMAND", "valid")
+        self._motor_started = False
         self._unanswered_in_a_row = 0
         incoming = [message for message in codec.database().messages if message.senders == ["ESTIMATOR"]]
         self._incoming = frozenset(message.frame_id for message in incoming)
@@ -192,7 +194,8 @@ class _Link:
         return None
 
     def answer(self, sample: int) -> float:
-        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for."""
+        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for. What
+        still fades of an earlier run's, before the gate opens for the first time, is none of this one."""
         time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
         torque = 0.0
@@ -200,7 +203,8 @@ class _Link:
             identifier, data = frame
             if identifier == self._motor:
                 if self._motor_time(data) == time_low:
-                    torque = self._torque(data)
+                    self._motor_started = self._motor_started or self._gate_open(data) != 0
+                    torque = self._torque(data) if self._motor_started else 0.0
             elif identifier == self._estimate:
                 if self._estimate_time(data) == time_low:
                     self._unanswered_in_a_row = 0

@@ -38,7 +38,7 @@ class PuppetBus(can.BusABC):
         if msg.arbitration_id == codec.message("BASE_SAMPLE").frame_id:
             time_us = codec.decode(msg.arbitration_id, msg.data)[1]["time_us"]
             for name, values in self._answers(self._samples):
-                fields = {signal.name for signal in codec.message(name).signals}
+                fields = {signal.name for signal in codec.message(name).signals if signal.multiplexer_ids is None}
                 defaults = {"model": "lever", "valid": 1, "time_low": time_us % 65536}
                 self._put(name, {key: value for key, value in defaults.items() if key in fields} | values)
             self._samples += 1

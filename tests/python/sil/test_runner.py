@@ -180,7 +180,7 @@ def test_a_refused_command_is_an_error_in_one_line(short: Scenario, result: str,
 def test_the_first_command_finds_the_sequence_that_an_earlier_run_has_left(short: Scenario) -> None:
     bus = PuppetBus(always, ["sequence"] * 5)
     loop.run(short, bus)
-    assert [command["counter"] for command in bus.decoded("COMMAND")] == list(range(6))
+    assert [command["counter"] for command in bus.decoded("COMMAND")] == list(range(7))
 
 
 def test_an_estimator_of_another_contract_is_an_error_in_one_line(short: Scenario) -> None:
@@ -287,7 +287,8 @@ def test_runs_of_one_seed_on_one_firmware_are_equal(lever_bus: MakeBus) -> None:
         assert again.summary["unanswered"] == again.summary["misplaced"] == 0
         for name, column in first.trace.items():
             if name not in ("faults", "late"):  # COMMANDs that were out of sequence are told at the start
-                np.testing.assert_array_equal(again.trace[name], column, err_msg=name)
+                first_of = 50 if name == "dither_N_m" else 0  # that of the run before fades within 50 ms
+                np.testing.assert_array_equal(again.trace[name][first_of:], column[first_of:], err_msg=name)
 
 
 def test_real_time_is_real_and_changes_nothing(lever_bus: MakeBus) -> None:
