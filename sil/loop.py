@@ -194,8 +194,8 @@ class _Link:
         return None
 
     def answer(self, sample: int) -> float:
-        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for. What
-        still fades of an earlier run's, before the gate opens for the first time, is none of this one."""
+        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for.
+        What still fades of an earlier run's, before the gate opens for the first time, is none of this one."""
         time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
         torque = 0.0
