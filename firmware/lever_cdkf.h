@@ -3,11 +3,11 @@
  * This header is the whole outside of the firmware; no other header is needed, and nothing below it is promised.
  *
  * What it does. A square-root Central Difference Kalman Filter (single precision, fixed size) estimates the angle and
- * rate of the lever and, in step with them, the pilot's parameters [m_p, c_p, k_p], each with its standard deviation; or those
- * of a linear model, for an arm on another device.
+ * rate of the lever and, in step with them, the pilot's parameters [m_p, c_p, k_p], each with its standard deviation;
+ * or those of a linear model, for an arm on another device.
  *
- * What it needs. A sample each sample_period: lever angle and rate, base vertical acceleration, motor torque. It uses no
- * heap, operating system, clock, thread, or mutable static; all memory is the caller's, time comes with the samples.
+ * What it needs. A sample each sample_period: lever angle and rate, base vertical acceleration, motor torque. It uses
+ * no heap, operating system, clock, thread, or mutable static; all memory is the caller's, time comes with the samples.
  *
  * Two ways to use it, on the same instance type:
  *
@@ -19,8 +19,8 @@
  *     // without CAN                                // with CAN
  *     lever_update(lever, &sample);                 if (lever_on_frame(lever, &rx) == LEVER_FRAME_SAMPLE) {
  *     lever_estimate(lever, &estimate);                 lever_step(lever);
- *                                                       while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *                                                   }
+ *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent.
  * Cost. Every call is bounded; lever_update() is the expensive one: 2,460 instructions on a Cortex-M4F (lever model, built for
@@ -57,8 +57,8 @@ enum lever_model {
  * cancels at a trim angle that follows theta slowly, and all signals count from their slow part (trim_corner). */
 enum lever_preload { LEVER_PRELOAD_FIXED = 0, LEVER_PRELOAD_TRIM = 1, LEVER_PRELOAD_COUNT };
 
-/* How state and parameters are estimated together. DUAL: two filters in step, of which the state's takes the parameters as
- * they are. JOINT: one filter on both, for which what the parameters may have done since the last sample also is
+/* How state and parameters are estimated together. DUAL: two filters in step, of which the state's takes the parameters
+ * as they are. JOINT: one filter on both, for which what the parameters may have done since the last sample also is
  * uncertainty of the state. */
 enum lever_estimator { LEVER_ESTIMATOR_DUAL = 0, LEVER_ESTIMATOR_JOINT = 1, LEVER_ESTIMATOR_COUNT };
 
@@ -106,7 +106,8 @@ const lever_setting_t *lever_setting(uint32_t index);
 void lever_config_default(lever_config_t *config);
 
 /* NULL when the configuration is usable, otherwise the name of the first thing that is out of range (a setting, or
- * "model", "preload", "estimator", "adaptation"), or of a setting that does not go with another; its meaning says with which. */
+ * "model", "preload", "estimator", "adaptation"), or of a setting that does not go with another; its meaning says with
+ * which. */
 const char *lever_config_check(const lever_config_t *config);
 
 /* CRC-32 (IEEE 802.3) over the settings in their order, each as the four bytes of its float, lowest first. */
@@ -123,10 +124,10 @@ typedef union lever_memory {
 
 typedef struct lever lever_t;
 
-/* Makes an instance in `memory`. Memory and configuration are the caller's, and must outlive it; the configuration, of which
- * the instance reads the settings, must not change meanwhile, and may be constant, in flash, and shared by instances. There is
- * nothing to release. Returns NULL, touching nothing, if the configuration is not usable. Also the way to start over with
- * another configuration. */
+/* Makes an instance in `memory`. Memory and configuration are the caller's, and must outlive it; the configuration, of
+ * which the instance reads the settings, must not change meanwhile, and may be constant, in flash, and shared by
+ * instances. There is nothing to release. Returns NULL, touching nothing, if the configuration is not usable. Also the
+ * way to start over with another configuration. */
 lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config);
 
 /* --- samples in ------------------------------------------------------------------------------------------------ */
@@ -155,9 +156,9 @@ enum lever_mode {
 };
 
 /* Takes one sample: predicts to its time (through up to gap_limit of missing samples), then updates. Inputs between two
- * samples are taken as the mean of both. A sample not newer than the last is counted as late and ignored; when such samples
- * advance for gap_limit, their sender has restarted its clock, and the estimator aligns anew. Returns the mode after the
- * sample. */
+ * samples are taken as the mean of both. A sample not newer than the last is counted as late and ignored; when such
+ * samples advance for gap_limit, their sender has restarted its clock, and the estimator aligns anew. Returns the mode
+ * after the sample. */
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample);
 
 enum lever_request {
@@ -203,8 +204,8 @@ typedef struct lever_estimate {
     float damping_ratio; /* [1] */
     float damping_ratio_sigma;
     float trim;       /* angle about which the dynamics are linearised [rad] */
-    float nis;        /* normalised innovation squared of the last update, chi-square with nis_size
-                                                degrees of freedom when the filter is consistent; 0 without measurement */
+    float nis;        /* normalised innovation squared of the last update, chi-square with nis_size degrees of
+                         freedom when the filter is consistent; 0 without measurement */
     uint8_t nis_size; /* 0, 1 or 2 outputs used in the last update */
 } lever_estimate_t;
 
@@ -271,23 +272,23 @@ typedef struct lever_platform {
     uint16_t dropped;  /* frames to send dropped */
 } lever_platform_t;
 
-/* Takes the port's report, which stands until the next one. From the first report on PLATFORM_HEALTH is sent beside HEALTH,
- * and any of the faults raises LEVER_FAULT_PLATFORM. Without one nothing of it is sent. */
+/* Takes the port's report, which stands until the next one. From the first report on PLATFORM_HEALTH is sent beside
+ * HEALTH, and any of the faults raises LEVER_FAULT_PLATFORM. Without one nothing of it is sent. */
 void lever_platform(lever_t *lever, const lever_platform_t *platform);
 
 /* --- torque ---------------------------------------------------------------------------------------------------- */
 
-/* All torque for the motor leaves through one gate: finite, then torque_limit, torque_slew, torque_rms over one second. It is
- * open while all of this holds; otherwise torque fades to exactly zero within 50 ms:
- *   - mode RUN or FROZEN;
- *   - a sample, and with it a valid theta or theta_dot, within 20 ms or three sample periods, whichever is longer;
+/* All torque for the motor leaves through one gate: finite, then torque_limit, torque_slew, torque_rms over one second.
+ * It is open while all of this holds; otherwise torque fades to exactly zero within 50 ms:
+ *   - mode RUN or FROZEN, or COAST for a moment, as the next line has it;
+ *   - a sample, and in one a valid theta or theta_dot, within 20 ms or three sample periods, whichever is longer;
  *   - the sample clock advances;
  *   - a COMMAND, or lever_command(), was accepted within the last second of sample time: repeat one (keep-alive);
  *   - the platform reports none of ROM, SELF_TEST, WATCHDOG.
  * Opening takes dither_fade. */
 
-/* No sample came for elapsed_us since the last lever_step(), lever_update() or lever_idle(), by the port's own clock [us]. The
- * estimate stays; the gate ages, and while torque is not yet zero a MOTOR_COMMAND becomes due: fetch it with
+/* No sample came for elapsed_us since the last lever_step(), lever_update() or lever_idle(), by the port's own clock
+ * [us]. The estimate stays; the gate ages, and while torque is not yet zero a MOTOR_COMMAND becomes due: fetch it with
  * lever_next_frame(). Call it when no sample has come for about 5 ms, and again each 5 ms or so. */
 void lever_idle(lever_t *lever, uint32_t elapsed_us);
 
@@ -314,9 +315,10 @@ enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *fram
 /* lever_update() with the sample that lever_on_frame() has completed; without one it does nothing. Returns the mode. */
 enum lever_mode lever_step(lever_t *lever);
 
-/* The next frame to send; false when there is none left. Fetch after lever_step(), after every frame taken or refused (a
- * COMMAND is answered) and after lever_idle(). MOTOR_COMMAND comes first. Every step ends with one STATE_ESTIMATE, so who
- * has received that has everything the step gives. Frames not fetched before the next step are replaced by newer ones. */
+/* The next frame to send; false when there is none left. Fetch after lever_step(), after every frame taken or refused
+ * (a COMMAND is answered) and after lever_idle(). MOTOR_COMMAND comes first. Every step ends with one STATE_ESTIMATE,
+ * so who has received that has everything the step gives. Frames not fetched before the next step are replaced by newer
+ * ones. */
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 
 #ifdef __cplusplus

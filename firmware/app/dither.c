@@ -29,13 +29,13 @@ static float uniform(uint32_t *state)
     return ((float)(x >> 8) * 1.1920929e-7f) - 1.0f;
 }
 
-/* p[2] s^2 + p[1] s + p[0], of which the squared magnitude at s = j tan(w/2) is that of a filter's denominator at z = exp(jw). */
+/* p[2] s^2 + p[1] s + p[0], whose squared magnitude at s = j tan(w/2) is that of a filter's denominator at exp(jw). */
 typedef struct denominator {
     float p[3];
 } denominator_t;
 
-/* Both filters above have the denominator z^2 - (2 - a - d) z + (1 - d), with a = (w T)^2 and d = sqrt(2) w T of their corner. Its
- * squared magnitude is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(w/2). */
+/* Both filters above have the denominator z^2 - (2 - a - d) z + (1 - d), with a = (w T)^2 and d = sqrt(2) w T of their
+ * corner. Its squared magnitude is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(w/2). */
 static denominator_t denominator_of(const detrend_corner_t *corner, float period)
 {
     const float a = corner->square * period * period;
@@ -47,9 +47,9 @@ static denominator_t denominator_of(const detrend_corner_t *corner, float period
     return of;
 }
 
-/* Variance of white noise of variance 1 behind both filters: 32 b^2 times Phillips' integral I4 of (s^3 + s^2) over the product of
- * both denominators (James, Nichols, Phillips 1947), b = (w T)^2 of the low-pass. Exact; every term is positive, so that
- * float does. */
+/* Variance of white noise of variance 1 behind both filters: 32 b^2 times Phillips' integral I4 of (s^3 + s^2) over the
+ * product of both denominators (James, Nichols, Phillips 1947), b = (w T)^2 of the low-pass. Exact; every term is
+ * positive, so that float does. */
 static float band_variance(const dither_t *dither)
 {
     const denominator_t low = denominator_of(&dither->low, dither->period);

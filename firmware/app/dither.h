@@ -28,7 +28,7 @@ typedef struct dither {
     uint32_t noise; /* state of the generator */
 } dither_t;
 
-/* Off. Corners [Hz], sample_period [s] and dither_fade [s] as in lever_settings.def; rms_most [N m] is what no command exceeds. */
+/* Off. Corners [Hz], sample_period and dither_fade [s] as in lever_settings.def; no command exceeds rms_most [N m]. */
 void dither_init(dither_t *dither, float low, float high, float period, float rms_most, float fade);
 
 /* Off at once, the generator as new. */

@@ -26,7 +26,7 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
     return lever;
 }
 
-/* --- samples ------------------------------------------------------------------------------------------------------- */
+/* --- samples ------------------------------------------------------------------------------------------------------ */
 
 /* COAST is closed by torque_sample_t.measured, once it has lasted. */
 static bool permits_torque(const lever_t *lever)
@@ -69,7 +69,7 @@ bool instance_is_driving(const lever_t *lever)
     return (lever->gate.torque != 0.0f) || (lever->gate.open && dither_is_on(&lever->dither));
 }
 
-/* --- commands ------------------------------------------------------------------------------------------------------ */
+/* --- commands ----------------------------------------------------------------------------------------------------- */
 
 /* Something that IDENTITY says. */
 static bool is_changed(const lever_t *lever, const setup_t *before, float rms_before)
@@ -112,7 +112,7 @@ bool lever_command(lever_t *lever, const lever_command_t *command)
     return instance_command(lever, command) == MESSAGE_RESULT_ACCEPTED;
 }
 
-/* --- what is known ------------------------------------------------------------------------------------------------- */
+/* --- what is known ------------------------------------------------------------------------------------------------ */
 
 uint32_t instance_faults(const lever_t *lever)
 {
@@ -141,7 +141,7 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform)
     lever->has_platform = true;
 }
 
-/* --- CAN ----------------------------------------------------------------------------------------------------------- */
+/* --- CAN ---------------------------------------------------------------------------------------------------------- */
 
 enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *frame)
 {

@@ -21,8 +21,8 @@ static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE
     MESSAGE_HEALTH_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID,
     MESSAGE_STATE_ESTIMATE_DATA_ID};
 
-/* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame that
- * is repeated or one step late (which a sample's time would tell, too). */
+/* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame
+ * that is repeated or one step late (which a sample's time would tell, too). */
 static const e2e_tolerance_t tolerance = {13u, 14u, 0u};
 
 /* Of commands few may be missing, so that one that is sent again later, of the last dozen, is told from a new one. */
@@ -98,7 +98,7 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     return LEVER_FRAME_SAMPLE;
 }
 
-/* The sequence of commands: a second after the last accepted one it may start anywhere. A refused one leaves it as it was. */
+/* The sequence of commands: a second after the last accepted one it may start anywhere. A refused one leaves it. */
 static bool is_in_sequence(lever_t *lever, const lever_frame_t *frame)
 {
     e2e_receiver_t *receiver = &lever->link.command_receiver;
@@ -194,8 +194,8 @@ enum lever_frame_result link_on_frame(lever_t *lever, const lever_frame_t *frame
 
 /* --- step ------------------------------------------------------------------------------------------------------ */
 
-/* The divided messages that are due, as bits. A set of them is spread evenly over publish_period, so that no sample has to
- * answer with all of them. */
+/* The divided messages that are due, as bits. A set of them is spread evenly over publish_period, so that no sample has
+ * to answer with all of them. */
 static uint32_t divided_due(link_t *link)
 {
     uint32_t due = 0u;

@@ -6,12 +6,11 @@
 #define KEEP_ALIVE_US 1000000u
 #define SILENCE_US 20000u
 #define SILENCE_PERIODS 3u
-#define CLOSING_US 40000.0f /* so that a step of the port's clock is left of 50 ms */
-#define MEMORY 0.25f        /* of the mean square [s] */
-#define MEMORY_US 250000.0f
-#define WINDOW 1.0f /* of torque_rms [s] */
-#define ROOM 0.2f   /* part of square_most in which the amplitude falls, at least */
-#define LONGEST_US 0x3FFFFFFFu
+#define CLOSING_US 40000.0f   /* so that a step of the port's clock is left of 50 ms */
+#define MEMORY 0.25f          /* of the mean square [s] */
+#define MEMORY_PER_US 4.0e-6f /* 1 / that, in us */
+#define WINDOW 1.0f           /* of torque_rms [s] */
+#define ROOM 0.2f             /* part of square_most in which the amplitude falls, at least */
 
 static float clamped(float value, float most)
 {
@@ -19,12 +18,13 @@ static float clamped(float value, float most)
     return (above < -most) ? -most : above;
 }
 
-/* Room of the mean square below square_most in which the amplitude allowed falls from the limit to what may stay for ever: wide
- * enough that it falls no faster than torque_slew, and that the longest step leaves the mean square below. */
+/* Room of the mean square below square_most in which the amplitude allowed falls from the limit to what may stay for
+ * ever: wide enough that it falls no faster than torque_slew, and that the longest step leaves the mean square
+ * below. */
 static float room_of(const torque_gate_t *gate, float slew)
 {
     const float beyond = gate->limit - gate->sustained;
-    const float share = (float)gate->silence_us / MEMORY_US;
+    const float share = (float)gate->silence_us * MEMORY_PER_US;
     const float by_slew = (beyond * gate->limit * gate->limit) / (MEMORY * slew);
     const float by_step = (beyond * (gate->limit + gate->sustained) * share) / (1.0f - share);
     const float least = ROOM * gate->square_most;
@@ -48,24 +48,19 @@ void torque_gate_init(torque_gate_t *gate, const lever_settings_t *settings)
     if (gate->limit > gate->sustained) {
         gate->amplitude_slope = (gate->limit - gate->sustained) / room_of(gate, settings->torque_slew);
     }
-    gate->since_sample = LONGEST_US;
-    gate->since_output = LONGEST_US;
-    gate->since_command = LONGEST_US;
 }
 
-/* --- open or closed ------------------------------------------------------------------------------------------------ */
+/* --- open or closed ----------------------------------------------------------------------------------------------- */
 
-static uint32_t later(uint32_t age_us, uint32_t elapsed_us)
+/* What is left of a time after some of it. */
+static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)
 {
-    const uint32_t step_us = (elapsed_us < LONGEST_US) ? elapsed_us : LONGEST_US;
-    const uint32_t sum_us = age_us + step_us;
-    return (sum_us < LONGEST_US) ? sum_us : LONGEST_US;
+    return (elapsed_us < time_us) ? (time_us - elapsed_us) : 0u;
 }
 
 static bool is_fresh(const torque_gate_t *gate)
 {
-    return (gate->since_sample <= gate->silence_us) && (gate->since_output <= gate->silence_us) &&
-           !torque_gate_is_abandoned(gate);
+    return (gate->sample_left != 0u) && (gate->output_left != 0u) && (gate->command_left != 0u);
 }
 
 static void close_gate(torque_gate_t *gate)
@@ -93,11 +88,11 @@ static void fade(torque_gate_t *gate, uint32_t elapsed_us)
 /* Time has passed with the torque as it was; what is too old by now closes the gate, and it has been fading since. */
 static void age(torque_gate_t *gate, uint32_t elapsed_us)
 {
-    const float share = (float)elapsed_us / MEMORY_US;
+    const float share = (float)elapsed_us * MEMORY_PER_US;
     gate->mean_square += ((share < 1.0f) ? share : 1.0f) * ((gate->torque * gate->torque) - gate->mean_square);
-    gate->since_sample = later(gate->since_sample, elapsed_us);
-    gate->since_output = later(gate->since_output, elapsed_us);
-    gate->since_command = later(gate->since_command, elapsed_us);
+    gate->sample_left = left_of(gate->sample_left, elapsed_us);
+    gate->output_left = left_of(gate->output_left, elapsed_us);
+    gate->command_left = left_of(gate->command_left, elapsed_us);
     if (!is_fresh(gate)) {
         close_gate(gate);
     }
@@ -106,7 +101,7 @@ static void age(torque_gate_t *gate, uint32_t elapsed_us)
     }
 }
 
-/* --- limits -------------------------------------------------------------------------------------------------------- */
+/* --- limits ------------------------------------------------------------------------------------------------------- */
 
 static void drive(torque_gate_t *gate, float asked, uint32_t elapsed_us)
 {
@@ -125,12 +120,12 @@ static void drive(torque_gate_t *gate, float asked, uint32_t elapsed_us)
 void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *sample)
 {
     const uint32_t step_us = sample->advances ? sample->elapsed_us : gate->period_us;
-    const uint32_t elapsed_us = (step_us > gate->counted) ? (step_us - gate->counted) : 0u;
+    const uint32_t elapsed_us = left_of(step_us, gate->counted);
     age(gate, elapsed_us);
     gate->counted = 0u;
     if (sample->advances) {
-        gate->since_sample = 0u;
-        gate->since_output = sample->measured ? 0u : gate->since_output;
+        gate->sample_left = gate->silence_us + 1u;
+        gate->output_left = sample->measured ? (gate->silence_us + 1u) : gate->output_left;
     }
     const bool may_open = sample->advances && sample->permitted && is_fresh(gate);
     if (gate->open && may_open) {
@@ -147,15 +142,15 @@ void torque_gate_idle(torque_gate_t *gate, uint32_t elapsed_us)
 {
     age(gate, elapsed_us);
     gate->torque = clamped(gate->torque, amplitude(gate));
-    gate->counted = later(gate->counted, elapsed_us);
+    gate->counted += (elapsed_us < (UINT32_MAX - gate->counted)) ? elapsed_us : 0u;
 }
 
 void torque_gate_keep_alive(torque_gate_t *gate)
 {
-    gate->since_command = 0u;
+    gate->command_left = KEEP_ALIVE_US + 1u;
 }
 
 bool torque_gate_is_abandoned(const torque_gate_t *gate)
 {
-    return gate->since_command > KEEP_ALIVE_US;
+    return gate->command_left == 0u;
 }

@@ -118,7 +118,7 @@ typedef struct layout {
 #define LAYOUT(id, code, quantity) {(uint32_t)(id), (code), (quantity), COUNT(code), COUNT(quantity)}
 #define CODES_ONLY(id, code) {(uint32_t)(id), (code), NULL, COUNT(code), 0u}
 
-/* Writes identifier, length and all payload bits. Returns false, and leaves the frame untouched, when a code does not fit. */
+/* Writes identifier, length and all payload bits. Returns false, leaving the frame alone, when a code does not fit. */
 bool layout_encode(lever_frame_t *frame, const layout_t *layout, const uint32_t code[], const float value[]);
 
 /* Reads all codes and quantities. Returns false, and touches nothing, when the frame is not of this message. */

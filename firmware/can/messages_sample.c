@@ -1,8 +1,8 @@
 #include "can/layout.h"
 #include "can/messages.h"
 
-/* The messages of every sample, each by code of its own, which is faster than by a table. Their layouts are those of lever.dbc;
- * tests/python/can compares them. */
+/* The messages of every sample, each by code of its own, which is faster than by a table. Their layouts are those of
+ * lever.dbc; tests/python/can compares them. */
 
 static uint64_t bit_at(bool flag, uint32_t place)
 {

@@ -33,6 +33,17 @@ def limits(signal: Signal) -> tuple[int, int]:
     return least, least + (1 << signal.length) - 1
 
 
+def is_quantity(signal: Signal) -> bool:
+    """A physical value, as opposed to a code, flag or count."""
+    return signal.scale != 1
+
+
+def not_available(signal: Signal) -> int:
+    """The raw value that says so, of a quantity."""
+    least, greatest = limits(signal)
+    return least if signal.is_signed else greatest
+
+
 def scaled(signal: Signal, raw: int) -> float:
     """The physical value of a raw one, by cantools."""
     return float(cast(float, signal.raw_to_scaled(raw, decode_choices=False)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from python.can.codec import DBC, MULTIPLEXED, Codec, data_id_base, limits, scaled
+from python.can.codec import DBC, MULTIPLEXED, Codec, data_id_base, is_quantity, limits, not_available, scaled
 
 
 def test_identifiers(codec: Codec) -> None:
@@ -16,9 +16,13 @@ def test_data_ids(codec: Codec) -> None:
     assert codec.enum("message_data_id") == expected
 
 
+def test_the_version_is_what_identity_says(codec: Codec) -> None:
+    assert DBC.version == str(codec.lib.MESSAGE_CONTRACT)
+
+
 def test_no_two_messages_share_a_data_id() -> None:
     used = [data_id_base(message) + counter for message in DBC.messages for counter in range(16)]
-    assert len(set(used)) == len(used) == 16 * 10
+    assert len(set(used)) == len(used) == 16 * 13
     assert max(used) <= 255
 
 
@@ -35,8 +39,17 @@ def test_structs_have_the_signals(codec: Codec) -> None:
     for message in DBC.messages:
         signals = {signal.name for signal in message.signals} - {"crc", "counter"}
         if message.name in MULTIPLEXED:
-            signals = {signal for signal in signals if signal == "model"} | {MULTIPLEXED[message.name]}
+            signals = signals & {"model", "valid"} | {MULTIPLEXED[message.name]}
+        if message.name == "HEALTH":
+            signals = {name for name in signals if not name.startswith("fault_")} | {"faults"}
         assert set(codec.members(message.name)) == signals
+
+
+def test_everything_is_commented_and_has_its_cycle() -> None:
+    for message in DBC.messages:
+        assert message.comment
+        assert message.cycle_time is not None or message.name == "COMMAND_ACK"
+        assert all(signal.comment for signal in message.signals)
 
 
 def test_every_model_has_its_parameters(codec: Codec) -> None:
@@ -48,11 +61,18 @@ def test_every_model_has_its_parameters(codec: Codec) -> None:
         assert sorted(of_models) == [[model] for model in range(models) for _ in range(3)]
 
 
-def test_ranges_use_all_bits() -> None:
-    """So that the limits at which the C saturates, those of the bits, are those of the DBC."""
+def test_ranges_use_all_bits_but_not_available() -> None:
+    """So that the limits of the C, those of the bits, are those of the DBC; COMMAND says keep instead."""
     for message in DBC.messages:
         for signal in message.signals:
-            assert (signal.minimum, signal.maximum) == pytest.approx([scaled(signal, raw) for raw in limits(signal)])
+            least, greatest = limits(signal)
+            if is_quantity(signal) and message.name != "COMMAND":
+                assert not_available(signal) == (least if signal.is_signed else greatest)
+                assert signal.choices is not None
+                assert str(signal.choices[not_available(signal)]) == "not_available"
+                least, greatest = (least + 1, greatest) if signal.is_signed else (least, greatest - 1)
+            expected = [scaled(signal, raw) for raw in (least, greatest)]
+            assert (signal.minimum, signal.maximum) == pytest.approx(expected), signal.name
 
 
 def test_scales_have_whole_reciprocals() -> None:
@@ -66,13 +86,15 @@ def test_scales_have_whole_reciprocals() -> None:
 def test_named_values_are_the_enums(codec: Codec) -> None:
     choices = ("model", "preload", "estimator", "adaptation", "request", "mode")
     enums = {name: codec.enum(f"lever_{name}") for name in choices}
+    enums |= {name: codec.enum(f"message_{name}") for name in ("page", "result")}
     tested = 0
     for message in DBC.messages:
         for signal in message.signals:
-            if signal.name not in choices:
-                assert not signal.choices, signal.name
+            if signal.name not in enums:
+                assert all(str(name) == "not_available" for name in (signal.choices or {}).values())
                 continue
-            prefix = f"LEVER_{signal.name.upper()}_"
+            prefix = "LEVER" if signal.name in choices else "MESSAGE"
+            prefix = f"{prefix}_{signal.name.upper()}_"
             expected = {value: name.removeprefix(prefix).lower() for name, value in enums[signal.name].items()}
             expected = {value: name for value, name in expected.items() if name != "count"}
             if message.name == "COMMAND" and signal.name != "request":
@@ -80,12 +102,17 @@ def test_named_values_are_the_enums(codec: Codec) -> None:
             assert signal.choices is not None
             assert {value: str(name) for value, name in signal.choices.items()} == expected, signal.name
             tested += 1
-    assert tested == 13
+    assert tested == 22
 
 
-@pytest.mark.parametrize(("message", "enum"), [("HEALTH", "lever_fault"), ("PLATFORM_HEALTH", "lever_platform_fault")])
-def test_every_fault_has_its_bit(codec: Codec, message: str, enum: str) -> None:
-    faults = DBC.get_message_by_name(message).get_signal_by_name("faults")
-    bits = codec.enum(enum).values()
-    assert all(bit.bit_count() == 1 and bit < 1 << faults.length for bit in bits)
-    assert len(set(bits)) == len(bits)
+def test_every_fault_has_its_named_bit(codec: Codec) -> None:
+    health = DBC.get_message_by_name("HEALTH")
+    bits = {signal.name: 1 << signal.start - 16 for signal in health.signals if signal.name.startswith("fault_")}
+    expected = {name.removeprefix("LEVER_").lower(): bit for name, bit in codec.enum("lever_fault").items()}
+    assert bits == expected
+
+
+def test_every_fault_of_the_platform_has_its_bit(codec: Codec) -> None:
+    faults = DBC.get_message_by_name("PLATFORM_HEALTH").get_signal_by_name("faults")
+    bits = codec.enum("lever_platform_fault").values()
+    assert sorted(bits) == [1 << k for k in range(faults.length)]

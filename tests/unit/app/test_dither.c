@@ -45,7 +45,7 @@ static double rms_over(uint32_t count)
     return sqrt(square / (double)count);
 }
 
-/* --- off and on ---------------------------------------------------------------------------------------------------- */
+/* --- off and on --------------------------------------------------------------------------------------------------- */
 
 static void test_is_off_until_it_is_asked_for(void)
 {
@@ -121,7 +121,7 @@ static void test_no_command_exceeds_the_greatest_rms(void)
     TEST_ASSERT_FALSE(dither_is_on(&dither));
 }
 
-/* --- fades --------------------------------------------------------------------------------------------------------- */
+/* --- fades -------------------------------------------------------------------------------------------------------- */
 
 static void test_fades_in_linearly_over_its_time(void)
 {
@@ -176,7 +176,7 @@ static void test_without_a_fade_time_or_need_it_is_there_at_once(void)
     TEST_ASSERT_TRUE(dither.level == 0.4f);
 }
 
-/* --- spectrum ------------------------------------------------------------------------------------------------------ */
+/* --- spectrum ----------------------------------------------------------------------------------------------------- */
 
 enum { SEGMENT = 10000, SEGMENTS = 200, FREQUENCIES = 8 };
 

@@ -1,4 +1,4 @@
-/* COMMAND frames: what each does, in which sequence it is accepted, how it is answered; and IDENTITY of somebody else. */
+/* COMMAND frames: what each does, in which sequence it is accepted, how it is answered; and a foreign IDENTITY. */
 #include "frames.h"
 
 static lever_config_t config;
@@ -51,7 +51,7 @@ static lever_frame_t dither_frame(float rms)
     return sender_command(&sender, &command);
 }
 
-/* --- what it does, and the answer ---------------------------------------------------------------------------------- */
+/* --- what it does, and the answer --------------------------------------------------------------------------------- */
 
 static void test_a_command_is_carried_out_before_the_next_sample(void)
 {
@@ -117,7 +117,7 @@ static void test_after_a_reset_a_sender_may_start_anew_with_any_counter_and_time
     assert_counts(0u, 0u);
 }
 
-/* --- sequence ------------------------------------------------------------------------------------------------------ */
+/* --- sequence ----------------------------------------------------------------------------------------------------- */
 
 /* Once it turned the dither on again. */
 static void test_an_on_that_is_sent_again_after_an_off_is_refused_however_often(void)
@@ -167,7 +167,7 @@ static void test_a_second_after_the_last_command_a_sender_may_start_anywhere(voi
     TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, send(&nothing));
 }
 
-/* --- another estimator --------------------------------------------------------------------------------------------- */
+/* --- another estimator -------------------------------------------------------------------------------------------- */
 
 static lever_frame_t foreign_identity(void)
 {

@@ -237,7 +237,7 @@ static void test_identity_says_version_settings_and_choices(void)
     TEST_ASSERT_EQUAL_UINT8(LEVER_ADAPTATION_FIXED, pages[2].adaptation);
 }
 
-/* --- what the port reports ------------------------------------------------------------------------------------------ */
+/* --- what the port reports ---------------------------------------------------------------------------------------- */
 
 static void test_platform_health_is_sent_from_the_first_report_on(void)
 {

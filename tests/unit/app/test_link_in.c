@@ -31,7 +31,7 @@ static void assert_counts(uint32_t lost, uint32_t corrupt, uint32_t late)
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(late, health.late, "late");
 }
 
-/* --- pairing ------------------------------------------------------------------------------------------------------- */
+/* --- pairing ------------------------------------------------------------------------------------------------------ */
 
 static void test_a_pair_is_a_sample_without_fault(void)
 {
@@ -136,7 +136,7 @@ static void test_validity_bits_are_those_of_each_value(void)
     }
 }
 
-/* --- lost ---------------------------------------------------------------------------------------------------------- */
+/* --- lost --------------------------------------------------------------------------------------------------------- */
 
 static void test_lost_pairs_are_counted_by_time(void)
 {
@@ -167,7 +167,7 @@ static void test_after_an_outage_of_any_length_samples_are_taken_again_within_th
     }
 }
 
-/* --- corrupt and repeated ------------------------------------------------------------------------------------------ */
+/* --- corrupt and repeated ----------------------------------------------------------------------------------------- */
 
 static void test_every_single_bit_error_is_refused_counted_and_said(void)
 {

@@ -20,15 +20,15 @@ static void assert_ids(const uint32_t *wanted, uint32_t count, uint32_t found)
     }
 }
 
-/* --- which, and in what order -------------------------------------------------------------------------------------- */
+/* --- which, and in what order ------------------------------------------------------------------------------------- */
 
 static void test_nothing_is_sent_before_the_first_sample(void)
 {
     TEST_ASSERT_EQUAL_UINT32(0u, fetch_all(lever, frames));
 }
 
-/* Part k of six, of which PLATFORM_HEALTH is not sent without a report, at the first sample after k sixths of the period; the
- * pages of IDENTITY each second. */
+/* Part k of six, of which PLATFORM_HEALTH is not sent without a report, at the first sample after k sixths of the
+ * period; the pages of IDENTITY each second. */
 static void test_a_set_of_divided_messages_is_spread_over_a_publish_period(void)
 {
     const struct {
@@ -131,7 +131,7 @@ static void test_frames_not_fetched_are_replaced_and_do_not_pile_up(void)
     TEST_ASSERT_DOUBLE_WITHIN(1.1e-4, (double)rig_estimate(lever).theta, (double)message.theta);
 }
 
-/* --- how often ----------------------------------------------------------------------------------------------------- */
+/* --- how often ---------------------------------------------------------------------------------------------------- */
 
 static uint32_t publications_in(uint32_t samples)
 {
@@ -185,7 +185,7 @@ static void test_publication_goes_on_when_time_wraps(void)
     TEST_ASSERT_EQUAL_UINT32(50u, publications_in(1000u));
 }
 
-/* --- protection ---------------------------------------------------------------------------------------------------- */
+/* --- protection --------------------------------------------------------------------------------------------------- */
 
 static void test_every_message_has_its_own_gapless_counter_and_a_right_crc(void)
 {

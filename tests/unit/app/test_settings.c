@@ -52,7 +52,7 @@ static void assert_refused(const char *name)
     TEST_ASSERT_NULL(lever_init(&memory, &config));
 }
 
-/* --- table --------------------------------------------------------------------------------------------------------- */
+/* --- table -------------------------------------------------------------------------------------------------------- */
 
 static void test_table_has_a_row_for_every_float_of_the_struct(void)
 {
@@ -111,7 +111,7 @@ static void test_defaults_are_those_of_the_table(void)
     TEST_ASSERT_EQUAL_UINT8(LEVER_ADAPTATION_ROBBINS_MONRO, config.adaptation);
 }
 
-/* --- check --------------------------------------------------------------------------------------------------------- */
+/* --- check -------------------------------------------------------------------------------------------------------- */
 
 static void test_the_default_configuration_is_accepted(void)
 {
@@ -154,6 +154,56 @@ static void test_no_accepted_dither_band_is_empty(void)
     TEST_ASSERT_TRUE(config.settings.dither_low < config.settings.dither_high);
 }
 
+/* At trim_corner 3 and gap_limit 1 a few gaps drove all parameters to their bounds. */
+static void test_settings_that_do_not_go_together_are_refused_by_name(void)
+{
+    const struct {
+        float sample_period;
+        float gap_limit;
+        float trim_corner;
+        bool accepted;
+    } rows[] = {{1.0e-3f, 1.0f, 3.0f, false}, {1.0e-3f, 1.0f, 1.51f, false}, {1.0e-3f, 1.0f, 1.5f, true},
+        {1.0e-3f, 0.5f, 3.0f, true}, {2.0e-2f, 3.9e-2f, 1.0f, false}, {2.0e-2f, 4.0e-2f, 1.0f, true}};
+    for (uint32_t k = 0u; k < (sizeof rows / sizeof rows[0]); k++) {
+        config.settings.sample_period = rows[k].sample_period;
+        config.settings.gap_limit = rows[k].gap_limit;
+        config.settings.trim_corner = rows[k].trim_corner;
+        TEST_ASSERT_EQUAL_STRING(rows[k].accepted ? NULL : "gap_limit", lever_config_check(&config));
+        TEST_ASSERT_EQUAL(rows[k].accepted, lever_init(&memory, &config) != NULL);
+    }
+}
+
+/* CRC-32 a byte at a time, as IEEE 802.3 has it. */
+static uint32_t crc_by_bytes(const uint8_t *bytes, size_t count)
+{
+    uint32_t crc = UINT32_MAX;
+    for (size_t i = 0u; i < count; i++) {
+        crc ^= bytes[i];
+        for (uint32_t bit = 0u; bit < 8u; bit++) {
+            crc = ((crc & 1u) != 0u) ? ((crc >> 1u) ^ 0xEDB88320u) : (crc >> 1u);
+        }
+    }
+    return ~crc;
+}
+
+static void test_the_crc_of_the_settings_tells_every_one_of_them(void)
+{
+    const uint32_t crc = lever_settings_crc(&config.settings);
+    for (uint32_t i = 0u; i < lever_setting_count(); i++) {
+        lever_config_t other = config;
+        *setting(&other, i) = nextafterf(*setting(&other, i), 1.0e9f);
+        TEST_ASSERT_TRUE(lever_settings_crc(&other.settings) != crc);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926u, crc_by_bytes((const uint8_t *)"123456789", 9u));
+    uint8_t bytes[sizeof(lever_settings_t)];
+    for (uint32_t i = 0u; i < sizeof bytes; i++) {
+        uint32_t word = 0u;
+        (void)memcpy(&word, setting(&config, i / 4u), sizeof word);
+        bytes[i] = (uint8_t)((word >> (8u * (i % 4u))) & 0xFFu);
+    }
+    TEST_ASSERT_EQUAL_HEX32(crc_by_bytes(bytes, sizeof bytes), crc);
+}
+
 static void test_first_guesses_are_accepted_within_the_bounds_of_the_model_and_nowhere_else(void)
 {
     const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box};
@@ -188,7 +238,7 @@ static void test_keep_is_no_choice_for_a_configuration(void)
     assert_refused("adaptation");
 }
 
-/* --- init ---------------------------------------------------------------------------------------------------------- */
+/* --- init --------------------------------------------------------------------------------------------------------- */
 
 static void test_a_refused_configuration_leaves_the_memory_alone(void)
 {
@@ -238,6 +288,8 @@ int main(void)
     RUN_TEST(test_every_setting_is_accepted_at_both_limits);
     RUN_TEST(test_every_setting_is_refused_by_name_beyond_its_limits_and_when_not_finite);
     RUN_TEST(test_no_accepted_dither_band_is_empty);
+    RUN_TEST(test_settings_that_do_not_go_together_are_refused_by_name);
+    RUN_TEST(test_the_crc_of_the_settings_tells_every_one_of_them);
     RUN_TEST(test_first_guesses_are_accepted_within_the_bounds_of_the_model_and_nowhere_else);
     RUN_TEST(test_unknown_choices_are_refused_by_name);
     RUN_TEST(test_keep_is_no_choice_for_a_configuration);

@@ -190,6 +190,8 @@ static void draw_config(random_source_t *source, uint32_t run)
             value[i] = fminf(fmaxf(value[i], lever_setting(i)->least), lever_setting(i)->greatest);
         }
     }
+    lever_settings_t *s = &config.settings; /* what must go together, does */
+    s->gap_limit = fmaxf(fminf(s->gap_limit, 1.5f / s->trim_corner), 2.0f * s->sample_period);
     TEST_ASSERT_NULL(lever_config_check(&config));
 }
 
@@ -203,6 +205,7 @@ static void assert_finite(void)
     for (uint32_t i = 0u; i < 3u; i++) {
         TEST_ASSERT_TRUE(isfinite(estimate.parameter[i]) && isfinite(estimate.parameter_sigma[i]));
     }
+    TEST_ASSERT_TRUE(fabsf(rig_health(lever).torque) <= config.settings.torque_limit); /* NaN is not */
 }
 
 static void test_any_accepted_configuration_stays_finite_without_a_restart(void)
@@ -213,10 +216,13 @@ static void test_any_accepted_configuration_stays_finite_without_a_restart(void)
         rig = rig_of(config.model, truth);
         lever = lever_init(&memory, &config);
         const double period = (double)config.settings.sample_period;
+        lever_command_t dither = rig_command();
+        dither.dither_rms = 0.5f;
         for (uint32_t k = 1u; k <= 1000u; k++) {
             simulation_advance(&rig.simulation, period);
             lever_sample_t sample = rig_sample_after(&rig, 0u);
             sample.time_us = (uint32_t)(1.0e6 * period * (double)k);
+            (void)(((k % 50u) == 0u) && lever_command(lever, &dither)); /* it keeps it alive, too */
             (void)lever_update(lever, &sample);
             assert_finite();
         }

@@ -1,5 +1,5 @@
-/* The torque gate: no request, setting, gap or silence lets out more than its limits, and whatever closes it has it closed within
- * 50 ms. First the gate by itself, then in an instance. */
+/* The torque gate: no request, setting, gap or silence lets out more than its limits, and whatever closes it has it
+ * closed within 50 ms. First the gate by itself, then in an instance. */
 #include "app/torque_gate.h"
 
 #include "app/instance.h"
@@ -30,7 +30,7 @@ static float uniform(void)
     return (float)(seed >> 8u) / 16777216.0f;
 }
 
-/* --- limits: watched over time, by steps of 100 us ----------------------------------------------------------------- */
+/* --- limits: watched over time, by steps of 100 us ---------------------------------------------------------------- */
 
 enum { WINDOW = 10000 }; /* of 1 s */
 
@@ -160,7 +160,7 @@ static void test_what_is_within_the_limits_passes_as_it_is(void)
     }
 }
 
-/* --- in an instance ------------------------------------------------------------------------------------------------ */
+/* --- in an instance ----------------------------------------------------------------------------------------------- */
 
 static void command_dither(float rms)
 {
@@ -347,7 +347,7 @@ static void test_torque_ends_without_samples_by_the_clock_of_the_port(void)
     TEST_ASSERT_TRUE(rig_health(lever).gate_open);
 }
 
-/* --- gaps ---------------------------------------------------------------------------------------------------------- */
+/* --- gaps --------------------------------------------------------------------------------------------------------- */
 
 /* `count` samples, `periods` of a millisecond apart; the greatest torque. */
 static float greatest_over(uint32_t count, uint32_t periods)

@@ -27,7 +27,7 @@ static void assert_untouched(const lever_frame_t *frame, const char *name)
     TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(untouched.data, frame->data, 8, name);
 }
 
-/* --- bits of a frame, one at a time: bit n is bit n % 8 of byte n / 8 ---------------------------------------------- */
+/* --- bits of a frame, one at a time: bit n is bit n % 8 of byte n / 8 --------------------------------------------- */
 
 static int64_t get_bits(const lever_frame_t *frame, uint32_t start, uint32_t width, bool is_signed)
 {
@@ -61,7 +61,7 @@ static uint32_t bits_set(const lever_frame_t *frame)
     return count;
 }
 
-/* --- access to one field of an otherwise blank message -------------------------------------------------------------- */
+/* --- access to one field of an otherwise blank message ------------------------------------------------------------ */
 
 static const message_lever_sample_t blank_lever_sample = {0};
 static const message_base_sample_t blank_base_sample = {0};
@@ -333,8 +333,8 @@ static void test_an_input_that_is_not_available_is_not_valid(void)
     TEST_ASSERT_FALSE(base.z_ddot_valid);
 }
 
-/* Every count decodes to the float nearest to count * step, and that is sent as the same count again; no other bit of the
- * frame is touched by the field. */
+/* Every count decodes to the float nearest to count * step, and that is sent as the same count again; no other bit of
+ * the frame is touched by the field. */
 static void test_every_count(void)
 {
     for (int i = 0; i < QUANTITIES; i++) {
@@ -514,7 +514,7 @@ static void test_codes_beyond_their_limit_are_refused(void)
     }
 }
 
-/* --- whole frames --------------------------------------------------------------------------------------------------- */
+/* --- whole frames ------------------------------------------------------------------------------------------------- */
 
 /* Decodes and encodes what came out; false when decode refused, which must leave the message as it was. */
 #define AGAIN(kind)                                                                                                    \
@@ -655,7 +655,7 @@ static void test_an_unknown_page_is_refused(void)
     }
 }
 
-/* One frame worked out by hand: theta 0.3491 rad = 3491 = 0x0DA3, theta_dot -0.25 rad/s = -500 = 0xFE0C, tau_m invalid. */
+/* One frame by hand: theta 0.3491 rad = 3491 = 0x0DA3, theta_dot -0.25 rad/s = -500 = 0xFE0C, tau_m invalid. */
 static void test_a_frame_by_hand(void)
 {
     lever_frame_t frame = untouched;
