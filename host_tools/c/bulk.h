@@ -67,9 +67,9 @@ uint64_t bulk_format(const bulk_frame_t *frames, uint64_t count, const char *bus
 /* A sample and all that belongs to it. Slot 0 is LEVER_SAMPLE, 1 BASE_SAMPLE, 2.. the answers in the order of
  * bulk_feeder_t.answer_id, and after them the same messages as the recording has them. */
 typedef struct bulk_row {
-    int64_t time_us; /* recorded time of its BASE_SAMPLE [us] */
-    uint32_t fresh;  /* a bit for each slot that came with this sample */
-    uint32_t known;  /* a bit for each slot that came with this sample or an earlier one */
+    int64_t time_us;             /* recorded time of its BASE_SAMPLE [us] */
+    uint32_t fresh;              /* a bit for each slot that came with this sample */
+    uint32_t known;              /* a bit for each slot that came with this sample or an earlier one */
     uint8_t data[BULK_SLOTS][8]; /* of each slot, the last one that came */
 } bulk_row_t;
 
