@@ -220,7 +220,8 @@ def test_estimates_of_another_contract_are_not_compared(session: Session, tmp_pa
 
 def test_recorded_estimates_of_other_samples_are_told_and_not_compared(session: Session, tmp_path: Path) -> None:
     """A log in which each STATE_ESTIMATE stands behind the sample after its own."""
-    shifted, waiting = [], None
+    shifted: list[str] = []
+    waiting = None
     for line in session.lines:
         frame = line.split()[2]
         if frame.startswith("210#"):

@@ -195,7 +195,7 @@ def test_counts_of_the_estimator_go_on_beyond_their_bits() -> None:
     faults = {f"fault_{name}": 0 for name in enum_names("lever_fault").values()}
     for k in range(5):
         link = {"model": "lever", "valid": 1, "lost": 0, "corrupt": 30_000 * k, "late": 0}
-        health = {"mode": "run", "restarts": 100 * k % 256, "excitation": 0.1, **faults}
+        health: dict[str, codec.Value] = {"mode": "run", "restarts": 100 * k % 256, "excitation": 0.1, **faults}
         frames = [(0x219, codec.encode("LINK_HEALTH", k, link)), (0x214, codec.encode("HEALTH", k, health))]
         picture.take(frames, 0.1 * k)
     assert (picture.counts["corrupt"], picture.counts["restarts"]) == (120_000, 400)
