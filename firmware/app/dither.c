@@ -29,22 +29,16 @@ static float uniform(uint32_t *state)
     return ((float)(x >> 8) * 1.1920929e-7f) - 1.0f;
 }
 
-/* p[2] s^2 + p[1] s + p[0], whose squared magnitude at s = j tan(w/2) is that of a filter's denominator at exp(jw). */
-typedef struct denominator {
-    float p[3];
-} denominator_t;
-
 /* Both filters above have the denominator z^2 - (2 - a - d) z + (1 - d), with a = (w T)^2 and d = sqrt(2) w T of their
- * corner. Its squared magnitude is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(w/2). */
-static denominator_t denominator_of(const detrend_corner_t *corner, float period)
+ * corner. Its squared magnitude at z = exp(jv) is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(v/2), and with s = j tan(v/2)
+ * that is |p[2] s^2 + p[1] s + p[0]|^2 / (1 - s^2)^2. */
+static void denominator_of(float p[3], const detrend_corner_t *corner, float period)
 {
     const float a = corner->square * period * period;
     const float d = corner->damping * period;
-    denominator_t of;
-    of.p[0] = a;
-    of.p[2] = sqrtf((a * (a + (4.0f * d))) + (16.0f * (1.0f - d)));
-    of.p[1] = sqrtf(2.0f * a * (a + (2.0f * d) + of.p[2]));
-    return of;
+    p[0] = a;
+    p[2] = sqrtf((a * (a + (4.0f * d))) + (16.0f * (1.0f - d)));
+    p[1] = sqrtf(2.0f * a * (a + (2.0f * d) + p[2]));
 }
 
 /* Variance of white noise of variance 1 behind both filters: 32 b^2 times Phillips' integral I4 of (s^3 + s^2) over the
@@ -52,10 +46,10 @@ static denominator_t denominator_of(const detrend_corner_t *corner, float period
  * positive, so that float does. */
 static float band_variance(const dither_t *dither)
 {
-    const denominator_t low = denominator_of(&dither->low, dither->period);
-    const denominator_t high = denominator_of(&dither->high, dither->period);
-    const float *p = low.p;
-    const float *q = high.p;
+    float p[3];
+    float q[3];
+    denominator_of(p, &dither->low, dither->period);
+    denominator_of(q, &dither->high, dither->period);
     const float b = q[0];
     const float d1 = (p[1] * q[0]) + (p[0] * q[1]);
     const float d3 = (p[2] * q[1]) + (p[1] * q[2]);

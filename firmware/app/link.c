@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#define BIT(output) (1u << (uint32_t)(output))
+#define BIT(output) ((uint32_t)1u << (uint32_t)(output))
 #define EVERY_PAGE ((1u << (uint32_t)MESSAGE_PAGE_COUNT) - 1u)
 #define IDENTITY_US 1000000u
 #define DUPLICATE_US 2000000u
@@ -12,9 +12,10 @@
 #define LONG_AGO_US 0x40000000u
 
 /* The divided messages, in the order in which they are sent in each publish_period. */
-static const uint8_t parts[] = {(uint8_t)OUTPUT_HEALTH, (uint8_t)OUTPUT_PARAMETERS, (uint8_t)OUTPUT_SIGMA,
-    (uint8_t)OUTPUT_DYNAMICS, (uint8_t)OUTPUT_LINK_HEALTH, (uint8_t)OUTPUT_PLATFORM};
-#define PARTS ((uint32_t)sizeof parts)
+static const uint16_t parts[] = {(uint16_t)BIT(OUTPUT_HEALTH), (uint16_t)BIT(OUTPUT_PARAMETERS),
+    (uint16_t)BIT(OUTPUT_SIGMA), (uint16_t)BIT(OUTPUT_DYNAMICS), (uint16_t)BIT(OUTPUT_LINK_HEALTH),
+    (uint16_t)BIT(OUTPUT_PLATFORM)};
+#define PARTS ((uint32_t)(sizeof(parts) / sizeof(parts[0])))
 
 static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_COMMAND_ACK_DATA_ID,
     MESSAGE_PILOT_PARAMETERS_DATA_ID, MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID,
@@ -201,14 +202,14 @@ static uint32_t divided_due(link_t *link)
     uint32_t due = 0u;
     if (link->set_us >= link->publish_us) {
         for (; link->parts < (uint8_t)PARTS; link->parts++) { /* of the set before */
-            due |= BIT(parts[link->parts]);
+            due |= parts[link->parts];
         }
         link->set_us = 0u;
         link->parts = 0u;
     }
     for (; (link->parts < (uint8_t)PARTS) && ((link->set_us * PARTS) >= (link->publish_us * link->parts));
         link->parts++) {
-        due |= BIT(parts[link->parts]);
+        due |= parts[link->parts];
     }
     return due;
 }
@@ -265,7 +266,7 @@ static uint32_t first_of(uint32_t due)
     if (due == BIT(OUTPUT_STATE_ESTIMATE)) {
         output = (uint32_t)OUTPUT_STATE_ESTIMATE; /* mostly */
     } else {
-        while ((due & BIT(output)) == 0u) {
+        for (uint32_t rest = due; (rest & 1u) == 0u; rest >>= 1u) {
             output++;
         }
     }
@@ -277,8 +278,9 @@ bool link_next_frame(lever_t *lever, lever_frame_t *frame)
     link_t *link = &lever->link;
     bool sent = false;
     while ((link->due != 0u) && !sent) {
-        const uint32_t output = first_of(link->due);
-        link->due = (uint16_t)(link->due & ~BIT(output));
+        const uint32_t due = link->due;
+        const uint32_t output = first_of(due);
+        link->due = (uint16_t)(due & (due - 1u)); /* all but the lowest bit */
         sent = link_encode(lever, (enum link_output)output, frame);
         if (sent) {
             e2e_protect(frame, data_ids[output], link->counter[output]);

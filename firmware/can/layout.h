@@ -24,17 +24,13 @@ typedef struct place {
  * value * per_unit and count / per_unit are each rounded only once. */
 typedef struct quantity {
     place_t place;
+    bool is_signed;
     float per_unit;
-    float least; /* counts: 0 and 2^width - 2, or -(2^(width-1) - 1) and 2^(width-1) - 1 */
-    float greatest;
 } quantity_t;
 
-#define CODE(start_bit, greatest_code) {(greatest_code), (start_bit)}
-#define UNSIGNED(start_bit, width, counts_per_unit)                                                                    \
-    {CODE(start_bit, (1u << (width)) - 1u), (counts_per_unit), 0.0f, (float)((1u << (width)) - 2u)}
-#define SIGNED(start_bit, width, counts_per_unit)                                                                      \
-    {CODE(start_bit, (1u << (width)) - 1u), (counts_per_unit), -(float)((1u << ((width) - 1u)) - 1u),                  \
-        (float)((1u << ((width) - 1u)) - 1u)}
+#define CODE(start_bit, mask) {(mask), (start_bit)}
+#define UNSIGNED(start_bit, mask, counts_per_unit) {CODE(start_bit, mask), false, (counts_per_unit)}
+#define SIGNED(start_bit, mask, counts_per_unit) {CODE(start_bit, mask), true, (counts_per_unit)}
 
 /* --- one code, one quantity --------------------------------------------------------------------------------------- */
 
@@ -47,18 +43,22 @@ static inline uint32_t layout_code(uint64_t payload, place_t place)
 static inline uint32_t layout_not_available(const quantity_t *quantity)
 {
     const uint32_t mask = quantity->place.mask;
-    return (quantity->least < 0.0f) ? (mask ^ (mask >> 1u)) : mask;
+    return quantity->is_signed ? (mask ^ (mask >> 1u)) : mask;
 }
 
 /* The nearest count, half away from zero, at its place; not available for NaN and what does not fit. */
 static inline uint64_t layout_bits(const quantity_t *quantity, float value)
 {
+    const uint32_t mask = quantity->place.mask;
+    const uint32_t most = quantity->is_signed ? (mask >> 1u) : (mask - 1u);
+    const float greatest = (float)most;
+    const float least = quantity->is_signed ? -greatest : 0.0f;
     const float scaled = value * quantity->per_unit;
     uint32_t bits = layout_not_available(quantity);
-    if ((scaled > (quantity->least - 0.5f)) && (scaled < (quantity->greatest + 0.5f))) {
+    if ((scaled > (least - 0.5f)) && (scaled < (greatest + 0.5f))) {
         /* The float below 0.5: it rounds 0.5 up like 0.5 would, but not 0.49999997. */
         const float rounded = scaled + ((scaled < 0.0f) ? -0.49999997f : 0.49999997f);
-        bits = (uint32_t)(int32_t)rounded & quantity->place.mask;
+        bits = (uint32_t)(int32_t)rounded & mask;
     }
     return (uint64_t)bits << quantity->place.start;
 }
@@ -67,8 +67,9 @@ static inline uint64_t layout_bits(const quantity_t *quantity, float value)
 static inline float layout_value(uint64_t payload, const quantity_t *quantity)
 {
     const uint32_t bits = layout_code(payload, quantity->place);
-    const uint32_t sign = (quantity->least < 0.0f) ? layout_not_available(quantity) : 0u;
-    const int32_t count = (int32_t)(bits ^ sign) - (int32_t)sign; /* extends the sign */
+    const uint32_t sign = quantity->is_signed ? layout_not_available(quantity) : 0u;
+    const uint32_t flipped = bits ^ sign;
+    const int32_t count = (int32_t)flipped - (int32_t)sign; /* extends the sign */
     return (bits == layout_not_available(quantity)) ? NAN : ((float)count / quantity->per_unit);
 }
 

@@ -16,7 +16,7 @@ static uint32_t bit_of(bool flag)
 /* --- COMMAND ------------------------------------------------------------------------------------------------------ */
 
 static const place_t command_code[] = {CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u)};
-static const quantity_t command_quantity[] = {UNSIGNED(48u, 16u, 1000.0f)};
+static const quantity_t command_quantity[] = {UNSIGNED(48u, 65535u, 1000.0f)};
 static const layout_t command = LAYOUT(MESSAGE_COMMAND_ID, command_code, command_quantity);
 
 bool message_command_encode(lever_frame_t *frame, const message_command_t *message)
@@ -44,19 +44,20 @@ bool message_command_decode(message_command_t *message, const lever_frame_t *fra
 
 /* --- PILOT_PARAMETERS and PILOT_SIGMA, multiplexed by model ------------------------------------------------------- */
 
-#define PHYSICAL_PARAMETERS {UNSIGNED(16u, 16u, 1000.0f), UNSIGNED(32u, 16u, 100.0f), UNSIGNED(48u, 16u, 10.0f)}
-#define PHYSICAL_SIGMA {UNSIGNED(16u, 16u, 10000.0f), UNSIGNED(32u, 16u, 500.0f), UNSIGNED(48u, 16u, 20.0f)}
+#define PHYSICAL_PARAMETERS                                                                                            \
+    {UNSIGNED(16u, 65535u, 1000.0f), UNSIGNED(32u, 65535u, 100.0f), UNSIGNED(48u, 65535u, 10.0f)}
+#define PHYSICAL_SIGMA {UNSIGNED(16u, 65535u, 10000.0f), UNSIGNED(32u, 65535u, 500.0f), UNSIGNED(48u, 65535u, 20.0f)}
 
 /* One row a model, in the order of enum lever_model. */
 static const quantity_t parameter_quantity[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
     PHYSICAL_PARAMETERS,
     PHYSICAL_PARAMETERS,
-    {SIGNED(16u, 16u, 10.0f), SIGNED(32u, 16u, 100.0f), SIGNED(48u, 16u, 1000.0f)},
+    {SIGNED(16u, 65535u, 10.0f), SIGNED(32u, 65535u, 100.0f), SIGNED(48u, 65535u, 1000.0f)},
 };
 static const quantity_t sigma_quantity[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
     PHYSICAL_SIGMA,
     PHYSICAL_SIGMA,
-    {UNSIGNED(16u, 16u, 50.0f), UNSIGNED(32u, 16u, 500.0f), UNSIGNED(48u, 16u, 5000.0f)},
+    {UNSIGNED(16u, 65535u, 50.0f), UNSIGNED(32u, 65535u, 500.0f), UNSIGNED(48u, 65535u, 5000.0f)},
 };
 
 static const place_t model_code[] = {MODEL, VALID};
@@ -122,8 +123,8 @@ bool message_pilot_sigma_decode(message_pilot_sigma_t *message, const lever_fram
 /* --- PILOT_DYNAMICS ----------------------------------------------------------------------------------------------- */
 
 static const place_t pilot_dynamics_code[] = {MODEL, VALID};
-static const quantity_t pilot_dynamics_quantity[] = {
-    UNSIGNED(16u, 14u, 1000.0f), UNSIGNED(44u, 10u, 500.0f), UNSIGNED(30u, 14u, 5000.0f), UNSIGNED(54u, 10u, 1000.0f)};
+static const quantity_t pilot_dynamics_quantity[] = {UNSIGNED(16u, 16383u, 1000.0f), UNSIGNED(44u, 1023u, 500.0f),
+    UNSIGNED(30u, 16383u, 5000.0f), UNSIGNED(54u, 1023u, 1000.0f)};
 static const layout_t pilot_dynamics = LAYOUT(MESSAGE_PILOT_DYNAMICS_ID, pilot_dynamics_code, pilot_dynamics_quantity);
 
 bool message_pilot_dynamics_encode(lever_frame_t *frame, const message_pilot_dynamics_t *message)
@@ -153,7 +154,7 @@ bool message_pilot_dynamics_decode(message_pilot_dynamics_t *message, const leve
 /* --- HEALTH ------------------------------------------------------------------------------------------------------- */
 
 static const place_t health_code[] = {CODE(12u, 15u), CODE(16u, 0xFFFFFFu), CODE(40u, 255u)};
-static const quantity_t health_quantity[] = {UNSIGNED(48u, 16u, 2000.0f)};
+static const quantity_t health_quantity[] = {UNSIGNED(48u, 65535u, 2000.0f)};
 static const layout_t health = LAYOUT(MESSAGE_HEALTH_ID, health_code, health_quantity);
 
 bool message_health_encode(lever_frame_t *frame, const message_health_t *message)
@@ -215,7 +216,7 @@ static const place_t version_code[] = {
     CODE(12u, 15u), CODE(16u, 255u), CODE(24u, 255u), CODE(32u, 255u), CODE(40u, 255u)};
 static const place_t settings_code[] = {CODE(12u, 15u), CODE(16u, UINT32_MAX)};
 static const place_t choices_code[] = {CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u)};
-static const quantity_t choices_quantity[] = {UNSIGNED(32u, 16u, 1000.0f)};
+static const quantity_t choices_quantity[] = {UNSIGNED(32u, 65535u, 1000.0f)};
 static const layout_t identity[MESSAGE_PAGE_COUNT] = {
     CODES_ONLY(MESSAGE_IDENTITY_ID, version_code),
     CODES_ONLY(MESSAGE_IDENTITY_ID, settings_code),
@@ -226,7 +227,7 @@ bool message_identity_encode(lever_frame_t *frame, const message_identity_t *mes
 {
     const uint32_t code[MESSAGE_PAGE_COUNT][COUNT(version_code)] = {
         {message->page, message->firmware_major, message->firmware_minor, message->firmware_patch, message->contract},
-        {message->page, message->settings_crc},
+        {message->page, message->settings_crc, 0u, 0u, 0u},
         {message->page, message->model, message->preload, message->estimator, message->adaptation},
     };
     const uint8_t page = message->page;
@@ -236,7 +237,7 @@ bool message_identity_encode(lever_frame_t *frame, const message_identity_t *mes
 
 bool message_identity_decode(message_identity_t *message, const lever_frame_t *frame)
 {
-    uint32_t code[COUNT(version_code)] = {0u};
+    uint32_t code[COUNT(version_code)] = {0u, 0u, 0u, 0u, 0u};
     float value[1] = {0.0f};
     const bool fits =
         layout_decode(code, value, &identity[MESSAGE_PAGE_SETTINGS], frame) && (code[0] < (uint32_t)MESSAGE_PAGE_COUNT);
@@ -266,7 +267,7 @@ bool message_identity_decode(message_identity_t *message, const lever_frame_t *f
 
 static const place_t command_ack_code[] = {
     CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u)};
-static const quantity_t command_ack_quantity[] = {UNSIGNED(48u, 16u, 1000.0f)};
+static const quantity_t command_ack_quantity[] = {UNSIGNED(48u, 65535u, 1000.0f)};
 static const layout_t command_ack = LAYOUT(MESSAGE_COMMAND_ACK_ID, command_ack_code, command_ack_quantity);
 
 bool message_command_ack_encode(lever_frame_t *frame, const message_command_ack_t *message)

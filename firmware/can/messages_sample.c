@@ -21,9 +21,9 @@ static bool is_available(float value)
 
 /* --- LEVER_SAMPLE ------------------------------------------------------------------------------------------------ */
 
-static const quantity_t sample_theta = SIGNED(16u, 16u, 10000.0f);
-static const quantity_t sample_theta_dot = SIGNED(32u, 16u, 2000.0f);
-static const quantity_t sample_tau_m = SIGNED(48u, 16u, 1000.0f);
+static const quantity_t sample_theta = SIGNED(16u, 65535u, 10000.0f);
+static const quantity_t sample_theta_dot = SIGNED(32u, 65535u, 2000.0f);
+static const quantity_t sample_tau_m = SIGNED(48u, 65535u, 1000.0f);
 
 bool message_lever_sample_encode(lever_frame_t *frame, const message_lever_sample_t *message)
 {
@@ -53,7 +53,7 @@ bool message_lever_sample_decode(message_lever_sample_t *message, const lever_fr
 
 /* --- BASE_SAMPLE ------------------------------------------------------------------------------------------------- */
 
-static const quantity_t sample_z_ddot = SIGNED(16u, 16u, 1000.0f);
+static const quantity_t sample_z_ddot = SIGNED(16u, 65535u, 1000.0f);
 
 bool message_base_sample_encode(lever_frame_t *frame, const message_base_sample_t *message)
 {
@@ -77,9 +77,9 @@ bool message_base_sample_decode(message_base_sample_t *message, const lever_fram
 
 /* --- STATE_ESTIMATE ---------------------------------------------------------------------------------------------- */
 
-static const quantity_t state_innovation = UNSIGNED(13u, 8u, 8.0f);
-static const quantity_t state_theta_dot = SIGNED(21u, 13u, 500.0f);
-static const quantity_t state_theta = SIGNED(34u, 14u, 5000.0f);
+static const quantity_t state_innovation = UNSIGNED(13u, 255u, 8.0f);
+static const quantity_t state_theta_dot = SIGNED(21u, 8191u, 500.0f);
+static const quantity_t state_theta = SIGNED(34u, 16383u, 5000.0f);
 
 bool message_state_estimate_encode(lever_frame_t *frame, const message_state_estimate_t *message)
 {
@@ -106,8 +106,8 @@ bool message_state_estimate_decode(message_state_estimate_t *message, const leve
 
 /* --- MOTOR_COMMAND ----------------------------------------------------------------------------------------------- */
 
-static const quantity_t motor_torque = SIGNED(16u, 16u, 1000.0f);
-static const quantity_t motor_dither = SIGNED(32u, 16u, 1000.0f);
+static const quantity_t motor_torque = SIGNED(16u, 65535u, 1000.0f);
+static const quantity_t motor_dither = SIGNED(32u, 65535u, 1000.0f);
 static const place_t motor_model = CODE(12u, 7u);
 
 bool message_motor_command_encode(lever_frame_t *frame, const message_motor_command_t *message)
