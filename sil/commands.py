@@ -39,7 +39,7 @@ examples:
   lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
   lever sim my_own.toml
   lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
-  lever sim steady --settings > steady.settings; lever_can --lock-step --can vcan0 --settings steady.settings &
+  lever sim steady --settings > steady.settings; lever_can --can vcan0 --lock-step --settings steady.settings &
   lever sim steady --interface socketcan --channel vcan0
   lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
 
