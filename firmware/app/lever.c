@@ -80,21 +80,16 @@ static bool is_changed(const lever_t *lever, const setup_t *before, float rms_be
            (lever->dither.target < rms_before) || (lever->dither.target > rms_before);
 }
 
-enum message_result instance_command(lever_t *lever, const lever_command_t *command)
+/* Carries out what is not refused for the mode. Returns false, and changes nothing, when a value is not known. */
+static bool carry_out(lever_t *lever, const lever_command_t *command)
 {
-    const bool resets = (command->request == (uint8_t)LEVER_REQUEST_RESET);
     const setup_t before = lever->estimator.setup;
     const float rms_before = lever->dither.target;
-    enum message_result result = MESSAGE_RESULT_ACCEPTED;
-    if (!((command->dither_rms >= 0.0f) && (command->dither_rms <= DITHER_MOST))) {
-        result = MESSAGE_RESULT_UNKNOWN_VALUE;
-    } else if ((lever->estimator.mode == LEVER_MODE_FAULT) && !resets) {
-        result = MESSAGE_RESULT_FAULT_MODE;
-    } else if (!estimator_command(&lever->estimator, command)) {
-        result = MESSAGE_RESULT_UNKNOWN_VALUE;
-    } else {
+    const bool plausible = (command->dither_rms >= 0.0f) && (command->dither_rms <= DITHER_MOST);
+    const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
+    if (known) {
         torque_gate_keep_alive(&lever->gate);
-        if (resets) {
+        if (command->request == (uint8_t)LEVER_REQUEST_RESET) {
             dither_reset(&lever->dither);
         }
         if (command->dither_rms < (float)LEVER_KEEP) {
@@ -103,6 +98,19 @@ enum message_result instance_command(lever_t *lever, const lever_command_t *comm
         if (is_changed(lever, &before, rms_before)) {
             lever->link.pages |= (uint8_t)(1u << (uint32_t)MESSAGE_PAGE_CHOICES);
         }
+    }
+    return known;
+}
+
+enum message_result instance_command(lever_t *lever, const lever_command_t *command)
+{
+    enum message_result result = MESSAGE_RESULT_ACCEPTED;
+    if ((lever->estimator.mode == LEVER_MODE_FAULT) && (command->request != (uint8_t)LEVER_REQUEST_RESET)) {
+        result = MESSAGE_RESULT_FAULT_MODE;
+    } else if (!carry_out(lever, command)) {
+        result = MESSAGE_RESULT_UNKNOWN_VALUE;
+    } else {
+        /* accepted */
     }
     return result;
 }

@@ -8,7 +8,7 @@
 
 static bool is_finite(float value)
 {
-    return (value - value) == 0.0f;
+    return fabsf(value) <= 3.0e38f; /* NaN is not */
 }
 
 static bool are_finite(const float value[LEVER_PARAMETERS])

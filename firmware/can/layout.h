@@ -15,6 +15,8 @@
 
 enum { FRAME_BYTES = 8 };
 
+#define LAYOUT_ROUND 12582912.0f /* 1.5 * 2^23: near it a float holds whole numbers only */
+
 typedef struct place {
     uint32_t mask; /* 2^width - 1 */
     uint8_t start; /* the lowest bit */
@@ -46,7 +48,7 @@ static inline uint32_t layout_not_available(const quantity_t *quantity)
     return quantity->is_signed ? (mask ^ (mask >> 1u)) : mask;
 }
 
-/* The nearest count, half away from zero, at its place; not available for NaN and what does not fit. */
+/* The nearest count, half to even, at its place; not available for NaN and what does not fit. */
 static inline uint64_t layout_bits(const quantity_t *quantity, float value)
 {
     const uint32_t mask = quantity->place.mask;
@@ -54,10 +56,9 @@ static inline uint64_t layout_bits(const quantity_t *quantity, float value)
     const float greatest = (float)most;
     const float least = quantity->is_signed ? -greatest : 0.0f;
     const float scaled = value * quantity->per_unit;
+    const float rounded = (scaled + LAYOUT_ROUND) - LAYOUT_ROUND;
     uint32_t bits = layout_not_available(quantity);
-    if ((scaled > (least - 0.5f)) && (scaled < (greatest + 0.5f))) {
-        /* The float below 0.5: it rounds 0.5 up like 0.5 would, but not 0.49999997. */
-        const float rounded = scaled + ((scaled < 0.0f) ? -0.49999997f : 0.49999997f);
+    if ((rounded >= least) && (rounded <= greatest)) {
         bits = (uint32_t)(int32_t)rounded & mask;
     }
     return (uint64_t)bits << quantity->place.start;

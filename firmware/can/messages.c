@@ -37,7 +37,7 @@ bool message_command_decode(message_command_t *message, const lever_frame_t *fra
         message->preload = (uint8_t)code[2];
         message->estimator = (uint8_t)code[3];
         message->adaptation = (uint8_t)code[4];
-        message->dither_rms = (value[0] == value[0]) ? value[0] : 65.535f; /* only NaN is not itself: keep */
+        message->dither_rms = (value[0] >= 0.0f) ? value[0] : 65.535f; /* not available: keep */
     }
     return fits;
 }

@@ -5,8 +5,8 @@
  *
  * ..._encode() writes identifier, length and all payload bits (unused ones, CRC and counter as 0) and returns true, or
  * returns false and leaves the frame untouched.
- *   - Physical values are rounded to the nearest count, half away from zero (cantools: half to even). The value is
- *     scaled in single precision, which can decide only a value within 0.004 counts of a tie.
+ *   - Physical values are rounded to the nearest count, half to even. The value is scaled in single precision, which can
+ *     decide only a value within 0.004 counts of a tie.
  *   - A value that is NaN or does not fit its signal is sent as "not available": a smaller one would be wrong, and a
  *     standard deviation confident. In LEVER_SAMPLE and BASE_SAMPLE its flag says so, too.
  *   - Codes, flags and counts too large for their field are refused: the nearest code would mean something else.
