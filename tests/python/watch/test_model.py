@@ -192,9 +192,9 @@ def test_commands_of_several_senders_are_no_losses() -> None:
 
 def test_counts_of_the_estimator_go_on_beyond_their_bits() -> None:
     picture = Picture()
-    faults = {f"fault_{name}": 0 for name in enum_names("lever_fault").values()}
+    faults: dict[str, codec.Value] = {f"fault_{name}": 0 for name in enum_names("lever_fault").values()}
     for k in range(5):
-        link = {"model": "lever", "valid": 1, "lost": 0, "corrupt": 30_000 * k, "late": 0}
+        link: dict[str, codec.Value] = {"model": "lever", "valid": 1, "lost": 0, "corrupt": 30_000 * k, "late": 0}
         health: dict[str, codec.Value] = {"mode": "run", "restarts": 100 * k % 256, "excitation": 0.1, **faults}
         frames = [(0x219, codec.encode("LINK_HEALTH", k, link)), (0x214, codec.encode("HEALTH", k, health))]
         picture.take(frames, 0.1 * k)
