@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -112,8 +113,13 @@ class _Decoded:
         return came
 
     def _own(self, message: str) -> NDArray[np.bool_]:
+        return fields.belongs(self.fields(message), self._time_us)
+
+    @cached_property
+    def _time_us(self) -> NDArray[np.int64]:
+        """Of each sample."""
         base = np.ascontiguousarray(self._rows["data"][:, SLOTS["BASE_SAMPLE"]])
-        return fields.belongs(self.fields(message), fields.columns("BASE_SAMPLE", base)["time_us"].astype(np.int64))
+        return fields.columns("BASE_SAMPLE", base)["time_us"].astype(np.int64)
 
     def held(self, message: str, field: str, continued: Continued | None = None) -> FloatArray:
         """NaN before the first. Decodes only the rows with which the message came, and the first; what `continued`
