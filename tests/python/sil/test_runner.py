@@ -268,6 +268,7 @@ def test_a_firmware_behind_a_serial_line_gives_the_same_frames(lever_bus: MakeBu
     thread = threading.Thread(target=adapter, daemon=True)
     thread.start()
     with commands.open_bus(short, "slcan", os.ttyname(line)) as bus:
+        assert bus.channel_info == f"slcan channel {os.ttyname(line)}"  # for errors
         os.close(line)
         remote = runner.simulate(short, bus)
     thread.join()
