@@ -280,8 +280,8 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
 
 /* All torque for the motor leaves through one gate: finite, then torque_limit, torque_slew, torque_rms over one second.
  * It is open while all of this holds; otherwise torque fades to exactly zero within 50 ms:
- *   - mode RUN or FROZEN, or COAST for a moment, as the next line has it;
- *   - a sample, and in one a valid theta or theta_dot, within 20 ms or three sample periods, whichever is longer;
+ *   - mode RUN or FROZEN, or COAST for as long as the next line allows;
+ *   - a sample with a valid theta or theta_dot came within 20 ms or three sample periods, whichever is longer;
  *   - the sample clock advances;
  *   - a COMMAND, or lever_command(), was accepted within the last second of sample time: repeat one (keep-alive);
  *   - the platform reports none of ROM, SELF_TEST, WATCHDOG.

@@ -60,7 +60,7 @@ static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)
 
 static bool is_fresh(const torque_gate_t *gate)
 {
-    return (gate->sample_left != 0u) && (gate->output_left != 0u) && (gate->command_left != 0u);
+    return (gate->output_left != 0u) && (gate->command_left != 0u);
 }
 
 static void close_gate(torque_gate_t *gate)
@@ -90,7 +90,6 @@ static void age(torque_gate_t *gate, uint32_t elapsed_us)
 {
     const float share = (float)elapsed_us * MEMORY_PER_US;
     gate->mean_square += ((share < 1.0f) ? share : 1.0f) * ((gate->torque * gate->torque) - gate->mean_square);
-    gate->sample_left = left_of(gate->sample_left, elapsed_us);
     gate->output_left = left_of(gate->output_left, elapsed_us);
     gate->command_left = left_of(gate->command_left, elapsed_us);
     if (!is_fresh(gate)) {
@@ -123,9 +122,8 @@ void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *s
     const uint32_t elapsed_us = left_of(step_us, gate->counted);
     age(gate, elapsed_us);
     gate->counted = 0u;
-    if (sample->advances) {
-        gate->sample_left = gate->silence_us + 1u;
-        gate->output_left = sample->measured ? (gate->silence_us + 1u) : gate->output_left;
+    if (sample->advances && sample->measured) {
+        gate->output_left = gate->silence_us + 1u;
     }
     const bool may_open = sample->advances && sample->permitted && is_fresh(gate);
     if (gate->open && may_open) {

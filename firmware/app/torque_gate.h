@@ -3,11 +3,10 @@
  * What is asked for passes finite, amplitude (torque_limit), slew (torque_slew) and rms (torque_rms) in this order. The
  * gate is open while all of this holds:
  *   - the mode, the sample clock and the machine permit it: torque_sample_t;
- *   - a sample came, and in one a valid output, within 20 ms or three sample periods, whichever is longer;
+ *   - a sample with a valid output came within 20 ms or three sample periods, whichever is longer;
  *   - a command was accepted within the last second (keep-alive).
- * Otherwise torque goes to exactly zero, on a straight line within 40 ms (and the slew limit, if that would take
- * longer, is overruled). After that it opens over dither_fade. Closing needs no sample: the port calls
- * torque_gate_idle().
+ * Otherwise torque goes to exactly zero on a straight line within 40 ms, even if torque_slew is less than that takes.
+ * Closing needs no sample: the port calls torque_gate_idle(). Opening takes dither_fade.
  *
  * Rms. The mean square of the torque with a memory of 0.25 s is held below torque_rms^2 / 1.25, by an amplitude that
  * falls with the room left: then no second holds more than torque_rms. That amplitude falls slower than torque_slew, so
@@ -31,13 +30,12 @@ typedef struct torque_gate {
     float sustained;       /* its root: amplitude allowed for ever [N m] */
     float amplitude_slope; /* amplitude allowed beyond that per room left [1 / (N m)] */
     uint32_t period_us;    /* of a sample */
-    uint32_t silence_us;   /* longest time without a sample, or output */
+    uint32_t silence_us;   /* longest time without a valid output, so without a sample, too */
     float torque;          /* let through [N m] */
     float gain;            /* 0 to 1, of an opening gate */
     float closing;         /* rate of a closing one [N m / us] */
     float mean_square;     /* of torque [N^2 m^2] */
-    uint32_t sample_left;  /* time for which the last sample serves [us] */
-    uint32_t output_left;  /* the last valid theta or theta_dot */
+    uint32_t output_left;  /* time for which the last sample with a valid output serves [us] */
     uint32_t command_left; /* the last accepted command */
     uint32_t counted;      /* time since the last sample of any kind that torque_gate_idle() has counted [us] */
     bool open;
