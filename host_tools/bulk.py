@@ -32,7 +32,10 @@ FD: int = _lib.BULK_FD
 ANSWER: int = _lib.BULK_ANSWER
 LONGEST_LINE: int = _lib.BULK_LINE
 
-ANSWERS = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH", "MOTOR_COMMAND")
+ANSWERS = (
+    *("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH", "LINK_HEALTH"),
+    "MOTOR_COMMAND",
+)
 """The messages of the estimator that rows hold, in the order of their slots."""
 SLOTS = {name: slot for slot, name in enumerate(("LEVER_SAMPLE", "BASE_SAMPLE", *ANSWERS))}
 """Slot of each message in a row."""
@@ -101,6 +104,7 @@ class Feeder:
         self._feeder = ffi.new("bulk_feeder_t *")
         self._feeder.lever_id = codec.message("LEVER_SAMPLE").frame_id
         self._feeder.base_id = codec.message("BASE_SAMPLE").frame_id
+        self._feeder.command_id = codec.message("COMMAND").frame_id
         self._feeder.answer_id = [codec.message(name).frame_id for name in ANSWERS]
         self._out = np.empty(frames_at_once, FRAME)
         self._rows = np.empty(frames_at_once // 3, ROW)
@@ -114,7 +118,7 @@ class Feeder:
     def feed(self, frames: Frames) -> Iterator[tuple[Frames, Rows]]:
         """Feeds frames of one bus, all classic data frames with 11-bit identifiers, and gives pieces of
 
-        - the frames fed, each sample followed by its answers (flag ANSWER), valid until the next piece, and
+        - the frames fed, each followed by its answers (flag ANSWER), valid until the next piece, and
         - the rows of the samples that are complete with it; the last one is kept back until flush().
         """
         source = ffi.from_buffer("bulk_frame_t[]", np.ascontiguousarray(frames))

@@ -8,6 +8,7 @@ What is sent goes into an estimator of the firmware at once, and its answers can
   accepted (0 before), continued beyond the 32 bits of time_us and never going back. Logs are therefore reproducible.
 - recv() does not wait for what cannot come: if only the calling thread has sent so far, every answer is already there,
   and with none left it returns None at once, whatever the timeout. Other threads wait as usual.
+- A motor command is as old as the last sample: nobody calls lever_idle() here, since no clock runs.
 - Extended, remote and error frames pass and are not for the firmware, as on a real bus; CAN FD does not exist here.
 - At most `rx_queue_size` frames wait to be received; then the oldest are dropped, with one warning in the log.
 """
@@ -104,8 +105,7 @@ class LeverBus(BusABC):
                 self._advance(self._sample_time(data))
             if self.receive_own_messages:
                 self._put(self._own(msg))
-            if is_sample:
-                self._answer()
+            self._answer(is_sample)
 
     def recv(self, timeout: float | None = None) -> Message | None:
         """The oldest frame not yet received; None after `timeout` seconds, or at once where none can come.
@@ -152,9 +152,11 @@ class LeverBus(BusABC):
             self._time_us += ahead if ahead < 1 << 31 else 0
         self._timestamp = self._time_us * 1e-6
 
-    def _answer(self) -> None:
+    def _answer(self, is_sample: bool) -> None:
+        """Queues what the estimator has to say after a frame, of which a sample is to be taken first."""
         estimator = self.estimator
-        estimator.step()
+        if is_sample:
+            estimator.step()
         while (answer := estimator.next_frame()) is not None:
             identifier, data = answer
             self._put(

@@ -61,8 +61,11 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) ->
     given = {**_DEFAULTS.get(interface, {}), **options}
     if channel is not None:
         given["channel"] = read_ahead(channel) if interface == "slcan" else channel
+    where = interface if channel is None else f"{interface} channel {channel}"
     try:
-        return can.Bus(interface=interface, **given)
+        bus = can.Bus(interface=interface, **given)
     except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
-        where = interface if channel is None else f"{interface} channel {channel}"
         raise LeverError(f"cannot open {where}: {error}; is it there and up?") from None
+    if bus.channel_info == can.BusABC.channel_info:  # slcan does not say what it is
+        bus.channel_info = where
+    return bus

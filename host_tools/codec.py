@@ -3,16 +3,18 @@
 Three speeds: encode() and decode() for any frame, with names; encoder() for a loop, positional and prepared once (about
 1 µs a frame); decode_columns() for a whole recording, vectorised.
 
-Values are physical, in the units of the DBC. They are rounded to the nearest step of their field (ties to even) and
-saturate at its limits. None and NaN can be held only by a field with a validity bit (theta has theta_valid), which they
-clear. Whole numbers wrap if they count something ("us", "frames"); codes and flags, which have no unit, are refused
-when they do not fit.
+Values are physical, in the units of the DBC, rounded to the nearest step of their field (ties to even). A value that
+does not fit, None and NaN are "not available": the field has a code for that, which decodes to NaN, and the validity
+bit of a measured one (theta has theta_valid) is cleared. COMMAND.dither_rms alone has no such code: it saturates at the
+value that keeps the dither, and refuses NaN. Whole numbers wrap if they count something ("us", "frames"); codes and
+flags, which have no unit, are refused when they do not fit.
 
 Importing takes 0.1 s, most of it cantools.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -35,6 +37,7 @@ Value = float | str | None
 
 _FRAMING = ("crc", "counter")  # written by E2E, no content
 _VALID = "_valid"
+_NOT_AVAILABLE = "not_available"
 
 
 @cache
@@ -43,6 +46,12 @@ def database() -> Database:
     loaded = cantools.database.load_file(native_file("lever.dbc"))
     assert isinstance(loaded, Database)
     return loaded
+
+
+@cache
+def contract() -> int:
+    """The version of lever.dbc, which an estimator tells in IDENTITY."""
+    return int(database().version or 0)
 
 
 def message(key: str | int) -> Message:
@@ -105,7 +114,7 @@ Quantiser = Callable[[Value], int]
 
 def _quantiser(owner: Message, signal: Signal) -> Quantiser:
     place = f"{owner.name}.{signal.name}"
-    if signal.choices:
+    if signal.choices and not_available(signal) is None:
         return _choice(signal, place)
     if signal.scale == 1 and signal.offset == 0:
         return _whole(signal, place)
@@ -113,19 +122,34 @@ def _quantiser(owner: Message, signal: Signal) -> Quantiser:
     return _physical(signal, place, sum(1 << bit for bit in validity))
 
 
+def not_available(signal: Signal) -> int | None:
+    """The raw code of a field that says that there is no value; None where it has no such code."""
+    return next((raw for raw, name in (signal.choices or {}).items() if str(name) == _NOT_AVAILABLE), None)
+
+
 def _physical(signal: Signal, place: str, valid_bit: int) -> Quantiser:
     start, mask = signal.start, (1 << signal.length) - 1
-    low, high = (-(mask + 1) // 2, mask // 2) if signal.is_signed else (0, mask)
-    scale, offset = float(signal.scale), float(signal.offset)
+    low, high = (-(mask // 2), mask // 2) if signal.is_signed else (0, mask)
+    scale, offset, code = float(signal.scale), float(signal.offset), not_available(signal)
+    if code is None:
+
+        def saturate(value: Value) -> int:
+            if value is None or value != value:
+                raise CodecError(f"{place} cannot be {value}: it has no code for that")
+            steps = (value - offset) / scale  # type: ignore[operator]
+            return (low if steps <= low else high if steps >= high else round(steps)) << start
+
+        return saturate
+    highest = high if signal.is_signed else high - 1
+    absent = (code & mask) << start
 
     def quantise(value: Value) -> int:
         if value is None or value != value:
-            if not valid_bit:
-                raise CodecError(f"{place} cannot be {value}: it has no validity bit")
-            return 0
+            return 0 if valid_bit else absent
         steps = (value - offset) / scale  # type: ignore[operator]
-        raw = low if steps <= low else high if steps >= high else round(steps)
-        return valid_bit | (raw & mask) << start
+        if not low - 0.5 < steps < highest + 0.5:
+            return absent
+        return valid_bit | (round(steps) & mask) << start
 
     return quantise
 
@@ -240,14 +264,27 @@ def encode(name: str, counter: int, values: Mapping[str, Value]) -> bytes:
 
 
 def decode(identifier: int, data: bytes | bytearray) -> tuple[str, dict[str, float]]:
-    """Name and fields of a received frame, choices as numbers. Raises CodecError if it is not in the DBC or corrupt."""
+    """Name and fields of a received frame, choices as numbers, NaN for what is not available. Raises CodecError if it
+    is not in the DBC or corrupt."""
     found = message(identifier)
     if not check(identifier, data):
         raise CodecError(f"{found.name} ({identifier:#x}) {data.hex(' ')} is corrupt: its length or CRC is wrong")
     try:
-        return found.name, dict(found.decode_simple(bytes(data), decode_choices=False))  # type: ignore[arg-type]
+        fields = dict(found.decode_simple(bytes(data), decode_choices=False))
     except cantools.database.DecodeError as error:
         raise CodecError(f"{found.name} ({identifier:#x}) {data.hex(' ')}: {error}") from None
+    absent = _absent(found.name)
+    return found.name, {
+        name: math.nan if value == absent.get(name) else value  # type: ignore[misc]
+        for name, value in fields.items()
+    }
+
+
+@cache
+def _absent(name: str) -> dict[str, float]:
+    """By field, what its code for "not available" is when it is scaled like a value."""
+    codes = ((signal, not_available(signal)) for signal in message(name).signals)
+    return {signal.name: signal.conversion.raw_to_scaled(code, False) for signal, code in codes if code is not None}  # type: ignore[misc]
 
 
 def raw_field(name: str, field: str) -> Callable[[bytes | bytearray], int]:
@@ -260,7 +297,7 @@ def raw_field(name: str, field: str) -> Callable[[bytes | bytearray], int]:
 def decode_columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]]:
     """Every field of N frames of one message, data as (N, 8) bytes; CRCs are not checked.
 
-    Equal to cantools to the last bit. Rows in which a multiplexed field is absent hold NaN.
+    Equal to cantools to the last bit. Where a multiplexed field is absent, or a value not available, there is NaN.
     """
     import numpy as np
 
@@ -274,6 +311,8 @@ def decode_columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.f
         if signal.is_signed:
             raw -= (raw >> (signal.length - 1)) << signal.length
         column = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
+        if (code := not_available(signal)) is not None:
+            column[raw == code] = np.nan
         if signal.multiplexer_ids is not None:
             absent = ~np.isin(columns[signal.multiplexer_signal or ""], signal.multiplexer_ids)
             column[absent] = np.nan

@@ -143,3 +143,8 @@ class Config:
     def choices(self) -> dict[str, str]:
         """Names of model, preload, estimator and adaptation."""
         return {what: enum_names(f"lever_{what}")[getattr(self.pointer, what)] for what in CHOICES}
+
+    @property
+    def settings_crc(self) -> int:
+        """The CRC-32 over the settings, by which an estimator tells in IDENTITY which ones it has."""
+        return int(lib.lever_settings_crc(ffi.addressof(self.pointer, "settings")))

@@ -62,8 +62,10 @@ class Health(NamedTuple):
     recoveries: int
     excitation: float
     """rms of theta_dot [rad/s]."""
-    dither: float
-    """Identification torque asked for the next sample [N m]."""
+    torque: float
+    """What the torque gate asks of the motor until the next sample [N m]."""
+    gate_open: bool
+    """Whether torque may be other than zero: see lever_idle() of the façade."""
 
 
 def fault_names(faults: int) -> tuple[str, ...]:
@@ -127,7 +129,8 @@ class Estimator:
     ) -> None:
         """Carries out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
 
-        dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Raises LeverError.
+        dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque fades out a second
+        of sample time after the last command: repeat one. Raises LeverError.
         """
         command = ffi.new("lever_command_t *", {"dither_rms": lib.LEVER_KEEP if dither_rms is None else dither_rms})
         command.request = choice_value("lever_request", "request", request)
@@ -135,6 +138,10 @@ class Estimator:
             setattr(command, what, lib.LEVER_KEEP if name is None else choice_value(f"lever_{what}", what, name))
         if not lib.lever_command(self.pointer, command):
             raise LeverError(f"the firmware refused the command {request!r}, dither_rms = {dither_rms} N m")
+
+    def idle(self, elapsed_us: int) -> None:
+        """No sample came for so long [µs] since the last one, or the last call of this: ages the torque gate."""
+        lib.lever_idle(self.pointer, elapsed_us)
 
     def estimate(self) -> Estimate:
         """The estimate after the last sample."""
@@ -165,7 +172,8 @@ class Estimator:
         return lib.lever_step(self.pointer)  # type: ignore[no-any-return]
 
     def next_frame(self) -> tuple[int, bytes] | None:
-        """The next frame to send, as identifier and data; None when there is none left."""
+        """The next frame to send, as identifier and data; None when there is none left. Fetch them after every frame
+        taken: a COMMAND is acknowledged, sample or not."""
         answer = self._answer
         if not lib.lever_next_frame(self.pointer, answer):
             return None

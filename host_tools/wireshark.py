@@ -2,6 +2,8 @@
 
 Wireshark reads no DBC, but tables of its own, of which a profile is a folder: a comma-separated row for each message,
 signal, name of a value and identifier. Signals are listed from the first bit on without gaps; a gap is a hidden signal.
+Wireshark knows negative numbers of 8, 16, 32 and 64 bits only: others are shown as if they had no sign, and a negative
+one says by its name what to add.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ Row = tuple[str | float, ...]
 
 _EVERY_MULTIPLEXER_VALUE = -1
 _ANY_BUS = 0
+_SIZES = (8, 16, 32, 64)
 
 
 def write_profile(folder: Path) -> None:
@@ -63,10 +66,10 @@ def _signals(message: Message) -> Iterator[Row]:
             yield (*head, "-", gap, "uint", "FALSE", 64, field, 1.0, 0.0, "FALSE", _EVERY_MULTIPLEXER_VALUE, "TRUE")
             continue
         named = f"{field.name} [{field.unit}]" if field.unit not in (None, "", "1") else field.name
-        kind = "int" if field.is_signed else "uint"
+        kind = "int" if field.is_signed and field.length in _SIZES else "uint"
         only = field.multiplexer_ids[0] if field.multiplexer_ids else _EVERY_MULTIPLEXER_VALUE
         multiplexer = str(field.is_multiplexer).upper()
-        size = next(size for size in (8, 16, 32, 64) if size >= field.length)
+        size = next(size for size in _SIZES if size >= field.length)
         filtered = f"{message.name}.{field.name}".lower()
         scale, offset = float(field.scale), float(field.offset)
         yield (*head, named, filtered, kind, "FALSE", size, field.length, scale, offset, multiplexer, only, "FALSE")
@@ -74,8 +77,17 @@ def _signals(message: Message) -> Iterator[Row]:
 
 def _values(message: Message) -> Iterator[Row]:
     for position, field in enumerate(_fields(message)):
-        if isinstance(field, int) or not field.choices:
+        if isinstance(field, int):
             continue
-        choices = field.choices
-        for raw, name in sorted(choices.items()):
-            yield _hex(message.frame_id), position, len(choices), f"{raw:016x}", f"{raw:016x}", str(name)
+        names = list(_named(field))
+        for first, last, name in names:
+            yield _hex(message.frame_id), position, len(names), f"{first:016x}", f"{last:016x}", name
+
+
+def _named(field: Signal) -> Iterator[tuple[int, int, str]]:
+    """First and last bits, as they are in the frame, that have a name."""
+    size = 1 << field.length
+    for raw, name in sorted((field.choices or {}).items()):
+        yield raw % size, raw % size, str(name)
+    if field.is_signed and field.length not in _SIZES:
+        yield size // 2 + 1, size - 1, f"add {-size * float(field.scale):g}"

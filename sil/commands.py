@@ -29,8 +29,8 @@ before the next one is sent. Prints how good the estimates were; with --out also
   report.html   all of it as one page for a browser
 
 With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
-is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints;
-bus.log is the same to the byte but for the channel's name.
+is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
+and lever_can with --lock-step; bus.log is the same to the byte but for the channel's name.
 """
 _EPILOG = """\
 examples:
@@ -39,7 +39,7 @@ examples:
   lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
   lever sim my_own.toml
   lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
-  lever sim steady --settings > steady.settings; lever_can --can vcan0 --settings steady.settings &
+  lever sim steady --settings > steady.settings; lever_can --can vcan0 --lock-step --settings steady.settings &
   lever sim steady --interface socketcan --channel vcan0
   lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
 
@@ -196,12 +196,13 @@ def _tables(result: Result) -> Tables:
         )
     run_row: Row = {
         "samples": summary["samples"],
-        **{count: summary[count] for count in ("unanswered", "lost", "corrupt", "late")},
+        **{count: summary[count] for count in ("unanswered", "lost", "corrupt", "late", "restarts")},
         "mean NIS [1]": summary["nis"]["mean"],
         "expected NIS [1]": summary["nis"]["expected"],
         "largest correlation [1]": (summary["whiteness"] or {}).get("largest"),
         "simulated time [s]": summary["simulated_time_s"],
         "wall time [s]": summary["wall_time_s"],
+        "firmware": summary["firmware"]["version"],
     }
     return {summary["scenario"]["title"]: rows, "run": [run_row]}
 
@@ -215,5 +216,7 @@ def _reason(result: Result) -> str:
     """Why a run did not pass, in a line."""
     summary = result.summary
     reasons = [f"{summary['unanswered']} samples without an answer"] if summary["unanswered"] else []
+    if summary["misplaced"]:
+        reasons.append(f"{summary['misplaced']} estimates are of other samples: is the port in --lock-step, and alone?")
     reasons += ["the estimator was in fault"] if "fault" in summary["modes_s"] else []
     return "; ".join(reasons + summary["missed"])

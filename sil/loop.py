@@ -1,5 +1,8 @@
 """A run in lock-step over any python-can bus: one sample out, one estimate back, whatever time that takes.
 
+An estimate says which sample it belongs to, by the low bits of its time: what answers another one is not taken for this
+one's. Dither needs a COMMAND a second, and gets one every KEEP_ALIVE of simulated time.
+
 Everything that does not depend on the estimator (excitation, noise, dropouts, truth) is made beforehand, everything
 that is not needed to go on (decoding, statistics, files) is done afterwards, both in whole columns; the loop in between
 advances the plant, encodes two frames and waits for STATE_ESTIMATE. Time is the time in the frames, so that a run gives
@@ -10,13 +13,15 @@ from __future__ import annotations
 
 import time as clock
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import can
 import numpy as np
 from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, Commander, refusal, result_of
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.identity import Identity
 from numpy.typing import NDArray
 
 from . import excitation, sensors
@@ -39,6 +44,10 @@ _PROGRESS_EVERY = 500
 
 class NoAnswerError(LeverError):
     """No estimator answers on the bus."""
+
+
+class RefusedError(LeverError):
+    """The estimator refuses a COMMAND of the run."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,9 @@ class Recording:
     theta_dot: list[float] = field(default_factory=list)
     tau_m: list[float] = field(default_factory=list)
     unanswered: int = 0
+    misplaced: int = 0
+    """Estimates that belong to another sample than the one that was to be answered."""
+    identity: Identity = field(default_factory=Identity)
 
     def frames(self) -> Frames:
         """All frames, with the time of their sample."""
@@ -101,27 +113,42 @@ def prepare(scenario: Scenario) -> Inputs:
     )
 
 
-def run(scenario: Scenario, bus: can.BusABC, *, realtime: bool = False, progress: Progress | None = None) -> Recording:
+def run(
+    scenario: Scenario,
+    bus: can.BusABC,
+    *,
+    realtime: bool = False,
+    progress: Progress | None = None,
+    commander: Commander | None = None,
+) -> Recording:
     """Runs `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock.
 
-    Raises NoAnswerError when nobody answers.
+    `commander`: of whoever else sends COMMAND on this bus. Raises NoAnswerError when nobody answers, RefusedError when
+    the estimator refuses a COMMAND, and LeverError when it speaks another contract.
     """
     recording = Recording(scenario, prepare(scenario))
-    _loop(recording, _Link(bus, recording), realtime, progress)
+    _loop(recording, _Link(bus, recording, commander or Commander()), realtime, progress)
     return recording
 
 
 class _Link:
     """The estimator at the other end of the bus; records every frame both ways."""
 
-    def __init__(self, bus: can.BusABC, recording: Recording) -> None:
+    def __init__(self, bus: can.BusABC, recording: Recording, commander: Commander) -> None:
         self._bus = bus
         self._recording = recording
+        self._commander = commander
+        self._period_us = round(recording.scenario.period * 1e6)
         self._estimate = codec.message("STATE_ESTIMATE").frame_id
         self._motor = codec.message("MOTOR_COMMAND").frame_id
+        self._acknowledgement = codec.message("COMMAND_ACK").frame_id
+        self._identity = codec.message("IDENTITY").frame_id
         self._torque = _signed_field("MOTOR_COMMAND", "torque")
+        self._motor_time = codec.raw_field("MOTOR_COMMAND", "time_low")
+        self._estimate_time = codec.raw_field("STATE_ESTIMATE", "time_low")
+        self._gate_open = codec.raw_field("MOTOR_COMMAND", "valid")
+        self._motor_started = False
         self._unanswered_in_a_row = 0
-        self._counter = 0  # of the next COMMAND
         incoming = [message for message in codec.database().messages if message.senders == ["ESTIMATOR"]]
         self._incoming = frozenset(message.frame_id for message in incoming)
 
@@ -140,40 +167,67 @@ class _Link:
 
         return send_frame
 
-    def command(self, sample: int, request: str, dither_rms: float) -> None:
-        """Sends a COMMAND: a reset makes the scenario's choices, all else keeps them."""
+    def command(self, sample: int, values: Mapping[str, codec.Value]) -> None:
+        """Sends a COMMAND and waits until it is acknowledged. A run that has ended just before may have left the
+        sequence of its counter anywhere, so the first one is sent until it is in it. Raises LeverError."""
         send = self.sender("COMMAND")
-        keep = dict.fromkeys(self._recording.scenario.config.choices, "keep")
-        choices = self._recording.scenario.config.choices if request == "reset" else keep
-        send(sample, codec.encode("COMMAND", self._counter, {"request": request, "dither_rms": dither_rms, **choices}))
-        self._counter += 1
+        for _ in range(1 if sample else 16):
+            counter = self._commander.send(values, lambda _, data: send(sample, data))
+            result = self._acknowledged(sample, counter)
+            if result != SEQUENCE:
+                break
+        if result not in (ACCEPTED, None):
+            raise RefusedError(f"{self._bus.channel_info}: {refusal(str(result))}")
+
+    def _acknowledged(self, sample: int, counter: int) -> str | None:
+        """What became of a COMMAND; None when that is not said in time."""
+        timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
+        while (frame := self._take(sample, timeout)) is not None:
+            if frame[0] == self._acknowledgement:
+                ack = codec.decode(*frame)[1]
+                if ack["command_counter"] == counter:
+                    return result_of(ack)
+        if not sample:
+            raise NoAnswerError(
+                f"no COMMAND_ACK on {self._bus.channel_info}: is the firmware, of this version, running there?"
+            )
+        return None
 
     def answer(self, sample: int) -> float:
-        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for."""
-        recording, recv, motor, estimate = self._recording, self._bus.recv, self._motor, self._estimate
+        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for.
+        What still fades of an earlier run's, before the gate opens for the first time, is none of this one."""
+        time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
         torque = 0.0
-        while True:
-            message = recv(timeout)
-            if message is None:
-                self._miss(sample)
-                return torque
+        while (frame := self._take(sample, timeout)) is not None:
+            identifier, data = frame
+            if identifier == self._motor:
+                if self._motor_time(data) == time_low:
+                    self._motor_started = self._motor_started or self._gate_open(data) != 0
+                    torque = self._torque(data) if self._motor_started else 0.0
+            elif identifier == self._estimate:
+                if self._estimate_time(data) == time_low:
+                    self._unanswered_in_a_row = 0
+                    return torque
+                self._recording.misplaced += 1
+        self._miss(sample)
+        return torque
+
+    def _take(self, sample: int, timeout: float) -> tuple[int, bytes | bytearray] | None:
+        """The next frame of the estimator, recorded; None when none comes in time."""
+        recording = self._recording
+        while (message := self._bus.recv(timeout)) is not None:
             identifier, data = message.arbitration_id, message.data
             if identifier not in self._incoming or len(data) != 8:
                 continue  # somebody else's
             recording.identifier.append(identifier)
             recording.sample.append(sample)
             recording.data += data
-            if identifier == motor:
-                torque = self._torque(data)
-            elif identifier == estimate:
-                self._unanswered_in_a_row = 0
-                return torque
-
-    def discard_late(self) -> None:
-        """Takes late answers off the bus, so that none is mistaken for the next sample's; needed after a miss only."""
-        while self._recording.unanswered and self._bus.recv(0.0) is not None:
-            pass
+            if identifier == self._identity:
+                recording.identity.take(codec.decode(identifier, data)[1])
+                recording.identity.check(f"the estimator on {self._bus.channel_info}")
+            return identifier, data
+        return None
 
     def _miss(self, sample: int) -> None:
         self._recording.unanswered += 1
@@ -185,7 +239,7 @@ class _Link:
 
 
 def _signed_field(name: str, signal: str) -> Callable[[bytes | bytearray], float]:
-    """A fast reader of one signed, scaled field of an 8-byte frame."""
+    """A fast reader of one signed, scaled field of an 8-byte frame, which is always available."""
     layout = codec.message(name).get_signal_by_name(signal)
     raw, scale, half = codec.raw_field(name, signal), float(layout.scale), 1 << (layout.length - 1)
     return lambda data: ((raw(data) ^ half) - half) * scale
@@ -211,9 +265,8 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
         thetas.append(body.theta)
         theta_dots.append(body.theta_dot)
         torques.append(body.tau_m)
-        link.discard_late()
         if sample in commands:
-            link.command(sample, *commands[sample])
+            link.command(sample, commands[sample])
         theta, theta_dot, torque = measure(sample)
         if not no_lever[sample]:
             send_lever(sample, encode_lever(sample, theta, theta_dot, torque))
@@ -235,12 +288,17 @@ def _body(scenario: Scenario, inputs: Inputs) -> Body:
     return inputs.truth.body(Conditions(inputs.z_ddot, scenario.period, noise, lag, scenario.stream("process")))
 
 
-def _commands(scenario: Scenario, time: FloatArray) -> dict[int, tuple[str, float]]:
-    """(request, dither rms) at the samples before which a COMMAND goes out: a reset at the start, then the dither."""
-    commands = {0: ("reset", 0.0)}
-    for when, rms in scenario.dithers():
-        sample = int(np.searchsorted(time, when - 1e-9))
-        commands[sample] = ("none" if sample else "reset", rms)
+def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec.Value]]:
+    """What to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the start,
+    the dither as it changes, and while it is on, one that keeps it alive."""
+    changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
+    start: dict[str, codec.Value] = {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}
+    commands = {0: start}
+    repetition = max(1, round(KEEP_ALIVE / scenario.period))
+    for (sample, rms), end in zip(changes.items(), [*changes, len(time)][1:], strict=True):
+        commands[sample] = {**commands.get(sample, {}), "dither_rms": rms}
+        if rms > 0.0:
+            commands |= {later: {} for later in range(sample + repetition, end, repetition)}
     return commands
 
 

@@ -1,8 +1,8 @@
 """What the inceptor's computer gets to see of lever and base.
 
-A sensor gives (1 + gain_error) x(t - delay) + bias + noise. Quantisation and saturation are those of the CAN codec,
-which every value passes; nothing is rounded here. A Dropout says when a value is marked invalid or a whole frame is
-never sent.
+A sensor gives (1 + gain_error) x(t - delay) + bias + noise. Quantisation is that of the CAN codec, for which a value
+beyond its range is not valid; nothing is rounded here. A Dropout says when a value is marked invalid or a whole frame
+is never sent.
 """
 
 from __future__ import annotations

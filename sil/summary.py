@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.fields import COUNTS
 from lever_cdkf.host_tools.native import enum_names
 from numpy.typing import NDArray
 
@@ -65,17 +66,19 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
         },
         "truth": _truth(recording),
         "estimator": {**scenario.config.choices, "settings": scenario.config.settings},
+        "firmware": _firmware(recording),
         "parameters": {name: asdict(entry) for name, entry in quality.items()},
         "nis": nis,
         "whiteness": _whiteness(scenario, trace),
         "samples": count,
-        **{name: _last(trace[name]) for name in ("lost", "corrupt", "late")},
+        **{name: _last(trace[name]) for name in COUNTS},
         "unanswered": recording.unanswered,
+        "misplaced": recording.misplaced,
         "modes_s": modes,
         "missed": missed,
         "simulated_time_s": count * scenario.period,
     }
-    summary["passed"] = not missed and not recording.unanswered and "fault" not in modes
+    summary["passed"] = not (missed or recording.unanswered or recording.misplaced or "fault" in modes)
     summary["verdict"] = _verdict(summary, quality)
     return summary
 
@@ -92,6 +95,13 @@ def _truth(recording: Recording) -> dict[str, Any]:
     new = np.flatnonzero(np.append(True, np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
     told = {"numerator": transfer.numerator[new].tolist(), "denominator": transfer.denominator[new].tolist()}
     return {"model": scenario.pilot.model, "transfer": {"time_s": inputs.time[at[new]].tolist(), **told}}
+
+
+def _firmware(recording: Recording) -> dict[str, Any]:
+    """What the estimator said of itself; null where it did not."""
+    identity = recording.identity
+    same = None if identity.settings_crc is None else identity.settings_crc == recording.scenario.config.settings_crc
+    return {"version": identity.version, "contract": identity.contract, "settings_as_scenario": same}
 
 
 def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
@@ -210,9 +220,14 @@ def _verdict_run(summary: dict[str, Any]) -> str:
     troubles = []
     if summary["unanswered"]:
         troubles.append(f"{summary['unanswered']} samples got no answer")
+    if summary["misplaced"]:
+        troubles.append(f"{summary['misplaced']} estimates came that belong to other samples")
     if "fault" in summary["modes_s"]:
         troubles.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
-    return f"Trouble: {' and '.join(troubles)}." if troubles else ""
+    told = f"Trouble: {' and '.join(troubles)}." if troubles else ""
+    if summary["firmware"]["settings_as_scenario"] is False:
+        told = f"{told} The estimator has other settings than the scenario.".lstrip()
+    return told
 
 
 def _verdict_truth(summary: dict[str, Any]) -> str:

@@ -1,7 +1,8 @@
 """The trace of a run: truth, measured, estimated and health, one row a sample, the unit of each column in its name.
 
-Frames that come at a divided rate are held until the next one; before the first, where a value was invalid or a frame
-lost, and where a sample has no answer, there is NaN. Made from the frames as they were on the bus, in whole columns.
+Frames that come at a divided rate are held until the next one; before the first, where a value was invalid, not
+available or its frame lost, where the estimate may not be used, and where a sample has no answer of its own, there is
+NaN. Made from the frames as they were on the bus, in whole columns.
 
 The columns of the parameters are those of the estimator's model; their truth is there when the pilot is of that model.
 """
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools import codec, fields
 from numpy.typing import NDArray
 
 from .buslog import Frames
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 Trace = dict[str, FloatArray]
 
-WHOLE = ("mode", "faults", "lost", "corrupt", "late")
+WHOLE = ("mode", "faults", "lost", "corrupt", "late", "restarts")
 """Columns of whole numbers."""
 
 # column of the trace, its message and field
@@ -45,19 +46,19 @@ ESTIMATED = (
 HEALTH = (
     ("mode", "HEALTH", "mode"),
     ("faults", "HEALTH", "faults"),
-    ("lost", "HEALTH", "lost"),
-    ("corrupt", "HEALTH", "corrupt"),
-    ("late", "HEALTH", "late"),
+    ("lost", "LINK_HEALTH", "lost"),
+    ("corrupt", "LINK_HEALTH", "corrupt"),
+    ("late", "LINK_HEALTH", "late"),
+    ("restarts", "HEALTH", "restarts"),
     ("excitation_rad_s", "HEALTH", "excitation"),
 )
-COUNTS = ("lost", "corrupt", "late")  # eight bits that wrap
 
 
 def build(recording: Recording, frames: Frames) -> Trace:
     """The columns of trace.csv, in order."""
     sample = np.array(recording.sample, dtype=np.int64)
     count = len(recording.inputs.time)
-    decoded = _Decoded(frames, sample, count)
+    decoded = _Decoded(frames, sample, count, round(recording.scenario.period * 1e6))
     trace = _truth(recording)
     for column, message, field in MEASURED:
         trace[column] = decoded.at_samples(message, field)
@@ -94,33 +95,37 @@ def _truth(recording: Recording) -> Trace:
 class _Decoded:
     """The fields of all frames, decoded a message at a time when first asked for."""
 
-    def __init__(self, frames: Frames, sample: NDArray[np.int64], count: int) -> None:
-        self._frames, self._sample, self._count = frames, sample, count
+    def __init__(self, frames: Frames, sample: NDArray[np.int64], count: int, period_us: int) -> None:
+        self._frames, self._sample, self._count, self._period_us = frames, sample, count, period_us
         self._messages: dict[str, tuple[NDArray[np.int64], dict[str, FloatArray]]] = {}
 
     def _message(self, name: str) -> tuple[NDArray[np.int64], dict[str, FloatArray]]:
         if name not in self._messages:
             where = self._frames.of(codec.message(name).frame_id)
-            self._messages[name] = self._sample[where], codec.decode_columns(name, self._frames.data[where])
+            sample, decoded = self._sample[where], fields.columns(name, self._frames.data[where])
+            if "time_low" in decoded:
+                own = fields.belongs(decoded, sample * self._period_us)
+                sample, decoded = sample[own], {field: values[own] for field, values in decoded.items()}
+            self._messages[name] = sample, decoded
         return self._messages[name]
 
     def at_samples(self, message: str, field: str) -> FloatArray:
         """The field at each sample; NaN without a frame or with a cleared validity bit."""
-        sample, fields = self._message(message)
-        valid = fields.get(f"{field}_valid", np.ones(len(sample)))
+        sample, decoded = self._message(message)
+        valid = decoded.get(f"{field}_valid", np.ones(len(sample)))
         column = np.full(self._count, np.nan)
-        column[sample] = np.where(valid == 0.0, np.nan, fields[field])
+        column[sample] = np.where(valid == 0.0, np.nan, decoded[field])
         return column
 
     def held(self, message: str, field: str) -> FloatArray:
         """The last value of the field at or before each sample; NaN before the first.
 
-        Counts go on beyond their eight bits and start from 0, also if the firmware has counted in an earlier run.
+        Counts go on beyond their bits and start from 0, also if the firmware has counted in an earlier run.
         """
-        sample, fields = self._message(message)
-        values = fields[field]
-        if field in COUNTS and len(values):
-            values = np.unwrap(values, period=256.0) - values[0]
+        sample, decoded = self._message(message)
+        values = decoded[field]
+        if field in fields.COUNTS and len(values):
+            values = np.unwrap(values, period=float(fields.COUNTS[field])) - values[0]
         last = np.searchsorted(sample, np.arange(self._count), side="right")
         return np.concatenate(((np.nan,), values))[last]
 

@@ -29,6 +29,7 @@ _SPELLINGS: dict[str, dict[str, float]] = {
     "rad/s": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEG},
     "m/s^2": {"m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
     "N m": {"N m": 1.0, "mN m": 1e-3},
+    "N m/s": {"N m/s": 1.0},
     "N s/m": {"N s/m": 1.0},
     "N/m": {"N/m": 1.0, "N/mm": 1e3},
     "N m s/rad": {"N m s/rad": 1.0},

@@ -86,15 +86,16 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
 {
     const setup_t before = lever->estimator.setup;
     const float rms_before = lever->dither.target;
+    const bool resets = (command->request == (uint8_t)LEVER_REQUEST_RESET);
     const bool plausible = (command->dither_rms >= 0.0f) && (command->dither_rms <= DITHER_MOST);
     const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
     if (known) {
         torque_gate_keep_alive(&lever->gate);
-        if (command->request == (uint8_t)LEVER_REQUEST_RESET) {
+        if (resets) {
             dither_reset(&lever->dither);
         }
         if (command->dither_rms < (float)LEVER_KEEP) {
-            dither_set(&lever->dither, command->dither_rms, !lever->gate.open);
+            dither_set(&lever->dither, command->dither_rms, resets || !lever->gate.open); /* a reset closes it */
         }
         if (is_changed(lever, &before, rms_before)) {
             lever->link.pages |= (uint8_t)(1u << (uint32_t)MESSAGE_PAGE_CHOICES);

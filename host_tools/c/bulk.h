@@ -34,8 +34,8 @@ enum bulk_limits {
     BULK_BUS_NAME = 32, /* bytes of a name, with its final 0 */
     BULK_LINE = 512,    /* longest line of text */
     BULK_OUT_ROOM = 16, /* frames that one frame can become in bulk_feed(), at most */
-    BULK_ANSWERS = 6,   /* messages of the estimator that rows hold */
-    BULK_SLOTS = 14     /* 2 messages of a sample, the answers, and the same answers as they were recorded */
+    BULK_ANSWERS = 7,   /* messages of the estimator that rows hold */
+    BULK_SLOTS = 16     /* 2 messages of a sample, the answers, and the same answers as they were recorded */
 };
 
 /* Names of the buses in the order of their first frame. */
@@ -67,16 +67,16 @@ uint64_t bulk_format(const bulk_frame_t *frames, uint64_t count, const char *bus
 /* A sample and all that belongs to it. Slot 0 is LEVER_SAMPLE, 1 BASE_SAMPLE, 2.. the answers in the order of
  * bulk_feeder_t.answer_id, and after them the same messages as the recording has them. */
 typedef struct bulk_row {
-    int64_t time_us; /* recorded time of its BASE_SAMPLE [us] */
-    uint16_t fresh;  /* a bit for each slot that came with this sample */
-    uint16_t known;  /* a bit for each slot that came with this sample or an earlier one */
-    uint32_t unused;
+    int64_t time_us;             /* recorded time of its BASE_SAMPLE [us] */
+    uint32_t fresh;              /* a bit for each slot that came with this sample */
+    uint32_t known;              /* a bit for each slot that came with this sample or an earlier one */
     uint8_t data[BULK_SLOTS][8]; /* of each slot, the last one that came */
 } bulk_row_t;
 
 typedef struct bulk_feeder {
     uint32_t lever_id; /* LEVER_SAMPLE */
     uint32_t base_id;  /* BASE_SAMPLE */
+    uint32_t command_id;
     uint32_t answer_id[BULK_ANSWERS];
     uint8_t has_row;   /* whether `row` waits for what the recording still has of its sample */
     uint8_t has_lever; /* whether a LEVER_SAMPLE waits for its BASE_SAMPLE */
@@ -92,8 +92,8 @@ typedef struct bulk_fed {
 } bulk_fed_t;
 
 /* Feeds classic data frames of one bus to the estimator in their order, until they or the room in `out` or `rows` end.
- * `out` gets what was fed, each sample followed by its answers, which have its recorded time; `rows` gets the samples that
- * are complete: the last one stays in the feeder until the next comes. Answers in the recording are not fed. */
+ * `out` gets what was fed, each frame followed by its answers, which have its recorded time; `rows` gets the samples that
+ * are complete: the last one stays in the feeder until the next comes. Only the three inputs are fed, no recorded answers. */
 void bulk_feed(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *frames, uint64_t count,
     bulk_frame_t *out, uint64_t out_room, bulk_row_t *rows, uint64_t row_room, bulk_fed_t *fed);
 

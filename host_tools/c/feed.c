@@ -23,8 +23,8 @@ static uint32_t answer_index(const bulk_feeder_t *feeder, uint32_t id)
 static void put_slot(bulk_row_t *row, uint32_t slot, const uint8_t data[FRAME_BYTES])
 {
     (void)memcpy(row->data[slot], data, FRAME_BYTES);
-    row->fresh = (uint16_t)(row->fresh | (1u << slot));
-    row->known = (uint16_t)(row->known | (1u << slot));
+    row->fresh |= 1u << slot;
+    row->known |= 1u << slot;
 }
 
 /* The row of a new sample: with its LEVER_SAMPLE if that came before it with the same counter, as the estimator pairs. */
@@ -41,19 +41,18 @@ static void start_row(bulk_feeder_t *feeder, const bulk_frame_t *base)
     feeder->has_row = 1u;
 }
 
-/* Steps the estimator and appends its answers; returns the frames in `out` then. */
-static uint64_t step(
-    bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *base, bulk_frame_t *out, uint64_t count)
+/* Appends what the estimator has to say after a frame; returns the frames in `out` then. */
+static uint64_t fetch(
+    bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *cause, bulk_frame_t *out, uint64_t count)
 {
     lever_frame_t answer;
-    (void)lever_step(lever);
     while (lever_next_frame(lever, &answer)) {
         bulk_frame_t *frame = &out[count];
-        frame->time_us = base->time_us;
+        frame->time_us = cause->time_us;
         frame->id = answer.id;
         frame->length = answer.length;
         frame->flags = (uint8_t)BULK_ANSWER;
-        frame->bus = base->bus;
+        frame->bus = cause->bus;
         (void)memcpy(frame->data, answer.data, sizeof frame->data);
         const uint32_t index = answer_index(feeder, answer.id);
         if (index < (uint32_t)BULK_ANSWERS) {
@@ -64,17 +63,19 @@ static uint64_t step(
     return count;
 }
 
+/* What an estimator takes. An IDENTITY of the recorded one is not for it: it would stand for a second one on the bus. */
+static bool is_input(const bulk_feeder_t *feeder, const bulk_frame_t *frame)
+{
+    return (frame->id == feeder->lever_id) || (frame->id == feeder->base_id) || (frame->id == feeder->command_id);
+}
+
 /* An answer in the recording belongs to the sample before it. */
-static bool keep_recorded(bulk_feeder_t *feeder, const bulk_frame_t *frame)
+static void keep_recorded(bulk_feeder_t *feeder, const bulk_frame_t *frame)
 {
     const uint32_t index = answer_index(feeder, frame->id);
-    if (index == (uint32_t)BULK_ANSWERS) {
-        return false;
-    }
-    if ((feeder->has_row != 0u) && (frame->length == (uint8_t)FRAME_BYTES)) {
+    if ((index < (uint32_t)BULK_ANSWERS) && (feeder->has_row != 0u) && (frame->length == (uint8_t)FRAME_BYTES)) {
         put_slot(&feeder->row, (uint32_t)RECORDED_SLOT + index, frame->data);
     }
-    return true;
 }
 
 static void feed_one(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *frame, bulk_frame_t *out,
@@ -93,13 +94,14 @@ static void feed_one(bulk_feeder_t *feeder, struct lever *lever, const bulk_fram
             fed->rows++;
         }
         start_row(feeder, frame);
-        fed->out = step(feeder, lever, frame, out, fed->out);
+        (void)lever_step(lever);
     } else if ((result == LEVER_FRAME_TAKEN) && (frame->id == feeder->lever_id)) {
         (void)memcpy(feeder->lever_data, frame->data, sizeof feeder->lever_data);
         feeder->has_lever = 1u;
     } else {
         feeder->refused += (result == LEVER_FRAME_REFUSED) ? 1u : 0u;
     }
+    fed->out = fetch(feeder, lever, frame, out, fed->out);
 }
 
 void bulk_feed(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *frames, uint64_t count,
@@ -108,8 +110,10 @@ void bulk_feed(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *f
     (void)memset(fed, 0, sizeof *fed);
     while ((fed->taken < count) && (fed->rows < row_room) && ((fed->out + (uint64_t)BULK_OUT_ROOM) <= out_room)) {
         const bulk_frame_t *frame = &frames[fed->taken];
-        if (!keep_recorded(feeder, frame)) {
+        if (is_input(feeder, frame)) {
             feed_one(feeder, lever, frame, out, rows, fed);
+        } else {
+            keep_recorded(feeder, frame);
         }
         fed->taken++;
     }

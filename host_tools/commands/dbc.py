@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 _DESCRIPTION = """\
 Prints the CAN messages and their signals: classic CAN, 11-bit identifiers, 1 Mbit/s, little-endian. A physical value is
-the whole number in the frame times the step. Byte 0 and the low half of byte 1 are the CRC and counter of AUTOSAR E2E
-Profile 2, whose data ID is the message's base plus the counter.
+the whole number in the frame times the step, unless that number is named not_available. Byte 0 and the low half of byte
+1 are the CRC and counter of AUTOSAR E2E Profile 2, whose data ID is the message's base plus the counter.
 """
 _EPILOG = """\
 examples:
@@ -91,5 +91,5 @@ def _signal_row(message: Message, signal: Signal) -> Row:
         "unit": signal.unit,
         "least": signal.minimum,
         "greatest": signal.maximum,
-        "meaning": choices or signal.comment,
+        "meaning": " ".join(part for part in (signal.comment, choices) if part),
     }

@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import codec
+from .. import codec, fields
+from ..commander import ACCEPTED, refusal, result_of
 from ..config import model_parameters
 from ..estimator import fault_names
+from ..identity import Identity
 from ..library import enum_names
 from .traffic import Traffic
 
@@ -29,9 +31,11 @@ STALE_AFTER = 2.0
 FAULT_HOLD = 2.0
 """[s] that a fault stays, so that a short one can be read."""
 _MEAN_WINDOW = 2.0  # [s] of the means and rms
-_COUNTS = ("lost", "corrupt", "late")  # of HEALTH: eight bits that wrap
-_PLATFORM_COUNTS = ("bus_offs", "overruns", "dropped")
-_EVERY = ("STATE_ESTIMATE", "MOTOR_COMMAND", "HEALTH", "PLATFORM_HEALTH")  # of the others the last frame tells all
+_PATIENCE = 3.0  # [s] for an IDENTITY, which comes each second
+_PLATFORM_COUNTS = dict.fromkeys(("bus_offs", "overruns", "dropped"), 1 << 8)
+_WRAPS = fields.COUNTS | _PLATFORM_COUNTS
+# Of the others the last frame tells all.
+_EVERY = ("STATE_ESTIMATE", "MOTOR_COMMAND", "HEALTH", "PLATFORM_HEALTH", "IDENTITY", "COMMAND_ACK")
 
 
 class Estimated(NamedTuple):
@@ -69,6 +73,11 @@ class Picture:
         self._platform_faults: dict[str, float] = {}
         self._last_counts: dict[str, float] = {}
         self._windows = {name: _Window() for name in ("nis", "theta", "dither")}
+        self.identity = Identity()
+        """What the estimator says of itself."""
+        self.refusals: deque[str] = deque(maxlen=16)
+        """Why COMMANDs were refused; to be taken from here."""
+        self._first_estimate: float | None = None
 
     def clear_counts(self) -> None:
         """All counts start again from 0."""
@@ -76,7 +85,7 @@ class Picture:
             entry.clear()
         self.foreign = 0
         self.error_frames = 0
-        self.counts = dict.fromkeys((*_COUNTS, *_PLATFORM_COUNTS), 0)
+        self.counts = dict.fromkeys(_WRAPS, 0)
         """What the estimator and its machine have counted since then."""
 
     def take(self, frames: Iterable[Frame], now: float) -> None:
@@ -118,6 +127,16 @@ class Picture:
     def field(self, message: str, name: str) -> float:
         """The last value of a field; NaN when there is none or it is too old."""
         return self.values[message][name] if self.is_fresh(message) and message in self.values else NAN
+
+    def wrong_contract(self) -> str | None:
+        """Why what is shown may be misread: the estimator speaks another contract, or none that it tells."""
+        contract = self.identity.contract
+        if contract is not None:
+            told = f"contract {contract} of lever.dbc, this program {codec.contract()}: what is shown is wrong"
+            return None if contract == codec.contract() else f"the estimator speaks {told}"
+        if self._first_estimate is None or self.now - self._first_estimate <= _PATIENCE:
+            return None
+        return "the estimator does not tell its version (IDENTITY): of an old one, what is shown is wrong"
 
     def parameters(self) -> list[Estimated]:
         """The parameters of the model; none before it is known."""
@@ -166,24 +185,36 @@ class Picture:
     def _decode(self, name: str, frames: list[bytes | bytearray]) -> None:
         chosen = frames if name in _EVERY else frames[-1:]
         data = np.frombuffer(b"".join(chosen), dtype=np.uint8).reshape(-1, 8)
-        columns = codec.decode_columns(name, data)
+        columns = fields.columns(name, data)
         self.values[name] = {key: float(column[-1]) for key, column in columns.items()}
         if name == "PILOT_PARAMETERS":
             self._follow_model(int(self.values[name]["model"]))
         elif name == "STATE_ESTIMATE":
+            self._first_estimate = self.now if self._first_estimate is None else self._first_estimate
             self._windows["nis"].add(self.now, columns["nis"])
             self._windows["theta"].add(self.now, columns["theta"])
         elif name == "MOTOR_COMMAND":
             self._windows["dither"].add(self.now, columns["dither"] ** 2)
         elif name == "HEALTH":
             self._note(self._faults, fault_names(_any_bit(columns["faults"])))
-            self._count(_COUNTS, columns)
+            self._count(("restarts",), columns)
+        elif name == "LINK_HEALTH":
+            self._count(("lost", "corrupt", "late"), columns)
+        elif name in ("IDENTITY", "COMMAND_ACK"):
+            for row in range(len(data)):
+                self._take_once(name, {key: float(column[row]) for key, column in columns.items()})
         elif name == "PLATFORM_HEALTH":
             seen = _any_bit(columns["faults"])
             self._note(
                 self._platform_faults, [n for bit, n in enum_names("lever_platform_fault").items() if seen & bit]
             )
             self._count(_PLATFORM_COUNTS, columns)
+
+    def _take_once(self, name: str, values: dict[str, float]) -> None:
+        if name == "IDENTITY":
+            self.identity.take(values)
+        elif (result := result_of(values)) != ACCEPTED:
+            self.refusals.append(refusal(result))
 
     def _follow_model(self, number: int) -> None:
         model = enum_names("lever_model").get(number)
@@ -198,7 +229,7 @@ class Picture:
         for name in names:
             raw = columns[name]
             last = self._last_counts.get(name, raw[0])
-            self.counts[name] += int(np.sum(np.diff(raw, prepend=last) % 256.0))
+            self.counts[name] += int(np.sum(np.diff(raw, prepend=last) % _WRAPS[name]))
             self._last_counts[name] = float(raw[-1])
 
     # --- history -----------------------------------------------------------------------------------------------------
@@ -225,7 +256,8 @@ class _Window:
         self._batches: deque[tuple[float, float, int]] = deque(maxlen=1000)  # time, sum, count
 
     def add(self, now: float, values: np.ndarray) -> None:
-        self._batches.append((now, float(np.sum(values)), len(values)))
+        known = values[np.isfinite(values)]
+        self._batches.append((now, float(np.sum(known)), len(known)))
 
     def mean(self, now: float) -> float:
         while self._batches and now - self._batches[0][0] > _MEAN_WINDOW:

@@ -17,6 +17,7 @@ NOTHING = "–"
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _TREND_MEAN = 1.0  # [s] of the means that a trend is the difference of
 _COLOURS = {"good": "green", "watch": "yellow", "bad": "bold red"}
+_EXPECTED = ("LEVER_SAMPLE", "BASE_SAMPLE", "STATE_ESTIMATE", "HEALTH")  # messages
 _UNIT = {"1": "", "N s/m": "N s/m", "1/s^2": "1/s²"}
 _COLUMNS: tuple[tuple[JustifyMethod, int], ...] = (
     *(("left", 17), ("right", 8), ("right", 8)),
@@ -30,7 +31,10 @@ def headline(picture: Picture, source: Source) -> Text:
     """What is watched, since when, and how it stands."""
     minutes, seconds = divmod(int(picture.now), 60)
     model = f" · model {picture.model}" if picture.model else ""
-    return Text(f"{source.title}{model} · watching for {minutes}:{seconds:02d} min", style="bold", no_wrap=True)
+    version = picture.identity.version
+    firmware = f" · firmware {version}" if version else ""
+    told = f"{source.title}{model} · watching for {minutes}:{seconds:02d} min{firmware}"
+    return Text(told, style="bold", no_wrap=True)
 
 
 def condition(picture: Picture, source: Source) -> Text:
@@ -93,10 +97,14 @@ def health(picture: Picture, source: Source) -> Table:
     style = "yellow" if told else "green"
     counts = picture.counts
     table.add_row("mode", Text(picture.mode or NOTHING, style="bold"))
+    chosen = [name for what, name in picture.identity.choices.items() if what != "model"]
+    table.add_row("choices", ", ".join(chosen) or NOTHING)
     table.add_row("counts", f"{counts['lost']} lost, {counts['corrupt']} corrupt, {counts['late']} late")
     table.add_row("excitation", f"{_number(picture.field('HEALTH', 'excitation'), 2)} rad/s")
-    table.add_row("dither", f"{picture.dither():.3f} N m rms" if picture.dither() > 0.0 else "off")
-    table.add_row("mean NIS", f"{_number(picture.nis())} (honest: 2)")
+    asked = picture.identity.dither_rms
+    dither = f"{picture.dither():.3f} N m rms" if picture.dither() > 0.0 else "off"
+    table.add_row("dither", f"{dither}, asked {asked:g}" if asked else dither)
+    table.add_row("mean NIS", f"{_number(picture.nis())} (expected 2)")
     table.add_row("theta", f"{_number(math.degrees(picture.theta()))} deg")
     if picture.is_fresh("PLATFORM_HEALTH"):
         errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]
@@ -104,7 +112,12 @@ def health(picture: Picture, source: Source) -> Table:
         table.add_row("machine", f"{counts['overruns']} lost, {counts['dropped']} dropped")
     faults = "; ".join(told) or ("none" if picture.mode else NOTHING)
     table.add_row("faults", Text(faults, style=style if picture.mode else "dim"))
-    others = [("other frames", picture.foreign), ("error frames", picture.error_frames), ("unseen", source.dropped)]
+    others = [
+        ("restarts", counts["restarts"]),
+        ("other frames", picture.foreign),
+        ("error frames", picture.error_frames),
+        ("unseen", source.dropped),
+    ]
     for name, count in others:
         if count:
             table.add_row(name, str(count))
@@ -112,7 +125,7 @@ def health(picture: Picture, source: Source) -> Table:
 
 
 def messages(picture: Picture) -> Table:
-    """Rates and losses of each message of the DBC."""
+    """Rates and losses of each message that has come."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(no_wrap=True)
     for _ in range(4):
@@ -120,6 +133,8 @@ def messages(picture: Picture) -> Table:
     table.add_row(*(Text(title, style="dim") for title in ("message", "[1/s]", "lost", "corrupt", "again")))
     for entry in picture.traffic.values():
         there = entry.heard is not None or entry.corrupt > 0
+        if not (there or entry.name in _EXPECTED):
+            continue
         cells = [f"{entry.rate:.0f}" if there and math.isfinite(entry.rate) else NOTHING]
         cells += [str(n) if there else NOTHING for n in (entry.lost, entry.corrupt, entry.repeated)]
         bad = entry.lost or entry.corrupt or entry.repeated

@@ -6,7 +6,6 @@ the view takes them at its own rate. The view may therefore be as slow as it lik
 
 from __future__ import annotations
 
-import math
 import socket
 import sys
 import threading
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import codec
 from ..buses import open_bus
+from ..commander import KEEP_ALIVE, Commander
 from ..errors import LeverError
 from .model import ERROR, FOREIGN, STEP, Frame, Picture
 
@@ -32,14 +32,6 @@ LONGEST_PAUSE = 5.0
 _RECEIVE_BUFFER = 1 << 22  # [bytes]
 _SWITCH_INTERVAL = 5e-4  # [s] after which drawing gives way to receiving; Python's own is ten times that
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
-KEEP: dict[str, codec.Value] = {
-    "model": "keep",
-    "preload": "keep",
-    "estimator": "keep",
-    "adaptation": "keep",
-    "dither_rms": math.inf,
-}
-"""A COMMAND that changes nothing; infinity saturates at the value that keeps the dither."""
 
 
 class Source(ABC):
@@ -60,6 +52,9 @@ class Source(ABC):
         self._start = time.monotonic()
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="lever frames", daemon=True)
+        self._commander = Commander()
+        self._commanded = 0.0
+        self._dithers = False  # by command() of this source
 
     @abstractmethod
     def run(self) -> None:
@@ -89,7 +84,27 @@ class Source(ABC):
 
     def command(self, values: Mapping[str, codec.Value]) -> None:
         """Sends a COMMAND: the fields of the message; those not given change nothing. Raises LeverError."""
-        raise LeverError(f"{self.title} takes no commands")
+        if not self.takes_commands:
+            raise LeverError(f"{self.title} takes no commands")
+        self._commander.send(values, self._transmit)
+        self._commanded = time.monotonic()
+        if isinstance(rms := values.get("dither_rms"), int | float):
+            self._dithers = rms > 0.0
+
+    def keep_alive(self) -> None:
+        """Repeats a COMMAND when it is time, so that dither asked for here goes on: to be called several times a second
+        as long as somebody watches it."""
+        if self._dithers and time.monotonic() - self._commanded >= KEEP_ALIVE:
+            self.command({})
+
+    def end_dither(self) -> None:
+        """Ends the dither asked for here, if there is any."""
+        if self._dithers:
+            self.command({"dither_rms": 0.0})
+
+    def _transmit(self, identifier: int, data: bytes) -> None:
+        """Sends a frame, where commands are taken. Raises LeverError."""
+        raise NotImplementedError
 
     def _put(self, frame: Frame) -> None:
         if len(self._waiting) == MOST_WAITING:
@@ -116,7 +131,6 @@ class BusSource(Source):
         self.title = interface if channel is None else f"{interface} {channel}"
         self._bus = open_bus(interface, channel, options or {})
         _widen(self._bus)
-        self._commands = 0
 
     def run(self) -> None:
         receive, put, stopping = self._bus.recv, self._put, self._stopping
@@ -129,16 +143,14 @@ class BusSource(Source):
         super().stop()
         self._bus.shutdown()
 
-    def command(self, values: Mapping[str, codec.Value]) -> None:
+    def _transmit(self, identifier: int, data: bytes) -> None:
         import can
 
-        frame = command_frame(self._commands, values)
-        self._commands += 1
         try:
-            self._bus.send(can.Message(arbitration_id=frame[0], is_extended_id=False, data=frame[1]), timeout=0.5)
+            self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data), timeout=0.5)
         except can.CanError as error:
             raise LeverError(f"{self.title} did not take the command: {error}") from None
-        self._put(frame)
+        self._put((identifier, data))
 
 
 class LogSource(Source):
@@ -215,9 +227,3 @@ def as_frame(message: can.Message) -> Frame:
     if message.is_extended_id or message.is_remote_frame or message.is_fd:
         return FOREIGN, b""
     return message.arbitration_id, message.data
-
-
-def command_frame(counter: int, values: Mapping[str, codec.Value]) -> tuple[int, bytes]:
-    """A COMMAND that changes only `values`. Raises CodecError."""
-    data = codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
-    return codec.message("COMMAND").frame_id, data

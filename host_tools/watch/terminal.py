@@ -34,7 +34,7 @@ class Monitor(App[None]):
     .panel { border: round $primary; padding: 0 1; }
     #lower { height: 1fr; }
     #health { width: 1fr; height: 100%; overflow-y: auto; scrollbar-size-vertical: 1; }
-    #messages { width: 46; height: 100%; }
+    #messages { width: 46; height: 100%; overflow-y: auto; scrollbar-size-vertical: 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("q", "quit", "quit"),

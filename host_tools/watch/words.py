@@ -27,6 +27,8 @@ FAULTS = {
     "recovered": "the filter was restarted",
     "change": "sudden change of the pilot, learning anew",
     "platform": "the machine reports a fault of its own",
+    "clock": "the sample clock stands or runs backwards",
+    "duplicate": "a second estimator is on this bus",
 }
 """Conditions of the estimator, by enum lever_fault."""
 
@@ -57,6 +59,8 @@ def condition(picture: Picture) -> tuple[str, str]:
         if any(entry.frames for entry in picture.traffic.values()) or picture.foreign:
             return "watch", "frames pass, but neither samples nor estimates"
         return "watch", "no frame has come yet"
+    if (wrong := picture.wrong_contract()) is not None:
+        return "bad", wrong
     mode = picture.mode
     if mode is None:
         return "watch", "the estimator is there; no HEALTH from it yet"

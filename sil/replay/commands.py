@@ -25,7 +25,8 @@ also writes into DIR
 LOG is a log of candump -L (.log, or - for standard input), or .blf, .asc, .mf4, .trc, .csv or .db, compressed (.gz) or
 not. Several logs are taken one after another in the order of their first frames. Whatever else is in a log, other
 messages, other buses, damaged lines, is counted and left out. If it holds estimates too, of the firmware that ran when
-it was recorded, they are compared with the new ones, signal by signal.
+it was recorded, and of this version of lever.dbc (IDENTITY says so), they are compared with the new ones, signal by
+signal.
 
 The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
 choice (model, preload, estimator, adaptation) that is made here.
@@ -139,7 +140,7 @@ def _recording_row(summary: dict[str, Any]) -> Row:
         "frames": recording["frames"],
         "frames left out": left_out or "none",
         "samples": summary["samples"],
-        **{count: summary[count] for count in ("lost", "corrupt", "late")},
+        **{count: summary[count] for count in ("lost", "corrupt", "late", "restarts")},
         "repeated frames": recording["repeated"],
         "damaged lines": recording["damaged_lines"],
         "gaps": recording["gaps"],

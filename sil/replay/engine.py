@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from lever_cdkf.host_tools.files import write_text
 from lever_cdkf.host_tools.library import enum_names
@@ -85,12 +86,15 @@ class _Replay:
         self._model_number = -1
         self._model_changes = 0
         self._started_us = 0
+        self._recorded_contract: int | None = None
+        self._other_contract = False
 
     def run(self, progress: Progress | None) -> None:
         """All of the recording."""
         recording = self._traffic.recording
         for frames in self._traffic.chunks():
             self._repeats.add(frames)
+            self._identify(frames)
             for fed, rows in self._feeder.feed(self._commands.applied(frames)):
                 if self._outputs is not None:
                     self._log(fed, self._outputs)
@@ -98,6 +102,13 @@ class _Replay:
             if progress is not None:
                 progress(recording.done, recording.size)
         self._take(self._feeder.flush(), last=True)
+
+    def _identify(self, frames: Frames) -> None:
+        """Which contract the recorded estimator speaks, by its first IDENTITY that says so."""
+        if self._recorded_contract is None:
+            data = frames["data"][frames["id"] == codec.message("IDENTITY").frame_id]
+            said = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
+            self._recorded_contract = next((int(number) for number in said[np.isfinite(said)]), None)
 
     def _log(self, fed: Frames, outputs: Outputs) -> None:
         if self._bus_log is None:
@@ -134,7 +145,9 @@ class _Replay:
         """Everything that has to know the model."""
         self._model_number = next((number for _, number in model_numbers(rows)), 0)
         self.model = enum_names("lever_model")[self._model_number]
-        with_recorded = bool(np.any(rows["known"] >> min(RECORDED.values())))
+        there = bool(np.any(rows["known"] >> min(RECORDED.values())))
+        with_recorded = there and self._recorded_contract == codec.contract()
+        self._other_contract = there and not with_recorded
         self._started_us = int(rows["time_us"][0])
         self.figures = Figures(self._options.config, self.model)
         self.kept = Kept(self._options.config.settings["sample_period"])
@@ -177,6 +190,8 @@ class _Replay:
             "frames": traffic.frames,
             "frames_left_out": {kind: count for kind, count in traffic.others.items() if count},
             "corrupt_recorded_answers": traffic.corrupt_answers,
+            "answers_of_other_contract": self._other_contract,
+            "misplaced_answers": 0 if self._columns is None else self._columns.misplaced,
             "damaged_lines": recording.damaged,
             "ends_early": [_without_folder(reason) for reason in recording.ends_early],
             "refused": self._feeder.refused,

@@ -25,7 +25,12 @@ Signals = list[tuple[str, str, str]]
 """Column of the trace, name and unit in the file."""
 
 
+_DERIVED = {"nis": "1", "faults": ""}  # fields.py
+
+
 def _unit(message: str, field: str) -> str:
+    if field in _DERIVED:
+        return _DERIVED[field]
     return codec.message(message).get_signal_by_name(field).unit or ""
 
 

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.fields import COUNTS
 from lever_cdkf.host_tools.native import Config, enum_names
 from numpy.typing import NDArray
 
@@ -14,7 +15,7 @@ from ..innovations import Innovations, freedom
 from ..quantities import quantities
 from ..scenario import CONVERGED_AFTER
 from ..summary import verdict_nis, verdict_whiteness
-from ..trace import COUNTS, Trace
+from ..trace import Trace
 from .reduction import Groups
 
 FloatArray = NDArray[np.float64]
@@ -112,6 +113,12 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
         told.append(f"The sender's clock started over {recording['clock_restarts']} times.")
     if recording["model_changes"]:
         told.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
+    if recording["answers_of_other_contract"]:
+        told.append(
+            "The estimates in the log are of another contract, or none that it tells (IDENTITY): they are not compared."
+        )
+    if recording["misplaced_answers"]:
+        told.append(f"{recording['misplaced_answers']} recorded estimates do not belong to the sample before them.")
     step, period = recording["typical_step_s"], summary["estimator"]["settings"]["sample_period"]
     if step and not 0.7 < step / period < 1.4:
         told.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")

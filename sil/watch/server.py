@@ -93,11 +93,18 @@ class Server:
             for page in list(self.pages):
                 page.close(1001, "the server ends")
             await web.close_all_connections()
+            with suppress(LeverError):
+                self.source.end_dither()
             self.source.stop()
 
     def advance(self) -> None:
-        """Tells all pages what is new."""
+        """Tells all pages what is new. Dither goes on as long as there is a page that shows it."""
         messages = self.state.advance()
+        with suppress(LeverError):  # a bus that fails says so in the source's error
+            if self.pages:
+                self.source.keep_alive()
+            else:
+                self.source.end_dither()
         for page in list(self.pages):
             page.update(messages)
 

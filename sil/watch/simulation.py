@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Mapping
 
 import can
 import numpy as np
-from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.host_tools.watch.sources import Source, as_frame, command_frame
+from lever_cdkf.host_tools.watch.sources import Source, as_frame
 
 from .. import loop
 from ..scenario import Scenario
@@ -28,7 +26,6 @@ class SimulationSource(Source):
         self.title = f"simulation of {scenario.name}"
         self.scenario = scenario
         self._bus = _HeardBus(self)
-        self._commands = 0
         self._truth: tuple[float, Truth] | None = None  # when the run began by the clock, and what is true in it
 
     def run(self) -> None:
@@ -36,7 +33,7 @@ class SimulationSource(Source):
         while not self._stopping.is_set():
             self._truth = time.monotonic(), scenario.truth(scenario.time())
             try:
-                loop.run(scenario, self._bus, realtime=True, progress=self._look_up)
+                loop.run(scenario, self._bus, realtime=True, progress=self._look_up, commander=self._commander)
             except _Stopped:
                 return
             scenario = dataclasses.replace(scenario, seed=scenario.seed + 1)
@@ -45,9 +42,7 @@ class SimulationSource(Source):
         super().stop()
         self._bus.shutdown()
 
-    def command(self, values: Mapping[str, codec.Value]) -> None:
-        identifier, data = command_frame(self._commands, values)
-        self._commands += 1
+    def _transmit(self, identifier: int, data: bytes) -> None:
         self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.config import Config, setting
+from lever_cdkf.host_tools.fields import COUNTS
 from lever_cdkf.host_tools.library import enum_names
 from lever_cdkf.host_tools.watch import words
 from lever_cdkf.host_tools.watch.model import STEP, Picture
@@ -37,7 +38,7 @@ class State:
         self.controls = source.takes_commands and not read_only
         self._source = source
         self._geometry = Geometry(config)
-        self._dither_limit = config.settings["dither_limit"]
+        self._dither_limit = greatest_dither(config)
         self._rows: deque[list[float]] = deque(maxlen=round(SPAN / STEP))
         self._map: deque[tuple[float, FloatArray]] = deque(maxlen=round(SPAN / MAP_STEP))
         self._model: str | None = None
@@ -62,6 +63,7 @@ class State:
         if not self._map or picture.now - self._map[-1][0] >= 0.99 * MAP_STEP:
             self._map.append((picture.now, np.zeros(0) if response is None else response.magnitude[::2]))
             update["map"] = self._map[-1]
+        messages += [_json({"refused": picture.refusals.popleft()}) for _ in range(len(picture.refusals))]
         return [*messages, _json({"update": update})]
 
     def start(self) -> str:
@@ -132,7 +134,9 @@ class State:
             "mode": picture.mode,
             "faults": words.faults(picture),
             "silence": picture.silence(),
-            "counts": {name: picture.counts[name] for name in ("lost", "corrupt", "late")},
+            "counts": {name: picture.counts[name] for name in COUNTS},
+            "firmware": picture.identity.version,
+            "choices": picture.identity.choices,
             "machine": machine,
             "theta": math.degrees(picture.theta()),
             "messages": [
@@ -181,6 +185,11 @@ def _short(value: float) -> float | None:
     return float(f"{value:.{_DIGITS}g}") if abs(value) < 100.0 else round(value, 2)
 
 
+def greatest_dither(config: Config) -> float:
+    """Rms of the dither that the torque gate can let through [N m]."""
+    return min(config.settings["torque_rms"], config.settings["torque_limit"])
+
+
 def command_of(content: Any, config: Config) -> dict[str, str | float]:
     """The fields of COMMAND that a page asks for. Raises ValueError with what is wrong."""
     allowed = {what: list(enum_names(f"lever_{what}").values()) for what in ("request", "model", "estimator")}
@@ -193,9 +202,9 @@ def command_of(content: Any, config: Config) -> dict[str, str | float]:
                 raise ValueError(f"{key} must be one of {', '.join(allowed[key])}")
             found[key] = value
         elif key == "dither_rms":
-            limit = config.settings["dither_limit"]
+            limit = greatest_dither(config)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= limit:
-                raise ValueError(f"dither_rms must be a number from 0 to {limit:g} {setting('dither_limit').unit}")
+                raise ValueError(f"dither_rms must be a number from 0 to {limit:g} {setting('torque_rms').unit}")
             found[key] = float(value)
         else:
             raise ValueError(f"a command has no {key!r}")

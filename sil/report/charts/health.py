@@ -26,6 +26,8 @@ FAULT_WORDS = {
     "recovered": "filter restarted",
     "change": "sudden change noticed",
     "platform": "machine reports a fault",
+    "clock": "sample clock stands or runs back",
+    "duplicate": "second estimator on the bus",
 }
 
 

@@ -9,7 +9,7 @@ const DITHERS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1];
 const OTHERS = [
   { key: "excitation", title: "excitation: rms of θ̇ [rad/s]", name: "base" },
   { key: "dither", title: "dither of the motor, rms [N m]", name: "torque" },
-  { key: "nis", title: "mean normalised innovation squared (honest: 2)", name: "estimate" },
+  { key: "nis", title: "mean normalised innovation squared (expected 2)", name: "estimate" },
 ];
 
 const story = { start: null, update: null };
@@ -113,7 +113,9 @@ function tellHealth(update) {
   const lines = [
     ["mode", update.mode ?? "–"],
     ["faults", faults.length ? faults.join("; ") : "none", faults.length > 0],
-    ["estimator counts", `${counts.lost} lost, ${counts.corrupt} corrupt, ${counts.late} late`],
+    ["estimator counts", `${counts.lost} lost, ${counts.corrupt} corrupt, ${counts.late} late, ${counts.restarts} restarts`],
+    ["firmware", update.firmware ?? "–"],
+    ["choices", Object.values(update.choices).join(", ") || "–"],
     ["lever angle", `${written(update.theta, 4)} deg`],
   ];
   if (machine) {

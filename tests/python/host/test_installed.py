@@ -76,6 +76,6 @@ def test_the_command_lever() -> None:
 
 
 def test_versions_agree(installed: str, root: Path) -> None:
-    project = re.search(r"project\(lever_cdkf VERSION ([0-9.]+)", (root / "CMakeLists.txt").read_text())
-    assert project is not None
-    assert installed == project[1]
+    header = (root / "firmware/lever_cdkf.h").read_text()
+    parts = re.findall(r"#define LEVER_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header)
+    assert installed == ".".join(parts)

@@ -147,7 +147,7 @@ def test_configuration_changed_behind_its_back() -> None:
 
 def test_life_of_an_instance() -> None:
     estimator = Estimator(QUICK)
-    assert estimator.health() == Health("init", (), 0, 0, 0, 0, 0, 0.0, 0.0)
+    assert estimator.health() == Health("init", (), 0, 0, 0, 0, 0, 0.0, 0.0, gate_open=False)
     modes = {estimator.update(1000 * k, 0.35, 0.0, 0.0, 0.0) for k in range(300)}
     assert modes == {"align", "run"}
     estimate = estimator.estimate()

@@ -23,6 +23,9 @@ from .conftest import Session, simulated
 
 Summary = dict[str, Any]
 
+ALIGNING = 300
+"""Samples at the start whose estimates may not be used."""
+
 
 def replayed(out: Path, *arguments: str | Path) -> Summary:
     """`lever replay … -o out`, which must do; returns its summary."""
@@ -168,19 +171,19 @@ def test_other_settings_give_other_estimates_and_are_compared(session: Session, 
     assert told["identical"] is False
     with (tmp_path / "out/trace.csv").open() as file:
         rows = list(csv.DictReader(file))
-    columns = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    columns = {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
     for key, unit in (("k_p", "_N_m"), ("m_p", "_kg"), ("natural_frequency", "_Hz"), ("damping_ratio", "")):
         difference = columns[f"{key}_estimate{unit}"] - columns[f"{key}_recorded{unit}"]
         said = ~np.isnan(difference)  # from the first message on
         difference = difference[said]
         signal = told["signals"][key]
-        assert signal["samples"] == len(difference) > len(rows) - 20
+        assert signal["samples"] == len(difference) > len(rows) - ALIGNING - 20
         assert signal["identical_samples"] == int(np.sum(difference == 0.0)) < len(rows)
         assert signal["rms"] == pytest.approx(math.sqrt(np.mean(difference**2)), rel=1e-6)
         assert signal["bias"] == pytest.approx(np.mean(difference), rel=1e-6, abs=1e-12)
         assert abs(signal["largest"]) == pytest.approx(np.max(np.abs(difference)), abs=1e-9)
         in_sigma = difference / columns[f"{key}_sigma{unit}"][said]
-        assert signal["rms_in_sigma"] == pytest.approx(math.sqrt(np.mean(in_sigma**2)), rel=1e-6)
+        assert signal["rms_in_sigma"] == pytest.approx(math.sqrt(np.nanmean(in_sigma**2)), rel=1e-6)
     assert "Against the estimates that were recorded with the log" in summary["verdict"]
 
 
@@ -189,12 +192,50 @@ def test_a_choice_made_here_wins_over_the_commands_in_the_log(session: Session, 
     assert summary["estimator"]["model"] == "linear_physical"
     assert summary["estimator"]["estimator"] == "joint"
     assert list(summary["estimates"]) == ["m", "c", "k", "natural_frequency", "damping_ratio"]
-    assert summary["recording"]["commands"] == summary["recording"]["commands_changed"] == 1
+    assert summary["recording"]["commands"] == 6 * 4  # dither is kept alive
+    assert summary["recording"]["commands_changed"] == 1
     command = (tmp_path / "out/bus.log").read_text().split()[2]
     fields = codec.decode(0x120, bytes.fromhex(command.split("#")[1]))[1]
     assert (fields["model"], fields["estimator"], fields["adaptation"], fields["request"]) == (15, 15, 2, 3)
-    assert summary["comparison"]["signals"]["theta"]["samples"] == 6000
+    assert summary["comparison"]["signals"]["theta"]["samples"] == 6000 - ALIGNING
     assert summary["comparison"]["signals"]["m"]["samples"] == 0
+
+
+@pytest.mark.parametrize("contract", [None, 1, 3])
+def test_estimates_of_another_contract_are_not_compared(session: Session, tmp_path: Path, contract: int | None) -> None:
+    """The first contract had no IDENTITY, and the same frames with other fields: their CRC is right all the same."""
+    lines = [line for line in session.lines if line.split()[2][:3] != "217"]
+    if contract is not None:
+        version = {"firmware_major": 9, "firmware_minor": 0, "firmware_patch": 0, "contract": contract}
+        page = codec.encode("IDENTITY", 0, {"page": 0, **version}).hex().upper()
+        lines.insert(10, f"{lines[9].split()[0]} lever 217#{page} R")
+    log = tmp_path / "old.log"
+    log.write_text("".join(f"{line}\n" for line in lines))
+    summary = replayed(tmp_path / "out", log)
+    assert summary["comparison"] is None
+    assert "they are not compared." in summary["verdict"]
+    assert "recorded" not in (tmp_path / "out/trace.csv").read_text().partition("\n")[0]
+    assert (tmp_path / "out/bus.log").read_bytes() == session.log.read_bytes()
+
+
+def test_recorded_estimates_of_other_samples_are_told_and_not_compared(session: Session, tmp_path: Path) -> None:
+    """A log in which each STATE_ESTIMATE stands behind the sample after its own."""
+    shifted: list[str] = []
+    waiting = None
+    for line in session.lines:
+        frame = line.split()[2]
+        if frame.startswith("210#"):
+            shifted += [waiting] if waiting else []
+            waiting = line
+        else:
+            shifted.append(line)
+    log = tmp_path / "shifted.log"
+    log.write_text("".join(f"{line}\n" for line in shifted))
+    summary = replayed(tmp_path / "out", log)
+    assert summary["recording"]["misplaced_answers"] == 5999
+    assert "5999 recorded estimates do not belong to the sample before them." in summary["verdict"]
+    assert summary["comparison"]["signals"]["theta"]["samples"] == 0
+    assert summary["comparison"]["signals"]["k_p"]["samples"] > 5000
 
 
 def test_settings_that_the_firmware_refuses_are_one_line(
@@ -263,4 +304,4 @@ def test_the_page_has_all_but_truth(replay: tuple[Path, Summary]) -> None:
     assert {"recorded", "replayed", "measured", "estimate"} <= curves
     assert "truth" not in curves
     cells = {row[0]: row[1:] for table in page.tables for row in table}
-    assert cells["theta"][1:3] == ["6\u2009000", "6\u2009000"]
+    assert cells["theta"][1:3] == ["5\u2009700", "5\u2009700"]

@@ -66,6 +66,17 @@ def test_the_motor_turns_as_the_firmware_commands(short: Scenario) -> None:
     assert torque[301] == pytest.approx(-0.75 * math.exp(-0.5))
 
 
+def test_a_motor_command_of_another_sample_turns_nothing(short: Scenario) -> None:
+    """A port sends one when no sample comes for a while."""
+
+    def push(sample: int) -> list[tuple[str, dict[str, Any]]]:
+        return [("MOTOR_COMMAND", {"torque": 0.75, "dither": 0.75, "time_low": 1000 * sample + 1}), estimate()]
+
+    recording = loop.run(short, PuppetBus(push))
+    assert not np.any(recording.tau_m)
+    assert recording.misplaced == 0
+
+
 def test_the_start_resets_and_chooses_and_the_dither_follows_the_scenario() -> None:
     bus = PuppetBus(always)
     loop.run(scenario.load("poor_excitation", ["duration=0.4 s", "torque.0.end=0.1 s", "torque.1.start=0.3 s"]), bus)
@@ -76,6 +87,17 @@ def test_the_start_resets_and_chooses_and_the_dither_follows_the_scenario() -> N
     assert [command["adaptation"] for command in bus.decoded("COMMAND")] == [2, 15, 15]
     places = [sum(i == 0x111 for i, _ in bus.sent[:k]) for k, (i, _) in enumerate(bus.sent) if i == 0x120]
     assert places == [0, 100, 300]
+
+
+def test_dither_is_kept_alive_by_a_command_each_quarter_of_a_second() -> None:
+    bus = PuppetBus(always)
+    loop.run(scenario.load("poor_excitation", ["duration=1.2 s", "torque.0.end=0.6 s", "torque.1.start=0.9 s"]), bus)
+    places = [sum(i == 0x111 for i, _ in bus.sent[:k]) for k, (i, _) in enumerate(bus.sent) if i == 0x120]
+    assert places == [0, 250, 500, 600, 900, 1150]
+    commands = bus.decoded("COMMAND")
+    kept = [round(command["dither_rms"], 3) for command in commands]
+    assert kept == [0.3, 65.535, 65.535, 0.0, 0.3, 65.535]
+    assert [command["counter"] for command in commands] == list(range(6))
 
 
 def test_lost_frames_are_not_sent_and_invalid_values_are_marked() -> None:
@@ -113,18 +135,61 @@ def test_unanswered_samples_are_counted_and_silence_ends_the_run(short: Scenario
     assert recording.unanswered == 5
     with pytest.raises(loop.NoAnswerError, match="no STATE_ESTIMATE on puppet at sample 0: is the firmware running"):
         loop.run(short, PuppetBus(lambda sample: []))
+    with pytest.raises(loop.NoAnswerError, match="no COMMAND_ACK on puppet: is the firmware, of this version, running"):
+        loop.run(short, PuppetBus(always, [None]))
     with pytest.raises(loop.NoAnswerError, match=f"at sample {100 + loop.MOST_UNANSWERED - 1}"):
         loop.run(short, PuppetBus(lambda sample: [estimate()] if sample < 100 else []))
 
 
 def test_a_late_answer_is_not_taken_for_the_next_samples(short: Scenario) -> None:
     def late(sample: int) -> list[tuple[str, dict[str, Any]]]:
-        return [] if sample == 100 else [estimate(sample * 1e-3)] + ([estimate(9.0)] if sample == 101 else [])
+        before = [estimate(1.5, time_low=100_000 % 65536)] if sample == 101 else []
+        return [] if sample == 100 else [*before, estimate(sample * 1e-3)]
 
     result = runner.simulate(short, PuppetBus(late))
     theta = result.trace["theta_estimate_rad"]
     assert math.isnan(theta[100])
-    assert theta[102:] == pytest.approx(np.arange(102, 500) * 1e-3)
+    assert theta[101:] == pytest.approx(np.arange(101, 500) * 1e-3, abs=1.01e-4)
+    assert (result.summary["unanswered"], result.summary["misplaced"]) == (1, 1)
+    assert not result.summary["passed"]
+
+
+def test_estimates_that_are_one_sample_behind_are_told_and_none_is_taken(short: Scenario) -> None:
+    def behind(sample: int) -> list[tuple[str, dict[str, Any]]]:
+        own = [estimate()] if sample == 0 else []
+        return [estimate(1.0, time_low=(1000 * (sample - 1)) % 65536), *own]
+
+    with pytest.raises(loop.NoAnswerError, match=f"at sample {loop.MOST_UNANSWERED}"):
+        loop.run(short, PuppetBus(behind))
+
+
+@pytest.mark.parametrize(
+    ("result", "why"),
+    [
+        ("unknown_value", "it does not know a value in it"),
+        ("fault_mode", "it is in mode fault, which only a reset leaves"),
+        ("sequence", "its counter is out of sequence: is there another sender of COMMAND?"),
+    ],
+)
+def test_a_refused_command_is_an_error_in_one_line(short: Scenario, result: str, why: str) -> None:
+    with pytest.raises(loop.RefusedError) as caught:
+        loop.run(short, PuppetBus(always, [result] * 20))
+    assert str(caught.value) == f"puppet: the estimator refuses COMMAND: {why}"
+
+
+def test_the_first_command_finds_the_sequence_that_an_earlier_run_has_left(short: Scenario) -> None:
+    bus = PuppetBus(always, ["sequence"] * 5)
+    loop.run(short, bus)
+    assert [command["counter"] for command in bus.decoded("COMMAND")] == list(range(7))
+
+
+def test_an_estimator_of_another_contract_is_an_error_in_one_line(short: Scenario) -> None:
+    def other(_: int) -> list[tuple[str, dict[str, Any]]]:
+        version = {"firmware_major": 1, "firmware_minor": 0, "firmware_patch": 0, "contract": 7}
+        return [("IDENTITY", {"page": 0, **version}), estimate()]
+
+    with pytest.raises(LeverError, match=r"the estimator on puppet speaks contract 7 of lever.dbc, this program 2: "):
+        loop.run(short, PuppetBus(other))
 
 
 def test_other_nodes_frames_are_no_answers(short: Scenario) -> None:
@@ -203,6 +268,7 @@ def test_a_firmware_behind_a_serial_line_gives_the_same_frames(lever_bus: MakeBu
     thread = threading.Thread(target=adapter, daemon=True)
     thread.start()
     with commands.open_bus(short, "slcan", os.ttyname(line)) as bus:
+        assert bus.channel_info == f"slcan channel {os.ttyname(line)}"  # for errors
         os.close(line)
         remote = runner.simulate(short, bus)
     thread.join()
@@ -212,14 +278,18 @@ def test_a_firmware_behind_a_serial_line_gives_the_same_frames(lever_bus: MakeBu
     assert b"".join(buslog.lines(remote.frames, "x")) == b"".join(buslog.lines(inside.frames, "x"))
 
 
-def test_a_firmware_that_has_run_before_starts_over(lever_bus: MakeBus, short: Scenario) -> None:
-    bus = lever_bus(short)
-    first, second = (runner.simulate(short, bus) for _ in range(2))
-    assert (second.summary["unanswered"], second.summary["late"]) == (0, 0)
-    guesses = [run.trace["m_p_estimate_kg"] for run in (first, second)]
-    before, after = (guess[~np.isnan(guess)][0] for guess in guesses)  # as it was published first
-    assert after == before
-    assert second.summary["modes_s"] == first.summary["modes_s"]
+def test_runs_of_one_seed_on_one_firmware_are_equal(lever_bus: MakeBus) -> None:
+    """With dither, whose generator and level a reset starts over: rms errors of m_p were 26, 17 and 19 % before."""
+    wanted = scenario.load("steady", ["duration=3.3 s", "converged_after=1 s", "limits={}"])
+    bus = lever_bus(wanted)
+    first, *others = (runner.simulate(wanted, bus) for _ in range(3))
+    assert np.std(first.trace["dither_N_m"]) > 0.1
+    for again in others:
+        assert again.summary["unanswered"] == again.summary["misplaced"] == 0
+        for name, column in first.trace.items():
+            if name not in ("faults", "late"):  # COMMANDs that were out of sequence are told at the start
+                first_of = 50 if name == "dither_N_m" else 0  # that of the run before fades within 50 ms
+                np.testing.assert_array_equal(again.trace[name][first_of:], column[first_of:], err_msg=name)
 
 
 def test_real_time_is_real_and_changes_nothing(lever_bus: MakeBus) -> None:

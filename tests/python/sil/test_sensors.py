@@ -70,14 +70,19 @@ def test_only_the_dropouts_of_that_value_count_and_they_add_up() -> None:
     assert np.array_equal(gone, ((TIME >= 1) & (TIME < 2)) | ((TIME >= 5) & (TIME < 6)))
 
 
-def test_what_reaches_the_estimator_is_quantised_and_saturated_as_cantools_has_it() -> None:
+def test_what_reaches_the_estimator_is_quantised_or_not_available_as_cantools_has_it() -> None:
     database = cantools.database.load_file(str(native_file("lever.dbc")))
     assert isinstance(database, cantools.database.Database)
     measured = Sensor(noise=1e-3).measure(0.35 + 4.0 * np.sin(TIME[:2000]), PERIOD, rng())
     encode = codec.encoder("LEVER_SAMPLE")
     for value in measured.tolist():
         frame = encode(0, value, None, 0.0)
-        theta = dict(database.decode_message("LEVER_SAMPLE", frame))["theta"]
+        decoded = dict(database.decode_message("LEVER_SAMPLE", frame))
+        theta = decoded["theta"]
+        assert decoded["theta_valid"] == (abs(value) < 3.27675)
+        if not decoded["theta_valid"]:
+            assert theta == "not_available"
+            continue
         assert isinstance(theta, float)
-        assert theta == pytest.approx(min(max(value, -3.2768), 3.2767), abs=0.5e-4 + 1e-9)
+        assert theta == pytest.approx(value, abs=0.5e-4 + 1e-9)
         assert round(theta / 1e-4) * 1e-4 == pytest.approx(theta, abs=1e-12)

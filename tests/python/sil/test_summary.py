@@ -50,7 +50,7 @@ def perfect(recording: loop.Recording) -> Trace:
         trace[quantity.column("sigma")] = 0.01 * values[quantity.key]
     trace["nis"] = random.chisquare(2, COUNT)
     trace["mode"] = np.where(TIME < 0.1, 1.0, 2.0)
-    return trace | {name: np.zeros(COUNT) for name in ("lost", "corrupt", "late")}
+    return trace | {name: np.zeros(COUNT) for name in ("lost", "corrupt", "late", "restarts")}
 
 
 def test_a_perfect_estimate_is_perfect(recording: loop.Recording) -> None:
@@ -130,11 +130,26 @@ def test_faults_and_missing_answers_fail_a_run(recording: loop.Recording) -> Non
     made = summary.build(recording, trace)
     assert not made["passed"]
     assert made["verdict"].startswith("Trouble: 3 samples got no answer.")
-    recording.unanswered = 0
+    recording.unanswered, recording.misplaced = 0, 2
+    made = summary.build(recording, trace)
+    assert not made["passed"]
+    assert made["verdict"].startswith("Trouble: 2 estimates came that belong to other samples.")
+    recording.misplaced = 0
     trace["mode"][5000:5100] = 5.0
     made = summary.build(recording, trace)
     assert not made["passed"]
     assert "the estimator was in fault for 0.1 s" in made["verdict"]
+
+
+def test_settings_of_the_estimator_that_are_not_the_scenarios_are_told(recording: loop.Recording) -> None:
+    crc = recording.scenario.config.settings_crc
+    pages = {"firmware_major": 0.0, "firmware_minor": 2.0, "firmware_patch": 0.0, "contract": 2.0}
+    for wrong in (0, 1):
+        recording.identity.take(pages | {"settings_crc": float(crc ^ wrong)})
+        made = summary.build(recording, perfect(recording))
+        assert made["firmware"] == {"version": "0.2.0", "contract": 2, "settings_as_scenario": not wrong}
+        assert ("other settings than the scenario" in made["verdict"]) is bool(wrong)
+        assert made["passed"]
 
 
 def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., Scenario]) -> None:
@@ -184,7 +199,8 @@ def test_the_keys_are_those_of_the_contract(recording: loop.Recording) -> None:
     made = summary.build(recording, perfect(recording))
     summary.add_wall_time(made, 1.0)
     assert set(made) >= {
-        "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "unanswered", "wall_time_s",
+        "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "restarts", "unanswered",
+        "misplaced", "firmware", "wall_time_s",
         "simulated_time_s", "wall_time_per_simulated_time", "verdict",
     }  # fmt: skip
     assert set(made["parameters"]) == {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}

@@ -13,7 +13,7 @@ from lever_cdkf.host_tools.bus import LeverBus
 from lever_cdkf.sil import loop, scenario, trace
 from lever_cdkf.sil.scenario import Scenario
 
-from .conftest import PuppetBus, estimate
+from .conftest import PuppetBus, estimate, health
 
 COLUMNS = """
 time_s theta_true_rad theta_dot_true_rad_s z_ddot_true_m_s2 tau_m_true_N_m
@@ -21,12 +21,13 @@ trim_true_rad m_p_true_kg c_p_true_N_s_m k_p_true_N_m natural_frequency_true_Hz 
 theta_measured_rad theta_dot_measured_rad_s z_ddot_measured_m_s2 tau_m_measured_N_m
 theta_estimate_rad theta_dot_estimate_rad_s nis m_p_estimate_kg m_p_sigma_kg c_p_estimate_N_s_m c_p_sigma_N_s_m
 k_p_estimate_N_m k_p_sigma_N_m natural_frequency_estimate_Hz natural_frequency_sigma_Hz damping_ratio_estimate
-damping_ratio_sigma mode faults lost corrupt late excitation_rad_s dither_N_m
+damping_ratio_sigma mode faults lost corrupt late restarts excitation_rad_s dither_N_m
 """.split()  # noqa: SIM905
 
 
 def answers(sample: int) -> list[tuple[str, dict[str, Any]]]:
-    """Parameters each 20th sample from 40 on, health each 100th, dither from 250 on, no answer at 333."""
+    """Parameters each 20th sample from 40 on, health each 100th, dither from 250 on, no answer at 333, one that may not
+    be used at 222, no innovation at 111."""
     if sample == 333:
         return []
     frames: list[tuple[str, dict[str, Any]]] = []
@@ -36,10 +37,11 @@ def answers(sample: int) -> list[tuple[str, dict[str, Any]]]:
         frames.append(("PILOT_PARAMETERS", {"m_p": sample * 0.01, "c_p": 42.0, "k_p": 1500.0}))
         frames.append(("PILOT_SIGMA", {"m_p_sigma": 0.5, "c_p_sigma": 3.0, "k_p_sigma": 90.0}))
     if sample % 100 == 0:
-        count = 3 + 70 * (sample // 100)  # of frames lost since power-on: 3, 73, 143, 213, 283, so it wraps
-        health = {"mode": "run", "faults": 128, "corrupt": 0, "late": 7, "excitation": 0.25}
-        frames.append(("HEALTH", {**health, "lost": count}))
-    return [*frames, estimate(theta=sample * 1e-3, nis=1.5)]
+        count = sample // 100  # since power-on: both wrap
+        frames.append(health("run", "excitation", restarts=(3 + 70 * count) % 256, excitation=0.25))
+        frames.append(("LINK_HEALTH", {"lost": 65535 - 70 + 70 * count, "corrupt": 0, "late": 7}))
+    valid = int(sample != 222)
+    return [*frames, estimate(theta=sample * 1e-3, innovation=1.5 if sample != 111 else None, valid=valid)]
 
 
 def made(*overrides: str) -> tuple[loop.Recording, trace.Trace]:
@@ -104,8 +106,11 @@ def test_estimates_stand_at_their_sample_and_slower_frames_are_held() -> None:
     recording = loop.run(wanted, PuppetBus(answers))
     columns = trace.build(recording, recording.frames())
     sample = np.arange(500)
-    assert np.flatnonzero(np.isnan(columns["theta_estimate_rad"])).tolist() == [333]
-    assert np.delete(columns["theta_estimate_rad"], 333) == pytest.approx(np.delete(sample, 333) * 1e-3)
+    assert np.flatnonzero(np.isnan(columns["theta_estimate_rad"])).tolist() == [222, 333]
+    there = np.delete(sample, [222, 333])
+    assert columns["theta_estimate_rad"][there] == pytest.approx(there * 1e-3, abs=1.01e-4)
+    assert np.flatnonzero(np.isnan(columns["nis"])).tolist() == [111, 222, 333]
+    assert columns["nis"][0] == 1.5**2
     assert np.isnan(columns["m_p_estimate_kg"][:40]).all()
     assert columns["m_p_estimate_kg"][40:] == pytest.approx(sample[40:] // 20 * 20 * 0.01)
     assert columns["k_p_sigma_N_m"][499] == 90.0
@@ -113,9 +118,10 @@ def test_estimates_stand_at_their_sample_and_slower_frames_are_held() -> None:
     assert columns["dither_N_m"] == pytest.approx(expected, abs=1e-9)
 
 
-def test_counts_start_at_zero_and_go_on_beyond_their_eight_bits() -> None:
+def test_counts_start_at_zero_and_go_on_beyond_their_bits() -> None:
     _, columns = made("sensors.dropout=[{what='theta', share='1 %'}]")
-    assert columns["lost"][[0, 150, 250, 350, 499]].tolist() == [0, 70, 140, 210, 280]
+    for name in ("lost", "restarts"):
+        assert columns[name][[0, 150, 250, 350, 499]].tolist() == [0, 70, 140, 210, 280]
     assert columns["late"].max() == 0
     assert set(columns["mode"]) == {2.0}
     assert set(columns["faults"]) == {128.0}

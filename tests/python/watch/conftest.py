@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import can
 import pytest
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.host_tools.commander import Commander
 from lever_cdkf.host_tools.config import Config
 from lever_cdkf.host_tools.watch.model import Frame
 from lever_cdkf.host_tools.watch.sources import as_frame
@@ -25,6 +26,7 @@ class Flight:
     def __init__(self, config: Config | None = None) -> None:
         self.bus = LeverBus("flight", config=config, receive_own_messages=True)
         self.sample = 0
+        self._commander = Commander()
         self._lever, self._base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
 
     def messages(self, count: int) -> list[can.Message]:
@@ -39,6 +41,10 @@ class Flight:
 
     def frames(self, count: int) -> list[Frame]:
         return [as_frame(message) for message in self.messages(count)]
+
+    def command(self, values: Mapping[str, codec.Value]) -> None:
+        """A COMMAND, of this one's only sender."""
+        self._commander.send(values, self.send)
 
     def send(self, identifier: int, data: bytes) -> None:
         self.bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))

@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 import pytest
 from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.commander import KEEP
 from lever_cdkf.host_tools.config import Config, model_parameters
 from lever_cdkf.host_tools.library import enum_names, ffi, lib
 from lever_cdkf.host_tools.watch import model, words
 from lever_cdkf.host_tools.watch.model import Frame, Picture
-from lever_cdkf.host_tools.watch.sources import command_frame
 from python.watch.conftest import Flight
 
 
@@ -53,9 +53,9 @@ def test_dither_is_measured_over_a_window(flight: Flight) -> None:
     picture = Picture()
     watch(picture, flight, 0.5)
     assert picture.dither() == 0.0
-    flight.send(*command_frame(0, {"dither_rms": 0.3}))
     squares = []
-    for _ in range(60):
+    for k in range(60):
+        flight.command({"dither_rms": 0.3} if k == 0 else {})
         frames = flight.frames(100)
         picture.take(frames, flight.sample * 1e-3)
         squares += [codec.decode(0x215, data)[1]["dither"] ** 2 for identifier, data in frames if identifier == 0x215]
@@ -140,7 +140,8 @@ def test_rates_are_frames_a_second(flight: Flight) -> None:
     assert rates.pop("LEVER_SAMPLE") == pytest.approx(1000)
     assert rates.pop("BASE_SAMPLE") == pytest.approx(1000)
     assert rates.pop("STATE_ESTIMATE") == pytest.approx(1000)
-    assert set(rates) >= {"PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH"}
+    assert rates.pop("IDENTITY") == pytest.approx(3, abs=1)
+    assert set(rates) == {"PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH", "LINK_HEALTH"}
     assert all(rate == pytest.approx(50) for rate in rates.values())  # publish_period
     picture.take([], 6.1)
     picture.take([], 8.2)
@@ -183,27 +184,71 @@ def test_what_was_taken_away_is_counted_as_lost(flight: Flight) -> None:
 
 def test_commands_of_several_senders_are_no_losses() -> None:
     picture = Picture()
-    picture.take([command_frame(counter, {}) for counter in (3, 11, 4, 4)], 0.0)
+    values: dict[str, codec.Value] = {"request": "none", **KEEP}
+    picture.take([(0x120, codec.encode("COMMAND", counter, values)) for counter in (3, 11, 4, 4)], 0.0)
     entry = picture.traffic["COMMAND"]
     assert (entry.frames, entry.lost, entry.repeated) == (4, 0, 0)
 
 
-def test_counts_of_the_estimator_go_on_beyond_eight_bits(flight: Flight) -> None:
+def test_counts_of_the_estimator_go_on_beyond_their_bits() -> None:
+    picture = Picture()
+    faults: dict[str, codec.Value] = {f"fault_{name}": 0 for name in enum_names("lever_fault").values()}
+    for k in range(5):
+        link: dict[str, codec.Value] = {"model": "lever", "valid": 1, "lost": 0, "corrupt": 30_000 * k, "late": 0}
+        health: dict[str, codec.Value] = {"mode": "run", "restarts": 100 * k % 256, "excitation": 0.1, **faults}
+        frames = [(0x219, codec.encode("LINK_HEALTH", k, link)), (0x214, codec.encode("HEALTH", k, health))]
+        picture.take(frames, 0.1 * k)
+    assert (picture.counts["corrupt"], picture.counts["restarts"]) == (120_000, 400)
+
+
+def test_an_estimator_of_another_contract_is_told(flight: Flight) -> None:
+    picture = Picture()
+    watch(picture, flight, 1.0)
+    assert picture.identity.version == "0.2.0"
+    assert picture.identity.choices["estimator"] == "dual"
+    version = {"firmware_major": 1, "firmware_minor": 0, "firmware_patch": 0, "contract": 3}
+    picture.take([(0x217, codec.encode("IDENTITY", 0, {"page": 0, **version}))], 1.0)
+    assert words.condition(picture) == (
+        "bad",
+        "the estimator speaks contract 3 of lever.dbc, this program 2: what is shown is wrong",
+    )
+
+
+def test_an_estimator_that_does_not_tell_its_contract_is_told(flight: Flight) -> None:
+    picture = Picture()
+    for _ in range(40):
+        picture.take([frame for frame in flight.frames(100) if frame[0] != 0x217], flight.sample * 1e-3)
+        told = words.condition(picture)
+        assert (told[0] == "bad") is (picture.now > 3.1 + 1e-9)
+    assert told[1].startswith("the estimator does not tell its version (IDENTITY): ")
+
+
+def test_a_second_estimator_on_the_bus_is_told(make_flight: Callable[..., Flight]) -> None:
+    picture, first, second = Picture(), make_flight(), make_flight()
+    watch(picture, first, 1.0)
+    for identifier, data in second.frames(10):
+        if identifier == 0x217:
+            first.send(identifier, bytes(data))
+    watch(picture, first, 0.2)
+    assert "duplicate" in picture.faults()
+    assert "a second estimator is on this bus" in words.condition(picture)[1]
+
+
+def test_refused_commands_are_told(flight: Flight) -> None:
     picture = Picture()
     watch(picture, flight, 0.1)
-    spoilt = bytes(8)
-    for _ in range(7):
-        for _ in range(100):
-            flight.send(0x110, spoilt)
-        watch(picture, flight, 0.1)
-    assert flight.bus.estimator.health().corrupt == 700
-    assert picture.counts["corrupt"] == 700
+    command = codec.encode("COMMAND", 0, {"request": "none", **KEEP})
+    for _ in range(2):
+        flight.send(0x120, command)
+    watch(picture, flight, 0.1)
+    (why,) = picture.refusals
+    assert why.startswith("the estimator refuses COMMAND: its counter is out of sequence")
 
 
 def test_other_traffic_is_counted_and_harmless(flight: Flight) -> None:
     picture = Picture()
     frames: list[Frame] = [(0x123, b"\1\2"), (model.FOREIGN, b""), (model.ERROR, b""), (0x210, b"\1"), (0x210, b"")]
-    picture.take([*flight.frames(10), *frames], 0.0)
+    picture.take([*flight.frames(400), *frames], 0.0)
     assert (picture.foreign, picture.error_frames) == (2, 1)
     assert picture.traffic["STATE_ESTIMATE"].corrupt == 2
     assert not math.isnan(picture.parameters()[0].value)

@@ -77,7 +77,8 @@ def test_everything_fits_on_the_screen(size: tuple[int, int], flight: Flight) ->
         assert re.search(r"natural_frequency +\d\.\d\d\d +± 0\.\d+ Hz .*[▁▂▃▄▅▆▇█]{5}", text)
         assert re.search(r"LEVER_SAMPLE +1000 +0 +0 +0 ", text)
         assert re.search(r"HEALTH +50 +0 +0 +0 ", text)
-        assert re.search(r"PLATFORM_HEALTH +– +– +– +– ", text)
+        assert re.search(r"LINK_HEALTH +50 +0 +0 +0 ", text)
+        assert "PLATFORM_HEALTH" not in text  # which never came
         for label in ("mode +run", "excitation +0.[0-9]+ rad/s", "dither +off", "mean NIS", "theta +20.0"):
             assert re.search(label, text), label
         for key in ("q quit", "space hold the picture", "t time span", "c clear counts"):
@@ -165,7 +166,11 @@ def test_once(log: Path, flight: Flight, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["monitor", "--scenario", "steady", "--once", "--duration", "3"]) == 0
-    assert re.search(r"^simulation of steady · model lever · watching for 0:0[234] min$", capsys.readouterr().out, re.M)
+    assert re.search(
+        r"^simulation of steady · model lever · watching for 0:0[234] min · firmware 0.2.0$",
+        capsys.readouterr().out,
+        re.M,
+    )
 
 
 @pytest.mark.parametrize(

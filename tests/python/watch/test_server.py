@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from lever_cdkf.host_tools import cli, codec
 from lever_cdkf.host_tools.config import Config
-from lever_cdkf.host_tools.watch.sources import KEEP, Source
+from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.sil.watch.server import Server
 from lever_cdkf.sil.watch.state import State, command_of
 from python.watch.conftest import Flight
@@ -48,7 +48,10 @@ class FlightSource(Source):
 
     def command(self, values: Any) -> None:
         self.commanded.append(dict(values))
-        self.flight.send(0x120, codec.encode("COMMAND", 0, {"request": "none", **KEEP, **values}))
+        super().command(values)
+
+    def _transmit(self, identifier: int, data: bytes) -> None:
+        self.flight.send(identifier, data)
 
 
 Story = Callable[[Server], Awaitable[None]]
@@ -296,6 +299,33 @@ def test_commands_reach_the_estimator(on_server: Callable[..., FlightSource]) ->
     on_server(story)
 
 
+def test_dither_is_kept_alive_as_long_as_a_page_is_open(on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        async with Visitor(server) as visitor:
+            await visitor.ask('{"dither_rms": 0.3}')
+            for _ in range(12):
+                await visitor.hear("update")
+        while server.pages:
+            await asyncio.sleep(0.05)
+        await asyncio.sleep(0.3)
+
+    first, *kept, last = on_server(story).commanded
+    assert (first, last) == ({"dither_rms": 0.3}, {"dither_rms": 0.0})
+    assert 2 <= len(kept) <= 5  # in 1.2 s, each 0.25 s or at the next tenth
+    assert not any(kept)
+
+
+def test_a_command_that_the_estimator_refuses_is_told(on_server: Callable[..., FlightSource], flight: Flight) -> None:
+    async def story(server: Server) -> None:
+        async with Visitor(server) as visitor:
+            await visitor.hear("update")
+            flight.command({})
+            await visitor.ask('{"request": "freeze"}')  # with a counter that was there before
+            assert (await visitor.hear("refused")).startswith("the estimator refuses COMMAND: its counter is out of")
+
+    on_server(story)
+
+
 @pytest.mark.parametrize(
     ("message", "text"),
     [
@@ -306,11 +336,11 @@ def test_commands_reach_the_estimator(on_server: Callable[..., FlightSource]) ->
         ('{"request": "explode"}', "request must be one of none, run, freeze, reset"),
         ('{"request": ["freeze"]}', "request must be one of"),
         ('{"model": 3}', "model must be one of lever, "),
-        ('{"dither_rms": 1e9}', "dither_rms must be a number from 0 to 1.5 N m"),
-        ('{"dither_rms": -0.1}', "dither_rms must be a number from 0 to 1.5 N m"),
-        ('{"dither_rms": NaN}', "dither_rms must be a number from 0 to 1.5 N m"),
-        ('{"dither_rms": true}', "dither_rms must be a number from 0 to 1.5 N m"),
-        ('{"dither_rms": "0.1"}', "dither_rms must be a number from 0 to 1.5 N m"),
+        ('{"dither_rms": 1e9}', "dither_rms must be a number from 0 to 1 N m"),
+        ('{"dither_rms": -0.1}', "dither_rms must be a number from 0 to 1 N m"),
+        ('{"dither_rms": NaN}', "dither_rms must be a number from 0 to 1 N m"),
+        ('{"dither_rms": true}', "dither_rms must be a number from 0 to 1 N m"),
+        ('{"dither_rms": "0.1"}', "dither_rms must be a number from 0 to 1 N m"),
         ('{"counter": 1}', "a command has no 'counter'"),
     ],
 )

@@ -1,0 +1,57 @@
+"""COMMAND frames of one sender: they have one counter, whose sequence the estimator checks, and are acknowledged."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping
+
+from . import codec
+
+KEEP: dict[str, codec.Value] = {
+    "model": "keep",
+    "preload": "keep",
+    "estimator": "keep",
+    "adaptation": "keep",
+    "dither_rms": math.inf,
+}
+"""A COMMAND that changes nothing; infinity saturates at the value that keeps the dither."""
+
+KEEP_ALIVE = 0.25
+"""[s] after which to repeat a COMMAND, so that torque goes on: the estimator waits for a second."""
+
+ACCEPTED, SEQUENCE = "accepted", "sequence"
+_REFUSALS = {
+    "unknown_value": "it does not know a value in it",
+    SEQUENCE: "its counter is out of sequence: is there another sender of COMMAND?",
+    "fault_mode": "it is in mode fault, which only a reset leaves",
+}
+
+
+class Commander:
+    """Makes them, in any thread."""
+
+    def __init__(self) -> None:
+        self._counter = 0
+        self._lock = threading.Lock()
+
+    def send(self, values: Mapping[str, codec.Value], put: Callable[[int, bytes], None]) -> int:
+        """Has `put` send a COMMAND that changes only `values`; returns its counter, 0 to 15. Raises CodecError."""
+        with self._lock:
+            counter = self._counter
+            data = codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
+            self._counter = (counter + 1) & 15
+            put(codec.message("COMMAND").frame_id, data)
+            return counter
+
+
+def result_of(ack: Mapping[str, float]) -> str:
+    """ACCEPTED, SEQUENCE or another of the results in lever.dbc, of the fields of a COMMAND_ACK."""
+    number = int(ack["result"])
+    choices = codec.message("COMMAND_ACK").get_signal_by_name("result").choices
+    return str(choices[number]) if choices and number in choices else f"result {number}"
+
+
+def refusal(result: str) -> str:
+    """Why a COMMAND was refused, in words."""
+    return f"the estimator refuses COMMAND: {_REFUSALS.get(result, result)}"
