@@ -22,10 +22,10 @@
  *                                                   }
  *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
- * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent.
- * Cost. Every call is bounded; lever_update() is the expensive one: 2,460 instructions on a Cortex-M4F (lever model, built for
- * size as shipped; 2,060 at -O3), within 6 % the same for every sample, and up to 16 times the prediction in it, 18,200, for the
- * first one after a gap. 16.3 KB of code, 1 KiB an instance, 0.7 KiB of stack (firmware/port/PORTING.md has the budget).
+ * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent. Cost.
+ * Every call is bounded; lever_update() is the expensive one: 1,690 instructions and 2,690 cycles on a Cortex-M4F on
+ * average (lever model, as shipped), 5,000 instructions when the parameters learn (once a learn_period), 12,100 at the
+ * first sample after a gap. 20 KiB of code, 1 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
 #ifndef LEVER_CDKF_H
@@ -116,7 +116,7 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1152 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1024 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];
@@ -232,7 +232,7 @@ enum lever_fault {
     LEVER_FAULT_RECOVERED = 512,    /* an invalid factor or estimate was refused and restarted at this sample */
     LEVER_FAULT_CHANGE = 1024,      /* the pilot has changed suddenly within the last second; learning anew */
     LEVER_FAULT_PLATFORM = 2048,    /* the machine reports a fault of its own: lever_platform() */
-    LEVER_FAULT_CLOCK = 4096,       /* the sample clock stands or runs backwards */
+    LEVER_FAULT_CLOCK = 4096,       /* the sample clock stands, runs backwards or crawls (a quarter of sample_period) */
     LEVER_FAULT_DUPLICATE = 8192    /* another estimator has spoken on this bus within the last two seconds */
 };
 

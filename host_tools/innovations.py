@@ -1,6 +1,6 @@
 """The estimator's innovations on recorded samples, and how likely the samples were to it: through c/innovations.h.
 
-Arrays have the dtypes of the C structs: SAMPLE is lever_sample_t of the façade, INNOVATION is innovation_t.
+Arrays have the dtypes of the C structs: SAMPLE is lever_sample_t of the façade, INNOVATION is sample_innovation_t.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _one_at_a_time = threading.Lock()  # cffi lets other threads run meanwhile
 
 FRAME = struct_dtype("lever_frame_t")
 SAMPLE = struct_dtype("lever_sample_t")
-INNOVATION = struct_dtype("innovation_t")
+INNOVATION = struct_dtype("sample_innovation_t")
 Array = NDArray[Any]
 
 
@@ -49,7 +49,7 @@ def innovations(config: Config, samples: Array) -> Array:
             config.pointer,
             ffi.from_buffer("lever_sample_t[]", np.ascontiguousarray(samples)),
             len(samples),
-            ffi.from_buffer("innovation_t[]", result),
+            ffi.from_buffer("sample_innovation_t[]", result),
         )
     if not done:
         raise LeverError("the firmware refused its configuration: Config.pointer was changed after its check")

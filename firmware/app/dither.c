@@ -6,11 +6,11 @@
 #define HIGHEST 0.1f     /* greatest corner, in samples^-1: what the integration below is good for */
 #define SEED 2463534242u /* any but 0 (Marsaglia 2003) */
 
-/* Butterworth low-pass of second order behind the high-pass of detrend.h, by semi-implicit Euler. */
+/* Butterworth low-pass of second order behind the high-pass of trim.h, by semi-implicit Euler. */
 static float filter(dither_t *dither, float in)
 {
     const float period = dither->period;
-    const float deviation = detrend_step(&dither->high_pass, in, &dither->low, period);
+    const float deviation = high_pass_step(&dither->high_pass, in, &dither->low, period);
     const float force =
         (dither->high.square * (deviation - dither->low_pass)) - (dither->high.damping * dither->low_pass_rate);
     dither->low_pass_rate += period * force;
@@ -30,9 +30,9 @@ static float uniform(uint32_t *state)
 }
 
 /* Both filters above have the denominator z^2 - (2 - a - d) z + (1 - d), with a = (w T)^2 and d = sqrt(2) w T of their
- * corner. Its squared magnitude at z = exp(jv) is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(v/2), and with s = j tan(v/2)
- * that is |p[2] s^2 + p[1] s + p[0]|^2 / (1 - s^2)^2. */
-static void denominator_of(float p[3], const detrend_corner_t *corner, float period)
+ * corner. Its squared magnitude at z = exp(jv) is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(v/2), and with s = j
+ * tan(v/2) that is |p[2] s^2 + p[1] s + p[0]|^2 / (1 - s^2)^2. */
+static void denominator_of(float p[3], const high_pass_corner_t *corner, float period)
 {
     const float a = corner->square * period * period;
     const float d = corner->damping * period;
@@ -63,8 +63,8 @@ static float band_variance(const dither_t *dither)
 void dither_init(dither_t *dither, float low, float high, float period, float rms_most, float fade)
 {
     const float highest = HIGHEST / period;
-    dither->low = detrend_corner((low < highest) ? low : highest);
-    dither->high = detrend_corner((high < highest) ? high : highest);
+    dither->low = high_pass_corner((low < highest) ? low : highest);
+    dither->high = high_pass_corner((high < highest) ? high : highest);
     dither->period = period;
     dither->scale = sqrtf(3.0f / band_variance(dither)); /* uniform() has a variance of 1/3 */
     dither->rms_most = rms_most;
@@ -74,7 +74,8 @@ void dither_init(dither_t *dither, float low, float high, float period, float rm
 
 void dither_reset(dither_t *dither)
 {
-    detrend_start(&dither->high_pass, 0.0f);
+    dither->high_pass.level = 0.0f;
+    dither->high_pass.slope = 0.0f;
     dither->low_pass = 0.0f;
     dither->low_pass_rate = 0.0f;
     dither->target = 0.0f;
@@ -85,9 +86,16 @@ void dither_reset(dither_t *dither)
 
 void dither_set(dither_t *dither, float rms, bool at_once)
 {
-    const float change = fabsf(((rms < dither->rms_most) ? rms : dither->rms_most) - dither->level);
-    dither->target = (rms < dither->rms_most) ? rms : dither->rms_most;
-    dither->slope = (!at_once && (dither->fade > 1.0f)) ? (change / dither->fade) : change;
+    const float target = (rms < dither->rms_most) ? rms : dither->rms_most;
+    const float change = fabsf(target - dither->level);
+    if (at_once) {
+        dither->slope = change;
+    } else if ((target < dither->target) || (target > dither->target)) { /* the same again goes on as it does */
+        dither->slope = (dither->fade > 1.0f) ? (change / dither->fade) : change;
+    } else {
+        /* repeated */
+    }
+    dither->target = target;
 }
 
 /* The level goes to its target by at most the slope. */

@@ -2,24 +2,24 @@
  * through torque_gate.h.
  *
  * With base acceleration alone the common scale of m_p, c_p, k_p is hardly observable; a known torque of 0.3 to 0.5 N m
- * rms makes it so (DESIGN section 3).
+ * rms makes it so.
  */
 #ifndef APP_DITHER_H
 #define APP_DITHER_H
 
-#include "filter/detrend.h"
+#include "filter/trim.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
 typedef struct dither {
-    detrend_corner_t low; /* corners of the band */
-    detrend_corner_t high;
+    high_pass_corner_t low; /* corners of the band */
+    high_pass_corner_t high;
     float period;   /* of a step [s] */
     float scale;    /* makes the filtered noise 1 rms */
     float rms_most; /* [N m] */
     float fade;     /* steps of a fade */
-    detrend_t high_pass;
+    high_pass_t high_pass;
     float low_pass; /* output of the low-pass, and its rate [1/s] */
     float low_pass_rate;
     float target;   /* commanded rms [N m] */

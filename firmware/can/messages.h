@@ -5,16 +5,16 @@
  *
  * ..._encode() writes identifier, length and all payload bits (unused ones, CRC and counter as 0) and returns true, or
  * returns false and leaves the frame untouched.
- *   - Physical values are rounded to the nearest count, half to even. The value is scaled in single precision, which can
+ *   - Physical values are rounded to the nearest count, half to even. The value is scaled in single precision, which
+ *     can
  *     decide only a value within 0.004 counts of a tie.
  *   - A value that is NaN or does not fit its signal is sent as "not available": a smaller one would be wrong, and a
  *     standard deviation confident. In LEVER_SAMPLE and BASE_SAMPLE its flag says so, too.
  *   - Codes, flags and counts too large for their field are refused: the nearest code would mean something else.
- *   - An input whose flag is false is not read, and sent as 0.
- * ..._decode() returns true, or false and leaves the message untouched when identifier or length is not the message's,
- * or its model or page not known. Each value is the float nearest to the DBC's decimal value, so encoding it gives the
- * same bits again; one that is not available is NaN, and in LEVER_SAMPLE and BASE_SAMPLE its flag false. Codes are not
- * judged here.
+ *   - An input whose flag is false is not read, and sent as 0. ..._decode() returns true, or false and leaves the
+ *     message untouched when identifier or length is not the message's, or its model or page not known. Each value is
+ *     the float nearest to the DBC's decimal value, so encoding it gives the same bits again; one that is not available
+ *     is NaN, and in LEVER_SAMPLE and BASE_SAMPLE its flag false. Codes are not judged here.
  *
  * Cost on a Cortex-M4F at -Os: at most 250 instructions to encode and 200 to decode a message.
  */

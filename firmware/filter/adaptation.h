@@ -1,11 +1,8 @@
-/* How the random walk of the parameters is set while running. */
+/* How the random walk of the parameters is adapted. */
 #ifndef FILTER_ADAPTATION_H
 #define FILTER_ADAPTATION_H
 
-#include "filter/parameter_filter.h"
-
-#include <stdbool.h>
-#include <stdint.h>
+#include "filter/cdkf.h"
 
 typedef struct adaptation {
     uint8_t kind;                  /* enum lever_adaptation */
@@ -17,7 +14,7 @@ typedef struct adaptation {
 } adaptation_t;
 
 /* The walk to start with: annealing at its ceiling, the others at their floor. */
-void adaptation_start(const adaptation_t *adaptation, parameter_filter_t *filter);
+void adaptation_start(const adaptation_t *adaptation, cdkf_t *cdkf);
 
 /* Sets walk and growth for the next time from the correction of w that was learnt after `period` seconds.
  *   fixed          floor
@@ -26,7 +23,7 @@ void adaptation_start(const adaptation_t *adaptation, parameter_filter_t *filter
  *                  ceiling: every walk is a fixed point when the innovations match, so it drifts without them
  *   forgetting     floor, and growth = 1 / forgetting_time: lambda = exp(-period / forgetting_time) to first order
  * Without excitation the walk is held at its floor and nothing is forgotten, whatever the kind. */
-void adaptation_step(const adaptation_t *adaptation, float period, const float correction[MODEL_PARAMETERS],
-    bool excited, parameter_filter_t *filter);
+void adaptation_step(
+    const adaptation_t *adaptation, float period, const float correction[MODEL_PARAMETERS], bool excited, cdkf_t *cdkf);
 
 #endif

@@ -2,7 +2,7 @@
 #ifndef FILTER_DERIVED_H
 #define FILTER_DERIVED_H
 
-#include "filter/parameter_filter.h"
+#include "filter/cdkf.h"
 #include "model/model.h"
 
 typedef struct derived {
@@ -10,11 +10,8 @@ typedef struct derived {
     model_dynamics_t variance; /* of them */
 } derived_t;
 
-/* Both by the central difference transform over the covariance of the parameters (sigma_points.h), in parts of about equal cost:
- * first the mean and the pair of the first parameter, then the other pairs. */
-void derived_begin(derived_t *derived, const parameter_filter_t *filter, const model_t *model,
-    const model_constants_t *constants, const model_step_t *step);
-void derived_end(derived_t *derived, const parameter_filter_t *filter, const model_t *model,
-    const model_constants_t *constants, const model_step_t *step);
+/* Both by the central difference transform over the covariance of the parameters (cdkf.h). */
+void derived_compute(derived_t *derived, const cdkf_t *cdkf, const model_t *model, const model_constants_t *constants,
+    const model_step_t *step);
 
 #endif

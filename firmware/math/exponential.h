@@ -8,6 +8,8 @@
 #ifndef MATH_EXPONENTIAL_H
 #define MATH_EXPONENTIAL_H
 
+#include "math/rounding.h"
+
 #include <stdint.h>
 #include <string.h>
 
@@ -15,9 +17,8 @@ static inline float exponential(float x)
 {
     float inside = (x <= 80.0f) ? x : 80.0f;
     inside = (inside >= -80.0f) ? inside : -80.0f;
-    const float octaves = inside * 1.44269504f;
-    const int32_t n = (int32_t)(octaves + ((octaves < 0.0f) ? -0.5f : 0.5f));
-    const float multiple = (float)n;
+    const float multiple = nearest_integer(inside * 1.44269504f);
+    const int32_t n = (int32_t)multiple;
     const float r = (inside - (multiple * 0.693359375f)) + (multiple * 2.12194440e-4f); /* ln 2 in two parts */
 
     const float tail =
@@ -31,8 +32,8 @@ static inline float exponential(float x)
     return mantissa * scale;
 }
 
-/* Natural logarithm for x in [1e-4, 1e4], at most 2e-6 absolute off: Newton on the exponential from exponent and mantissa
- * as first guess (0.06 off). For initialisation. */
+/* Natural logarithm for x in [1e-4, 1e4], at most 2e-6 absolute off: Newton on the exponential from exponent and
+ * mantissa as first guess (0.06 off). For initialisation. */
 static inline float logarithm(float x)
 {
     uint32_t bits;

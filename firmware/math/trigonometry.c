@@ -1,5 +1,7 @@
 #include "math/trigonometry.h"
 
+#include "math/rounding.h"
+
 #include <math.h>
 #include <stdint.h>
 
@@ -7,8 +9,8 @@ sine_cosine_t sine_cosine(float angle)
 {
     const float inside = (fabsf(angle) <= 30.0f) ? angle : 0.0f;
     const float turns = inside * 0.636619772f; /* in units of pi/2 */
-    const int32_t quadrant = (int32_t)(turns + ((turns < 0.0f) ? -0.5f : 0.5f));
-    const float multiple = (float)quadrant;
+    const float multiple = nearest_integer(turns);
+    const int32_t quadrant = (int32_t)multiple;
     const float r = (inside - (multiple * 1.5703125f)) - (multiple * 4.83826794e-4f); /* pi/2 in two parts */
 
     const float z = r * r;

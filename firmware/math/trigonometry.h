@@ -15,14 +15,14 @@ typedef struct sine_cosine {
 
 sine_cosine_t sine_cosine(float angle);
 
-/* The same of a small angle, by Taylor series. Error: at most 5e-7 for |angle| <= 0.25 rad, 3e-5 for 0.5 rad. A fifth of
- * the cost. */
+/* The same of a small angle, by Taylor series. Error: at most 1.2e-7 for |angle| <= 0.25 rad, 2e-6 for 0.5 rad. A
+ * quarter of the cost. */
 static inline sine_cosine_t sine_cosine_small(float angle)
 {
     const float z = angle * angle;
     sine_cosine_t result;
     result.sine = angle * (1.0f - (z * (0.166666667f - (z * 0.00833333333f))));
-    result.cosine = 1.0f - (z * (0.5f - (z * 0.0416666667f)));
+    result.cosine = 1.0f - (z * (0.5f - (z * (0.0416666667f - (z * 0.00138888889f)))));
     return result;
 }
 

@@ -1,10 +1,11 @@
 /* The nonlinear lever: a rigid lever on a vertically accelerated base, held by a pilot's arm.
  *
- *   M theta_ddot + (c_p l^2 cos^2 theta + c_l) theta_dot + g l mu cos theta + l^2 k_p (sin theta - sin theta_a) cos theta
+ *   M theta_ddot + (c_p l^2 cos^2 theta + c_l) theta_dot + g l mu cos theta + l^2 k_p (sin theta - sin theta_a) cos
+ * theta
  *     + k_l (theta - theta_l) = -l mu cos theta z_ddot + tau_m
  *   M = l^2 (eta^2 m_l + m_p) + J_l,   mu = eta m_l + m_p
  *
- * Lagrangian with the arm as mass, damper and spring acting vertically at the grip (DESIGN section 3). The equation as
+ * Lagrangian with the arm as mass, damper and spring acting vertically at the grip. The equation as
  * published prints m_l + m_p in the gravity and forcing terms and loses sin theta_a and theta_l; this is the form that
  * follows from the energies (tests/python/sil derives it again).
  *
@@ -23,20 +24,21 @@
 
 #define GRAVITY 9.80665f /* [m/s^2] */
 
-/* The coefficients of an arm. */
-enum arm {
+/* The coefficients. */
+enum {
     INERTIA,  /* M [kg m^2] */
     FORCING,  /* l mu: torque per acceleration and cosine [kg m] */
     DAMPING,  /* l^2 c_p [N m s/rad] */
     STIFFNESS /* l^2 k_p [N m/rad] */
 };
 
-static void prepare(const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_arm_t *arm)
+static void prepare(
+    const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_coefficients_t *coefficients)
 {
-    arm->coefficient[INERTIA] = constants->inertia + (constants->length_squared * p[0]);
-    arm->coefficient[FORCING] = constants->length * (constants->mass_moment + p[0]);
-    arm->coefficient[DAMPING] = constants->length_squared * p[1];
-    arm->coefficient[STIFFNESS] = constants->length_squared * p[2];
+    coefficients->c[INERTIA] = constants->inertia + (constants->length_squared * p[0]);
+    coefficients->c[FORCING] = constants->length * (constants->mass_moment + p[0]);
+    coefficients->c[DAMPING] = constants->length_squared * p[1];
+    coefficients->c[STIFFNESS] = constants->length_squared * p[2];
 }
 
 /* What the points of a step share. */
@@ -48,15 +50,54 @@ typedef struct shared {
     float damping;      /* the lever's own */
 } shared_t;
 
-/* Change of theta_dot at a point: angle by sine and cosine, torque of lever spring and motor there. */
-static inline float change_at(
-    const shared_t *shared, const model_arm_t *arm, float sine, float cosine, float torque, float theta_dot)
+/* A point's change of theta_dot is force / inertia. */
+typedef struct fraction {
+    float arm;     /* force of the arm along cos theta, gravity and base included */
+    float damping; /* D */
+    float force;   /* times the period */
+    float inertia; /* M + T/2 D */
+} fraction_t;
+
+/* At a point: angle by sine and cosine, torque of lever spring and motor there. */
+static inline fraction_t fraction_at(
+    const shared_t *shared, const float *c, float sine, float cosine, float torque, float theta_dot)
 {
-    const float *of = arm->coefficient;
-    const float damping = (of[DAMPING] * (cosine * cosine)) + shared->damping;
-    const float arm_force = (of[FORCING] * shared->acceleration) + (of[STIFFNESS] * (sine - shared->rest_sine));
-    const float force = (torque - (cosine * arm_force)) - (damping * theta_dot);
-    return (shared->period * force) / (of[INERTIA] + (shared->half * damping));
+    fraction_t at;
+    at.arm = (c[FORCING] * shared->acceleration) + (c[STIFFNESS] * (sine - shared->rest_sine));
+    at.damping = (c[DAMPING] * (cosine * cosine)) + shared->damping;
+    at.force = shared->period * ((torque - (cosine * at.arm)) - (at.damping * theta_dot));
+    at.inertia = c[INERTIA] + (shared->half * at.damping);
+    return at;
+}
+
+/* Change at the mean and its slopes there, by the quotient rule; theta_m depends on theta_dot, too. */
+static inline void respond_at_mean(const shared_t *shared, const float *c, const fraction_t *at, sine_cosine_t angle,
+    float stiffness, float theta_dot, model_response_t *response)
+{
+    const float inverse = 1.0f / at->inertia;
+    const float change = at->force * inverse;
+    const float damping_slope = -2.0f * (c[DAMPING] * (angle.cosine * angle.sine));
+    const float arm_slope = (angle.sine * at->arm) - (c[STIFFNESS] * (angle.cosine * angle.cosine));
+    const float force_slope = shared->period * ((arm_slope - stiffness) - (damping_slope * theta_dot));
+    const float slope = (force_slope - ((shared->half * damping_slope) * change)) * inverse;
+    response->mean = change;
+    response->slope[0] = slope;
+    response->slope[1] = (shared->half * slope) - ((shared->period * at->damping) * inverse);
+}
+
+/* Sine and cosine of an angle that is mostly near the trim, of which they are known. */
+static inline sine_cosine_t sine_cosine_beside(const model_step_t *step, float angle)
+{
+    const float beside = angle - step->trim;
+    sine_cosine_t result;
+    if (fabsf(beside) <= 0.25f) {
+        const sine_cosine_t by = sine_cosine_small(beside);
+        result.sine = (step->trim_sine * by.cosine) + (step->trim_cosine * by.sine);
+        result.cosine = (step->trim_cosine * by.cosine) - (step->trim_sine * by.sine);
+    } else {
+        result = sine_cosine(angle);
+    }
+    return result;
 }
 
 static void respond(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
@@ -70,45 +111,45 @@ static void respond(const model_constants_t *constants, const model_step_t *step
     const float rest = constants->trim ? step->trim : constants->lever_preload_angle;
     const float theta_dot = points->x[1];
     const float middle = step->origin + (points->x[0] + (shared.half * theta_dot));
-    const sine_cosine_t at = sine_cosine(middle);
+    const sine_cosine_t angle = sine_cosine_beside(step, middle);
     const float torque = step->tau_m - (constants->stiffness * (middle - rest));
-    response->mean = change_at(&shared, &points->arm[0], at.sine, at.cosine, torque, theta_dot);
-    for (uint32_t j = 0u; j < (uint32_t)MODEL_PAIRS; j++) {
-        const bool moves_arm = (j < (uint32_t)MODEL_PARAMETERS);
-        const model_arm_t *plus_arm = &points->arm[moves_arm ? (1u + (2u * j)) : 0u];
-        const model_arm_t *minus_arm = &points->arm[moves_arm ? (2u + (2u * j)) : 0u];
+    const float *c = points->coefficients[0].c;
+    const fraction_t mean = fraction_at(&shared, c, angle.sine, angle.cosine, torque, theta_dot);
+    respond_at_mean(&shared, c, &mean, angle, constants->stiffness, theta_dot, response);
+    for (uint32_t j = 0u; j < (uint32_t)MODEL_PARAMETERS; j++) {
         const float rate = points->offset[j][1];
-        const float angle = points->offset[j][0] + (shared.half * rate);
-        const sine_cosine_t by = sine_cosine_small(angle);
-        const float sine = at.sine * by.cosine; /* addition theorem: the parts that + and - share, and the others */
-        const float cosine = at.cosine * by.cosine;
-        const float more_sine = at.cosine * by.sine;
-        const float less_cosine = at.sine * by.sine;
-        const float less_torque = constants->stiffness * angle;
-        const float plus = change_at(
-            &shared, plus_arm, sine + more_sine, cosine - less_cosine, torque - less_torque, theta_dot + rate);
-        const float minus = change_at(
-            &shared, minus_arm, sine - more_sine, cosine + less_cosine, torque + less_torque, theta_dot - rate);
-        model_response_pair(response, j, plus, minus);
+        const float ahead = points->offset[j][0] + (shared.half * rate);
+        const sine_cosine_t by = sine_cosine_small(ahead);
+        const float sine = angle.sine * by.cosine; /* addition theorem: what + and - share, and what they do not */
+        const float cosine = angle.cosine * by.cosine;
+        const float more_sine = angle.cosine * by.sine;
+        const float less_cosine = angle.sine * by.sine;
+        const float less_torque = constants->stiffness * ahead;
+        const fraction_t plus = fraction_at(&shared, points->coefficients[1u + (2u * j)].c, sine + more_sine,
+            cosine - less_cosine, torque - less_torque, theta_dot + rate);
+        const fraction_t minus = fraction_at(&shared, points->coefficients[2u + (2u * j)].c, sine - more_sine,
+            cosine + less_cosine, torque + less_torque, theta_dot - rate);
+        model_response_pair(response, j, plus.force, plus.inertia, minus.force, minus.inertia);
     }
 }
 
-/* K = d/dtheta of the restoring torque and D at the trim; omega = sqrt(K/M), zeta = D / (2 M omega). A trim at which the
- * lever would fall (K <= 0) has frequency 0 and damping ratio 0. */
-static model_dynamics_t dynamics(const model_constants_t *constants, const model_step_t *step, const model_arm_t *arm)
+/* K = d/dtheta of the restoring torque and D at the trim; omega = sqrt(K/M), zeta = D / (2 M omega). A trim at which
+ * the lever would fall (K <= 0) has frequency 0 and damping ratio 0. */
+static model_dynamics_t dynamics(
+    const model_constants_t *constants, const model_step_t *step, const model_coefficients_t *coefficients)
 {
-    const float *of = arm->coefficient;
+    const float *c = coefficients->c;
     const float squared = step->trim_cosine * step->trim_cosine;
-    const float weight = GRAVITY * of[FORCING];
+    const float weight = GRAVITY * c[FORCING];
     const float geometric =
-        constants->trim ? 0.0f : ((of[STIFFNESS] * (constants->arm_preload_sine - step->trim_sine)) - weight);
-    const float stiffness = (of[STIFFNESS] * squared) + (geometric * step->trim_sine) + constants->stiffness;
-    const float damping = (of[DAMPING] * squared) + constants->damping;
+        constants->trim ? 0.0f : ((c[STIFFNESS] * (constants->arm_preload_sine - step->trim_sine)) - weight);
+    const float stiffness = (c[STIFFNESS] * squared) + (geometric * step->trim_sine) + constants->stiffness;
+    const float damping = (c[DAMPING] * squared) + constants->damping;
     model_dynamics_t result = {0.0f, 0.0f};
     if (stiffness > 0.0f) {
-        const float omega = sqrtf(stiffness / of[INERTIA]);
+        const float omega = sqrtf(stiffness / c[INERTIA]);
         result.natural_frequency = omega * MODEL_INVERSE_TURN;
-        result.damping_ratio = damping / (2.0f * (of[INERTIA] * omega));
+        result.damping_ratio = damping / (2.0f * (c[INERTIA] * omega));
     }
     return result;
 }

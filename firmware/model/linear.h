@@ -12,18 +12,19 @@
 
 #include "model/model.h"
 
-/* The coefficients of an arm. */
-enum linear {
+/* The coefficients. */
+enum {
     LINEAR_STIFFNESS, /* [1/s^2] */
     LINEAR_DAMPING,   /* [1/s] */
     LINEAR_BASE,      /* answer to the base acceleration [unit of x / m] */
     LINEAR_TORQUE     /* and to the motor torque [unit of x / (s^2 N m)] */
 };
 
-/* model_t.respond and model_t.dynamics of the linear models. Without a restoring stiffness there is no natural frequency: it
- * and the damping ratio are 0. */
+/* model_t.respond and model_t.dynamics of the linear models. Without a restoring stiffness there is no natural
+ * frequency: it and the damping ratio are 0. */
 void linear_respond(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
     model_response_t *response);
-model_dynamics_t linear_dynamics(const model_constants_t *constants, const model_step_t *step, const model_arm_t *arm);
+model_dynamics_t linear_dynamics(
+    const model_constants_t *constants, const model_step_t *step, const model_coefficients_t *coefficients);
 
 #endif

@@ -1,20 +1,21 @@
-/* A second-order system that nobody looks into (DESIGN section 3):
+/* A second-order system that nobody looks into:
  *
  *   x_ddot = a21 x + a22 x_dot + b21 z_ddot
  *
- * with p = [a21, a22, b21] of any sign. x is theta as a deviation from the trim (preload trim) or from lever_preload_angle. The
- * motor torque is not part of it: run it without one.
+ * with p = [a21, a22, b21] of any sign. x is theta as a deviation from the trim (preload trim) or from
+ * lever_preload_angle. The motor torque is not part of it: run it without one.
  */
 #include "model/linear.h"
 #include "model/model.h"
 
-static void prepare(const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_arm_t *arm)
+static void prepare(
+    const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_coefficients_t *coefficients)
 {
     (void)constants;
-    arm->coefficient[LINEAR_STIFFNESS] = -p[0];
-    arm->coefficient[LINEAR_DAMPING] = -p[1];
-    arm->coefficient[LINEAR_BASE] = p[2];
-    arm->coefficient[LINEAR_TORQUE] = 0.0f;
+    coefficients->c[LINEAR_STIFFNESS] = -p[0];
+    coefficients->c[LINEAR_DAMPING] = -p[1];
+    coefficients->c[LINEAR_BASE] = p[2];
+    coefficients->c[LINEAR_TORQUE] = 0.0f;
 }
 
 const model_t model_linear_black_box = {

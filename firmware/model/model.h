@@ -1,10 +1,11 @@
-/* What a model of arm and lever is: a const descriptor with the response of sigma points, names, units and bounds.
+/* What a model of the pilot's arm on the lever is: a const descriptor with its response to a step, names, units and
+ * bounds.
  *
- * All models have the state x = [theta, theta_dot] (in preload trim: their deviations from the trim), three parameters p, the
- * inputs u = [z_ddot, tau_m] and the outputs y = x. Over a step of T seconds theta_dot changes by what the model says, and
- * theta by T (theta_dot + change / 2): the midpoint rule, which is the same for all of them. Sigma points are told apart by
- * their offsets from the mean, and changes instead of new values are told of them: differences are then differences of small
- * numbers, which is what keeps a float filter alive when measurement noise is near float resolution.
+ * All models have the state x = [theta, theta_dot] (in preload trim: deviations from the trim), three parameters p,
+ * the inputs u = [z_ddot, tau_m] and the outputs y = x. Over a step of T seconds theta_dot changes by what the model
+ * says, and theta by T (theta_dot + change / 2): the midpoint rule, the same for all models. Models return changes,
+ * not new values, and points are given by their offsets from the mean. So differences are those of small numbers,
+ * which single precision needs when the measurement noise is near its resolution.
  */
 #ifndef MODEL_MODEL_H
 #define MODEL_MODEL_H
@@ -17,34 +18,31 @@
 enum {
     MODEL_STATES = 2,
     MODEL_PARAMETERS = 3,
-    MODEL_PAIRS = MODEL_PARAMETERS + MODEL_STATES,
-    MODEL_PARAMETER_POINTS = 1 + (2 * MODEL_PARAMETERS),
+    MODEL_POINTS = 1 + (2 * MODEL_PARAMETERS), /* sigma points of the parameters: the mean, then + and - of each pair */
     MODEL_COEFFICIENTS = 4
 };
 
-/* What a step needs of the parameters p, made of them once for many steps. What each is, is the model's. */
-typedef struct model_arm {
-    float coefficient[MODEL_COEFFICIENTS];
-} model_arm_t;
+/* What a step needs of the parameters p, computed once for many steps. The meaning is the model's. */
+typedef struct model_coefficients {
+    float c[MODEL_COEFFICIENTS];
+} model_coefficients_t;
 
-/* The sigma points of state and parameters, for one call of the model: the mean; then a pair for each column of the
- * parameters' factor, in which the state moves along with the parameters; then a pair for each column of the state's own
- * factor, at the mean parameters. */
+/* The sigma points of the parameters with the states that go with them, all for one call of the model. */
 typedef struct model_points {
-    float x[MODEL_STATES];                   /* the mean */
-    float offset[MODEL_PAIRS][MODEL_STATES]; /* the states of a pair are x + offset and x - offset */
-    const model_arm_t *arm; /* [MODEL_PARAMETER_POINTS]: of the mean; of + and - of each parameter pair */
+    float x[MODEL_STATES];                        /* at the mean */
+    float offset[MODEL_PARAMETERS][MODEL_STATES]; /* the states of a pair are x + offset and x - offset */
+    const model_coefficients_t *coefficients;     /* [MODEL_POINTS] */
 } model_points_t;
 
-/* How theta_dot changes over a step [rad/s]: at the mean; and of each pair the difference, f(+) - f(-), and the bend,
- * f(+) + f(-) - 2 f(mean). */
+/* The change f of theta_dot over a step [rad/s]. */
 typedef struct model_response {
-    float mean;
-    float difference[MODEL_PAIRS];
-    float bend[MODEL_PAIRS];
+    float mean;                                /* f at the mean */
+    float slope[MODEL_STATES];                 /* df / dtheta and df / dtheta_dot there */
+    float difference[MODEL_PARAMETERS];        /* of each pair: f(+) - f(-) */
+    float second_difference[MODEL_PARAMETERS]; /* f(+) + f(-) - 2 f(mean) */
 } model_response_t;
 
-/* What is constant in a lever: derived once from the settings, so that a propagation does not redo it. */
+/* Constants of the lever, derived from the settings once. */
 typedef struct model_constants {
     float length;              /* l [m] */
     float length_squared;      /* l^2 [m^2] */
@@ -85,21 +83,28 @@ typedef struct model {
     model_parameter_t parameter[MODEL_PARAMETERS];
     bool positive; /* all parameters are, and are estimated on a logarithmic scale; else on a linear one */
 
-    void (*prepare)(const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_arm_t *arm);
+    void (*prepare)(
+        const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_coefficients_t *coefficients);
 
-    /* The response of all points at once: what they share is computed once. */
+    /* The response of all points in one call, so that they share its trigonometry. */
     void (*respond)(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
         model_response_t *response);
 
-    /* Natural frequency and damping ratio of the model linearised about the trim: its angle, sine and cosine in `step`. */
-    model_dynamics_t (*dynamics)(const model_constants_t *constants, const model_step_t *step, const model_arm_t *arm);
+    /* Natural frequency and damping ratio of the model linearised about the trim: its angle, sine and cosine in
+     * `step`. */
+    model_dynamics_t (*dynamics)(
+        const model_constants_t *constants, const model_step_t *step, const model_coefficients_t *coefficients);
 } model_t;
 
-/* Takes down what a pair of points has given. */
-static inline void model_response_pair(model_response_t *response, uint32_t pair, float plus, float minus)
+/* Both differences of a pair whose changes are the fractions force / inertia: one division. */
+static inline void model_response_pair(model_response_t *response, uint32_t pair, float plus_force, float plus_inertia,
+    float minus_force, float minus_inertia)
 {
+    const float inverse = 1.0f / (plus_inertia * minus_inertia);
+    const float plus = (plus_force * minus_inertia) * inverse;
+    const float minus = (minus_force * plus_inertia) * inverse;
     response->difference[pair] = plus - minus;
-    response->bend[pair] = (plus - response->mean) + (minus - response->mean);
+    response->second_difference[pair] = (plus - response->mean) + (minus - response->mean);
 }
 
 extern const model_t model_lever;            /* nonlinear lever: m_p, c_p, k_p */

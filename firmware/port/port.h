@@ -45,8 +45,8 @@ typedef struct port {
     /* Reports the state of the machine, before each sample is stepped; NULL: it has nothing to report. */
     void (*status)(void *self, lever_platform_t *status);
 
-    /* After PORT_DOWN, one attempt to bring the link back: PORT_DONE, PORT_DOWN (still lost) or PORT_BROKEN. NULL: a link
-     * that is never down. */
+    /* After PORT_DOWN, one attempt to bring the link back: PORT_DONE, PORT_DOWN (still lost) or PORT_BROKEN. NULL: a
+     * link that is never down. */
     enum port_result (*restore)(void *self);
 } port_t;
 

@@ -1,28 +1,29 @@
 /* The likelihood by the prediction error decomposition (Schweppe 1965): the density of all samples is the product of what was
  * predicted for each, given those before it. The prediction for a sample is normal about x, with the covariance
- *     S_x S_x^T + T T^T + R
- * of the belief in filter/dual.h and the noise of the outputs. Samples from which the parameters learn together (learn_period)
+ *     S_xx S_xx^T + S_xw S_xw^T + R
+ * of the belief in filter/cdkf.h and the noise of the outputs. Samples from which the parameters learn together (learn_period)
  * count as if each were predicted by itself, as the firmware's own NIS has it; what they have in common is second order.
  */
 #include "innovations.h"
 
 #include "app/instance.h"
-#include "filter/dual.h"
+#include "filter/cdkf.h"
 #include "lever_cdkf.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-/* The seam: dual_update() of filter/dual.c, which is built with this name here (CMakeLists.txt), so that its caller in app/ comes
- * to the one below instead. */
-float firmware_update(dual_t *dual, const measurement_t *measurement, bool learn);
+/* cdkf_measurement_update() of filter/cdkf.c, which is built with this name here (CMakeLists.txt), so that its caller in app/
+ * comes to the one below instead. */
+void firmware_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
+    innovation_t innovation[CDKF_OUTPUTS]);
 
 #define PARAMETERS ((uint32_t)MODEL_PARAMETERS)
 #define BOTH ((uint32_t)INNOVATION_OUTPUTS)
 #define LN_TURN 1.8378770664093453 /* ln 2 pi */
 
-static innovation_t *current; /* of the sample that the estimator is taking; NULL: nobody asks */
+static sample_innovation_t *current; /* of the sample that the estimator is taking; NULL: nobody asks */
 
 static double squared(double x)
 {
@@ -36,14 +37,15 @@ static double squared_of(float x)
 
 /* Notes what is predicted for a sample. An output that was not measured has no innovation, and counts in units of its own, so
  * that it has no part in determinants. */
-static void note_prediction(dual_t *dual, const measurement_t *measurement, innovation_t *innovation)
+static void note_prediction(
+    const cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], sample_innovation_t *innovation)
 {
-    const state_filter_t *state = &dual->state;
-    const float *t = parameter_filter_sensitivity(&dual->parameters);
-    const bool both = measurement->valid[0] && measurement->valid[1];
-    double a = squared_of(state->s[0]) + squared_of(state->output_noise[0]);
-    double b = (double)state->s[0] * (double)state->s[2];
-    double d = squared_of(state->s[2]) + squared_of(state->s[3]) + squared_of(state->output_noise[1]);
+    const float *own = cdkf->s_xx;
+    const float *t = &cdkf->s[PARAMETERS * PARAMETERS]; /* S_xw */
+    const bool both = valid[0] && valid[1];
+    double a = squared_of(own[0]) + squared_of(cdkf->output_noise[0]);
+    double b = (double)own[0] * (double)own[2];
+    double d = squared_of(own[2]) + squared_of(own[3]) + squared_of(cdkf->output_noise[1]);
     for (uint32_t j = 0u; j < PARAMETERS; j++) {
         a += squared_of(t[j]);
         b += (double)t[j] * (double)t[PARAMETERS + j];
@@ -52,32 +54,32 @@ static void note_prediction(dual_t *dual, const measurement_t *measurement, inno
     double nu[INNOVATION_OUTPUTS];
     const double variance[INNOVATION_OUTPUTS] = {a, d};
     for (uint32_t i = 0u; i < BOTH; i++) {
-        const bool valid = measurement->valid[i];
-        nu[i] = valid ? ((double)measurement->y[i] - (double)state->x[i]) : 0.0;
+        nu[i] = valid[i] ? ((double)y[i] - (double)cdkf->x[i]) : 0.0;
         innovation->value[i] = (float)nu[i];
-        innovation->sigma[i] = valid ? (float)sqrt(variance[i]) : 0.0f;
-        innovation->size = (uint8_t)(innovation->size + (valid ? 1u : 0u));
+        innovation->sigma[i] = valid[i] ? (float)sqrt(variance[i]) : 0.0f;
+        innovation->size = (uint8_t)(innovation->size + (valid[i] ? 1u : 0u));
     }
-    a = measurement->valid[0] ? a : 1.0;
+    a = valid[0] ? a : 1.0;
     b = both ? b : 0.0;
-    d = measurement->valid[1] ? d : 1.0;
+    d = valid[1] ? d : 1.0;
     const double determinant = (a * d) - squared(b);
     const double nis = ((d * squared(nu[0])) - (2.0 * b * nu[0] * nu[1]) + (a * squared(nu[1]))) / determinant;
     innovation->nis = (float)nis;
     innovation->log_likelihood = -0.5 * (nis + log(determinant) + (LN_TURN * (double)innovation->size));
 }
 
-float dual_update(dual_t *dual, const measurement_t *measurement, bool learn)
+void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
+    innovation_t innovation[CDKF_OUTPUTS])
 {
     if (current != NULL) {
-        note_prediction(dual, measurement, current);
+        note_prediction(cdkf, y, valid, current);
         current->learns = learn;
     }
-    return firmware_update(dual, measurement, learn);
+    firmware_update(cdkf, y, valid, learn, innovation);
 }
 
 bool innovation_run(
-    const lever_config_t *config, const lever_sample_t *samples, uint32_t count, innovation_t *innovations)
+    const lever_config_t *config, const lever_sample_t *samples, uint32_t count, sample_innovation_t *innovations)
 {
     static lever_memory_t memory;
     lever_t *lever = lever_init(&memory, config);

@@ -1,17 +1,17 @@
 """A float64 oracle for the firmware's estimator, written from the equations and not from the C.
 
-It repeats what the firmware does (DESIGN sections 3 and 4) the plain way: full sigma-point sets, every matrix a numpy
+It does what the firmware does (DESIGN sections 3 and 4) the plain way: full sigma-point sets, every matrix a numpy
 array, LAPACK's QR for every factor. It shares no code and no shortcut with the firmware, so where both agree both are
 probably right. It is also the readable version of the estimator:
 
 - `cdkf`             the square-root Central Difference Kalman Filter for any model: draw, predict, measure, update;
 - `lever` `linear`   the models: the step of the motion, natural frequency and damping ratio;
-- `scale`            how a model's parameters are scaled, and what is known of them before the first sample;
-- `belief`           what is known of state and parameters, and how samples change it: dual, joint, joint in one piece;
-- `dual`             the whole estimator: when it learns, adaptation of the parameter noise, trim, gaps, alignment.
+- `scale`            how a model's parameters are scaled, and their prior;
+- `belief`           the belief about state and parameters, and how samples change it: dual, joint, augmented;
+- `estimator`        the whole estimator: when it learns, adaptation of the parameter noise, trim, gaps, alignment.
 """
 
-from .dual import DualFilter, Start, align, run
+from .estimator import Estimator, Start, align, run
 from .lever import Lever
 
-__all__ = ["DualFilter", "Lever", "Start", "align", "run"]
+__all__ = ["Estimator", "Lever", "Start", "align", "run"]

@@ -27,7 +27,7 @@ C2 = (H_SQUARED - 1.0) ** 0.5 / (2.0 * H_SQUARED)  # weight of second difference
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a belief predicts for an output of m values, and how far it trusts that."""
+    """What a belief predicts for an output of m values, and the covariance of the innovation."""
 
     mean: Array  # (m,) expected output
     first: Array  # (m, n) C, first differences: the part that is linear in the state
@@ -47,8 +47,8 @@ def tria(matrix: Array) -> Array:
 def draw(mean: Array, factor: Array) -> Array:
     """The sigma points of a belief, shape (n, 2n + 1)."""
     centre = mean[:, np.newaxis]
-    spread = H * factor
-    return np.concatenate((centre, centre + spread, centre - spread), axis=1)
+    offset = H * factor
+    return np.concatenate((centre, centre + offset, centre - offset), axis=1)
 
 
 def differences(values: Array) -> tuple[Array, Array, Array]:
@@ -93,7 +93,7 @@ def update(mean: Array, factor: Array, measurement: Measurement, k: Array, innov
 
 
 def normalised_square(factor: Array, innovation: Array) -> float:
-    """Normalised innovation squared νᵀ (S_y S_yᵀ)⁻¹ ν: chi-square with m degrees of freedom for an honest filter."""
+    """Normalised innovation squared νᵀ (S_y S_yᵀ)⁻¹ ν: chi-square with m degrees of freedom if consistent."""
     whitened = np.linalg.solve(factor, innovation)
     return float(whitened @ whitened)
 

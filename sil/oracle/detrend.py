@@ -1,7 +1,7 @@
 """Deviation of a signal from its slowly moving level, by a second-order Butterworth high-pass.
 
-Outputs and inputs that are detrended alike obey the same linear dynamics; what moves slowly and is not known, the
-pilot's trim above all, drops out.
+Outputs and inputs that are detrended alike obey the same linear dynamics; what moves slowly and is unknown, the pilot's
+trim above all, drops out.
 """
 
 import math

@@ -1,10 +1,10 @@
-"""The two linear models, in float64: a mass with spring and damper on a base, and a system that nobody looks into.
+"""The two linear models, in float64: a mass with spring and damper on a base, and a black box.
 
     physical    x_ddot = -(k/m) x - (c/m) x_dot + z_ddot + f/m      p = [m kg, c N s/m, k N/m], all positive
     black box   x_ddot = a21 x + a22 x_dot + b21 z_ddot             p = [a21 1/s², a22 1/s, b21], of any sign
 
 x is what the samples carry as theta, counted from the trim (preload trim) or from where the lever's spring rests
-(preload fixed); f is what they carry as motor torque, of which the black box knows nothing. Both have the interface of
+(preload fixed); f is what they carry as motor torque, which the black box does not take. Both have the interface of
 `lever.Lever`: `step` and `dynamics`.
 """
 

@@ -1,4 +1,4 @@
-"""How the parameters of a model are scaled for a filter, and what the settings say of them.
+"""How the parameters of a model are scaled for a filter, and their prior.
 
 Positive parameters are filtered as w = ln(p / guess): they stay positive, and a random walk of w is a relative one.
 Parameters of either sign are filtered as w = (p - guess) / sigma.
@@ -21,7 +21,7 @@ SIGNED = frozenset(("linear_black_box",))
 
 @dataclass(frozen=True)
 class Scale:
-    """Of one model: what is known of its n parameters before the first sample, and how they walk."""
+    """Of one model: the prior of its n parameters, and how they walk."""
 
     names: tuple[str, ...]
     positive: bool

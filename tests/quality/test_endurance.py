@@ -3,6 +3,10 @@
 The program of endurance/ is the firmware's core twice, once as shipped and once with every float a double and libm's
 functions for its own. Both see the same samples: an arm that drifts by a factor of two, and an arm that is hardly
 shaken, so that what a sample adds to the covariance is less than single precision holds.
+
+Change detection and noise estimation compare with thresholds. A value that is on its threshold may fall on either side
+of it by rounding alone, after which the two differ for a while. So the filter by itself is held to a tighter bound, and
+the filter with both to a wider one for all but a hundredth of the hour.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from quality import tools
 
 SECONDS = 3600
 LINES_A_SECOND = 10
-WITHIN = 0.05
+PLAIN, SHIPPED = 0.003, 0.05
 """Greatest difference of the two, in standard deviations; and of their standard deviations, relatively."""
 
 
@@ -32,32 +36,35 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @cache
-def flown(program: Path, scene: str, estimator: int) -> np.ndarray:
+def flown(program: Path, scene: str, estimator: int, settings: str) -> np.ndarray:
     """Columns: time [s], then value and standard deviation of each parameter."""
-    result = tools.run([program, scene, str(estimator), str(SECONDS)])
+    result = tools.run([program, scene, str(estimator), settings, str(SECONDS)])
     assert result.returncode == 0, "the belief broke its invariant"
     return np.array([line.split() for line in result.stdout.splitlines()], dtype=np.float64)
 
 
 @pytest.mark.requires("cc|gcc|clang")
 @pytest.mark.parametrize("scene", ["drift", "calm"])
+@pytest.mark.parametrize(("settings", "within", "share"), [("plain", PLAIN, 1.0), ("default", SHIPPED, 0.99)])
 @pytest.mark.parametrize(("estimator", "name"), enum_names("lever_estimator").items())
-def test_single_precision_goes_where_double_goes(programs: Path, scene: str, estimator: int, name: str) -> None:
+def test_single_precision_goes_where_double_goes(
+    programs: Path, scene: str, settings: str, within: float, share: float, estimator: int, name: str
+) -> None:
     with ThreadPoolExecutor() as pool:
-        both = pool.map(lambda precision: flown(programs / precision, scene, estimator), ("single", "double"))
+        both = pool.map(lambda precision: flown(programs / precision, scene, estimator, settings), ("single", "double"))
     single, double = both
     assert len(single) == len(double) == SECONDS * LINES_A_SECOND
     value, sigma = slice(1, None, 2), slice(2, None, 2)
-    assert (np.abs(single[:, value] - double[:, value]) / double[:, sigma]).max() <= WITHIN
-    assert np.abs(single[:, sigma] / double[:, sigma] - 1.0).max() <= WITHIN
+    for difference in ((single - double)[:, value] / double[:, sigma], single[:, sigma] / double[:, sigma] - 1.0):
+        assert np.quantile(np.abs(difference).max(axis=1), share) <= within
 
 
 @pytest.mark.requires("cc|gcc|clang")
 def test_the_two_scenes_are_what_they_claim(programs: Path) -> None:
-    """Drift: followed, and surely. Calm: little is learnt, and uncertainty does not wind up."""
-    drift, calm = (flown(programs / "single", scene, 0) for scene in ("drift", "calm"))
-    drift_unsure, calm_unsure = (np.median(run[:, 6] / run[:, 5]) for run in (drift, calm))
+    """Drift: followed, with a small sigma. Calm: little is learnt, and uncertainty does not wind up."""
+    drift, calm = (flown(programs / "single", scene, 0, "default") for scene in ("drift", "calm"))
+    drift_sigma, calm_sigma = (np.median(run[:, 6] / run[:, 5]) for run in (drift, calm))
     assert drift[600:, 5].max() / drift[600:, 5].min() > 1.8
-    assert drift_unsure < 0.06
-    assert calm_unsure > 2.0 * drift_unsure
+    assert drift_sigma < 0.06
+    assert calm_sigma > 2.0 * drift_sigma
     assert (calm[:, 2] / calm[:, 1]).max() <= setting("m_p_sigma").default * (1.0 + 1e-5)

@@ -1,8 +1,8 @@
 /* A configuration from text: from the command line, one `name = value` at a time, or from a file.
  *
- * Names are those of lever_settings.def, in its units, and the four choices model, preload, estimator and adaptation; the last
- * of two equal names counts. The grammar of a settings file, for all who read one (lever_can, host_tools/settings_file.py,
- * firmware/settings.cmake), in bytes:
+ * Names are those of lever_settings.def, in its units, and the four choices model, preload, estimator and adaptation;
+ * the last of two equal names counts. The grammar of a settings file, for all who read one (lever_can,
+ * host_tools/settings_file.py, firmware/settings.cmake), in bytes:
  *
  *     file       = [ EF BB BF ] line { LF line }
  *     line       = blank [ assignment blank ] [ "#" comment ] [ CR ]
@@ -13,8 +13,9 @@
  *     blank      = any number of spaces and tabs
  *     comment    = any bytes but NUL and LF
  *
- * A line has at most 510 bytes, not counting EF BB BF and CR. A number means the double nearest to it, rounded to float; it is
- * that which must be in range. (Only CMake compares the double: it refuses what is out of range before it is rounded.)
+ * A line has at most 510 bytes, not counting EF BB BF and CR. A number means the double nearest to it, rounded to
+ * float; it is that which must be in range. (Only CMake compares the double: it refuses what is out of range before it
+ * is rounded.)
  *
  *     preload = trim
  *     theta_noise = 0.002      # rad

@@ -122,8 +122,13 @@ def dense_differences(mean: Array, covariance: Array, function: Callable[[Array]
 def test_square_root_form_equals_the_form_on_covariances() -> None:
     rng = np.random.default_rng(3)
     process, noise = random_factor(rng, 3, 0.05), random_factor(rng, 2, 0.2)
-    step = lambda x: np.array([x[0] + 0.1 * x[1], 0.95 * x[1] - 0.1 * np.sin(x[0]) + 0.05 * x[2] ** 2, 0.99 * x[2]])  # noqa: E731
-    output = lambda x: np.array([x[0] * x[2], np.exp(0.3 * x[1])])  # noqa: E731
+
+    def step(x: Array) -> Array:
+        return np.array([x[0] + 0.1 * x[1], 0.95 * x[1] - 0.1 * np.sin(x[0]) + 0.05 * x[2] ** 2, 0.99 * x[2]])
+
+    def output(x: Array) -> Array:
+        return np.array([x[0] * x[2], np.exp(0.3 * x[1])])
+
     mean, factor = np.array([0.4, -0.2, 1.0]), random_factor(rng, 3, 0.3)
     dense_mean, dense = mean, factor @ factor.T
     truth = mean + 0.2

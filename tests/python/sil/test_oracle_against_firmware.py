@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +11,13 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.native import Config, run_samples
 from lever_cdkf.sil import oracle
-from lever_cdkf.sil.oracle.dual import model_of
+from lever_cdkf.sil.oracle.estimator import model_of
 from lever_cdkf.sil.oracle.scale import PARAMETERS
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
 DERIVED = ("natural_frequency", "damping_ratio")
+STATES = ("theta", "theta_dot")
 BOUNDS = {  # of firmware/model
     "lever": np.array(((0.3, 10.0), (2.0, 400.0), (50.0, 6500.0))),
     "linear_physical": np.array(((0.05, 60.0), (0.1, 600.0), (1.0, 6500.0))),
@@ -29,7 +31,11 @@ PILOTS = {  # none the first guess
 TORQUE = {"lever": 0.3, "linear_physical": 1.6, "linear_black_box": 0.0}  # rms; [N m], [N]
 NOT_REPEATED = {"change_threshold": 0.0, "noise_window": 0.0}  # by the oracle: these are off
 PRELOADED = {"arm_preload_angle": 0.4, "lever_preload_angle": 0.36}
-EVERY = 10  # samples from one comparison to the next: not a multiple of those that are learnt from at once
+EVERY = 7  # samples from one comparison to the next: all phases of a block of samples
+
+# Greatest difference: of an estimate in standard deviations, of a standard deviation relatively, of the normalised
+# innovation squared in 1 + itself. About three times what was measured (an estimate of theta is rounded at 3e-8 rad).
+PARAMETERS_WITHIN, THETA_WITHIN, THETA_DOT_WITHIN, SIGMA_WITHIN, NIS_WITHIN = 2e-3, 1e-2, 1e-3, 3e-4, 1e-3
 
 
 def single(values: Array) -> Array:
@@ -49,7 +55,10 @@ def band_limited(rng: np.random.Generator, count: int, rms: float) -> Array:
 
 @functools.cache
 def recorded(model: str, preload: str, seconds: float) -> dict[str, Array]:
-    """A pilot who stiffens by 30 % half way; before that the sensors drop out one after the other, and both at once."""
+    """A pilot who stiffens by 30 % half way; sensors drop out before, one, both, the other; three gaps after.
+
+    The gaps: of 5 ms; of 15 ms, more samples than a gap has predictions; of 30 ms, which is an outage.
+    """
     rng = np.random.default_rng(7)
     count = round(seconds * 1e3)
     z_ddot, tau_m = band_limited(rng, count, 0.98), band_limited(rng, count, TORQUE[model])
@@ -63,17 +72,19 @@ def recorded(model: str, preload: str, seconds: float) -> dict[str, Array]:
         x[1] += disturbance[k]
         truth[k] = x[:, 0]
     part = np.arange(count) / count
-    theta_valid = (part < 0.40) | (part > 0.43)
-    theta_dot_valid = (part < 0.42) | (part > 0.45)
-    return {
+    sent = np.ones(count, np.bool_)
+    for start, length in ((0.6, 4), (0.65, 14), (0.7, 29)):
+        sent[round(start * count) :][:length] = False
+    samples = {
         "time_us": np.arange(count) * 1000,
         "theta": single(truth[:, 0] + 1e-3 * rng.standard_normal(count)),
         "theta_dot": single(truth[:, 1] + 1e-2 * rng.standard_normal(count)),
         "z_ddot": single(z_ddot),
         "tau_m": single(tau_m),
-        "theta_valid": theta_valid,
-        "theta_dot_valid": theta_dot_valid,
+        "theta_valid": (part < 0.40) | (part > 0.43),
+        "theta_dot_valid": (part < 0.42) | (part > 0.45),
     }
+    return {name: values[sent] for name, values in samples.items()}
 
 
 @dataclass(frozen=True)
@@ -82,59 +93,50 @@ class Case:
 
     model: str = "lever"
     estimator: str = "dual"
-    adaptation: str = "fixed"
-    samples: int = 4  # from which the parameters learn at once
     preload: str = "trim"
+    adaptation: str = "fixed"
+    block: int = 10  # samples that the parameters learn from at once
     seconds: float = 5.0
     form: str = ""  # of the oracle, where it is not named like the estimator
 
     def __str__(self) -> str:
-        return "-".join((self.model, self.form or self.estimator, self.adaptation, self.preload, str(self.samples)))
+        choices = (self.model, self.form or self.estimator, self.preload, self.adaptation)
+        return "-".join((*choices, f"{self.block}", f"{self.seconds:g}s"))
 
 
+BOTH = ("dual", "joint")
 CASES = (
-    *(Case(model, estimator, samples=k) for model in PARAMETERS for estimator in ("dual", "joint") for k in (1, 4, 25)),
-    *(Case(model, "joint", samples=1, form="whole") for model in PARAMETERS),
-    *(Case(model, "joint", preload="fixed") for model in PARAMETERS),
-    *(Case(adaptation=adaptation) for adaptation in ("annealing", "forgetting")),
-    Case("linear_physical", "joint", "annealing"),
-    Case("linear_black_box", "dual", "robbins_monro"),
-    Case("linear_black_box", "joint", "forgetting"),
-    Case("lever", "joint", "robbins_monro", seconds=20.0),
-    Case("lever", "dual", "robbins_monro", seconds=60.0),
+    *(Case(*choices) for choices in itertools.product(PARAMETERS, BOTH, ("trim", "fixed"))),
+    *(Case(model, "joint", block=1, form="augmented") for model in PARAMETERS),
+    *(Case(estimator=estimator, block=block) for estimator in BOTH for block in (1, 25)),
+    *(Case("lever", e, "trim", a) for e in BOTH for a in ("annealing", "forgetting", "robbins_monro")),
+    Case("linear_black_box", "dual", "trim", "robbins_monro"),
+    Case("lever", "dual", "trim", "robbins_monro", seconds=60.0),
 )
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_float_differs_from_double_by_less_than_a_hundredth_of_sigma(case: Case) -> None:
+def test_float_agrees_with_double(case: Case) -> None:
     samples = recorded(case.model, case.preload, case.seconds)
-    settings = NOT_REPEATED | PRELOADED | {"learn_period": 1e-3 * case.samples}
-    if case.form == "whole":
+    settings = NOT_REPEATED | PRELOADED | {"learn_period": 1e-3 * case.block}
+    if case.form == "augmented":
         settings |= {"caution_time": 0.0}
     config = Config(case.model, case.preload, case.estimator, case.adaptation, settings)
     firmware = run_samples(config, samples)
     inputs = {name: np.asarray(values, float) for name, values in samples.items()}
     inputs["time_s"] = inputs["time_us"] * 1e-6
     start, first = oracle.align(inputs, config.settings)
-    double = oracle.DualFilter(
-        config.settings,
-        start,
-        case.preload,
-        case.adaptation,
-        BOUNDS[case.model],
-        case.model,
-        case.form or case.estimator,
-    )
-    expected = oracle.run(double, inputs, first, EVERY)
+    choices = (case.preload, case.adaptation, BOUNDS[case.model], case.model, case.form or case.estimator)
+    expected = oracle.run(oracle.Estimator(config.settings, start, *choices), inputs, first, EVERY)
 
     names, rows = PARAMETERS[case.model], slice(first, None, EVERY)
-    got = {name: firmware["parameter"][rows, i] for i, name in enumerate(names)}
-    got |= {name: firmware[name][rows] for name in (*DERIVED, "theta", "theta_dot")}
-    for name, values in got.items():
-        assert np.abs((values - expected[name]) / expected[f"{name}_sigma"]).max() < 0.01, name
-    for i, name in enumerate(names):
-        assert firmware["parameter_sigma"][rows, i] == pytest.approx(expected[f"{name}_sigma"], rel=2e-3), name
-    for name in ("theta_sigma", "theta_dot_sigma"):
-        known = np.asarray(inputs[f"{name.removesuffix('_sigma')}_valid"][rows], bool)
-        assert firmware[name][rows][known] == pytest.approx(expected[name][known], rel=2e-3), name
-    assert firmware["nis"][rows] == pytest.approx(expected["nis"], rel=5e-3, abs=5e-3)
+    got = {name: firmware[name][rows] for of in (*STATES, *DERIVED) for name in (of, f"{of}_sigma")}
+    got |= {name: firmware["parameter"][rows, i] for i, name in enumerate(names)}
+    got |= {f"{name}_sigma": firmware["parameter_sigma"][rows, i] for i, name in enumerate(names)}
+    within = {"theta": THETA_WITHIN, "theta_dot": THETA_DOT_WITHIN}
+    for name in (*STATES, *names, *DERIVED):
+        sigma = expected[f"{name}_sigma"]
+        assert np.abs((got[name] - expected[name]) / sigma).max() < within.get(name, PARAMETERS_WITHIN), name
+        measured = samples[f"{name}_valid"][rows] if name in STATES else np.ones(len(sigma), np.bool_)
+        assert got[f"{name}_sigma"][measured] == pytest.approx(sigma[measured], rel=SIGMA_WITHIN), name
+    assert firmware["nis"][rows] == pytest.approx(expected["nis"], rel=NIS_WITHIN, abs=NIS_WITHIN)

@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 from lever_cdkf.sil.oracle import cdkf
-from lever_cdkf.sil.oracle.belief import Belief, Motion, Parts, Whole
+from lever_cdkf.sil.oracle.belief import Augmented, Belief, Motion, TwoStage
 from lever_cdkf.sil.oracle.scale import Scale
 from numpy.typing import NDArray
 
 Array = NDArray[Any]  # of floats
-BOTH = np.array([True, True])
 W_FACTOR = np.diag([0.4, 0.6, 0.5])
 A = np.array([[1.0, 1e-3], [-0.63, 0.985]])
 X = np.array([0.1, 0.0])
 X_FACTOR = np.diag([1e-3, 1e-2])
 PROCESS = np.array([[0.0], [2e-3]])
 OUTPUT = np.diag([1e-3, 1e-2])
-UNCAPPED = np.full(3, np.inf)
 
 
 def belief(form: str) -> Belief:
-    return Whole(W_FACTOR, X, X_FACTOR) if form == "whole" else Parts(W_FACTOR, X, X_FACTOR, form == "joint")
+    if form == "augmented":
+        return Augmented(W_FACTOR, X, X_FACTOR)
+    return TwoStage(W_FACTOR, X, X_FACTOR, joint=form == "joint")
 
 
 def estimate(of: Belief) -> Array:
@@ -70,8 +70,9 @@ class Linear:
             self.reference.update(y[valid, np.newaxis], R=self.reference.R[np.ix_(valid, valid)], H=rows)
 
     def walk(self, variance: Array, growth: float) -> None:
-        """Of both; with forgetting, in proportion to what they knew."""
-        self.belief.walk(variance, growth, UNCAPPED)
+        """Of both, after forgetting."""
+        self.belief.forget(growth)
+        self.belief.walk(variance)
         self.reference.P[:3, :3] = (1.0 + growth) * self.reference.P[:3, :3] + np.diag(variance)
 
     def assert_equal(self) -> None:
@@ -82,50 +83,24 @@ class Linear:
 # --- linear systems --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("form", "block"), [("whole", 1), ("joint", 1), ("joint", 4), ("joint", 50)])
-def test_with_a_walk_and_forgetting_it_is_the_kalman_filter(form: str, block: int) -> None:
-    linear = Linear(form)
-    for _ in range(600 // block):
-        for _ in range(block):
-            linear.sample(missing=0.3)
-        linear.belief.hold()
-        linear.belief.learn()
-        linear.walk(1e-5 * block * np.array([1.0, 2.0, 3.0]), growth=1e-3 * block)
-        linear.assert_equal()
-
-
 @pytest.mark.parametrize("block", [1, 4, 50])
-def test_with_constant_parameters_the_dual_filter_is_the_kalman_filter(block: int) -> None:
-    linear = Linear("dual")
+@pytest.mark.parametrize(("form", "walk"), [("joint", 1.0), ("dual", 0.0), ("augmented", 1.0)])
+def test_on_a_linear_system_it_is_the_kalman_filter(form: str, walk: float, block: int) -> None:
+    """The dual filter as long as the parameters neither walk nor are forgotten."""
+    linear = Linear(form)
     for _ in range(600 // block):
         for _ in range(block):
             linear.sample(missing=0.3)
-        linear.belief.hold()
         linear.belief.learn()
+        linear.walk(1e-5 * walk * block * np.array([1.0, 2.0, 3.0]), growth=1e-3 * walk * block)
         linear.assert_equal()
 
 
-@pytest.mark.parametrize("form", ["dual", "joint"])
-def test_what_is_put_aside_and_learnt_late_is_learnt_in_full(form: str) -> None:
-    linear = Linear(form)
-    for _ in range(100):
-        for _ in range(6):
-            linear.sample(missing=0.3)
-        linear.belief.hold()
-        for _ in range(4):
-            linear.sample(missing=0.3)
-        linear.belief.learn()
-    linear.belief.hold()
-    linear.belief.learn()
-    linear.assert_equal()
-
-
-def test_a_walk_makes_the_dual_filter_surer_of_the_state_and_of_nothing_else() -> None:
-    """By what the parameters explained before, less what they explain with the same covariance when they are wider."""
+def test_a_walk_makes_the_dual_filter_more_certain_of_the_state_and_of_nothing_else() -> None:
+    """By what the parameters explained of it before, less what they explain with the same cross-covariance after."""
     linear = Linear("dual")
     for _ in range(200):
         linear.sample()
-    linear.belief.hold()
     linear.belief.learn()
     linear.walk(np.array([0.01, 0.02, 0.03]), growth=0.5)
     grown, cross = linear.reference.P[:3, :3], linear.reference.P[3:, :3]
@@ -134,16 +109,16 @@ def test_a_walk_makes_the_dual_filter_surer_of_the_state_and_of_nothing_else() -
     linear.assert_equal()
 
 
-@pytest.mark.parametrize("form", ["dual", "joint", "whole"])
+@pytest.mark.parametrize("form", ["dual", "joint", "augmented"])
 def test_what_is_not_to_be_learnt_leaves_the_parameters_alone(form: str) -> None:
     """The state is that for given parameters; how it moves with them is what other parameters would make of it."""
     rng = np.random.default_rng(29)
     step, of = 1e-6, belief(form)
-    given = [Parts(W_FACTOR, X, X_FACTOR, joint=False) for _ in range(4)]
+    given = [TwoStage(W_FACTOR, X, X_FACTOR, joint=False) for _ in range(4)]
     offsets = [*(step * np.eye(3)[:, [j]] for j in range(3)), np.zeros((3, 1))]  # of the parameters; none in the last
     for index in range(100):
         b, y = 0.03 * rng.standard_normal((2, 3)), 1e-2 * rng.standard_normal(2)
-        valid = BOTH if index % 3 else np.array([True, False])
+        valid = np.array([True, index % 3 > 0])
         for one, offset in ((of, offsets[-1]), *zip(given, offsets, strict=True)):
             one.predict(pushed(b, offset), PROCESS)
             one.update(y, valid, OUTPUT, learn=False)
@@ -167,37 +142,27 @@ def curved(index: int) -> Motion:
     return motion
 
 
-def test_joint_in_parts_and_in_one_piece_are_one_filter() -> None:
+def test_the_two_stage_joint_filter_is_the_augmented_one() -> None:
     rng = np.random.default_rng(23)
-    parts, whole = belief("joint"), belief("whole")
-    most = np.array([0.4, 0.6, 0.2])  # the last one is capped
+    two_stage, augmented = belief("joint"), belief("augmented")
+    most = np.array([0.4, 0.6, 0.2])  # the last one is reached
     for index in range(300):
-        y = whole.x + OUTPUT @ rng.standard_normal(2)
+        y = augmented.x + OUTPUT @ rng.standard_normal(2)
         valid = rng.random(2) > 0.2
-        for one in (parts, whole):
-            one.predict(curved(index), PROCESS)
-            if valid.any():
-                one.update(y, valid, OUTPUT, learn=index % 7 > 1)
-            one.hold()
-            one.learn()
-            one.walk(np.array([1e-5, 2e-5, 3e-3]), 1e-3, most)
-            if index == 150:
-                one.restart_state(np.array([0.2, 0.1]), X_FACTOR)
-        np.testing.assert_allclose(estimate(parts), estimate(whole), atol=1e-9)
-        np.testing.assert_allclose(parts.joint_factor, whole.joint_factor, atol=1e-9)
-    assert cdkf.deviations(whole.w_factor)[2] == pytest.approx(0.2)
-
-
-def test_normalised_innovations_are_those_of_the_joint_belief() -> None:
-    parts, whole = belief("joint"), belief("whole")
-    for index in range(50):
         nis = []
-        for one in (parts, whole):
+        for one in (two_stage, augmented):
             one.predict(curved(index), PROCESS)
-            nis.append(one.update(np.array([0.1, 0.02]), BOTH, OUTPUT, learn=True))
-            one.hold()
+            nis.append(one.update(y, valid, OUTPUT, learn=index % 7 > 1) if valid.any() else 0.0)
             one.learn()
+            one.forget(1e-3)
+            one.walk(np.array([1e-5, 2e-5, 3e-3]))
+            one.limit(most)
+            if index == 150:
+                one.start_state(np.array([0.2, 0.1]), X_FACTOR)
         assert nis[0] == pytest.approx(nis[1], rel=1e-9)
+        np.testing.assert_allclose(estimate(two_stage), estimate(augmented), atol=1e-9)
+        np.testing.assert_allclose(two_stage.joint_factor, augmented.joint_factor, atol=1e-9)
+    assert cdkf.deviations(augmented.w_factor)[2] == pytest.approx(0.2)
 
 
 # --- scales ----------------------------------------------------------------------------------------------------------

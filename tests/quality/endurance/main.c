@@ -1,10 +1,11 @@
-/* Flies the estimator for a long time and prints what it says ten times a second.
+/* Flies the estimator for a long time and prints its parameters ten times a second.
  *
- *     single|double SCENE ESTIMATOR SECONDS
+ *     single|double SCENE ESTIMATOR SETTINGS SECONDS
  *
- * SCENE: drift (the arm changes slowly by a factor of two, fair excitation) or calm (a constant arm, hardly any). ESTIMATOR: the
- * number of enum lever_estimator. A line is: time [s], then value and standard deviation of each parameter. The exit status
- * is 1 as soon as the belief breaks its invariant after any sample. Samples are the same in both precisions. */
+ * SCENE: drift (the arm changes slowly by a factor of two, fair excitation) or calm (a constant arm, hardly any).
+ * ESTIMATOR: the number of enum lever_estimator. SETTINGS: default, or plain (neither change detection nor noise
+ * estimation). A line is: time [s], then value and standard deviation of each parameter. The exit status is 1 as soon
+ * as the belief breaks its invariant after any sample. Samples are the same in both precisions. */
 #include "app/estimator.h"
 #include "model/simulation.h"
 
@@ -78,7 +79,7 @@ static bool fly(const lever_config_t *config, bool drifts, uint32_t samples)
         set_arm(&simulation, drifts);
         const lever_sample_t sample = sample_of(&simulation, index);
         (void)estimator_update(&estimator, &sample);
-        valid = (index == 0u) || (dual_is_valid(&estimator.dual) && (estimator.recoveries == 0u));
+        valid = (index == 0u) || (cdkf_is_valid(&estimator.cdkf) && (estimator.recoveries == 0u));
         if ((index % (uint32_t)SAMPLES_A_LINE) == 0u) {
             print_line(&estimator, &simulation);
         }
@@ -89,14 +90,18 @@ static bool fly(const lever_config_t *config, bool drifts, uint32_t samples)
 
 int main(int argc, char **argv)
 {
-    if (argc != 4) {
-        (void)fprintf(stderr, "usage: %s drift|calm ESTIMATOR SECONDS\n", argv[0]);
+    if (argc != 5) {
+        (void)fprintf(stderr, "usage: %s drift|calm ESTIMATOR default|plain SECONDS\n", argv[0]);
         return 2;
     }
     const bool drifts = (strcmp(argv[1], "drift") == 0);
-    const uint32_t seconds = (uint32_t)strtoul(argv[3], NULL, 10);
+    const uint32_t seconds = (uint32_t)strtoul(argv[4], NULL, 10);
     lever_config_t config;
     lever_config_default(&config);
     config.estimator = (uint8_t)strtoul(argv[2], NULL, 10);
+    if (strcmp(argv[3], "plain") == 0) {
+        config.settings.change_threshold = 0.0f;
+        config.settings.noise_window = 0.0f;
+    }
     return fly(&config, drifts, seconds * (uint32_t)SAMPLES_A_SECOND) ? 0 : 1;
 }

@@ -118,7 +118,7 @@ def _source(file: str, line: int) -> str:
 
 
 def _place(file: str) -> str:
-    """The last two parts of a path: filter/dual.c."""
+    """The last two parts of a path: filter/cdkf.c."""
     return "/".join(file.split("/")[-2:])
 
 

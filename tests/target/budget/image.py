@@ -99,7 +99,7 @@ def call_graph(elf: Path) -> Path:
 
 
 def core_objects(elf: Path) -> dict[str, Path]:
-    """The object files of the core, by source file ("filter/dual.c")."""
+    """The object files of the core, by source file ("filter/cdkf.c")."""
     folder = elf.parent / "lever_cdkf/CMakeFiles/lever_cdkf.dir"
     paths = sorted(folder.glob("*/*.c.obj"))
     return {str(path.relative_to(folder)).removesuffix(".obj"): path for path in paths}

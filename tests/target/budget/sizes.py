@@ -23,7 +23,7 @@ def of_core(elf: Path) -> dict[str, int]:
 
 
 def of_files(elf: Path) -> dict[str, int]:
-    """Bytes of text by source file ("filter/dual.c"), as far as its functions have not been taken into others."""
+    """Bytes of text by source file ("filter/cdkf.c"), as far as its functions have not been taken into others."""
     return of_image(elf).text_by_file()
 
 

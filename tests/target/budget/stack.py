@@ -52,7 +52,7 @@ class Deepest:
 
 
 class CallGraph:
-    """The functions of the core; a name is "filter/dual.c:is_joint" when static, else as the linker sees it."""
+    """The functions of the core; a name is "filter/cdkf.c:move" when static, else as the linker sees it."""
 
     def __init__(self, objects: Mapping[str, Path], elf: Path, graph: Path) -> None:
         """`objects`: the object file of each source file; `elf`: what they are linked into; `graph`: its .ci."""

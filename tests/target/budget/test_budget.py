@@ -38,11 +38,11 @@ def test_cycles_are_counted_of_the_same_calls(budget: dict[str, Any]) -> None:
     for name, instructions in counted.items():
         if name.startswith("instructions"):
             assert 1.4 < counted[name.replace("instructions", "cycles", 1)] / instructions < 2.2, name
-    assert 1.4 < counted["init.cycles"] / counted["init.instructions"] < 2.5
+    assert 1.2 < counted["init.cycles"] / counted["init.instructions"] < 2.5  # mostly integers: memory is cleared
 
 
 def test_a_gap_is_bounded(budget: dict[str, Any]) -> None:
-    """One call predicts at most 16 times: lever_cdkf.h."""
+    """One call predicts at most 12 times: app/estimator.c."""
     for estimator, most in budget["instructions_after_gap"].items():
         entry = budget["instructions"][estimator]["lever"]
         assert entry["worst"] < most < 16 * entry["mean"]

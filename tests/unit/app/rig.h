@@ -11,7 +11,7 @@
 
 enum { RIG_PERIOD_US = 1000 };
 
-/* --- every model with every estimator, for programs that run their tests with all of them ---------------------------- */
+/* --- every model with every estimator, for programs that run their tests with all of them ------------------------- */
 
 enum { RIG_COMBINATIONS = LEVER_MODEL_COUNT * LEVER_ESTIMATOR_COUNT };
 
@@ -49,7 +49,7 @@ static inline float *rig_setting(lever_config_t *config, const char *name)
     return (float *)(void *)((uint8_t *)&config->settings + (index * sizeof(float)));
 }
 
-/* The setting of parameter i of the chosen model that is named like it with `suffix`: "" its first guess, "_sigma", "_walk". */
+/* The setting of parameter i of the chosen model named like it with `suffix`: "" its first guess, "_sigma", "_walk". */
 static inline float *rig_parameter_setting(lever_config_t *config, uint32_t i, const char *suffix)
 {
     char name[32];
@@ -65,7 +65,7 @@ static inline float rig_first_sigma(lever_config_t *config, uint32_t i)
     return relative ? (sigma * *rig_parameter_setting(config, i, "")) : sigma;
 }
 
-/* --- samples --------------------------------------------------------------------------------------------------------- */
+/* --- samples ------------------------------------------------------------------------------------------------------ */
 
 typedef struct rig {
     simulation_t simulation;
@@ -78,7 +78,7 @@ static inline rig_t rig_typical(void)
     return rig;
 }
 
-/* The same samples, of a plant that is what `model` takes it for; its parameters, none the first guess, are left in `truth`. */
+/* The same of a plant that is what `model` takes it for; its parameters, none the first guess, are left in `truth`. */
 static inline rig_t rig_of(uint8_t model, double truth[LEVER_PARAMETERS])
 {
     static const double parameters[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {[LEVER_MODEL_LEVER] = {3.2, 60.0, 2100.0},
@@ -134,17 +134,42 @@ static inline enum lever_mode rig_run(rig_t *rig, lever_t *lever, uint32_t count
     return mode;
 }
 
-/* `count` samples in which nothing could be measured. */
+/* A sample in which nothing could be measured. */
+static inline lever_sample_t rig_sample_blind(rig_t *rig)
+{
+    lever_sample_t sample = rig_sample(rig);
+    sample.theta_valid = false;
+    sample.theta_dot_valid = false;
+    return sample;
+}
+
+/* `count` of them; the mode after the last. */
 static inline enum lever_mode rig_run_blind(rig_t *rig, lever_t *lever, uint32_t count)
 {
     enum lever_mode mode = LEVER_MODE_INIT;
     for (uint32_t k = 0u; k < count; k++) {
-        lever_sample_t sample = rig_sample(rig);
-        sample.theta_valid = false;
-        sample.theta_dot_valid = false;
+        const lever_sample_t sample = rig_sample_blind(rig);
         mode = lever_update(lever, &sample);
     }
     return mode;
+}
+
+/* Nothing moves any more. */
+static inline void rig_let_rest(rig_t *rig)
+{
+    rig->simulation.base_rms = 0.0;
+    rig->simulation.torque_rms = 0.0;
+    rig->simulation.process_noise = 0.0;
+}
+
+/* Twice as stiff and damped, at once; of the black box, what multiplies theta and its rate. */
+static inline void rig_grip(rig_t *rig)
+{
+    plant_t *plant = &rig->simulation.plant;
+    plant->c_p *= 2.0;
+    plant->k_p *= 2.0;
+    plant->linear.damping *= 2.0;
+    plant->linear.stiffness *= 2.0;
 }
 
 static inline lever_health_t rig_health(const lever_t *lever)
@@ -160,6 +185,40 @@ static inline lever_estimate_t rig_estimate(const lever_t *lever)
     (void)memset(&estimate, 0, sizeof estimate); /* padding too: estimates are compared as bytes */
     lever_estimate(lever, &estimate);
     return estimate;
+}
+
+/* Each parameter is within so many of the standard deviations that the estimate claims. */
+static inline void rig_assert_within(double sigmas, const double truth[LEVER_PARAMETERS], lever_estimate_t estimate)
+{
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+        const double sigma = (double)estimate.parameter_sigma[i];
+        TEST_ASSERT_DOUBLE_WITHIN(sigmas * sigma, truth[i], (double)estimate.parameter[i]);
+    }
+}
+
+/* At the first guess of the configuration, as uncertain as that, and uncorrelated. */
+static inline void rig_assert_first_guess(lever_config_t *config, lever_estimate_t estimate)
+{
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+        TEST_ASSERT_EQUAL_FLOAT(*rig_parameter_setting(config, i, ""), estimate.parameter[i]);
+        TEST_ASSERT_EQUAL_FLOAT(rig_first_sigma(config, i), estimate.parameter_sigma[i]);
+        TEST_ASSERT_TRUE(estimate.parameter_correlation[i] == 0.0f);
+    }
+}
+
+/* Everything in it is a number. */
+static inline void rig_assert_finite(lever_estimate_t estimate)
+{
+    const float values[] = {estimate.theta, estimate.theta_dot, estimate.theta_sigma, estimate.theta_dot_sigma,
+        estimate.natural_frequency, estimate.natural_frequency_sigma, estimate.damping_ratio,
+        estimate.damping_ratio_sigma, estimate.trim, estimate.nis};
+    for (uint32_t i = 0u; i < (uint32_t)(sizeof values / sizeof values[0]); i++) {
+        TEST_ASSERT_TRUE(isfinite(values[i]));
+    }
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+        TEST_ASSERT_TRUE(isfinite(estimate.parameter[i]) && isfinite(estimate.parameter_sigma[i]));
+        TEST_ASSERT_TRUE(fabsf(estimate.parameter_correlation[i]) <= 1.0001f);
+    }
 }
 
 static inline void rig_assert_same_estimates(const lever_t *expected, const lever_t *actual)

@@ -1,4 +1,5 @@
-/* A sudden change of the pilot: noticed, said, and followed; and nothing else taken for one. With every model and estimator. */
+/* A sudden change of the pilot: noticed, said, and followed; and nothing else taken for one. With every model and
+ * estimator. */
 #include "rig.h"
 
 enum { PARAMETERS = LEVER_PARAMETERS };
@@ -29,17 +30,7 @@ void tearDown(void)
 
 static bool has_changed(void)
 {
-    return (rig_health(lever).faults & (uint16_t)LEVER_FAULT_CHANGE) != 0u;
-}
-
-/* Twice as stiff and damped, at once; of the black box, what multiplies theta and its rate. */
-static void grip(void)
-{
-    plant_t *plant = &rig.simulation.plant;
-    plant->c_p *= 2.0;
-    plant->k_p *= 2.0;
-    plant->linear.damping *= 2.0;
-    plant->linear.stiffness *= 2.0;
+    return (rig_health(lever).faults & (uint32_t)LEVER_FAULT_CHANGE) != 0u;
 }
 
 /* Samples until a change is reported, at most so many. */
@@ -65,9 +56,8 @@ static void test_a_sudden_grip_is_reported_for_a_second_and_opens_the_parameters
 {
     (void)rig_run(&rig, lever, 20000u);
     const lever_estimate_t before = rig_estimate(lever);
-    grip();
+    rig_grip(&rig);
     TEST_ASSERT_LESS_THAN_UINT32(1000u, samples_until_change(1000u));
-    (void)rig_run(&rig, lever, 10u); /* learn_period: then it has taken effect */
     const lever_estimate_t opened = rig_estimate(lever);
     for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
         TEST_ASSERT_TRUE(opened.parameter_sigma[i] > before.parameter_sigma[i]);
@@ -90,7 +80,7 @@ static void test_a_sudden_grip_is_followed_sooner_than_by_the_walk_alone(void)
         config.settings.change_threshold = thresholds[k];
         start();
         (void)rig_run(&rig, lever, 20000u);
-        grip();
+        rig_grip(&rig);
         const double wanted = plant_natural_frequency(&rig.simulation.plant);
         for (uint32_t sample = 0u; sample < 5000u; sample++) {
             (void)rig_run(&rig, lever, 1u);
@@ -105,18 +95,16 @@ static void test_threshold_0_reports_no_change(void)
     config.settings.change_threshold = 0.0f;
     start();
     (void)rig_run(&rig, lever, 20000u);
-    grip();
+    rig_grip(&rig);
     TEST_ASSERT_EQUAL_UINT32(3000u, samples_until_change(3000u));
 }
 
 static void test_a_grip_at_rest_is_not_seen(void)
 {
     (void)rig_run(&rig, lever, 10000u);
-    rig.simulation.base_rms = 0.0;
-    rig.simulation.torque_rms = 0.0;
-    rig.simulation.process_noise = 0.0;
+    rig_let_rest(&rig);
     (void)rig_run(&rig, lever, 10000u);
-    grip();
+    rig_grip(&rig);
     TEST_ASSERT_EQUAL_UINT32(10000u, samples_until_change(10000u));
 }
 
@@ -125,7 +113,7 @@ static void test_a_grip_after_a_reset_is_reported(void)
     (void)rig_run(&rig, lever, 5000u);
     rig_request(lever, LEVER_REQUEST_RESET);
     (void)rig_run(&rig, lever, 20000u);
-    grip();
+    rig_grip(&rig);
     TEST_ASSERT_LESS_THAN_UINT32(1000u, samples_until_change(1000u));
 }
 

@@ -86,6 +86,23 @@ static void test_is_the_same_after_every_reset(void)
     TEST_ASSERT_TRUE(first == torque);
 }
 
+/* A keep-alive may repeat the command: once a sample, the fade still takes its time. */
+static void test_a_repeated_command_does_not_stretch_the_fade(void)
+{
+    const float steps = dither.fade;
+    dither_set(&dither, 0.3f, false);
+    for (float k = 0.0f; k < (steps + 1.0f); k += 1.0f) {
+        dither_set(&dither, 0.3f, false);
+        step(1u);
+    }
+    TEST_ASSERT_TRUE(dither.level == dither.target);
+    for (float k = 0.0f; k < (steps + 1.0f); k += 1.0f) {
+        dither_set(&dither, 0.0f, false);
+        step(1u);
+    }
+    TEST_ASSERT_FALSE(dither_is_on(&dither));
+}
+
 static float limit_of(const char *name, bool greatest)
 {
     const lever_setting_t *row = lever_setting(0u);
@@ -225,6 +242,7 @@ int main(void)
     RUN_TEST(test_has_the_rms_that_is_asked);
     RUN_TEST(test_has_no_mean);
     RUN_TEST(test_is_the_same_after_every_reset);
+    RUN_TEST(test_a_repeated_command_does_not_stretch_the_fade);
     RUN_TEST(test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow);
     RUN_TEST(test_no_command_exceeds_the_greatest_rms);
     RUN_TEST(test_fades_in_linearly_over_its_time);

@@ -24,22 +24,19 @@ static void run_for(uint32_t samples)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u + samples));
 }
 
-static void test_a_gap_up_to_gap_limit_is_coasted_through(void)
+static void test_a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew(void)
 {
     run_for(1000u);
-    const lever_sample_t sample = rig_sample_after(&rig, 500u);
+    lever_sample_t sample = rig_sample_after(&rig, 500u);
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
-    const lever_health_t health = rig_health(lever);
-    TEST_ASSERT_EQUAL_UINT32(499u, health.lost);
-    TEST_ASSERT_TRUE((health.faults & (uint16_t)LEVER_FAULT_GAP) != 0u);
-}
-
-static void test_a_longer_gap_aligns_anew(void)
-{
-    run_for(1000u);
-    const lever_sample_t sample = rig_sample_after(&rig, 501u);
+    TEST_ASSERT_EQUAL_UINT32(499u, rig_health(lever).lost);
+    TEST_ASSERT_TRUE((rig_health(lever).faults & (uint32_t)LEVER_FAULT_GAP) != 0u);
+    (void)rig_run(&rig, lever, 1u);
+    TEST_ASSERT_EQUAL_UINT32(
+        0u, rig_health(lever).faults & (uint32_t)LEVER_FAULT_GAP); /* of the sample after it only */
+    sample = rig_sample_after(&rig, 501u);
     TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, lever_update(lever, &sample));
-    TEST_ASSERT_EQUAL_UINT32(500u, rig_health(lever).lost);
+    TEST_ASSERT_EQUAL_UINT32(999u, rig_health(lever).lost);
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 301u));
 }
 
@@ -57,16 +54,6 @@ static void test_a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk(v
     }
 }
 
-static void test_gap_fault_belongs_to_the_sample_after_the_gap_only(void)
-{
-    run_for(0u);
-    const lever_sample_t sample = rig_sample_after(&rig, 3u);
-    (void)lever_update(lever, &sample);
-    (void)rig_run(&rig, lever, 1u);
-    TEST_ASSERT_EQUAL_UINT16(0u, rig_health(lever).faults & (uint16_t)LEVER_FAULT_GAP);
-    TEST_ASSERT_EQUAL_UINT32(2u, rig_health(lever).lost);
-}
-
 static void test_jitter_of_less_than_half_a_period_is_no_gap(void)
 {
     run_for(0u);
@@ -74,28 +61,45 @@ static void test_jitter_of_less_than_half_a_period_is_no_gap(void)
     sample.time_us += 400u;
     (void)lever_update(lever, &sample);
     TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).lost);
-    TEST_ASSERT_EQUAL_UINT16(0u, rig_health(lever).faults & (uint16_t)LEVER_FAULT_GAP);
+    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).faults & (uint32_t)LEVER_FAULT_GAP);
 }
 
-/* A gap is predicted in substeps: the state after it must be what the plant did, noise aside. */
-static void test_prediction_through_a_gap_follows_the_motion(void)
+/* As if samples without outputs had come, with inputs on a straight line; and as the plant did, noise aside. */
+static void test_prediction_through_a_gap_takes_inputs_on_a_straight_line_and_follows_the_motion(void)
 {
+    static lever_memory_t other_memory;
     run_for(30000u);
+    other_memory = memory;
+    lever_t *other = (lever_t *)(void *)&other_memory;
+    const double z_ddot = rig.simulation.z_ddot;
+    const double tau_m = rig.simulation.tau_m;
+    const uint32_t time_us = rig.time_us;
     lever_sample_t sample = rig_sample_after(&rig, 12u);
     sample.theta_valid = false;
     sample.theta_dot_valid = false;
     (void)lever_update(lever, &sample);
+    for (uint32_t k = 1u; k <= 12u; k++) {
+        lever_sample_t between = sample;
+        between.time_us = time_us + (1000u * k);
+        between.z_ddot = (float)(z_ddot + ((double)k / 12.0 * ((double)sample.z_ddot - z_ddot)));
+        between.tau_m = (float)(tau_m + ((double)k / 12.0 * ((double)sample.tau_m - tau_m)));
+        (void)lever_update(other, &between);
+    }
     const lever_estimate_t estimate = rig_estimate(lever);
+    const lever_estimate_t wanted = rig_estimate(other);
     const plant_t *plant = &rig.simulation.plant;
+    TEST_ASSERT_FLOAT_WITHIN(2.0e-6f, wanted.theta, estimate.theta);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, wanted.theta_dot, estimate.theta_dot);
     TEST_ASSERT_DOUBLE_WITHIN(4.0 * (double)estimate.theta_sigma, plant->theta, (double)estimate.theta);
     TEST_ASSERT_DOUBLE_WITHIN(4.0 * (double)estimate.theta_dot_sigma, plant->theta_dot, (double)estimate.theta_dot);
 }
 
-/* What the base did in a gap is not known; the parameters must not get the blame for what the lever did meanwhile, and the
- * innovation after it must be no larger than predicted (2 in the mean; 0 if the state starts anew). */
+/* What the base did in a gap is not known; the parameters must not get the blame for what the lever did meanwhile, and
+ * the innovation after it must be no larger than predicted (2 in the mean; 0 if the state starts anew). */
 static void assert_parameters_survive_gaps_of(uint32_t missing)
 {
-    const double truth[3] = {rig.simulation.plant.m_p, rig.simulation.plant.c_p, rig.simulation.plant.k_p};
+    const plant_t *plant = &rig.simulation.plant;
+    const double truth[3] = {plant->m_p, plant->c_p, plant->k_p};
     double nis = 0.0;
     run_for(20000u);
     for (uint32_t k = 0u; k < 20u; k++) {
@@ -104,63 +108,40 @@ static void assert_parameters_survive_gaps_of(uint32_t missing)
         nis += (double)rig_estimate(lever).nis;
         for (uint32_t tenth = 0u; tenth < 10u; tenth++) {
             (void)rig_run(&rig, lever, 100u);
-            const lever_estimate_t estimate = rig_estimate(lever);
-            for (uint32_t i = 0u; i < 3u; i++) {
-                TEST_ASSERT_DOUBLE_WITHIN(
-                    4.0 * (double)estimate.parameter_sigma[i], truth[i], (double)estimate.parameter[i]);
-            }
+            rig_assert_within(4.0, truth, rig_estimate(lever));
         }
     }
     TEST_ASSERT_DOUBLE_WITHIN(4.0, 0.0, nis / 20.0);
 }
 
-static void test_parameters_survive_gaps_of_ten_samples(void)
+static void test_parameters_survive_gaps_of_any_length_that_is_coasted_through(void)
 {
-    assert_parameters_survive_gaps_of(10u);
-}
-
-static void test_parameters_survive_gaps_of_a_hundred_samples(void)
-{
-    assert_parameters_survive_gaps_of(100u);
-}
-
-static void test_parameters_survive_gaps_of_three_hundred_samples(void)
-{
-    assert_parameters_survive_gaps_of(300u);
-}
-
-static void test_parameters_survive_gaps_with_preload_fixed(void)
-{
-    config.preload = (uint8_t)LEVER_PRELOAD_FIXED;
-    config.settings.arm_preload_angle = 0.4f;
-    rig.simulation.plant.follows_trim = false;
-    rig.simulation.plant.arm_preload_angle = 0.4;
-    lever = lever_init(&memory, &config);
-    assert_parameters_survive_gaps_of(300u);
-}
-
-static float greatest_of(const char *name)
-{
-    uint32_t index = 0u;
-    while (strcmp(lever_setting(index)->name, name) != 0) {
-        index++;
-        TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(lever_setting_count(), index, name);
+    const uint32_t missing[] = {10u, 100u, 300u, 300u};
+    for (uint32_t k = 0u; k < 4u; k++) {
+        setUp();
+        if (k == 3u) {
+            config.preload = (uint8_t)LEVER_PRELOAD_FIXED;
+            config.settings.arm_preload_angle = 0.4f;
+            rig.simulation.plant.follows_trim = false;
+            rig.simulation.plant.arm_preload_angle = 0.4;
+            lever = lever_init(&memory, &config);
+        }
+        assert_parameters_survive_gaps_of(missing[k]);
     }
-    return lever_setting(index)->greatest;
 }
 
 /* A gap is predicted in a bounded number of steps, which therefore get long; averages are shorter than that. */
 static void test_the_longest_gaps_that_the_settings_let_coast_need_no_restart(void)
 {
-    config.settings.gap_limit = greatest_of("gap_limit");
+    config.settings.gap_limit = 1.0f;                               /* the greatest that may be set */
     config.settings.trim_corner = 1.5f / config.settings.gap_limit; /* lever_config_check() allows no more */
     config.settings.excitation_time = 0.01f;
     config.settings.robbins_monro_time = 0.01f;
     lever = lever_init(&memory, &config);
+    TEST_ASSERT_NOT_NULL(lever);
     run_for(1000u);
     for (uint32_t k = 1u; k <= 20u; k++) {
-        const double gap = (double)config.settings.gap_limit * (double)k / 20.0;
-        const lever_sample_t sample = rig_sample_after(&rig, (uint32_t)(1000.0 * gap));
+        const lever_sample_t sample = rig_sample_after(&rig, 50u * k);
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 200u));
         TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
@@ -182,16 +163,11 @@ static void test_a_sample_much_too_early_is_taken(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_a_gap_up_to_gap_limit_is_coasted_through);
-    RUN_TEST(test_a_longer_gap_aligns_anew);
+    RUN_TEST(test_a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew);
     RUN_TEST(test_a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk);
-    RUN_TEST(test_gap_fault_belongs_to_the_sample_after_the_gap_only);
     RUN_TEST(test_jitter_of_less_than_half_a_period_is_no_gap);
-    RUN_TEST(test_prediction_through_a_gap_follows_the_motion);
-    RUN_TEST(test_parameters_survive_gaps_of_ten_samples);
-    RUN_TEST(test_parameters_survive_gaps_of_a_hundred_samples);
-    RUN_TEST(test_parameters_survive_gaps_of_three_hundred_samples);
-    RUN_TEST(test_parameters_survive_gaps_with_preload_fixed);
+    RUN_TEST(test_prediction_through_a_gap_takes_inputs_on_a_straight_line_and_follows_the_motion);
+    RUN_TEST(test_parameters_survive_gaps_of_any_length_that_is_coasted_through);
     RUN_TEST(test_the_longest_gaps_that_the_settings_let_coast_need_no_restart);
     RUN_TEST(test_a_sample_much_too_early_is_taken);
     return UNITY_END();

@@ -1,231 +1,273 @@
-/* The dual filter on a linear system, side by side with the textbook Kalman filter for [state; parameters] in double. The
- * parameters are w = ln p, their influence changes at random from step to step. */
+/* The filter on a linear system, side by side with the textbook's on z = [w; x] in double. */
 #ifndef UNIT_FILTER_PAIR_H
 #define UNIT_FILTER_PAIR_H
 
-#include "filter/dual.h"
+#include "filter/cdkf.h"
 #include "kalman.h"
-#include "revise.h"
 #include "unity.h"
 
-#include <stddef.h>
-
-enum { PAIR_W = MODEL_PARAMETERS, PAIR_X = MODEL_STATES, PAIR_ALL = PAIR_W + PAIR_X };
+enum { PAIR_W = MODEL_PARAMETERS, PAIR_X = MODEL_STATES, PAIR_Z = CDKF_ROWS };
 
 #define PAIR_PERIOD 1.0e-3f
 
 typedef struct pair {
-    dual_t dual;
-    kalman_t reference; /* elements x, then w */
-    bool joint;
+    cdkf_t cdkf;
+    kalman_t reference;
     random_source_t source;
     model_step_t step; /* the last one */
 } pair_t;
 
-/* --- the system: x_next = A x + B w, B from the inputs ------------------------------------------------------------ */
+/* --- the system: an oscillator of 4 Hz, driven by p, p_i = sigma_i w_i, in proportion to inputs ------------------- */
 
-static inline matrix_t pair_transition(const model_step_t *at)
+static inline void pair_prepare(
+    const model_constants_t *constants, const float p[MODEL_PARAMETERS], model_coefficients_t *coefficients)
 {
-    const double period = (double)at->period;
-    matrix_t a = matrix_identity((uint32_t)PAIR_ALL);
-    a.at[1][0] = -630.0 * period;
-    a.at[1][1] = 1.0 - (15.0 * period);
-    a.at[1][2] = period * (double)at->z_ddot;
-    a.at[1][3] = period * (double)at->tau_m;
-    a.at[1][4] = period * (double)at->trim;
-    for (uint32_t k = 0u; k < (uint32_t)PAIR_ALL; k++) { /* theta moves by T (theta_dot + change / 2) */
-        const double rate = (k == 1u) ? 1.0 : 0.0;
-        a.at[0][k] += period * (rate + (0.5 * (a.at[1][k] - rate)));
+    (void)constants;
+    for (uint32_t i = 0u; i < (uint32_t)PAIR_W; i++) {
+        coefficients->c[i] = p[i];
     }
-    return a;
 }
 
-/* Change of theta_dot at x + sign offset. */
-static inline double pair_change(
-    const matrix_t *a, const float x[PAIR_X], const float offset[PAIR_X], double sign, const model_arm_t *arm)
+/* Change of theta_dot per unit of p, theta and theta_dot. */
+static inline void pair_slopes(const model_step_t *at, double slope[PAIR_Z])
 {
-    double change = 0.0;
-    for (uint32_t k = 0u; k < (uint32_t)PAIR_X; k++) {
-        change += (a->at[1][k] - ((k == 1u) ? 1.0 : 0.0)) * ((double)x[k] + (sign * (double)offset[k]));
-    }
-    for (uint32_t k = 0u; k < (uint32_t)PAIR_W; k++) {
-        change += a->at[1][(uint32_t)PAIR_X + k] * log((double)arm->coefficient[k]);
-    }
-    return change;
+    const double period = (double)at->period;
+    slope[0] = period * (double)at->z_ddot;
+    slope[1] = period * (double)at->tau_m;
+    slope[2] = period * (double)at->trim;
+    slope[3] = -630.0 * period;
+    slope[4] = -15.0 * period;
 }
 
 static inline void pair_respond(const model_constants_t *constants, const model_step_t *at,
     const model_points_t *points, model_response_t *response)
 {
+    double slope[PAIR_Z];
     (void)constants;
-    const matrix_t a = pair_transition(at);
-    response->mean = (float)pair_change(&a, points->x, points->x, 0.0, &points->arm[0]);
-    for (uint32_t j = 0u; j < (uint32_t)MODEL_PAIRS; j++) {
-        const bool of_w = j < (uint32_t)PAIR_W;
-        const float *offset = points->offset[j];
-        model_response_pair(response, j,
-            (float)pair_change(&a, points->x, offset, 1.0, &points->arm[of_w ? (1u + (2u * j)) : 0u]),
-            (float)pair_change(&a, points->x, offset, -1.0, &points->arm[of_w ? (2u + (2u * j)) : 0u]));
+    pair_slopes(at, slope);
+    double mean = (slope[3] * (double)points->x[0]) + (slope[4] * (double)points->x[1]);
+    for (uint32_t j = 0u; j < (uint32_t)PAIR_W; j++) {
+        double of_pair = 0.0;
+        const float *plus = points->coefficients[1u + (2u * j)].c;
+        const float *minus = points->coefficients[2u + (2u * j)].c;
+        mean += slope[j] * (double)points->coefficients[0].c[j];
+        for (uint32_t i = 0u; i < (uint32_t)PAIR_W; i++) {
+            of_pair += slope[i] * ((double)plus[i] - (double)minus[i]);
+        }
+        of_pair += 2.0 * ((slope[3] * (double)points->offset[j][0]) + (slope[4] * (double)points->offset[j][1]));
+        response->difference[j] = (float)of_pair;
+        response->second_difference[j] = 0.0f;
     }
+    response->mean = (float)mean;
+    response->slope[0] = (float)slope[3];
+    response->slope[1] = (float)slope[4];
 }
 
 static const model_t pair_model = {.name = "linear",
-    .parameter = {{"a", "1", 1.0e-3f, 1.0e3f}, {"b", "1", 1.0e-3f, 1.0e3f}, {"c", "1", 1.0e-3f, 1.0e3f}},
-    .positive = true,
-    .prepare = plain_prepare,
+    .parameter = {{"a", "1", -1.0e3f, 1.0e3f}, {"b", "1", -1.0e3f, 1.0e3f}, {"c", "1", -1.0e3f, 1.0e3f}},
+    .positive = false,
+    .prepare = pair_prepare,
     .respond = pair_respond};
+
+static const prior_t pair_prior = {.guess = {0.0f, 0.0f, 0.0f}, .sigma = {0.4f, 0.6f, 0.5f}};
+
+static inline matrix_t pair_transition(const model_step_t *at)
+{
+    const double period = (double)at->period;
+    double slope[PAIR_Z];
+    matrix_t a = matrix_identity((uint32_t)PAIR_Z);
+    pair_slopes(at, slope);
+    for (uint32_t k = 0u; k < (uint32_t)PAIR_Z; k++) { /* theta moves by T (theta_dot + change / 2) */
+        const double change = slope[k] * ((k < (uint32_t)PAIR_W) ? (double)pair_prior.sigma[k] : 1.0);
+        a.at[3][k] += 0.5 * period * change;
+        a.at[4][k] += change;
+    }
+    a.at[3][4] += period;
+    return a;
+}
+
+/* q^2 [T^3/3, T^2/2; T^2/2, T] of theta_dot (van Loan 1978), and a walk of theta itself. */
+static inline matrix_t pair_process_noise(const cdkf_t *cdkf, double period)
+{
+    const double own = (double)cdkf->process_noise[0] * (double)cdkf->process_noise[0];
+    const double variance = (double)cdkf->process_noise[1] * (double)cdkf->process_noise[1];
+    matrix_t noise = matrix_zero((uint32_t)PAIR_Z, (uint32_t)PAIR_Z);
+    noise.at[3][3] = (variance * period * period * period / 3.0) + (own * period);
+    noise.at[3][4] = variance * period * period / 2.0;
+    noise.at[4][3] = noise.at[3][4];
+    noise.at[4][4] = variance * period;
+    return noise;
+}
 
 /* --- both filters ------------------------------------------------------------------------------------------------- */
 
-static inline pair_t pair_typical(bool joint)
+/* The covariance that the factor [S_ww 0; S_xw S_xx] stands for. */
+static inline matrix_t pair_covariance(const cdkf_t *cdkf)
 {
-    const prior_t prior = {.guess = {1.0f, 1.0f, 1.0f}, .sigma = {0.4f, 0.6f, 0.5f}};
-    const double sigmas[PAIR_ALL] = {(double)1.0e-3f, (double)1.0e-2f, (double)0.4f, (double)0.6f, (double)0.5f};
-    pair_t pair = {.joint = joint, .source = {1234u}};
-    parameter_filter_init(&pair.dual.parameters, &pair_model, NULL, &prior);
-    pair.dual.state = (state_filter_t){.x = {0.1f, 0.0f},
-        .s = {1.0e-3f, 0.0f, 0.0f, 1.0e-2f},
-        .process_noise = {0.0f, 0.05f},
-        .output_noise = {1.0e-3f, 1.0e-2f}};
-    pair.reference.x = matrix_zero((uint32_t)PAIR_ALL, 1u);
-    pair.reference.x.at[0][0] = (double)0.1f;
-    pair.reference.p = matrix_zero((uint32_t)PAIR_ALL, (uint32_t)PAIR_ALL);
-    for (uint32_t i = 0u; i < (uint32_t)PAIR_ALL; i++) {
-        pair.reference.p.at[i][i] = sigmas[i] * sigmas[i];
+    matrix_t s = matrix_zero((uint32_t)PAIR_Z, (uint32_t)PAIR_Z);
+    for (uint32_t r = 0u; r < (uint32_t)PAIR_Z; r++) {
+        for (uint32_t j = 0u; j < (uint32_t)PAIR_W; j++) {
+            s.at[r][j] = (double)cdkf->s[(r * (uint32_t)PAIR_W) + j];
+        }
     }
+    s.at[3][3] = (double)cdkf->s_xx[0];
+    s.at[4][3] = (double)cdkf->s_xx[2];
+    s.at[4][4] = (double)cdkf->s_xx[3];
+    return matrix_gram(s);
+}
+
+/* The reference takes over what the filter believes. */
+static inline void pair_agree(pair_t *pair)
+{
+    pair->reference.p = pair_covariance(&pair->cdkf);
+    pair->reference.x = matrix_zero((uint32_t)PAIR_Z, 1u);
+    for (uint32_t i = 0u; i < (uint32_t)PAIR_Z; i++) {
+        pair->reference.x.at[i][0] =
+            (double)((i < (uint32_t)PAIR_W) ? pair->cdkf.w[i] : pair->cdkf.x[i - (uint32_t)PAIR_W]);
+    }
+}
+
+static inline pair_t pair_typical(void)
+{
+    const float x[PAIR_X] = {0.1f, 0.0f};
+    pair_t pair = {.source = {1234u}};
+    cdkf_t *cdkf = &pair.cdkf;
+    cdkf_init(cdkf, &pair_model, NULL, &pair_prior);
+    cdkf->process_noise[1] = 0.05f;
+    cdkf->output_noise[0] = 1.0e-3f;
+    cdkf->output_noise[1] = 1.0e-2f;
+    cdkf_start_state(cdkf, x, cdkf->output_noise);
+    pair_agree(&pair);
     return pair;
 }
 
-static inline void pair_set_walk(pair_t *pair)
+/* As typical, but any belief, in which everything has to do with everything. */
+static inline pair_t pair_random(uint64_t seed)
 {
-    for (uint32_t i = 0u; i < (uint32_t)PAIR_W; i++) {
-        pair->dual.parameters.walk[i] = 0.01f * (float)(i + 1u);
+    pair_t pair = pair_typical();
+    cdkf_t *cdkf = &pair.cdkf;
+    pair.source.state = seed + 1u;
+    random_factor(&pair.source, cdkf->s, (uint32_t)PAIR_W, (uint32_t)PAIR_W);
+    for (uint32_t k = 0u; k < 9u; k++) {
+        cdkf->s[k] *= 0.2f;
     }
+    random_floats(&pair.source, &cdkf->s[9], 3u, 1.0e-3);
+    random_floats(&pair.source, &cdkf->s[12], 3u, 1.0e-2);
+    random_floats(&pair.source, &cdkf->s_xx[2], 1u, 1.0e-2);
+    random_floats(&pair.source, cdkf->w, 3u, 0.5);
+    random_floats(&pair.source, cdkf->response, 2u, 1.0e-2);
+    cdkf->s_xx[0] = (float)random_between(&pair.source, 2.0e-4, 2.0e-3);
+    cdkf->s_xx[3] = (float)random_between(&pair.source, 2.0e-3, 2.0e-2);
+    cdkf_draw(cdkf, &pair_model, NULL);
+    pair_agree(&pair);
+    return pair;
 }
 
-static inline void pair_predict(pair_t *pair)
+static inline void pair_predict(pair_t *pair, float period)
 {
-    const state_filter_t *state = &pair->dual.state;
-    pair->step = (model_step_t){.period = PAIR_PERIOD,
+    pair->step = (model_step_t){.period = period,
         .z_ddot = (float)(30.0 * random_normal(&pair->source)),
         .tau_m = (float)(30.0 * random_normal(&pair->source)),
         .trim = (float)(30.0 * random_normal(&pair->source))};
-    dual_predict(&pair->dual, &pair_model, NULL, &pair->step);
-    const matrix_t noise =
-        kalman_process_noise((double)state->process_noise[0], (double)state->process_noise[1], (double)PAIR_PERIOD);
-    kalman_predict(&pair->reference, pair_transition(&pair->step), matrix_padded(noise, (uint32_t)PAIR_ALL));
+    cdkf_time_update(&pair->cdkf, &pair_model, NULL, &pair->step);
+    kalman_predict(&pair->reference, pair_transition(&pair->step), pair_process_noise(&pair->cdkf, (double)period));
 }
 
-static inline matrix_t pair_output_covariance(const pair_t *pair)
+/* Of the valid outputs: rows of [0 I], noise covariance, and y as a column. */
+typedef struct pair_outputs {
+    matrix_t h;
+    matrix_t r;
+    matrix_t y;
+} pair_outputs_t;
+
+static inline pair_outputs_t pair_outputs(const cdkf_t *cdkf, const float y[PAIR_X], const bool valid[PAIR_X])
 {
-    matrix_t r = matrix_zero(2u, 2u);
-    for (uint32_t i = 0u; i < 2u; i++) {
-        r.at[i][i] = (double)pair->dual.state.output_noise[i] * (double)pair->dual.state.output_noise[i];
+    const uint32_t count = (valid[0] ? 1u : 0u) + (valid[1] ? 1u : 0u);
+    pair_outputs_t of = {matrix_zero(count, (uint32_t)PAIR_Z), matrix_zero(count, count), matrix_zero(count, 1u)};
+    uint32_t row = 0u;
+    for (uint32_t i = 0u; i < (uint32_t)PAIR_X; i++) {
+        if (valid[i]) {
+            of.h.at[row][(uint32_t)PAIR_W + i] = 1.0;
+            of.r.at[row][row] = (double)cdkf->output_noise[i] * (double)cdkf->output_noise[i];
+            of.y.at[row][0] = (double)y[i];
+            row++;
+        }
     }
-    return r;
+    return of;
 }
 
-/* Outputs about where the reference expects them; not a number where they are not valid. */
-static inline measurement_t pair_measurement(pair_t *pair, bool theta_valid, bool theta_dot_valid)
+/* Outputs about where the reference expects them, NaN where they are not valid, into both filters; their nis is left in
+ * nis[2]. */
+static inline void pair_update(pair_t *pair, bool theta_valid, bool theta_dot_valid, bool learn, double nis[2])
 {
-    const bool valid[2] = {theta_valid, theta_dot_valid};
-    measurement_t measurement = {.valid = {theta_valid, theta_dot_valid}};
-    for (uint32_t i = 0u; i < 2u; i++) {
-        const double noise = 1.2 * (double)pair->dual.state.output_noise[i] * random_normal(&pair->source);
-        measurement.y[i] = valid[i] ? (float)(pair->reference.x.at[i][0] + noise) : NAN;
+    const bool valid[PAIR_X] = {theta_valid, theta_dot_valid};
+    float y[PAIR_X];
+    innovation_t innovation[CDKF_OUTPUTS];
+    nis[0] = 0.0;
+    for (uint32_t i = 0u; i < (uint32_t)PAIR_X; i++) {
+        const double noise = 1.2 * (double)pair->cdkf.output_noise[i] * random_normal(&pair->source);
+        y[i] = valid[i] ? (float)(pair->reference.x.at[(uint32_t)PAIR_W + i][0] + noise) : NAN;
     }
-    return measurement;
+    cdkf_measurement_update(&pair->cdkf, y, valid, learn, innovation);
+    for (uint32_t i = 0u; i < (uint32_t)PAIR_X; i++) {
+        const double value = (double)innovation[i].value;
+        nis[0] += value * value * (double)innovation[i].inverse_variance;
+    }
+    const pair_outputs_t of = pair_outputs(&pair->cdkf, y, valid);
+    nis[1] = (of.h.rows == 0u) ? 0.0 : kalman_update(&pair->reference, of.h, of.r, of.y);
 }
 
-/* Normalised innovation squared of the reference. */
-static inline double pair_reference_update(pair_t *pair, const measurement_t *measurement)
-{
-    const matrix_t h = kalman_outputs(measurement->valid, (uint32_t)PAIR_ALL);
-    const matrix_t r = pair_output_covariance(pair);
-    return (h.rows == 0u) ? 0.0
-                          : kalman_update(&pair->reference, h, kalman_pick(measurement->valid, r),
-                                kalman_pick(measurement->valid, matrix_of(measurement->y, 2u, 1u)));
-}
-
-/* What the state's uncertainty loses when the covariance of w grows to `grown` and that of x and w stays: the part that w no
+/* What the reference's state loses when the covariance of w grows to `grown` and that of x and w stays: what w no
  * longer explains. */
-static inline matrix_t pair_freed(const matrix_t *p, matrix_t grown)
+static inline matrix_t pair_unexplained(const matrix_t *p, matrix_t grown)
 {
-    const matrix_t ww = matrix_block(p, (uint32_t)PAIR_X, (uint32_t)PAIR_W, (uint32_t)PAIR_X, (uint32_t)PAIR_W);
-    const matrix_t xw = matrix_block(p, 0u, (uint32_t)PAIR_X, (uint32_t)PAIR_X, (uint32_t)PAIR_W);
+    const matrix_t ww = matrix_block(p, 0u, (uint32_t)PAIR_W, 0u, (uint32_t)PAIR_W);
+    const matrix_t xw = matrix_block(p, (uint32_t)PAIR_W, (uint32_t)PAIR_X, 0u, (uint32_t)PAIR_W);
     return matrix_congruence(xw, matrix_sum(matrix_inverse(ww), -1.0, matrix_inverse(grown)));
 }
 
-/* The walk and forgetting of `period` seconds. A joint filter only gets noise on w; a dual one loses what that frees. */
-static inline void pair_reference_walk(pair_t *pair, double period)
+/* Forgetting and walk in the textbook: the joint filter's P_x stays, the dual's loses what w no longer explains. */
+static inline void pair_reference_walk(pair_t *pair, double period, double variance, bool joint)
 {
-    const parameter_filter_t *parameters = &pair->dual.parameters;
     matrix_t *p = &pair->reference.p;
-    matrix_t grown = matrix_block(p, (uint32_t)PAIR_X, (uint32_t)PAIR_W, (uint32_t)PAIR_X, (uint32_t)PAIR_W);
-    grown = matrix_sum(grown, (double)parameters->growth * period, grown);
+    matrix_t grown = matrix_block(p, 0u, (uint32_t)PAIR_W, 0u, (uint32_t)PAIR_W);
+    grown = matrix_sum(grown, (double)pair->cdkf.growth * period, grown);
     for (uint32_t i = 0u; i < (uint32_t)PAIR_W; i++) {
-        grown.at[i][i] += (double)parameters->walk[i] * period;
+        grown.at[i][i] += ((double)pair->cdkf.walk[i] * period) + variance;
     }
-    const matrix_t freed = matrix_padded(pair_freed(p, grown), (uint32_t)PAIR_ALL);
-    if (!pair->joint) {
-        *p = matrix_sum(*p, -1.0, freed);
-    }
+    const matrix_t lost = pair_unexplained(p, grown);
     for (uint32_t i = 0u; i < (uint32_t)PAIR_W; i++) {
         for (uint32_t j = 0u; j < (uint32_t)PAIR_W; j++) {
-            p->at[PAIR_X + i][PAIR_X + j] = grown.at[i][j];
+            p->at[i][j] = grown.at[i][j];
+            if (!joint && (i < (uint32_t)PAIR_X) && (j < (uint32_t)PAIR_X)) {
+                p->at[PAIR_W + i][PAIR_W + j] -= lost.at[i][j];
+            }
         }
     }
 }
 
-/* The parameters gather `samples`, each output missing with the given probability, learn, and walk for their time. Of the
- * first sample both filters know as much before it, so its normalised innovation squared must be the same for both. */
-static inline void pair_block(pair_t *pair, uint32_t samples, double missing, float correction[PAIR_W])
+static inline void pair_walk(pair_t *pair, float period, float variance, bool joint)
 {
-    const float period = PAIR_PERIOD * (float)samples;
-    for (uint32_t k = 0u; k < samples; k++) {
-        pair_predict(pair);
-        const bool theta_valid = random_unit(&pair->source) >= missing;
-        const measurement_t measurement = pair_measurement(pair, theta_valid, random_unit(&pair->source) >= missing);
-        const double nis = (double)dual_update(&pair->dual, &measurement, true);
-        const double wanted = pair_reference_update(pair, &measurement);
-        if (k == 0u) {
-            TEST_ASSERT_DOUBLE_WITHIN(5.0e-3 * (1.0 + wanted), wanted, nis);
-        }
-    }
-    TEST_ASSERT_FALSE(revise(&pair->dual, &pair_model, NULL, period, 0.0f, pair->joint, correction));
-    pair_reference_walk(pair, (double)period);
+    const float variances[PAIR_W] = {variance, variance, variance};
+    cdkf_forget(&pair->cdkf, period, joint);
+    cdkf_walk(&pair->cdkf, period, variances, joint);
+    cdkf_draw(&pair->cdkf, &pair_model, NULL);
+    pair_reference_walk(pair, (double)period, (double)variance, joint);
 }
 
-/* --- comparison --------------------------------------------------------------------------------------------------- */
-
-/* The covariance of [x; w] that the factors of the dual filter stand for: columns of w move the state, too. */
-static inline matrix_t pair_covariance(const dual_t *dual)
+/* To be asked when the parameters have just learnt: estimates within `sigmas`, the covariance within `relative`. */
+static inline void pair_assert_equal(const pair_t *pair, double sigmas, double relative)
 {
-    const matrix_t s = matrix_of(dual->state.s, (uint32_t)PAIR_X, (uint32_t)PAIR_X);
-    const matrix_t all = matrix_of(dual->parameters.s, (uint32_t)PAIR_ALL, (uint32_t)PAIR_W); /* rows w, then x */
-    matrix_t columns = matrix_padded(s, (uint32_t)PAIR_ALL);
-    for (uint32_t i = 0u; i < (uint32_t)PAIR_ALL; i++) {
-        const uint32_t row = (i < (uint32_t)PAIR_W) ? (i + (uint32_t)PAIR_X) : (i - (uint32_t)PAIR_W);
-        for (uint32_t j = 0u; j < (uint32_t)PAIR_W; j++) {
-            columns.at[row][PAIR_X + j] = all.at[i][j];
-        }
-    }
-    return matrix_gram(columns);
-}
-
-/* To be asked when the parameters have just learnt. The bound on covariances is relative. */
-static inline void pair_assert_equal(const pair_t *pair, double covariance)
-{
-    const dual_t *dual = &pair->dual;
-    const matrix_t found = pair_covariance(dual);
+    const cdkf_t *cdkf = &pair->cdkf;
+    const matrix_t found = pair_covariance(cdkf);
     const matrix_t *wanted = &pair->reference.p;
-    for (uint32_t i = 0u; i < (uint32_t)PAIR_ALL; i++) {
-        const double estimate =
-            (i < (uint32_t)PAIR_X) ? (double)dual->state.x[i] : (double)dual->parameters.w[i - (uint32_t)PAIR_X];
-        TEST_ASSERT_DOUBLE_WITHIN(2.0e-3 * sqrt(wanted->at[i][i]), pair->reference.x.at[i][0], estimate);
+    for (uint32_t i = 0u; i < (uint32_t)PAIR_Z; i++) {
+        const float estimate = (i < (uint32_t)PAIR_W) ? cdkf->w[i] : cdkf->x[i - (uint32_t)PAIR_W];
+        const double sigma = sqrt(wanted->at[i][i]);
+        TEST_ASSERT_DOUBLE_WITHIN(sigmas * sigma, pair->reference.x.at[i][0], (double)estimate);
     }
-    TEST_ASSERT_DOUBLE_WITHIN(covariance, 0.0, covariance_difference(&found, wanted, wanted));
-    TEST_ASSERT_TRUE(dual_is_valid(dual));
+    TEST_ASSERT_DOUBLE_WITHIN(relative, 0.0, covariance_difference(&found, wanted, wanted));
+    TEST_ASSERT_TRUE(cdkf_is_valid(cdkf));
 }
 
 #endif

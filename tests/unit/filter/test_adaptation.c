@@ -10,13 +10,13 @@ enum { L = MODEL_PARAMETERS };
 #define PERIOD 1.0e-3f
 
 static adaptation_t adaptation;
-static parameter_filter_t filter;
-static const float no_correction[L] = {0.0f, 0.0f, 0.0f};
+static cdkf_t cdkf;
+static const float none[L] = {0.0f, 0.0f, 0.0f};
+static const float large[L] = {1.0f, -1.0f, 1.0f};
 
 void setUp(void)
 {
-    adaptation = (adaptation_t){.kind = (uint8_t)LEVER_ADAPTATION_FIXED,
-        .floor = {1.0e-4f, 4.0e-4f, 9.0e-4f},
+    adaptation = (adaptation_t){.floor = {1.0e-4f, 4.0e-4f, 9.0e-4f},
         .ceiling = 100.0f,
         .annealing_time = 5.0f,
         .averaging_time = 2.0f,
@@ -27,155 +27,109 @@ void tearDown(void)
 {
 }
 
-static void start(enum lever_adaptation kind)
+static void start(uint8_t kind)
 {
-    adaptation.kind = (uint8_t)kind;
-    adaptation_start(&adaptation, &filter);
+    adaptation.kind = kind;
+    cdkf.growth = 1.0f;
+    adaptation_start(&adaptation, &cdkf);
 }
 
-/* A walk of so many floors. */
-static void assert_walk(float floors)
+static void step(uint32_t count, const float correction[L], bool excited)
 {
-    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        TEST_ASSERT_TRUE(filter.walk[i] == floors * adaptation.floor[i]);
+    for (uint32_t k = 0u; k < count; k++) {
+        adaptation_step(&adaptation, PERIOD, correction, excited, &cdkf);
     }
 }
 
-static void test_fixed_is_always_the_floor(void)
+/* Walks of so many floors, within a part of them. */
+static void assert_walk(double floors, double relative)
 {
-    const float correction[L] = {0.1f, -0.1f, 0.1f};
-    start(LEVER_ADAPTATION_FIXED);
-    assert_walk(1.0f);
-    adaptation_step(&adaptation, PERIOD, correction, true, &filter);
-    assert_walk(1.0f);
+    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+        const double wanted = floors * (double)adaptation.floor[i];
+        TEST_ASSERT_DOUBLE_WITHIN(relative * wanted, wanted, (double)cdkf.walk[i]);
+    }
 }
 
-static void test_annealing_starts_at_the_ceiling(void)
+static void test_each_kind_starts_and_ends_where_it_is_said_to(void)
 {
-    start(LEVER_ADAPTATION_ANNEALING);
-    assert_walk(adaptation.ceiling);
+    const double starts[LEVER_ADAPTATION_COUNT] = {1.0, 100.0, 1.0, 1.0};
+    const double wildest[LEVER_ADAPTATION_COUNT] = {1.0, 100.0, 100.0, 1.0};
+    for (uint8_t kind = 0u; kind < (uint8_t)LEVER_ADAPTATION_COUNT; kind++) {
+        const float growth = (kind == (uint8_t)LEVER_ADAPTATION_FORGETTING) ? 0.25f : 0.0f;
+        start(kind);
+        assert_walk(starts[kind], 1.0e-7);
+        TEST_ASSERT_TRUE(cdkf.growth == growth);
+        step(1u, large, true); /* a millisecond of annealing is hardly any */
+        assert_walk(wildest[kind], 2.1e-4);
+        TEST_ASSERT_TRUE(cdkf.growth == growth);
+        step(40000u, none, true);
+        assert_walk(1.0, 0.0);
+    }
 }
 
 static void test_annealing_decays_exponentially_with_its_time(void)
 {
-    start(LEVER_ADAPTATION_ANNEALING);
-    for (uint32_t k = 0u; k < 5000u; k++) {
-        adaptation_step(&adaptation, PERIOD, no_correction, true, &filter);
-    }
-    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        const double wanted = (double)(adaptation.ceiling * adaptation.floor[i]) * exp(-1.0);
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-3 * wanted, wanted, (double)filter.walk[i]);
-    }
-}
-
-static void test_annealing_ends_at_the_floor_and_not_below(void)
-{
-    start(LEVER_ADAPTATION_ANNEALING);
-    for (uint32_t k = 0u; k < 40000u; k++) {
-        adaptation_step(&adaptation, PERIOD, no_correction, true, &filter);
-    }
-    assert_walk(1.0f);
-}
-
-static void test_robbins_monro_starts_at_the_floor(void)
-{
-    start(LEVER_ADAPTATION_ROBBINS_MONRO);
-    assert_walk(1.0f);
+    start((uint8_t)LEVER_ADAPTATION_ANNEALING);
+    step(5000u, large, true);
+    assert_walk(100.0 * exp(-1.0), 1.0e-3);
 }
 
 static void test_robbins_monro_averages_the_square_of_the_corrections_per_second(void)
 {
     const float correction[L] = {1.0e-3f, -3.0e-3f, 5.0e-3f};
-    start(LEVER_ADAPTATION_ROBBINS_MONRO);
     double wanted[L];
+    start((uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        wanted[i] = (double)filter.walk[i];
+        wanted[i] = (double)cdkf.walk[i];
     }
     for (uint32_t k = 0u; k < 3000u; k++) {
-        adaptation_step(&adaptation, PERIOD, correction, true, &filter);
+        step(1u, correction, true);
         for (uint32_t i = 0u; i < (uint32_t)L; i++) {
             const double nu = (double)PERIOD / 2.0;
             const double rate = (double)correction[i] * (double)correction[i] / (double)PERIOD;
             wanted[i] = ((1.0 - nu) * wanted[i]) + (nu * rate);
-            TEST_ASSERT_DOUBLE_WITHIN(2.0e-5 * wanted[i], wanted[i], (double)filter.walk[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(2.0e-5 * wanted[i], wanted[i], (double)cdkf.walk[i]);
         }
     }
 }
 
-static void test_robbins_monro_stays_between_floor_and_ceiling(void)
+static void test_a_period_longer_than_the_averaging_time_counts_fully_and_stays_between_floor_and_ceiling(void)
 {
-    const float large[L] = {1.0f, -1.0f, 1.0f};
-    start(LEVER_ADAPTATION_ROBBINS_MONRO);
-    adaptation_step(&adaptation, PERIOD, large, true, &filter);
-    assert_walk(adaptation.ceiling);
-    for (uint32_t k = 0u; k < 30000u; k++) {
-        adaptation_step(&adaptation, PERIOD, no_correction, true, &filter);
-    }
-    assert_walk(1.0f);
-}
-
-static void test_forgetting_grows_by_one_over_its_time_and_walks_at_the_floor(void)
-{
-    const float large[L] = {1.0f, -1.0f, 1.0f};
-    start(LEVER_ADAPTATION_FORGETTING);
-    for (uint32_t k = 0u; k < 10u; k++) {
-        TEST_ASSERT_EQUAL_FLOAT(0.25f, filter.growth);
-        assert_walk(1.0f);
-        adaptation_step(&adaptation, PERIOD, large, true, &filter);
-    }
-}
-
-static void test_no_other_kind_forgets(void)
-{
+    const float five_floors[L] = {sqrtf(50.0e-4f), -sqrtf(200.0e-4f), sqrtf(450.0e-4f)};
+    start((uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    adaptation_step(&adaptation, 10.0f, five_floors, true, &cdkf);
+    assert_walk(5.0, 1.0e-6);
+    adaptation_step(&adaptation, 10.0f, five_floors, true, &cdkf);
+    assert_walk(5.0, 1.0e-6);
     for (uint8_t kind = 0u; kind < (uint8_t)LEVER_ADAPTATION_COUNT; kind++) {
-        filter.growth = 1.0f;
-        start((enum lever_adaptation)kind);
-        TEST_ASSERT_TRUE((filter.growth > 0.0f) == (kind == (uint8_t)LEVER_ADAPTATION_FORGETTING));
-        adaptation_step(&adaptation, PERIOD, no_correction, true, &filter);
-        TEST_ASSERT_TRUE((filter.growth > 0.0f) == (kind == (uint8_t)LEVER_ADAPTATION_FORGETTING));
-    }
-}
-
-static void test_a_period_longer_than_the_averaging_time_stays_between_floor_and_ceiling(void)
-{
-    const enum lever_adaptation kinds[] = {LEVER_ADAPTATION_ANNEALING, LEVER_ADAPTATION_ROBBINS_MONRO};
-    const float correction[L] = {1.0f, 0.0f, 1.0e-3f};
-    for (uint32_t kind = 0u; kind < 2u; kind++) {
-        start(kinds[kind]);
+        start(kind);
         for (uint32_t k = 0u; k < 10u; k++) {
-            adaptation_step(&adaptation, 10.0f, correction, true, &filter);
+            adaptation_step(&adaptation, 10.0f, ((k % 2u) == 0u) ? large : none, true, &cdkf);
             for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-                const float ceiling = adaptation.ceiling * adaptation.floor[i];
-                TEST_ASSERT_TRUE((filter.walk[i] >= adaptation.floor[i]) && (filter.walk[i] <= ceiling));
+                TEST_ASSERT_TRUE(cdkf.walk[i] >= adaptation.floor[i]);
+                TEST_ASSERT_TRUE(cdkf.walk[i] <= (adaptation.ceiling * adaptation.floor[i]));
             }
         }
     }
 }
 
-static void test_without_excitation_every_kind_is_held_at_its_floor_and_forgets_nothing(void)
+static void test_without_excitation_every_kind_is_at_its_floor_and_forgets_nothing(void)
 {
-    const float large[L] = {1.0f, -1.0f, 1.0f};
     for (uint8_t kind = 0u; kind < (uint8_t)LEVER_ADAPTATION_COUNT; kind++) {
-        start((enum lever_adaptation)kind);
-        adaptation_step(&adaptation, PERIOD, large, false, &filter);
-        assert_walk(1.0f);
-        TEST_ASSERT_TRUE(filter.growth == 0.0f);
+        start(kind);
+        step(1u, large, false);
+        assert_walk(1.0, 0.0);
+        TEST_ASSERT_TRUE(cdkf.growth == 0.0f);
     }
 }
 
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_fixed_is_always_the_floor);
-    RUN_TEST(test_annealing_starts_at_the_ceiling);
+    RUN_TEST(test_each_kind_starts_and_ends_where_it_is_said_to);
     RUN_TEST(test_annealing_decays_exponentially_with_its_time);
-    RUN_TEST(test_annealing_ends_at_the_floor_and_not_below);
-    RUN_TEST(test_robbins_monro_starts_at_the_floor);
     RUN_TEST(test_robbins_monro_averages_the_square_of_the_corrections_per_second);
-    RUN_TEST(test_robbins_monro_stays_between_floor_and_ceiling);
-    RUN_TEST(test_forgetting_grows_by_one_over_its_time_and_walks_at_the_floor);
-    RUN_TEST(test_no_other_kind_forgets);
-    RUN_TEST(test_a_period_longer_than_the_averaging_time_stays_between_floor_and_ceiling);
-    RUN_TEST(test_without_excitation_every_kind_is_held_at_its_floor_and_forgets_nothing);
+    RUN_TEST(test_a_period_longer_than_the_averaging_time_counts_fully_and_stays_between_floor_and_ceiling);
+    RUN_TEST(test_without_excitation_every_kind_is_at_its_floor_and_forgets_nothing);
     return UNITY_END();
 }

@@ -15,7 +15,7 @@ typedef struct matrix {
     double at[DENSE_MOST][DENSE_MOST];
 } matrix_t;
 
-/* --- random numbers, the same in every run ------------------------------------------------------------------------- */
+/* --- random numbers, the same in every run ------------------------------------------------------------------------ */
 
 typedef struct random_source {
     uint64_t state; /* any but 0 */
@@ -62,7 +62,7 @@ static inline void random_factor(random_source_t *source, float *s, uint32_t row
     }
 }
 
-/* --- matrices ------------------------------------------------------------------------------------------------------ */
+/* --- matrices ----------------------------------------------------------------------------------------------------- */
 
 static inline matrix_t matrix_zero(uint32_t rows, uint32_t columns)
 {

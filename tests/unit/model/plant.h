@@ -1,5 +1,6 @@
-/* The lever and the pilot's arm in double precision: the truth of the tests. The equation of DESIGN section 3 as it stands,
- * gravity and preload spelt out, integrated by Runge and Kutta's fourth-order rule; or a linear system instead. */
+/* The lever and the pilot's arm in double precision: the truth of the tests. The equation of DESIGN section 3
+ * as it stands, gravity and preload spelt out, integrated by Runge and Kutta's fourth-order rule; or a linear
+ * system instead. */
 #ifndef UNIT_MODEL_PLANT_H
 #define UNIT_MODEL_PLANT_H
 

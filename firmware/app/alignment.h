@@ -1,0 +1,31 @@
+/* Where the state starts: the first samples, averaged; and again after an outage. */
+#ifndef APP_ALIGNMENT_H
+#define APP_ALIGNMENT_H
+
+#include "app/estimator.h"
+
+#include <stdbool.h>
+
+/* A sample after its checks: outputs, and inputs of which a missing base acceleration is the last one, a missing
+ * torque 0. */
+typedef struct checked {
+    float y[CDKF_OUTPUTS];
+    bool valid[CDKF_OUTPUTS];
+    float z_ddot;
+    float tau_m;
+} checked_t;
+
+/* Begins with this sample. Excitation is presumed until it has been measured, so that annealing is not cut short. */
+void alignment_begin(estimator_t *estimator, const checked_t *sample);
+
+/* Averages angles until align_time has passed, then starts the state at a valid one. */
+void alignment_step(estimator_t *estimator, const checked_t *sample, float elapsed);
+
+/* The state starts at outputs y, deviations in preload trim, with the uncertainty of the measurement. An angle that is
+ * not known is near the trim, a rate that is not known anything plausible. */
+void alignment_start_state(estimator_t *estimator, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS]);
+
+/* After an outage the prediction is worth little: the state starts again where it is measured. */
+void alignment_end_outage(estimator_t *estimator, const checked_t *sample);
+
+#endif

@@ -1,0 +1,89 @@
+/* What is known: from the belief to the estimate that is reported. */
+#include "app/estimator.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#define TURN 6.28318531f
+
+float estimator_state(const estimator_t *estimator, uint32_t i)
+{
+    return estimator->trim.origin[i] + estimator->cdkf.x[i];
+}
+
+void estimator_parameters(const estimator_t *estimator, float parameter[LEVER_PARAMETERS])
+{
+    (void)memcpy(parameter, estimator->cdkf.p, sizeof estimator->cdkf.p);
+}
+
+void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_PARAMETERS])
+{
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+        sigma[i] = cdkf_parameter_sigma(&estimator->cdkf, i);
+    }
+}
+
+void estimator_derive(const estimator_t *estimator, derived_t *derived)
+{
+    const sine_cosine_t *angle = &estimator->trim_angle;
+    const model_step_t at_trim = {
+        .trim = estimator->trim.output[0].level, .trim_sine = angle->sine, .trim_cosine = angle->cosine};
+    const setup_t *setup = &estimator->setup;
+    derived_compute(derived, &estimator->cdkf, setup->model_in_use, &setup->constants, &at_trim);
+}
+
+/* Standard deviation of state i. While its level waits for samples, what moves slower than trim_corner is not
+ * predicted: a quarter of the rms rate, in the state's unit by `scale`. */
+static float state_sigma(const estimator_t *estimator, uint32_t i, float scale)
+{
+    const bool waiting = estimator->setup.constants.trim && trim_is_waiting(&estimator->trim, i);
+    const float slow = waiting ? (0.25f * scale) : 0.0f;
+    const float sigma = cdkf_state_sigma(&estimator->cdkf, i);
+    return sqrtf((sigma * sigma) + ((slow * slow) * estimator->averages.excitation_square));
+}
+
+void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate)
+{
+    derived_t derived;
+    estimate->time_us = estimator->time_us;
+    estimate->theta = estimator_state(estimator, 0u);
+    estimate->theta_dot = estimator_state(estimator, 1u);
+    estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->setup.settings->trim_corner));
+    estimate->theta_dot_sigma = state_sigma(estimator, 1u, 1.0f);
+    estimate->trim = estimator->trim.output[0].level;
+    estimate->nis = estimator->nis;
+    estimate->nis_size = estimator->nis_size;
+    estimator_parameters(estimator, estimate->parameter);
+    estimator_parameter_sigma(estimator, estimate->parameter_sigma);
+    cdkf_correlation(&estimator->cdkf, estimate->parameter_correlation);
+    estimator_derive(estimator, &derived);
+    estimate->natural_frequency = derived.mean.natural_frequency;
+    estimate->natural_frequency_sigma = sqrtf(derived.variance.natural_frequency);
+    estimate->damping_ratio = derived.mean.damping_ratio;
+    estimate->damping_ratio_sigma = sqrtf(derived.variance.damping_ratio);
+}
+
+void estimator_health(const estimator_t *estimator, lever_health_t *health)
+{
+    health->mode = estimator->mode;
+    health->faults = estimator->faults;
+    health->samples = estimator->samples;
+    health->lost = estimator->lost;
+    health->corrupt = estimator->corrupt;
+    health->late = estimator->late;
+    health->recoveries = estimator->recoveries;
+    health->excitation = sqrtf(estimator->averages.excitation_square);
+}
+
+const char *lever_parameter_name(uint8_t model, uint32_t index)
+{
+    const model_t *found = setup_model(model);
+    return ((found != NULL) && (index < (uint32_t)MODEL_PARAMETERS)) ? found->parameter[index].name : NULL;
+}
+
+const char *lever_parameter_unit(uint8_t model, uint32_t index)
+{
+    const model_t *found = setup_model(model);
+    return ((found != NULL) && (index < (uint32_t)MODEL_PARAMETERS)) ? found->parameter[index].unit : NULL;
+}

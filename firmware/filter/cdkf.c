@@ -1,0 +1,208 @@
+#include "filter/cdkf.h"
+
+#include "math/factor.h"
+
+#include <string.h>
+
+#define N ((uint32_t)MODEL_STATES)
+#define L ((uint32_t)MODEL_PARAMETERS)
+#define ROWS ((uint32_t)CDKF_ROWS)
+
+/* --- start ------------------------------------------------------------------------------------------------------ */
+
+void cdkf_start_state(cdkf_t *cdkf, const float x[MODEL_STATES], const float sigma[MODEL_STATES])
+{
+    for (uint32_t k = L * L; k < (ROWS * L); k++) {
+        cdkf->s[k] = 0.0f;
+    }
+    (void)memset(&cdkf->pending, 0, sizeof cdkf->pending);
+    for (uint32_t i = 0u; i < N; i++) {
+        cdkf->x[i] = x[i];
+        cdkf->response[i] = 0.0f;
+    }
+    cdkf->s_xx[0] = sigma[0];
+    cdkf->s_xx[1] = 0.0f;
+    cdkf->s_xx[2] = 0.0f;
+    cdkf->s_xx[3] = sigma[1];
+}
+
+/* --- time update ------------------------------------------------------------------------------------------------ */
+
+/* The mean moves by F0 and the second differences of the parameter points. S_xw: c1 (F+ - F-), with F = X +
+ * increment, is the column plus c1 times the difference of increments. */
+static void predict_mean_and_parameter_columns(cdkf_t *cdkf, const model_response_t *response, float period)
+{
+    float *theta = &cdkf->s[L * L];
+    float *theta_dot = &cdkf->s[(L + 1u) * L];
+    float mean = response->mean;
+    for (uint32_t j = 0u; j < L; j++) {
+        const float change = SIGMA_FIRST * response->difference[j];
+        theta[j] += period * (theta_dot[j] + (0.5f * change));
+        theta_dot[j] += change;
+        mean += SIGMA_MEAN * response->second_difference[j];
+    }
+    cdkf->x[0] += period * (cdkf->x[1] + (0.5f * mean));
+    cdkf->x[1] += mean;
+}
+
+/* A deviation of the state, moved by the slope of the step. Sigma points of S_xx would give the same to 5e-5
+ * standard deviations: the model is nearly linear over the state's own uncertainty. */
+static inline void move(const model_response_t *response, float period, float *theta, float *theta_dot)
+{
+    const float change = (response->slope[0] * *theta) + (response->slope[1] * *theta_dot);
+    *theta += period * (*theta_dot + (0.5f * change));
+    *theta_dot += change;
+}
+
+/* S_xx: its own columns; the walk q of theta_dot, integrated by theta, q^2 [T^3/3, T^2/2; T^2/2, T] (van Loan 1978);
+ * second differences along the parameters, in the same direction [T/2; 1]; and a walk of theta itself. */
+static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period)
+{
+    const float variance = cdkf->process_noise[1] * cdkf->process_noise[1] * period;
+    const float own = cdkf->process_noise[0] * cdkf->process_noise[0] * period;
+    float square = 0.0f;
+    for (uint32_t j = 0u; j < L; j++) {
+        square += response->second_difference[j] * response->second_difference[j];
+    }
+    const float rate = sqrtf(variance + ((SIGMA_SECOND * SIGMA_SECOND) * square));
+    const float angle = sqrtf((variance * (period * period * 0.0833333333f)) + own);
+    float theta[4] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, angle};
+    float theta_dot[4] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f};
+    move(response, period, &theta[0], &theta_dot[0]);
+    move(response, period, &theta[1], &theta_dot[1]);
+    factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
+}
+
+void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step)
+{
+    model_points_t points;
+    model_response_t response;
+    points.coefficients = cdkf->points;
+    points.x[0] = cdkf->x[0];
+    points.x[1] = cdkf->x[1];
+    for (uint32_t j = 0u; j < L; j++) {
+        points.offset[j][0] = SIGMA_OFFSET * cdkf->s[(L * L) + j];
+        points.offset[j][1] = SIGMA_OFFSET * cdkf->s[((L + 1u) * L) + j];
+    }
+    model->respond(constants, step, &points, &response);
+    predict_mean_and_parameter_columns(cdkf, &response, step->period);
+    predict_state_columns(cdkf, &response, step->period);
+    move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
+}
+
+/* --- measurement update ------------------------------------------------------------------------------------------ */
+
+/* Gain of one output on the state for given w, and the innovation's standard deviation. */
+typedef struct gain {
+    float k[MODEL_STATES];
+    float inverse; /* 1 / S_y */
+} gain_t;
+
+/* Conditions S_xx on output i of standard deviation `noise`, by Carlson's triangular form (1973) for
+ * lower-triangular factors: column by column from the output's own to the first. There is no downdate; the diagonal
+ * is only ever multiplied by factors in (0, 1], so it cannot fail. */
+static inline gain_t condition_on(float *s, uint32_t i, float noise)
+{
+    gain_t gain = {{0.0f, 0.0f}, 0.0f};
+    float root = noise; /* of the variance of the output, in the columns so far */
+    for (uint32_t left = i + 1u; left > 0u; left--) {
+        const uint32_t j = left - 1u;
+        const float seen = s[(i * N) + j];
+        const float next = sqrtf((root * root) + (seen * seen));
+        const float inverse = 1.0f / next;
+        const float keep = root * inverse;
+        const float share = seen * inverse * gain.inverse; /* of what the columns so far have given to the gain */
+        for (uint32_t r = j; r < N; r++) {
+            const float old = s[(r * N) + j];
+            s[(r * N) + j] = (keep * old) - (share * gain.k[r]);
+            gain.k[r] += old * seen;
+        }
+        root = next;
+        gain.inverse = inverse;
+    }
+    gain.k[0] *= gain.inverse * gain.inverse;
+    gain.k[1] *= gain.inverse * gain.inverse;
+    return gain;
+}
+
+/* Takes from a deviation of the state what the correction by output i takes, I - K H; returns what the output saw of
+ * it, divided by S_y. */
+static inline float correct(const gain_t *gain, float seen, float *theta, float *theta_dot)
+{
+    *theta -= gain->k[0] * seen;
+    *theta_dot -= gain->k[1] * seen;
+    return gain->inverse * seen;
+}
+
+/* Takes output i, or nothing when it is not valid: row = H S_xw / S_y is what the output sees of each column of S_ww.
+ * `step` adds up the correction of the state. */
+static inline void take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, float row[MODEL_PARAMETERS],
+    innovation_t *innovation, float step[MODEL_STATES])
+{
+    if (valid) {
+        /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+        const gain_t gain = condition_on(cdkf->s_xx, i, cdkf->output_noise[i]);
+        float *theta = &cdkf->s[L * L];
+        float *theta_dot = &cdkf->s[(L + 1u) * L];
+        const float *seen = (i == 0u) ? theta : theta_dot;
+        for (uint32_t j = 0u; j < L; j++) {
+            row[j] = correct(&gain, seen[j], &theta[j], &theta_dot[j]);
+        }
+        const float nu = y - cdkf->x[i];
+        const float share = cdkf->output_noise[i] * gain.inverse;
+        innovation->value = gain.inverse * nu;
+        innovation->noise_variance = share * share;
+        innovation->response = correct(&gain, cdkf->response[i], &cdkf->response[0], &cdkf->response[1]);
+        for (uint32_t k = 0u; k < N; k++) {
+            cdkf->x[k] += gain.k[k] * nu;
+            step[k] += gain.k[k] * nu;
+        }
+    } else {
+        (void)memset(row, 0, L * sizeof row[0]);
+        (void)memset(innovation, 0, sizeof *innovation);
+    }
+}
+
+static inline void add_information(information_t *pending, const float row[MODEL_PARAMETERS], float nu)
+{
+    for (uint32_t i = 0u; i < L; i++) {
+        pending->vector[i] += row[i] * nu;
+        for (uint32_t j = i; j < L; j++) {
+            pending->matrix[(i * L) + j] += row[i] * row[j];
+        }
+    }
+}
+
+void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
+    innovation_t innovation[CDKF_OUTPUTS])
+{
+    float row[2][L];
+    float step[N] = {0.0f, 0.0f};
+    take_output(cdkf, 0u, y[0], valid[0], row[0], &innovation[0], step);
+    take_output(cdkf, 1u, y[1], valid[1], row[1], &innovation[1], step);
+    cdkf->response[0] += step[0]; /* from now on it includes the response to this correction */
+    cdkf->response[1] += step[1];
+    if (learn) {
+        add_information(&cdkf->pending, row[0], innovation[0].value);
+        add_information(&cdkf->pending, row[1], innovation[1].value);
+    }
+    /* w makes both uncertain together: I + R R^T = L D L^T, and the second innovation is then given the first */
+    const float covariance = factor_dot_three(row[0], row[1]);
+    innovation[0].inverse_variance = 1.0f / (1.0f + factor_dot_three(row[0], row[0]));
+    const float coupling = covariance * innovation[0].inverse_variance;
+    const float variance = (1.0f + factor_dot_three(row[1], row[1])) - (coupling * covariance);
+    innovation[1].value -= coupling * innovation[0].value;
+    innovation[1].response -= coupling * innovation[0].response;
+    innovation[1].inverse_variance = (variance > 1.0f) ? (1.0f / variance) : 1.0f; /* it is at least 1 */
+}
+
+#define THETA_MOST 25.0f      /* a few turns [rad] */
+#define THETA_DOT_MOST 1.0e4f /* [rad/s] */
+#define SIGMA_MOST 1.0e6f     /* beyond it nothing is known */
+
+bool cdkf_state_is_valid(const cdkf_t *cdkf)
+{
+    const float *s = cdkf->s_xx;
+    return ((s[0] + fabsf(s[2]) + s[3]) < SIGMA_MOST) && (fabsf(cdkf->x[0]) < THETA_MOST) &&
+           (fabsf(cdkf->x[1]) < THETA_DOT_MOST);
+}

@@ -1,0 +1,174 @@
+/* Learning of the parameters, once a block: see cdkf.h. */
+#include "filter/cdkf.h"
+#include "math/factor.h"
+
+#include <string.h>
+
+#define N ((uint32_t)MODEL_STATES)
+#define L ((uint32_t)MODEL_PARAMETERS)
+#define ROWS ((uint32_t)CDKF_ROWS)
+#define FINITE_MOST 1.0e17f /* squares stay inside the range of float */
+
+void cdkf_init(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const prior_t *prior)
+{
+    (void)memset(cdkf, 0, sizeof *cdkf);
+    scaling_init(&cdkf->scaling, model, prior);
+    cdkf_open(cdkf);
+    cdkf_draw(cdkf, model, constants);
+}
+
+void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correction)
+{
+    float *u = cdkf->pending.matrix;
+    float *step = cdkf->pending.vector; /* of w in coordinates of the columns of S_ww */
+    if (u[0] > 0.0f) {                  /* there is information */
+        const float trust = cdkf->trust + ((period < caution) ? (period / caution) : 1.0f);
+        cdkf->trust = (trust < 1.0f) ? trust : 1.0f;
+    }
+    for (uint32_t i = 0u; i < L; i++) {
+        for (uint32_t j = i; j < L; j++) {
+            u[(i * L) + j] *= cdkf->trust;
+        }
+        step[i] *= cdkf->trust;
+        correction->variance[i] = factor_variance(cdkf->s, L, i);
+        correction->w[i] = cdkf->w[i];
+    }
+    factor_reverse(u, L);
+    factor_reverse_solve(u, L, step, L);
+    for (uint32_t r = 0u; r < ROWS; r++) { /* S (I + information)^-1/2; rows of S_ww end at their diagonal */
+        float *row = &cdkf->s[r * L];
+        factor_reverse_solve(u, L, row, (r < L) ? (r + 1u) : L);
+        float *mean = (r < L) ? &cdkf->w[r] : &cdkf->x[r - L];
+        *mean += factor_dot_three(row, step);
+    }
+    (void)memset(&cdkf->pending, 0, sizeof cdkf->pending);
+    correction->bounded = scaling_bound(&cdkf->scaling, cdkf->w);
+    for (uint32_t i = 0u; i < L; i++) {
+        correction->variance[i] -= factor_variance(cdkf->s, L, i);
+        correction->w[i] = cdkf->w[i] - correction->w[i];
+    }
+}
+
+/* Adds independent deviations of the state, columns [MODEL_STATES x MODEL_PARAMETERS], to its own uncertainty. */
+static void add_to_state(cdkf_t *cdkf, const float deviations[MODEL_STATES * MODEL_PARAMETERS])
+{
+    float theta[N + L] = {cdkf->s_xx[0], 0.0f, deviations[0], deviations[1], deviations[2]};
+    const float theta_dot[N + L] = {cdkf->s_xx[2], cdkf->s_xx[3], deviations[3], deviations[4], deviations[5]};
+    factor_tria_two(theta, theta_dot, N + L, cdkf->s_xx);
+}
+
+void cdkf_open(cdkf_t *cdkf)
+{
+    add_to_state(cdkf, &cdkf->s[L * L]);
+    (void)memset(cdkf->s, 0, sizeof cdkf->s);
+    for (uint32_t i = 0u; i < L; i++) {
+        cdkf->s[(i * L) + i] = scaling_prior_sigma(&cdkf->scaling, i);
+    }
+    (void)memset(&cdkf->pending, 0, sizeof cdkf->pending);
+    cdkf->trust = 0.0f;
+}
+
+void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
+{
+    const float growth = cdkf->growth * period;
+    if (growth != 0.0f) { /* a NaN is to show */
+        const float stretch = sqrtf(1.0f + growth);
+        const float shrink = 1.0f / stretch;
+        const float rest = sqrtf(growth) * shrink;
+        float unexplained[N * L];
+        for (uint32_t k = 0u; k < (N * L); k++) { /* S_xw S_ww^T stays, so S_xw shrinks as S_ww grows */
+            unexplained[k] = rest * cdkf->s[(L * L) + k];
+            cdkf->s[(L * L) + k] *= shrink;
+        }
+        for (uint32_t k = 0u; k < (L * L); k++) {
+            cdkf->s[k] *= stretch;
+        }
+        if (joint) {
+            add_to_state(cdkf, unexplained);
+        }
+    }
+}
+
+void cdkf_walk(cdkf_t *cdkf, float period, const float variance[MODEL_PARAMETERS], bool joint)
+{
+    float unexplained[N * L];
+    for (uint32_t i = 0u; i < L; i++) {
+        float rest[N];
+        factor_add_noise(cdkf->s, ROWS, L, i, sqrtf((cdkf->walk[i] * period) + variance[i]), rest);
+        unexplained[i] = rest[0];
+        unexplained[L + i] = rest[1];
+    }
+    if (joint) {
+        add_to_state(cdkf, unexplained);
+    }
+}
+
+/* Standard deviations of w stay at or below those of the prior (wind-up). */
+static void cap(cdkf_t *cdkf)
+{
+    for (uint32_t i = 0u; i < L; i++) {
+        const float most = scaling_prior_sigma(&cdkf->scaling, i);
+        const float square = factor_variance(cdkf->s, L, i);
+        const float shrink = (square > (most * most)) ? (most / sqrtf(square)) : 1.0f;
+        for (uint32_t j = 0u; j <= i; j++) {
+            cdkf->s[(i * L) + j] *= shrink;
+        }
+    }
+}
+
+void cdkf_draw(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants)
+{
+    cap(cdkf);
+    scaling_parameters(&cdkf->scaling, cdkf->w, cdkf->p);
+    model->prepare(constants, cdkf->p, &cdkf->points[0]);
+    for (uint32_t j = 0u; j < L; j++) {
+        const float offset[L] = {
+            SIGMA_OFFSET * cdkf->s[j], SIGMA_OFFSET * cdkf->s[L + j], SIGMA_OFFSET * cdkf->s[(2u * L) + j]};
+        float plus[L];
+        float minus[L];
+        scaling_pair(&cdkf->scaling, cdkf->p, offset, plus, minus);
+        model->prepare(constants, plus, &cdkf->points[1u + (2u * j)]);
+        model->prepare(constants, minus, &cdkf->points[2u + (2u * j)]);
+    }
+}
+
+float cdkf_state_sigma(const cdkf_t *cdkf, uint32_t i)
+{
+    const float *row = &cdkf->s[(L + i) * L];
+    const float *own = &cdkf->s_xx[i * N];
+    return sqrtf(factor_dot_three(row, row) + (own[0] * own[0]) + (own[1] * own[1]));
+}
+
+float cdkf_parameter_sigma(const cdkf_t *cdkf, uint32_t i)
+{
+    return scaling_slope(&cdkf->scaling, cdkf->p, i) * factor_sigma(cdkf->s, L, i);
+}
+
+static float correlation_of(const cdkf_t *cdkf, uint32_t i, uint32_t j)
+{
+    return factor_dot_three(&cdkf->s[i * L], &cdkf->s[j * L]) /
+           (factor_sigma(cdkf->s, L, i) * factor_sigma(cdkf->s, L, j));
+}
+
+void cdkf_correlation(const cdkf_t *cdkf, float correlation[MODEL_PARAMETERS])
+{
+    correlation[0] = correlation_of(cdkf, 0u, 1u);
+    correlation[1] = correlation_of(cdkf, 0u, 2u);
+    correlation[2] = correlation_of(cdkf, 1u, 2u);
+}
+
+bool cdkf_is_valid(const cdkf_t *cdkf)
+{
+    const scaling_t *scaling = &cdkf->scaling;
+    bool valid = cdkf_state_is_valid(cdkf) && (cdkf->s_xx[0] > 0.0f) && (cdkf->s_xx[3] > 0.0f);
+    float size = fabsf(cdkf->response[0]) + fabsf(cdkf->response[1]);
+    for (uint32_t i = 0u; i < L; i++) {
+        valid = valid && (cdkf->s[(i * L) + i] > 0.0f) && (cdkf->walk[i] >= 0.0f);
+        valid = valid && (cdkf->w[i] >= scaling->least[i]) && (cdkf->w[i] <= scaling->greatest[i]);
+        size += cdkf->walk[i];
+    }
+    for (uint32_t k = 0u; k < (ROWS * L); k++) {
+        size += fabsf(cdkf->s[k]);
+    }
+    return valid && (size < FINITE_MOST);
+}

@@ -1,0 +1,36 @@
+#include "filter/change_detection.h"
+
+#include <string.h>
+
+#define L ((uint32_t)MODEL_PARAMETERS)
+#define LONG 100.0f /* memory of the long average, in memories of the sum */
+
+void change_detection_init(change_detection_t *change)
+{
+    (void)memset(change, 0, sizeof *change);
+    change->average = 1.0f;
+}
+
+bool change_detection_step(
+    change_detection_t *change, const correction_t *correction, float period, float memory, float threshold)
+{
+    const float share = (period < memory) ? (period / memory) : 1.0f;
+    const float keep = 1.0f - share;
+    float statistic = 0.0f;
+    for (uint32_t i = 0u; i < L; i++) {
+        const float variance = (correction->variance[i] > 0.0f) ? correction->variance[i] : 0.0f;
+        change->sum[i] = (keep * change->sum[i]) + correction->w[i];
+        change->variance[i] = (keep * keep * change->variance[i]) + variance;
+        if (change->variance[i] > 0.0f) {
+            statistic += (change->sum[i] * change->sum[i]) / change->variance[i];
+        }
+    }
+    change->average += (share / LONG) * ((statistic / (float)L) - change->average);
+    const float level = (change->average > 1.0f) ? change->average : 1.0f;
+    const bool changed = (threshold > 0.0f) && (statistic > (threshold * level));
+    if (changed) {
+        (void)memset(change->sum, 0, sizeof change->sum);
+        (void)memset(change->variance, 0, sizeof change->variance);
+    }
+    return changed;
+}

@@ -1,0 +1,28 @@
+/* Detection of a sudden change of the pilot.
+ *
+ * Corrections of w are white when the filter is right: each has the variance by which it made w more certain,
+ * independent of the last one. After a jump of the pilot they all point the same way. So their sum over a short
+ * time, squared and over its variance, is chi-square with a degree of freedom for each parameter (in steady state
+ * each correction makes up for the walk, whose parts are independent), and large after a change: the generalised
+ * likelihood ratio of a jump (Willsky & Jones 1976) without a bank of filters. It is compared with its own long
+ * average, which makes it insensitive to noise that is set wrongly.
+ */
+#ifndef FILTER_CHANGE_DETECTION_H
+#define FILTER_CHANGE_DETECTION_H
+
+#include "filter/cdkf.h"
+
+typedef struct change_detection {
+    float sum[MODEL_PARAMETERS];      /* of the corrections of w, with exponential forgetting */
+    float variance[MODEL_PARAMETERS]; /* expected of it */
+    float average;                    /* of the statistic per parameter, over a long time; expected 1 */
+} change_detection_t;
+
+void change_detection_init(change_detection_t *change);
+
+/* Takes a correction of w, `period` seconds after the last one. Memory of the sum [s]; threshold on the statistic
+ * (0: never). True: a change; the sum starts anew. */
+bool change_detection_step(
+    change_detection_t *change, const correction_t *correction, float period, float memory, float threshold);
+
+#endif

@@ -1,0 +1,71 @@
+/* The trim: the slow part of every signal, and the high-pass that separates it.
+ *
+ * A second-order Butterworth high-pass, in the form of a tracker: the level follows the signal without lag on a
+ * ramp, the deviation is what is left. When outputs and inputs of a linear system pass the same high-pass, the
+ * deviations obey the same system, and whatever is slow and not known drops out: the pilot's trim, gravity, the bias
+ * of an accelerometer. To do so with the angle alone (a trim angle by low-pass) would bias the damping by 1 / (2
+ * zeta omega T) and fail on a re-trim, which for T of seconds looks like a torque larger than all others.
+ *
+ * In preload trim the estimator works on deviations. In preload fixed signals stay as they come, and the level of
+ * theta only serves as the trim angle.
+ */
+#ifndef FILTER_TRIM_H
+#define FILTER_TRIM_H
+
+#include "model/model.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Of a corner w [rad/s]: w^2 and sqrt(2) w. */
+typedef struct high_pass_corner {
+    float square;
+    float damping;
+} high_pass_corner_t;
+
+typedef struct high_pass {
+    float level; /* [unit of the signal] */
+    float slope; /* [unit / s] */
+} high_pass_t;
+
+/* Of a corner frequency [Hz]. */
+high_pass_corner_t high_pass_corner(float frequency);
+
+/* One value after `period` seconds. Returns its deviation from the level before it. */
+float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period);
+
+enum { TRIM_INPUTS = 2 };
+
+typedef struct trim {
+    high_pass_t output[MODEL_STATES]; /* theta, whose level is the trim angle [rad], and theta_dot */
+    high_pass_t input[TRIM_INPUTS];   /* z_ddot, tau_m */
+    float origin[MODEL_STATES];       /* of the state: the levels in preload trim, otherwise 0 */
+    float missing[MODEL_STATES];      /* time since the last sample of each output [s] */
+    float unsettled;                  /* time until the levels have settled: nothing can be learnt before [s] */
+    high_pass_corner_t corner;
+    float settling_time; /* [s] */
+    bool deviations;     /* preload trim */
+} trim_t;
+
+/* Starts at a trim angle, at rest; corner [Hz]. */
+void trim_start(trim_t *trim, float angle, float corner, bool deviations);
+
+/* Input i (0 z_ddot, 1 tau_m) after `period` seconds: its deviation in preload trim. */
+float trim_input(trim_t *trim, uint32_t i, float value, float period);
+
+/* Sets the origin of the state to the levels: before a prediction. */
+void trim_set_origin(trim_t *trim);
+
+/* Replaces valid outputs y by deviations from the levels, in preload trim, `period` seconds after the last sample.
+ * The level of an output that is not valid follows the prediction x for 20 ms, then waits: to follow itself for long
+ * would be to integrate twice. Returns true when an output is back after that. */
+bool trim_outputs(
+    trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period);
+
+/* The level of output i waits for samples. */
+bool trim_is_waiting(const trim_t *trim, uint32_t i);
+
+/* The levels are guesses: in preload trim nothing can be learnt until they have settled. */
+void trim_unsettle(trim_t *trim);
+
+#endif
