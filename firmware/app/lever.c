@@ -97,6 +97,9 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
         if (command->dither_rms < (float)LEVER_KEEP) {
             dither_set(&lever->dither, command->dither_rms, resets || !lever->gate.open); /* a reset closes it */
         }
+        if (!permits_torque(lever)) {
+            torque_gate_close(&lever->gate);
+        }
         if (is_changed(lever, &before, rms_before)) {
             lever->link.pages |= (uint8_t)(1u << (uint32_t)MESSAGE_PAGE_CHOICES);
         }
@@ -149,6 +152,9 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform)
 {
     lever->platform = *platform;
     lever->has_platform = true;
+    if (!permits_torque(lever)) {
+        torque_gate_close(&lever->gate);
+    }
 }
 
 /* --- CAN ---------------------------------------------------------------------------------------------------------- */

@@ -6,6 +6,8 @@
 #define KEEP_ALIVE_US 1000000u
 #define SILENCE_US 20000u
 #define SILENCE_PERIODS 3u
+#define IDLE_US                                                                                                        \
+    5000u /* longest time from a sample to the next or torque_gate_idle(): what one without a clock counts as */
 #define CLOSING_US 40000.0f   /* so that a step of the port's clock is left of 50 ms */
 #define MEMORY 0.25f          /* of the mean square [s] */
 #define MEMORY_PER_US 4.0e-6f /* 1 / that, in us */
@@ -63,7 +65,7 @@ static bool is_fresh(const torque_gate_t *gate)
     return (gate->output_left != 0u) && (gate->command_left != 0u);
 }
 
-static void close_gate(torque_gate_t *gate)
+void torque_gate_close(torque_gate_t *gate)
 {
     if (gate->open) {
         gate->open = false;
@@ -72,10 +74,11 @@ static void close_gate(torque_gate_t *gate)
     }
 }
 
-/* Amplitude that keeps the mean square below square_most. */
+/* Amplitude that keeps the mean square below square_most; 0 when a long time at one torque has it above. */
 static float amplitude(const torque_gate_t *gate)
 {
-    return gate->sustained + (gate->amplitude_slope * (gate->square_most - gate->mean_square));
+    const float allowed = gate->sustained + (gate->amplitude_slope * (gate->square_most - gate->mean_square));
+    return (allowed > 0.0f) ? allowed : 0.0f;
 }
 
 /* The torque of a closed gate after so much time more. */
@@ -93,7 +96,7 @@ static void age(torque_gate_t *gate, uint32_t elapsed_us)
     gate->output_left = left_of(gate->output_left, elapsed_us);
     gate->command_left = left_of(gate->command_left, elapsed_us);
     if (!is_fresh(gate)) {
-        close_gate(gate);
+        torque_gate_close(gate);
     }
     if (!gate->open) {
         fade(gate, elapsed_us);
@@ -118,8 +121,8 @@ static void drive(torque_gate_t *gate, float asked, uint32_t elapsed_us)
 
 void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *sample)
 {
-    const uint32_t step_us = sample->advances ? sample->elapsed_us : gate->period_us;
-    const uint32_t elapsed_us = left_of(step_us, gate->counted);
+    const uint32_t unknown_us = (gate->period_us > IDLE_US) ? gate->period_us : IDLE_US;
+    const uint32_t elapsed_us = left_of(sample->advances ? sample->elapsed_us : unknown_us, gate->counted);
     age(gate, elapsed_us);
     gate->counted = 0u;
     if (sample->advances && sample->measured) {
@@ -129,7 +132,7 @@ void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *s
     if (gate->open && may_open) {
         drive(gate, asked, sample->elapsed_us);
     } else if (gate->open) {
-        close_gate(gate);
+        torque_gate_close(gate);
         fade(gate, elapsed_us);
     } else {
         gate->open = may_open; /* to let torque through from the next sample on */

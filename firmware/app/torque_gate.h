@@ -12,7 +12,8 @@
  * falls with the room left: then no second holds more than torque_rms. That amplitude falls slower than torque_slew, so
  * that all limits hold at once.
  *
- * Time is that of the samples, or the port's where none came; the torque of a step moves by what a sample period
+ * Time is that of the samples, or the port's where none came; a sample whose clock does not advance counts as 5 ms, the
+ * longest that a port waits before it calls torque_gate_idle(); the torque of a step moves by what a sample period
  * allows, however long the step was. */
 #ifndef APP_TORQUE_GATE_H
 #define APP_TORQUE_GATE_H
@@ -57,6 +58,9 @@ void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *s
 
 /* No sample came for `elapsed_us` since the last call of this or the last sample. */
 void torque_gate_idle(torque_gate_t *gate, uint32_t elapsed_us);
+
+/* The mode or the machine does not permit torque any more: it fades from now on, without a sample. */
+void torque_gate_close(torque_gate_t *gate);
 
 /* A command was accepted. */
 void torque_gate_keep_alive(torque_gate_t *gate);

@@ -100,6 +100,19 @@ static void clock_runs_backwards(lever_sample_t *sample, uint32_t k)
     sample->time_us = stopped_us - (1000u * k);
 }
 
+/* Advances, but by hardly anything: no torque may live longer by that. */
+static void clock_crawls(lever_sample_t *sample, uint32_t k)
+{
+    stopped_us = (k == 0u) ? (sample->time_us - 1000u) : stopped_us;
+    sample->time_us = stopped_us + k + 1u;
+}
+
+static void blind_and_clock_crawls(lever_sample_t *sample, uint32_t k)
+{
+    blind(sample, k);
+    clock_crawls(sample, k);
+}
+
 /* Through COAST, and in FROZEN, which does not tell. */
 static void test_torque_ends_when_no_output_is_valid_for_a_minute(void)
 {
@@ -122,6 +135,92 @@ static void test_torque_ends_when_the_sample_clock_stands_or_runs_backwards(void
     start_dithering();
     run_to_zero(clock_runs_backwards, 10000u, 0u);
     TEST_ASSERT_BITS_HIGH(LEVER_FAULT_CLOCK, rig_health(lever).faults);
+}
+
+static void test_torque_ends_when_the_sample_clock_crawls(void)
+{
+    start_dithering();
+    run_to_zero(clock_crawls, 10000u, 0u);
+    TEST_ASSERT_BITS_HIGH(LEVER_FAULT_CLOCK, rig_health(lever).faults);
+    setUp();
+    start_dithering();
+    run_to_zero(blind_and_clock_crawls, 10000u, 0u);
+}
+
+/* A sample whose clock stands counts as 5 ms: so late a port calls lever_idle(). */
+static void test_torque_ends_when_the_clock_stands_and_samples_are_few(void)
+{
+    config.settings.sample_period = 1.0e-4f;
+    start_dithering();
+    for (uint32_t k = 0u; k < 10u; k++) {
+        const lever_sample_t sample = sample_after(clock_stands, k);
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_TRUE(torque_now() == 0.0f);
+}
+
+/* Neither a reset nor a report of the port needs a sample to have its effect. */
+static void test_torque_ends_within_50_ms_of_a_reset_or_report_without_a_sample(void)
+{
+    const lever_platform_t broken = {.faults = (uint8_t)LEVER_PLATFORM_ROM};
+    for (uint32_t report = 0u; report < 2u; report++) {
+        setUp();
+        start_dithering();
+        if (report == 1u) {
+            lever_platform(lever, &broken);
+        } else {
+            rig_request(lever, LEVER_REQUEST_RESET);
+        }
+        TEST_ASSERT_FALSE(rig_health(lever).gate_open);
+        for (uint32_t k = 0u; k < 10u; k++) {
+            lever_idle(lever, 5000u);
+        }
+        TEST_ASSERT_TRUE(torque_now() == 0.0f);
+    }
+}
+
+/* A process that was stopped, a debugger: one long time in one call, at any moment of a dither that uses its rms up. */
+static void test_a_long_idle_time_ends_torque_and_never_raises_it(void)
+{
+    const uint32_t times_us[] = {100000u, 120000u, 150000u, 300000u, 0x7FFFFFFFu, UINT32_MAX};
+    (void)sender_run(&sender, lever, 400u);
+    command_dither(0.9f);
+    (void)sender_run(&sender, lever, 300u);
+    for (uint32_t k = 0u; k < 20000u; k++) {
+        command_dither((float)LEVER_KEEP);
+        (void)sender_run(&sender, lever, 1u);
+        lever_memory_t copy = memory;
+        for (uint32_t again = 0u; again < 2u; again++) {
+            lever_idle((lever_t *)(void *)&copy, times_us[k % 6u]);
+            TEST_ASSERT_TRUE(rig_health((lever_t *)(void *)&copy).torque == 0.0f);
+        }
+    }
+}
+
+/* A gap in the samples, and then silence: what was let through before it is all that may be left of it. */
+static void test_a_gap_and_idle_time_after_it_never_raise_torque(void)
+{
+    (void)sender_run(&sender, lever, 400u);
+    command_dither(0.9f);
+    (void)sender_run(&sender, lever, 300u);
+    for (uint32_t k = 0u; k < 5000u; k++) {
+        command_dither((float)LEVER_KEEP);
+        (void)sender_run(&sender, lever, 1u);
+        lever_memory_t copy = memory;
+        lever_t *other = (lever_t *)(void *)&copy;
+        rig_t rig = sender.rig;
+        lever_sample_t sample = rig_sample(&rig);
+        sample.time_us += 100000u * (1u + (k % 5u));
+        (void)lever_update(other, &sample);
+        float last = fabsf(rig_health(other).torque);
+        TEST_ASSERT_TRUE(last <= config.settings.torque_limit);
+        for (uint32_t idle = 0u; idle < 15u; idle++) {
+            lever_idle(other, 5000u);
+            TEST_ASSERT_TRUE(fabsf(rig_health(other).torque) <= last);
+            last = fabsf(rig_health(other).torque);
+        }
+        TEST_ASSERT_TRUE(last == 0.0f);
+    }
 }
 
 static void test_torque_ends_a_second_after_the_last_command_and_goes_on_with_the_next(void)
@@ -258,6 +357,11 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_torque_ends_when_no_output_is_valid_for_a_minute);
     RUN_TEST(test_torque_ends_when_the_sample_clock_stands_or_runs_backwards);
+    RUN_TEST(test_torque_ends_when_the_sample_clock_crawls);
+    RUN_TEST(test_torque_ends_when_the_clock_stands_and_samples_are_few);
+    RUN_TEST(test_torque_ends_within_50_ms_of_a_reset_or_report_without_a_sample);
+    RUN_TEST(test_a_long_idle_time_ends_torque_and_never_raises_it);
+    RUN_TEST(test_a_gap_and_idle_time_after_it_never_raise_torque);
     RUN_TEST(test_torque_ends_a_second_after_the_last_command_and_goes_on_with_the_next);
     RUN_TEST(test_torque_ends_when_the_machine_is_broken_and_only_then);
     RUN_TEST(test_torque_ends_with_a_reset_and_does_not_come_back);
