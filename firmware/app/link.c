@@ -122,6 +122,10 @@ static enum message_result obey(lever_t *lever, const lever_frame_t *frame)
     (void)message_command_decode(&command, frame);
     if (!is_in_sequence(lever, frame)) {
         lever->estimator.late++;
+        if (command.dither_rms <= 0.0f) { /* off is obeyed in any order */
+            dither_set(&lever->dither, 0.0f, false);
+            lever->link.pages |= (uint8_t)BIT(MESSAGE_PAGE_CHOICES);
+        }
     } else {
         result = instance_command(lever, &command);
         lever->estimator.corrupt += (result == MESSAGE_RESULT_ACCEPTED) ? 0u : 1u;

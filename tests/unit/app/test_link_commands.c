@@ -119,6 +119,22 @@ static void test_after_a_reset_a_sender_may_start_anew_with_any_counter_and_time
 
 /* --- sequence ----------------------------------------------------------------------------------------------------- */
 
+/* Whoever asks for no torque gets none, whatever his counter says; all else of such a frame is refused. */
+static void test_off_is_obeyed_in_any_order(void)
+{
+    lever_command_t off = rig_command();
+    const lever_frame_t on = dither_frame(0.3f);
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_ACCEPTED, answer_to(&on).result);
+    off.request = (uint8_t)LEVER_REQUEST_FREEZE;
+    off.dither_rms = 0.0f;
+    sender.command_counter = (uint8_t)(sender.command_counter + 9u); /* a sender that has started again */
+    const lever_frame_t frame = sender_command(&sender, &off);
+    const message_command_ack_t ack = answer_to(&frame);
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_SEQUENCE, ack.result);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, ack.dither_rms);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
+}
+
 /* Once it turned the dither on again. */
 static void test_an_on_that_is_sent_again_after_an_off_is_refused_however_often(void)
 {
@@ -233,6 +249,7 @@ static void test_two_firmwares_on_one_bus_notice_each_other(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_off_is_obeyed_in_any_order);
     RUN_TEST(test_a_command_is_carried_out_before_the_next_sample);
     RUN_TEST(test_the_answer_has_the_choices_as_they_stand);
     RUN_TEST(test_an_unknown_command_is_refused_said_and_changes_nothing);
