@@ -52,9 +52,9 @@ void can_poll(uint32_t now_ms);
 can_counts_t can_counts(void);
 can_errors_t can_errors(void);
 
-/* Interrupts. Weak: an image without this driver has none. */
-__attribute__((weak)) void can_transmit_interrupt(void);
-__attribute__((weak)) void can_receive_interrupt(void);
-__attribute__((weak)) void can_error_interrupt(void);
+/* Interrupts. */
+void can_transmit_interrupt(void);
+void can_receive_interrupt(void);
+void can_error_interrupt(void);
 
 #endif

@@ -1,13 +1,12 @@
-/* What happens before main(): the vector table (RM0090 12.2, table 62), the FPU, initial values of memory. */
+/* What happens before main(): the vectors of the processor (RM0090 12.2, table 62; those of the devices follow them, from
+ * transport.h), the FPU, initial values of memory. */
 #include <stdint.h>
 
-#include "port/stm32f4/can.h"
 #include "port/stm32f4/clock.h"
 #include "port/stm32f4/fault.h"
 #include "port/stm32f4/processor.h"
 #include "port/stm32f4/registers.h"
 #include "port/stm32f4/tick.h"
-#include "port/stm32f4/usart.h"
 
 extern uint32_t image_stack_top[]; /* of image.ld, all of them */
 extern uint32_t image_data[];
@@ -21,15 +20,15 @@ int main(void);
 /* NOLINTNEXTLINE(misc-use-internal-linkage): image.ld makes it the entry point */
 __attribute__((noreturn)) void reset_interrupt(void);
 
-/* Exceptions are numbered from 1 on, interrupts from 16 on. */
-enum { FIRST_OTHER = 4, SYSTEM_TICK = 15, FIRST_INTERRUPT = 16, INTERRUPTS = 82 };
+/* Exceptions are numbered from 1 on. */
+enum { FIRST_OTHER = 4, SYSTEM_TICK = 15, EXCEPTIONS = 16 };
 
 typedef struct vectors {
     uint32_t *stack;
     void (*reset)(void);
     void (*non_maskable)(void);
     void (*hard_fault)(void);
-    void (*other[FIRST_INTERRUPT + INTERRUPTS - FIRST_OTHER])(void); /* an entry that is 0 faults, and so is recorded */
+    void (*other[EXCEPTIONS - FIRST_OTHER])(void); /* an entry that is 0 faults, and so is recorded */
 } vectors_t;
 
 __attribute__((section(".vectors"), used)) static const vectors_t vectors = {
@@ -37,14 +36,7 @@ __attribute__((section(".vectors"), used)) static const vectors_t vectors = {
     .reset = reset_interrupt,
     .non_maskable = clock_failure_interrupt,
     .hard_fault = fault_interrupt,
-    .other =
-        {
-            [SYSTEM_TICK - FIRST_OTHER] = tick_interrupt,
-            [FIRST_INTERRUPT + INTERRUPT_CAN1_TX - FIRST_OTHER] = can_transmit_interrupt,
-            [FIRST_INTERRUPT + INTERRUPT_CAN1_RX0 - FIRST_OTHER] = can_receive_interrupt,
-            [FIRST_INTERRUPT + INTERRUPT_CAN1_SCE - FIRST_OTHER] = can_error_interrupt,
-            [FIRST_INTERRUPT + INTERRUPT_USART1 - FIRST_OTHER] = usart_interrupt,
-        },
+    .other = {[SYSTEM_TICK - FIRST_OTHER] = tick_interrupt},
 };
 
 void reset_interrupt(void)

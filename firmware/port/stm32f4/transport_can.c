@@ -1,5 +1,10 @@
 #include "port/stm32f4/can.h"
+#include "port/stm32f4/registers.h"
 #include "port/stm32f4/transport.h"
+
+DEVICE_VECTORS = {[INTERRUPT_CAN1_TX] = can_transmit_interrupt,
+    [INTERRUPT_CAN1_RX0] = can_receive_interrupt,
+    [INTERRUPT_CAN1_SCE] = can_error_interrupt};
 
 void transport_start(const clock_rates_t *rates)
 {

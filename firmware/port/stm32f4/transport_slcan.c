@@ -1,8 +1,11 @@
 #include "can/messages.h"
 #include "port/slcan/slcan.h"
+#include "port/stm32f4/registers.h"
 #include "port/stm32f4/tick.h"
 #include "port/stm32f4/transport.h"
 #include "port/stm32f4/usart.h"
+
+DEVICE_VECTORS = {[INTERRUPT_USART1] = usart_interrupt};
 
 static slcan_t peer;
 

@@ -33,7 +33,7 @@ uint32_t usart_waiting_ms(void);
 /* Received bytes that were lost since the start; one that the hardware lost counts one each time. */
 uint32_t usart_overruns(void);
 
-/* Interrupt. Weak: an image without this driver has none. */
-__attribute__((weak)) void usart_interrupt(void);
+/* Interrupt. */
+void usart_interrupt(void);
 
 #endif
