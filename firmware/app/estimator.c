@@ -10,8 +10,7 @@
 #define INNOVATION_MOST 1.0e6f    /* a single value is not averaged beyond this, so that the mean recovers */
 #define SUBSTEPS_MOST 12u         /* predictions through a gap: bounds the time of one call */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
-#define THETA_MOST 25.0f          /* plausible samples [rad], [rad/s], [N m], [m/s^2] */
-#define OTHER_MOST 1.0e4f
+#define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
 #define HALF_TURN_OF_TIME 0x80000000u
 
 static float squared(float x)
@@ -88,7 +87,7 @@ static bool is_usable(estimator_t *estimator, float value, bool valid, float mos
 static checked_t check(estimator_t *estimator, const lever_sample_t *sample)
 {
     checked_t checked = {.y = {sample->theta, sample->theta_dot}};
-    checked.valid[0] = is_usable(estimator, sample->theta, sample->theta_valid, THETA_MOST);
+    checked.valid[0] = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     checked.valid[1] = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
     const bool torque = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);

@@ -6,8 +6,7 @@
 #define KEEP_ALIVE_US 1000000u
 #define SILENCE_US 20000u
 #define SILENCE_PERIODS 3u
-#define IDLE_US                                                                                                        \
-    5000u /* longest time from a sample to the next or torque_gate_idle(): what one without a clock counts as */
+#define IDLE_US 5000u         /* longest time from a sample to torque_gate_idle(), or the next sample */
 #define CLOSING_US 40000.0f   /* so that a step of the port's clock is left of 50 ms */
 #define MEMORY 0.25f          /* of the mean square [s] */
 #define MEMORY_PER_US 4.0e-6f /* 1 / that, in us */

@@ -12,10 +12,9 @@
 #include <stdint.h>
 
 #include "lever_cdkf.h"
+#include "math/rounding.h"
 
 enum { FRAME_BYTES = 8 };
-
-#define LAYOUT_ROUND 12582912.0f /* 1.5 * 2^23: near it a float holds whole numbers only */
 
 typedef struct place {
     uint32_t mask; /* 2^width - 1 */
@@ -55,8 +54,7 @@ static inline uint64_t layout_bits(const quantity_t *quantity, float value)
     const uint32_t most = quantity->is_signed ? (mask >> 1u) : (mask - 1u);
     const float greatest = (float)most;
     const float least = quantity->is_signed ? -greatest : 0.0f;
-    const float scaled = value * quantity->per_unit;
-    const float rounded = (scaled + LAYOUT_ROUND) - LAYOUT_ROUND;
+    const float rounded = nearest_integer(value * quantity->per_unit);
     uint32_t bits = layout_not_available(quantity);
     if ((rounded >= least) && (rounded <= greatest)) {
         bits = (uint32_t)(int32_t)rounded & mask;

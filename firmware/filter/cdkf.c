@@ -196,13 +196,12 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
     innovation[1].inverse_variance = (variance > 1.0f) ? (1.0f / variance) : 1.0f; /* it is at least 1 */
 }
 
-#define THETA_MOST 25.0f      /* a few turns [rad] */
 #define THETA_DOT_MOST 1.0e4f /* [rad/s] */
 #define SIGMA_MOST 1.0e6f     /* beyond it nothing is known */
 
 bool cdkf_state_is_valid(const cdkf_t *cdkf)
 {
     const float *s = cdkf->s_xx;
-    return ((s[0] + fabsf(s[2]) + s[3]) < SIGMA_MOST) && (fabsf(cdkf->x[0]) < THETA_MOST) &&
+    return ((s[0] + fabsf(s[2]) + s[3]) < SIGMA_MOST) && (fabsf(cdkf->x[0]) < MODEL_THETA_MOST) &&
            (fabsf(cdkf->x[1]) < THETA_DOT_MOST);
 }

@@ -5,8 +5,7 @@
 
 #define TURN 6.28318531f
 #define SQRT_TWO 1.41421356f
-#define OUTAGE 0.0205f   /* an output missing for longer is out [s]; not a whole number of periods */
-#define STATE_MOST 25.0f /* a prediction beyond is none [rad], [rad/s] */
+#define OUTAGE 0.0205f /* an output missing for longer is out [s]; not a whole number of periods */
 
 high_pass_corner_t high_pass_corner(float frequency)
 {
@@ -78,7 +77,7 @@ bool trim_outputs(
             if (waiting) {
                 trim->output[i].slope = 0.0f;
             } else {
-                const float predicted = trim->origin[i] + ((fabsf(x[i]) <= STATE_MOST) ? x[i] : 0.0f);
+                const float predicted = trim->origin[i] + ((fabsf(x[i]) <= MODEL_THETA_MOST) ? x[i] : 0.0f);
                 (void)pass(trim, &trim->output[i], predicted, period);
             }
         }

@@ -52,14 +52,15 @@ typedef struct bulk_parsed {
     uint64_t damaged; /* lines of those that are no frame */
 } bulk_parsed_t;
 
-/* Reads the whole lines of `text`, until they or the `room` in `frames` end, and returns the number of frames. A line is
- * "(seconds.fraction) bus id#data", as candump -L and python-can write it, with or without a direction; whatever else is
- * counted as damaged. New buses are added to `buses`. */
+/* Reads the whole lines of `text`, until they or the `room` in `frames` end, and returns the number of frames. A line
+ * is "(seconds.fraction) bus id#data", as candump -L and python-can write it, with or without a direction; whatever
+ * else is counted as damaged. New buses are added to `buses`. */
 uint64_t bulk_parse(
     const char *text, uint64_t size, bulk_buses_t *buses, bulk_frame_t *frames, uint64_t room, bulk_parsed_t *parsed);
 
-/* Writes frames of 11-bit identifiers as such lines, with direction R for answers and T for all else, as from the view of
- * whoever feeds the estimator. `text` must have room for count lines of BULK_BUS_NAME + 64 bytes. Returns the bytes written. */
+/* Writes frames of 11-bit identifiers as such lines, with direction R for answers and T for all else, as from the view
+ * of whoever feeds the estimator. `text` must have room for count lines of BULK_BUS_NAME + 64 bytes. Returns the bytes
+ * written. */
 uint64_t bulk_format(const bulk_frame_t *frames, uint64_t count, const char *bus, char *text);
 
 /* --- the estimator --------------------------------------------------------------------------------------------- */
@@ -92,8 +93,9 @@ typedef struct bulk_fed {
 } bulk_fed_t;
 
 /* Feeds classic data frames of one bus to the estimator in their order, until they or the room in `out` or `rows` end.
- * `out` gets what was fed, each frame followed by its answers, which have its recorded time; `rows` gets the samples that
- * are complete: the last one stays in the feeder until the next comes. Only the three inputs are fed, no recorded answers. */
+ * `out` gets what was fed, each frame followed by its answers, which have its recorded time; `rows` gets the samples
+ * that are complete: the last one stays in the feeder until the next comes. Only the three inputs are fed, no recorded
+ * answers. */
 void bulk_feed(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *frames, uint64_t count,
     bulk_frame_t *out, uint64_t out_room, bulk_row_t *rows, uint64_t row_room, bulk_fed_t *fed);
 

@@ -27,7 +27,8 @@ static void put_slot(bulk_row_t *row, uint32_t slot, const uint8_t data[FRAME_BY
     row->known |= 1u << slot;
 }
 
-/* The row of a new sample: with its LEVER_SAMPLE if that came before it with the same counter, as the estimator pairs. */
+/* The row of a new sample: with its LEVER_SAMPLE if that came before it with the same counter, as the estimator
+ * pairs. */
 static void start_row(bulk_feeder_t *feeder, const bulk_frame_t *base)
 {
     bulk_row_t *row = &feeder->row;
@@ -63,7 +64,8 @@ static uint64_t fetch(
     return count;
 }
 
-/* What an estimator takes. An IDENTITY of the recorded one is not for it: it would stand for a second one on the bus. */
+/* What an estimator takes. An IDENTITY of the recorded one is not for it: it would stand for a second one on the
+ * bus. */
 static bool is_input(const bulk_feeder_t *feeder, const bulk_frame_t *frame)
 {
     return (frame->id == feeder->lever_id) || (frame->id == feeder->base_id) || (frame->id == feeder->command_id);

@@ -1,8 +1,10 @@
-/* The likelihood by the prediction error decomposition (Schweppe 1965): the density of all samples is the product of what was
- * predicted for each, given those before it. The prediction for a sample is normal about x, with the covariance
+/* The likelihood by the prediction error decomposition (Schweppe 1965): the density of all samples is the product of
+ * what was predicted for each, given those before it. The prediction for a sample is normal about x, with the
+ * covariance
  *     S_xx S_xx^T + S_xw S_xw^T + R
- * of the belief in filter/cdkf.h and the noise of the outputs. Samples from which the parameters learn together (learn_period)
- * count as if each were predicted by itself, as the firmware's own NIS has it; what they have in common is second order.
+ * of the belief in filter/cdkf.h and the noise of the outputs. Samples from which the parameters learn together
+ * (learn_period) count as if each were predicted by itself, as the firmware's own NIS has it; what they have in common
+ * is second order.
  */
 #include "innovations.h"
 
@@ -14,8 +16,8 @@
 #include <stddef.h>
 #include <string.h>
 
-/* cdkf_measurement_update() of filter/cdkf.c, which is built with this name here (CMakeLists.txt), so that its caller in app/
- * comes to the one below instead. */
+/* cdkf_measurement_update() of filter/cdkf.c, which is built with this name here (CMakeLists.txt), so that its caller
+ * in app/ comes to the one below instead. */
 void firmware_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS]);
 
@@ -35,8 +37,8 @@ static double squared_of(float x)
     return squared((double)x);
 }
 
-/* Notes what is predicted for a sample. An output that was not measured has no innovation, and counts in units of its own, so
- * that it has no part in determinants. */
+/* Notes what is predicted for a sample. An output that was not measured has no innovation, and counts in units of its
+ * own, so that it has no part in determinants. */
 static void note_prediction(
     const cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], sample_innovation_t *innovation)
 {

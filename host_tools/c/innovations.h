@@ -1,7 +1,7 @@
 /* What tuning needs and a bus does not carry: the innovations of the estimator, and how likely its samples were to it.
  *
- * The estimator is the firmware's own code; innovations.c watches it at the seam between app/ and filter/. One call at a time
- * in a process, since where it writes is static.
+ * The estimator is the firmware's own code; innovations.c watches it at the seam between app/ and filter/. One call at
+ * a time in a process, since where it writes is static.
  */
 #ifndef INNOVATIONS_H
 #define INNOVATIONS_H
@@ -31,7 +31,8 @@ bool innovation_run(const struct lever_config *config, const struct lever_sample
     sample_innovation_t *innovations);
 
 /* The samples that the firmware makes of received frames, in their order and after all its checks, at most one a frame.
- * Returns how many. `config` has the choices that commands among them have made, `health` what was lost, corrupt or late. */
+ * Returns how many. `config` has the choices that commands among them have made, `health` what was lost, corrupt or
+ * late. */
 uint32_t innovation_samples(const struct lever_frame *frames, uint32_t count, struct lever_sample *samples,
     struct lever_config *config, struct lever_health *health);
 

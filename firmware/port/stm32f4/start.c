@@ -1,5 +1,5 @@
-/* What happens before main(): the vectors of the processor (RM0090 12.2, table 62; those of the devices follow them, from
- * transport.h), the FPU, initial values of memory. */
+/* What happens before main(): the vectors of the processor (RM0090 12.2, table 62; those of the devices follow them,
+ * from transport.h), the FPU, initial values of memory. */
 #include <stdint.h>
 
 #include "port/stm32f4/clock.h"

@@ -9,8 +9,8 @@
 #include "port/port.h"
 #include "port/stm32f4/clock.h"
 
-/* Vectors of the devices' interrupts, from number 0 on: image.ld puts them behind those of the processor. Each transport
- * defines them with the handlers that it needs, as DEVICE_VECTORS = {[INTERRUPT_...] = ...}. */
+/* Vectors of the devices' interrupts, from number 0 on: image.ld puts them behind those of the processor. Each
+ * transport defines them with the handlers that it needs, as DEVICE_VECTORS = {[INTERRUPT_...] = ...}. */
 typedef void (*interrupt_t)(void);
 enum { INTERRUPTS = 82 };
 #define DEVICE_VECTORS __attribute__((section(".vectors.devices"), used)) static const interrupt_t vectors[INTERRUPTS]
