@@ -233,7 +233,11 @@ enum lever_fault {
     LEVER_FAULT_CHANGE = 1024,      /* the pilot has changed suddenly within the last second; learning anew */
     LEVER_FAULT_PLATFORM = 2048,    /* the machine reports a fault of its own: lever_platform() */
     LEVER_FAULT_CLOCK = 4096,       /* the sample clock stands, runs backwards or crawls (a quarter of sample_period) */
-    LEVER_FAULT_DUPLICATE = 8192    /* another estimator has spoken on this bus within the last two seconds */
+    LEVER_FAULT_DUPLICATE = 8192,   /* another estimator has spoken on this bus within the last two seconds */
+    LEVER_FAULT_SETTLING = 16384,   /* nothing is learnt: the levels of the signals have not settled yet */
+    LEVER_FAULT_MISMATCH = 32768,   /* innovations are not white: something moves the lever that the model lacks */
+    LEVER_FAULT_CALIBRATION = 65536, /* the mass that the torque shows is not the one that the base shows */
+    LEVER_FAULT_HANDS_OFF = 131072   /* nobody holds the lever; nothing is learnt */
 };
 
 typedef struct lever_health {

@@ -29,6 +29,10 @@ FAULTS = {
     "platform": "the machine reports a fault of its own",
     "clock": "the sample clock stands or runs backwards",
     "duplicate": "a second estimator is on this bus",
+    "settling": "levels settling, nothing is learnt",
+    "mismatch": "innovations not white: not the model",
+    "calibration": "torque and base show different masses",
+    "hands_off": "nobody holds the lever",
 }
 """Conditions of the estimator, by enum lever_fault."""
 

@@ -28,6 +28,10 @@ FAULT_WORDS = {
     "platform": "machine reports a fault",
     "clock": "sample clock stands or runs back",
     "duplicate": "second estimator on the bus",
+    "settling": "levels settling",
+    "mismatch": "innovations not white",
+    "calibration": "torque and base disagree",
+    "hands_off": "hands off",
 }
 
 
