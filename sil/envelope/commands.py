@@ -32,7 +32,7 @@ examples:
   lever envelope --list
   lever envelope --quick                          some conditions, three pilots each: ten seconds
   lever envelope --only retrim base_stuck --seeds 24
-  lever envelope --json envelope.json             all conditions, ten pilots each: a minute or two
+  lever envelope --json envelope.json             all conditions, ten pilots each: some minutes
 """
 _SEEDS, _QUICK_SEEDS = 10, 3
 

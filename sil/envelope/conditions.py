@@ -194,15 +194,19 @@ def _rubbing(friction: float) -> Condition:
 
 def _drawn(name: str, title: str, dither: float) -> Condition:
     """Errors drawn from what the settings state."""
-    stated = {"z_ddot_gain_sigma": 0.02, "z_ddot_delay_sigma": 0.5e-3, "tau_m_gain_sigma": 0.02}
-    friction = 0.05
+    gain, delay, friction = 0.02, 0.5e-3, 0.05
     return Condition(
         name,
         title,
         Motion(friction_sigma=friction, dither=dither),
         _ALL_COVERED,
-        sensors=Sensors(**stated),
-        settings=stated | {"lever_friction_sigma": friction},
+        sensors=Sensors(z_ddot_gain_sigma=gain, z_ddot_delay_sigma=delay, tau_m_gain_sigma=gain),
+        settings={
+            "z_ddot_gain_sigma": gain,
+            "z_ddot_delay_sigma": delay,
+            "tau_m_gain_sigma": gain,
+            "lever_friction_sigma": friction,
+        },
         also=_OF_PARAMETERS,
         runs=4,
     )

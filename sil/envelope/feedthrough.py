@@ -17,13 +17,11 @@ FREQUENCIES = np.linspace(*BAND, 25)
 def response(hardware: Hardware, parameters: FloatArray, trim: FloatArray) -> ComplexArray:
     """theta/z_ddot [rad/(m/s^2)] of [m_p, c_p, k_p] (..., 3) at a trim (...) [rad], at FREQUENCIES: (..., F)."""
     m_p, c_p, k_p = (parameters[..., i, None] for i in range(3))
-    s = 2j * np.pi * FREQUENCIES
+    s: ComplexArray = 2j * np.pi * FREQUENCIES.astype(np.complex128)
     rise = hardware.length * np.cos(trim)[..., None]
     damping, stiffness = rise**2 * c_p + hardware.damping, rise**2 * k_p + hardware.stiffness
-    answer: ComplexArray = (
-        -rise * hardware.forcing_mass(m_p) / (hardware.moving_inertia(m_p) * s**2 + damping * s + stiffness)
-    )
-    return answer
+    resistance: ComplexArray = hardware.moving_inertia(m_p) * s**2 + damping * s + stiffness
+    return -rise * hardware.forcing_mass(m_p) / resistance
 
 
 def estimated(

@@ -65,7 +65,7 @@ def _track(runs: Sequence[Mapping[str, NDArray[Any]]], at: NDArray[np.intp]) -> 
     for i, name in enumerate(PARAMETERS):
         value[name], sigma[name] = beside("parameter")[..., i], beside("parameter_sigma")[..., i]
     return Track(
-        time=at * PERIOD,
+        time=(at * PERIOD).astype(np.float64),
         value={name: column.astype(np.float64) for name, column in value.items()},
         sigma={name: column.astype(np.float64) for name, column in sigma.items()},
         correlation=beside("parameter_correlation").astype(np.float64),

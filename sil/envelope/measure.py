@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.library import lib
@@ -92,13 +93,23 @@ Values = FloatArray
 """One for each run."""
 
 
+def _percent(true: BoolArray, axis: int | tuple[int, ...] = 0) -> Values:
+    share: Values = 100.0 * np.mean(true, axis=axis)
+    return share
+
+
+def _percent_rms(errors: NDArray[Any], axis: int | tuple[int, ...] = 0) -> Values:
+    """Of real or complex errors."""
+    rms: Values = 100.0 * np.sqrt(np.mean(np.abs(errors) ** 2, axis=axis))
+    return rms
+
+
 def _rms(quantity: str, outcome: Outcome) -> Values:
-    relative = (outcome.error(quantity) / outcome.recording.truth[quantity])[outcome.judged]
-    return 100.0 * np.sqrt(np.mean(relative**2, axis=0))
+    return _percent_rms((outcome.error(quantity) / outcome.recording.truth[quantity])[outcome.judged])
 
 
 def _covered(quantity: str, outcome: Outcome) -> Values:
-    return 100.0 * np.mean(outcome.deviation(quantity)[outcome.judged] <= 2.0, axis=0)
+    return _percent(outcome.deviation(quantity)[outcome.judged] <= 2.0)
 
 
 def _largest(quantity: str, outcome: Outcome) -> Values:
@@ -107,11 +118,11 @@ def _largest(quantity: str, outcome: Outcome) -> Values:
 
 
 def _share(names: tuple[str, ...], outcome: Outcome) -> Values:
-    return 100.0 * np.mean(outcome.flagged(*names)[outcome.judged], axis=0)
+    return _percent(outcome.flagged(*names)[outcome.judged])
 
 
 def _running(outcome: Outcome) -> Values:
-    return 100.0 * np.mean(outcome.track.mode[outcome.judged] == lib.LEVER_MODE_RUN, axis=0)
+    return _percent(outcome.track.mode[outcome.judged] == lib.LEVER_MODE_RUN)
 
 
 def _settled(outcome: Outcome) -> Values:
@@ -122,13 +133,14 @@ def _settled(outcome: Outcome) -> Values:
     time = outcome.track.time[after] - start
     step = time[1] - time[0]
     last = np.where(wrong, time[:, None] + step, 0.0).max(axis=0)
-    return np.where(wrong[-1], math.inf, last)
+    settled: Values = np.where(wrong[-1], math.inf, last)
+    return settled
 
 
 def _lag(outcome: Outcome) -> Values:
     """By which c_p is late on a ramp: its mean error over its slope."""
-    truth = outcome.recording.truth["c_p"][outcome.judged]
-    slope = (truth[-1] - truth[0]) / (outcome.window[1] - outcome.window[0])
+    truth, time = outcome.recording.truth["c_p"][outcome.judged], outcome.track.time[outcome.judged]
+    slope = (truth[-1] - truth[0]) / (time[-1] - time[0])
     lag: Values = -outcome.error("c_p")[outcome.judged].mean(axis=0) / slope
     return lag
 
@@ -141,7 +153,8 @@ def _until_flagged(names: tuple[str, ...], outcome: Outcome) -> Values:
         shown = outcome.flagged(*names)[inside]
         delay = outcome.track.time[inside][shown.argmax(axis=0)] - start
         delays.append(np.where(shown.any(axis=0), delay, math.inf))
-    return np.max(delays, axis=0)
+    slowest: Values = np.max(delays, axis=0)
+    return slowest
 
 
 def _back(outcome: Outcome) -> Values:
@@ -154,7 +167,8 @@ def _back(outcome: Outcome) -> Values:
         calm = round(_CALM / (time[1] - time[0]))
         run = np.lib.stride_tricks.sliding_window_view(shown, calm, axis=0).any(axis=-1)
         delays.append(np.where(run.all(axis=0), math.inf, time[run.argmin(axis=0)]))
-    return np.max(delays, axis=0)
+    slowest: Values = np.max(delays, axis=0)
+    return slowest
 
 
 def _learnt(within: float, outcome: Outcome) -> Values:
@@ -165,36 +179,38 @@ def _learnt(within: float, outcome: Outcome) -> Values:
         if inside.any():
             value, sigma = (outcome.track.parameters(which)[inside] for which in ("value", "sigma"))
             changes.append(np.max(np.abs(value - value[0]) / sigma[0], axis=(0, 2)))
-    return np.max(changes, axis=0)
+    greatest: Values = np.max(changes, axis=0)
+    return greatest
 
 
 def _against(compute: Callable[[Outcome], Values], outcome: Outcome) -> Values:
     """A figure over that of the reference."""
     if outcome.reference is None:
         raise ValueError("this condition has no reference")
-    return compute(outcome) / compute(replace(outcome.reference, window=outcome.window))
+    ratio: Values = compute(outcome) / compute(replace(outcome.reference, window=outcome.window))
+    return ratio
 
 
-def _widest_sigma(outcome: Outcome) -> FloatArray:
-    """Stated standard deviations of the three parameters, relative, mean over time: of the three, (runs, 3)."""
+def _relative_sigma(outcome: Outcome) -> FloatArray:
+    """Stated standard deviations of the three parameters, relative, mean over time (runs, 3)."""
     relative = outcome.track.parameters("sigma") / outcome.track.parameters("value")
     mean: FloatArray = relative[outcome.judged].mean(axis=0)
     return mean
 
 
 def _sigma_ratio(outcome: Outcome) -> Values:
-    ratio: Values = _against(_widest_sigma, outcome).max(axis=-1)
-    return ratio
+    widest: Values = _against(_relative_sigma, outcome).max(axis=-1)
+    return widest
 
 
 def _response_rms(outcome: Outcome) -> Values:
     error, _ = outcome.response
-    return 100.0 * np.sqrt(np.mean(np.abs(error) ** 2, axis=(0, 2)))
+    return _percent_rms(error, (0, 2))
 
 
 def _response_covered(outcome: Outcome) -> Values:
     error, sigma = outcome.response
-    return 100.0 * np.mean(np.abs(error) <= 2.0 * sigma, axis=(0, 2))
+    return _percent(np.abs(error) <= 2.0 * sigma, (0, 2))
 
 
 def _pooled_rms(values: Values) -> float:

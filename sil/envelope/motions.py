@@ -63,7 +63,7 @@ class Motion:
     @property
     def time(self) -> FloatArray:
         """Of the samples [s]."""
-        return np.arange(round(self.duration / PERIOD) + 1) * PERIOD
+        return np.arange(round(self.duration / PERIOD) + 1, dtype=np.float64) * PERIOD
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,9 @@ def band_limited(white: FloatArray, band: tuple[float, float], rms: float) -> Fl
     spectrum = np.fft.rfft(white, axis=0)
     frequency = np.fft.rfftfreq(len(white), PERIOD)
     spectrum[(frequency < band[0]) | (frequency > band[1])] = 0.0
-    wave: FloatArray = np.fft.irfft(spectrum, len(white), axis=0)
-    return wave * (rms / np.sqrt(np.mean(wave**2, axis=0)))
+    wave = np.fft.irfft(spectrum, len(white), axis=0)
+    scaled: FloatArray = wave * (rms / np.sqrt(np.mean(wave**2, axis=0)))
+    return scaled
 
 
 def excitation(motion: Motion, seeds: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -6,6 +6,7 @@ import html
 from collections.abc import Sequence
 
 import numpy as np
+from lever_cdkf.host_tools.tables import Row
 
 from ..report.document import document
 from ..report.figure import Figure, axis, band, dots, line, time_axis
@@ -13,48 +14,60 @@ from ..report.page import Page
 from ..report.words import table
 from .campaign import Result
 from .measure import FIGURES, FLAGS, Excerpt
-from .table import lines, state
+from .table import MISSED, figures, lines, state
 
 _TITLE = "Lever CDKF: what a collective meets every minute"
+_STYLE = ".missed { color: var(--bad); } #table :is(td, th):nth-child(3) { text-align: left; white-space: normal; }"
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
     """The whole page."""
     page = Page()
-    page.section("table", "Table", "Measured against what must hold", _table(results), _legend(results))
+    page.section("table", "Table", "Measured against what must hold", _table(lines(results)), _legend(results))
     for result in results:
-        if result.excerpt is not None:
-            page.section(
-                result.condition.name,
-                result.condition.name,
-                f"{html.escape(result.condition.title)}: {state(result)}",
-                page.figure(f"chart-{result.condition.name}", _chart(result.excerpt, result), ""),
-            )
-    judged = [result for result in results if result.condition.limits]
-    kept = sum(result.ok for result in judged)
-    mood = "good" if kept == len(judged) else "bad"
-    missed = [f'<a href="#{result.condition.name}">{result.condition.name}</a>' for result in judged if not result.ok]
+        name, chart = result.condition.name, None if result.excerpt is None else _chart(result.excerpt, result)
+        title = f"{html.escape(result.condition.title)}: {state(result)}"
+        page.section(name, name, title, page.figure(f"chart-{name}", chart, ""), _table(figures(result)))
     body = (
         f'<header><h1>{_TITLE}</h1><p class="subtitle">Levers and pilots by a plant that shares nothing with the '
         f"filter's model, {seeds} random pilots a condition, the firmware as shipped. Charts: the natural frequency "
-        "with its ±2σ, of each condition in the run in which it was worst.</p></header>"
-        f'<p class="verdict {mood}">{kept} of {len(judged)} conditions hold.'
-        f"{' Missed: ' + ', '.join(missed) + '.' if missed else ''}</p>{''.join(page.sections)}"
+        f"with its ±2σ, of each condition in the run in which it was worst.</p></header>{_verdict(results)}"
+        f"{''.join(page.sections)}"
         "<footer>Made by <code>lever envelope</code>. Nothing on this page is loaded from elsewhere.</footer>"
     )
-    return document(_TITLE, body, {key: figure.spec() for key, figure in page.figures.items()})
+    return document(_TITLE, body, {key: figure.spec() for key, figure in page.figures.items()}, _STYLE)
 
 
-def _table(results: Sequence[Result]) -> str:
-    rows = lines(results)
-    cells = ([html.escape(str(cell)) for cell in row.values()] for row in rows)
-    return table([html.escape(column) for column in rows[0]] if rows else (), cells)
+def _verdict(results: Sequence[Result]) -> str:
+    judged = [result for result in results if result.condition.limits]
+    missed = [f'<a href="#{each.condition.name}">{each.condition.name}</a>' for each in judged if not each.ok]
+    return (
+        f'<p class="verdict {"bad" if missed else "good"}">{len(judged) - len(missed)} of {len(judged)} conditions '
+        f"hold.{' Missed: ' + ', '.join(missed) + '.' if missed else ''}</p>"
+    )
+
+
+def _table(rows: Sequence[Row]) -> str:
+    return table([html.escape(column) for column in rows[0]], (_cells(row) for row in rows))
+
+
+def _cells(row: Row) -> list[str]:
+    """As HTML; a condition links to its section."""
+    cells = {column: html.escape(str(cell)) for column, cell in row.items()}
+    if cells.get("condition"):
+        cells["condition"] = f'<a href="#{cells["condition"]}">{cells["condition"]}</a>'
+    if cells.get("result") == MISSED:
+        cells["result"] = f'<strong class="missed">{MISSED}</strong>'
+    return list(cells.values())
 
 
 def _legend(results: Sequence[Result]) -> str:
     used = dict.fromkeys(name for result in results for name in result.condition.figures)
-    meanings = "; ".join(f"<strong>{html.escape(name)}</strong> {html.escape(FIGURES[name].meaning)}" for name in used)
-    return f"<p>{meanings}. Flagged is any of {', '.join(FLAGS)}.</p>"
+    rows = ([html.escape(name), html.escape(FIGURES[name].unit), html.escape(FIGURES[name].meaning)] for name in used)
+    return (
+        f"<details><summary>What the figures mean</summary>{table(('', 'unit', 'meaning'), rows)}"
+        f"<p>Flagged is any of {', '.join(FLAGS)}.</p></details>"
+    )
 
 
 def _chart(shown: Excerpt, result: Result) -> Figure:

@@ -31,12 +31,14 @@ DynamicStiffness = Callable[[FloatArray, FloatArray, FloatArray], ComplexArray]
 
 
 def _hysteretic(c_p: FloatArray, k_p: FloatArray, frequency: FloatArray) -> ComplexArray:
-    return k_p * (1.0 + 1j * LOSS * np.sign(frequency))
+    stiffness: ComplexArray = k_p * (1.0 + 1j * LOSS * np.sign(frequency))
+    return stiffness
 
 
 def _reflex(c_p: FloatArray, k_p: FloatArray, frequency: FloatArray) -> ComplexArray:
     s = 2j * np.pi * frequency
-    return k_p * (1.0 + REFLEX_GAIN * np.exp(-REFLEX_DELAY * s)) + s * c_p
+    stiffness: ComplexArray = k_p * (1.0 + REFLEX_GAIN * np.exp(-REFLEX_DELAY * s)) + s * c_p
+    return stiffness
 
 
 LINEAR: dict[str, DynamicStiffness] = {"hysteretic": _hysteretic, "reflex": _reflex}
@@ -54,18 +56,19 @@ def _linear(motion: Motion, seeds: Sequence[int]) -> Recording:
     inertia, rise = hardware.moving_inertia(m_p), hardware.length * np.cos(trim)
     forcing = -rise * hardware.forcing_mass(m_p)
 
-    def resistance(frequency: FloatArray) -> ComplexArray:
+    def divisor(frequency: FloatArray) -> ComplexArray:
         s = 2j * np.pi * frequency
         own = inertia * s**2 + hardware.damping * s + hardware.stiffness
-        return own + rise**2 * stiffness(c_p, k_p, frequency)
+        resistance: ComplexArray = own + rise**2 * stiffness(c_p, k_p, frequency)
+        return resistance
 
     count = len(z_ddot)
-    frequency = np.fft.rfftfreq(count, PERIOD)[:, None]
+    frequency = np.fft.rfftfreq(count, PERIOD)[:, None].astype(np.float64)
     torque = forcing * z_ddot + tau_m + inertia * kick / PERIOD
-    answer = np.fft.rfft(torque, axis=0) / resistance(frequency)
+    answer = np.fft.rfft(torque, axis=0) / divisor(frequency)
     theta = trim + np.fft.irfft(answer, count, axis=0)
     theta_dot = np.fft.irfft(2j * np.pi * frequency * answer, count, axis=0)
-    response = (forcing / resistance(FREQUENCIES[:, None])).T
+    response = (forcing / divisor(FREQUENCIES[:, None])).T
     return Recording(motion.time, theta, theta_dot, tau_m, z_ddot, {}, response)
 
 

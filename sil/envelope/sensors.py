@@ -49,7 +49,8 @@ def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> di
     """The four signals, (samples, runs)."""
 
     def drawn(mean: float, sigma: float, what: str) -> FloatArray:
-        return mean + sigma * columns(what, seeds, 1)[0]
+        values: FloatArray = mean + sigma * columns(what, seeds, 1)[0]
+        return values
 
     gain = {
         "theta": np.full(len(seeds), sensors.angle_gain),

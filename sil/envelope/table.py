@@ -12,24 +12,30 @@ from .campaign import Result
 from .condition import Limit
 from .measure import FIGURES
 
-HOLDS = {True: "yes", False: "MISSED"}
+HOLDS, MISSED, REPORTED = "holds", "MISSED", "reported"
 
 
 def state(result: Result) -> str:
-    """Whether the limits hold, in a word."""
-    limited = bool(result.condition.limits)
-    return HOLDS[result.ok] if limited or result.problem else "reported"
+    """Whether its limits hold, in a word."""
+    if result.ok:
+        return HOLDS if result.condition.limits else REPORTED
+    return MISSED
 
 
 def lines(results: Sequence[Result]) -> list[Row]:
-    """A line for each figure of each condition, the condition on the first."""
+    """A line for each figure that has a limit, or for all where none has; the condition stands on its first."""
     found: list[Row] = []
     for result in results:
-        own = [_line(result, name) for name in result.condition.figures] if result.values else [_problem(result)]
-        for i, line in enumerate(own):
-            head = {"condition": result.condition.name, "holds": state(result)} if i == 0 else {}
-            found.append({"condition": "", "holds": ""} | head | line)
+        everything = figures(result)
+        for i, line in enumerate([line for line in everything if line["limit"]] or everything):
+            head = (result.condition.name, state(result)) if i == 0 else ("", "")
+            found.append({"condition": head[0], "result": head[1], **line})
     return found
+
+
+def figures(result: Result) -> list[Row]:
+    """A line for each figure of a condition."""
+    return [_line(result, name) for name in result.condition.figures] if result.values else [_problem(result)]
 
 
 def _line(result: Result, name: str) -> Row:
