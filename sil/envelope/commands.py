@@ -13,6 +13,7 @@ from lever_cdkf.host_tools.files import make_folder, write_text
 from lever_cdkf.host_tools.progress import Progress
 
 if TYPE_CHECKING:
+    from .campaign import Result
     from .condition import Condition
 
 _DESCRIPTION = """\
@@ -80,16 +81,15 @@ def run(args: argparse.Namespace) -> int:
     return 1 if missed else 0
 
 
-def _run(chosen: Sequence[Condition], seeds: int) -> list[Any]:
+def _run(chosen: Sequence[Condition], seeds: int) -> list[Result]:
     from . import campaign
     from .conditions import CONDITIONS
 
     with Progress("envelope") as progress:
-        found = {each.condition.name: each for each in campaign.run(chosen, CONDITIONS, seeds, progress.show)}
-    return [found[condition.name] for condition in chosen]
+        return campaign.run(chosen, CONDITIONS, seeds, progress.show)
 
 
-def _write(args: argparse.Namespace, results: Sequence[Any], seeds: int) -> None:
+def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
     """The files that were asked for."""
     import json
 

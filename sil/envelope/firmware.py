@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from lever_cdkf.host_tools.estimator import Estimator, run_samples
 from lever_cdkf.host_tools.library import ffi, lib, struct_dtype
 from numpy.typing import NDArray
 
+from .condition import ClosedLoop
 from .motions import PERIOD, STRIDE, Motion, Recording, columns, lanes, stream, truth
 from .plant import FloatArray, Plant
 from .sensors import NOISE
@@ -76,17 +77,17 @@ def _track(runs: Sequence[Mapping[str, NDArray[Any]]], at: NDArray[np.intp]) -> 
 
 
 def closed_loop(
-    config: Config, motion: Motion, seeds: Sequence[int], dither: float, lost: float, whole: bool
+    config: Config, motion: Motion, seeds: Sequence[int], loop: ClosedLoop, tick: Callable[[], None]
 ) -> tuple[Recording, Track]:
-    """The firmware dithers [N m rms] the lever itself, and a share of its samples is lost at random.
+    """The firmware dithers the lever itself, and samples are lost at random; `tick` is called now and then.
 
-    A lost sample lacks what LEVER_SAMPLE carries, theta, theta_dot and tau_m; `whole`: it never comes at all. The motor
-    holds the last torque that it was asked for.
+    A lost sample lacks what LEVER_SAMPLE carries, theta, theta_dot and tau_m, or never comes at all. The motor holds
+    the last torque that it was asked for.
     """
     given = lanes(motion, seeds)
     plant, (count, width) = Plant(given), given.z_ddot.shape
     noise = {what: sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()}
-    gone = np.stack([stream("lost", seed).random(count) < lost for seed in seeds], axis=1)
+    gone = np.stack([stream("lost", seed).random(count) < loop.lost for seed in seeds], axis=1)
     theta, theta_dot, tau_m = (np.empty((count, width)) for _ in range(3))
     decay, torque = math.exp(-PERIOD / MOTOR_LAG), np.zeros(width)
     runs = [_Live(config, count) for _ in seeds]
@@ -95,10 +96,11 @@ def closed_loop(
         values = np.stack((theta[i], theta_dot[i], torque, given.z_ddot[i]))
         values += np.stack([noise[what][i] for what in ("theta", "theta_dot", "tau_m", "z_ddot")])
         if i % _KEEP_ALIVE == 0:
+            tick()
             for run in runs:
-                run.estimator.command(dither_rms=dither)
+                run.estimator.command(dither_rms=loop.dither)
         for run, column, missing in zip(runs, values.T.tolist(), gone[i].tolist(), strict=True):
-            if not (missing and whole):
+            if not (missing and loop.whole):
                 run.take(i, column, missing)
             if i % STRIDE == 0:
                 run.note(i // STRIDE)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.envelope import conditions, table
-from lever_cdkf.sil.envelope.condition import Condition, Limit
+from lever_cdkf.host_tools.config import Config
+from lever_cdkf.sil.envelope import campaign, conditions, firmware, table
+from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
+from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
 
 
@@ -36,6 +39,32 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
         Condition("reported", "title", motion, start=1.0),
     )
     monkeypatch.setattr(conditions, "CONDITIONS", {row.name: row for row in rows})
+
+
+def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [
+        Condition("wander", "", Motion(duration=3.0, wander=3.0), start=1.0),
+        Condition("steady", "", Motion(duration=3.0, friction=0.1), start=1.0),
+    ]
+    together = campaign.run(rows, {}, 3, lambda *_: None)
+    monkeypatch.setattr(campaign, "LANES", 2)
+    apart = campaign.run(rows, {}, 3, lambda *_: None)
+    for left, right in zip(together, apart, strict=True):
+        assert left.condition is right.condition
+        assert len(left.values["f_n rms"]) == 3
+        for name, values in left.values.items():
+            np.testing.assert_allclose(values, right.values[name], rtol=1e-9)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> None:
+    motion, loop = Motion(duration=4.0, dither=0.0), ClosedLoop(dither=0.3, lost=0.5, whole=whole)
+    recording, track = firmware.closed_loop(Config(), motion, range(2), loop, lambda: None)
+    assert np.all(np.std(recording.tau_m[2000:], axis=0) > 0.15)
+    missing = np.mean(track.faults & fault_mask("THETA") != 0)
+    assert missing == 0.0 if whole else 0.4 < missing < 0.6
+    assert np.any(track.faults & fault_mask("GAP")) == whole
+    assert np.all(np.diff(track.value["f_n"][200:], axis=0).any(axis=0))
 
 
 @pytest.mark.usefixtures("short")
