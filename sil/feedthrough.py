@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.fields import FEEDTHROUGH_FREQUENCIES
 from numpy.typing import NDArray
 
 from .trace import FEEDTHROUGH
@@ -14,8 +15,8 @@ from .trace import FEEDTHROUGH
 FloatArray = NDArray[np.float64]
 
 COLUMNS = ("time_s", *(column for column, _, _ in FEEDTHROUGH))
-FREQUENCIES: FloatArray = np.arange(2.0, 9.0)
-"""That FEEDTHROUGH is sent for [Hz]."""
+FREQUENCIES: FloatArray = np.array(FEEDTHROUGH_FREQUENCIES, dtype=np.float64)
+"""[Hz]"""
 _THINNED = 0.5  # [s]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...feedthrough import FREQUENCIES as SENT
 from ...quantities import DYNAMICS
 from .. import bode
-from ..bode import FREQUENCIES
+from ..bode import FREQUENCIES, magnitude_and_phase
 from ..figure import TICKS, Figure, Spec, axis, axis_range, band, frequency_axis, line, time_axis
 from ..run import Run
 from ..series import Array, packed, spread_indices
@@ -90,7 +90,7 @@ def slices(run: Run) -> Figure | None:
     if not responses:
         return None
     magnitudes = [np.abs(values) for values in responses.values()]
-    phases = [_curves(curve)[1] for values in responses.values() for curve in values]
+    phases = [magnitude_and_phase(curve)[1] for values in responses.values() for curve in values]
     decades = [np.log10(0.8 * np.nanmin(magnitudes)), np.log10(1.25 * np.nanmax(magnitudes))]
     rows = [
         axis("θ/z̈ [deg per m/s²]", type="log", range=[float(decade) for decade in decades], tickvals=TICKS),
@@ -103,7 +103,7 @@ def slices(run: Run) -> Figure | None:
         figure.add(*band(BAND, *edges[shown], "estimate ± 2σ", "estimate-band", row))
     looks: dict[str, Spec] = {"truth": {"line_dash": "dash"}, "estimate": {}}
     for name, values in responses.items():
-        for row, curve in enumerate(_curves(values[shown])):
+        for row, curve in enumerate(magnitude_and_phase(values[shown])):
             figure.add(line(FREQUENCIES, curve, name, name, row, **looks[name]))
     steps = [
         _step(moment, [edge for edges in bands for edge in edges[index]], [each[index] for each in responses.values()])
@@ -126,7 +126,7 @@ def _bands(run: Run, time: Array, estimate: np.ndarray) -> list[list[tuple[Array
     inside = np.isin(FREQUENCIES, BAND)
     magnitudes, phases = [], []
     for curve, gain_sigma, phase_sigma in zip(estimate, sent["gain_sigma"], sent["phase_sigma"], strict=True):
-        magnitude, phase = (values[inside] for values in _curves(curve))
+        magnitude, phase = (values[inside] for values in magnitude_and_phase(curve))
         factor = np.exp(SIGMAS * np.interp(BAND, SENT, gain_sigma))
         half = SIGMAS * DEGREES * np.interp(BAND, SENT, phase_sigma)
         magnitudes.append((magnitude / factor, magnitude * factor))
@@ -155,20 +155,12 @@ def _add_coherence(run: Run, figure: Figure) -> None:
     figure.add(line(ends, chance, "95 % of chance alone", "mark", row, line_dash="dash", line_width=1.2))
 
 
-def _curves(values: np.ndarray) -> tuple[Array, Array]:
-    """Magnitude, and phase [deg] that goes on downwards from -180 where the lever moves against the floor at first (the
-    arm's weight does so), from 0 where it moves along."""
-    start = -180.0 if values[0].real < 0.0 else 0.0
-    along = values if start == 0.0 else -values
-    return np.abs(values), np.degrees(np.unwrap(np.angle(along))) + start
-
-
 def _short(number: float) -> float | None:
     return float(f"{number:.4g}") if np.isfinite(number) else None
 
 
 def _step(moment: float, edges: list[Array], values: list[np.ndarray]) -> dict[str, Any]:
-    curves = [*edges, *(curve for value in values for curve in _curves(value))]
+    curves = [*edges, *(curve for value in values for curve in magnitude_and_phase(value))]
     return {
         "label": f"{moment:.3g}" if moment < 1000.0 else f"{moment:.0f}",
         "method": "restyle",
