@@ -115,7 +115,7 @@ def _result(
         loop = row.closed_loop or ClosedLoop()
         recording, track = firmware.closed_loop(config, row.motion, seeds, loop, tick)
     else:
-        track = firmware.estimates(config, measured(recording, row.sensors, seeds))
+        track = firmware.estimates(config, measured(recording, row.sensors, seeds), recording.response is not None)
     outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""))
     outcomes[row.name] = outcome
     return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt(outcome))

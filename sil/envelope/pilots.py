@@ -17,9 +17,9 @@ import numpy as np
 from lever_cdkf.host_tools.config import settings_table
 
 from .. import mayo_plant, plant, two_dof_plant
+from ..transfer import ComplexArray
 from ..truth import Conditions, Truth
-from .feedthrough import FREQUENCIES, ComplexArray
-from .motions import PERIOD, Motion, Recording, arms, excitation, stream
+from .motions import FREQUENCIES, PERIOD, Motion, Recording, arms, excitation, stream
 from .plant import FloatArray, Hardware
 
 LOSS = 0.6
