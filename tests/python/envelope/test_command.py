@@ -69,7 +69,7 @@ def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> N
 
 @pytest.mark.usefixtures("short")
 def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["envelope", "--seeds", "2", "--json", str(tmp_path / "rows.json")]) == 1
+    assert cli.main(["envelope", "--seeds", "2", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]) == 1
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     assert {name: row["ok"] for name, row in rows.items()} == {"missed": False, "unknown": False, "reported": True}
     assert rows["unknown"]["measured"] == {"f_n rms [%]": None}
