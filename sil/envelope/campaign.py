@@ -118,7 +118,8 @@ def _result(
         track = firmware.estimates(config, measured(recording, row.sensors, seeds), recording.response is not None)
     outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""))
     outcomes[row.name] = outcome
-    return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt(outcome))
+    with np.errstate(all="ignore"):  # an estimate that is not finite is no warning but a figure that keeps no limit
+        return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt(outcome))
 
 
 def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recording | None]]:

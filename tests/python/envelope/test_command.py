@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.config import Config
-from lever_cdkf.sil.envelope import campaign, conditions, firmware, table
+from lever_cdkf.sil.envelope import campaign, conditions, firmware, page, table
 from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
 from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
@@ -19,12 +21,12 @@ def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[s
     status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
-    page = (tmp_path / "envelope.html").read_text(encoding="utf-8")
+    written = (tmp_path / "envelope.html").read_text(encoding="utf-8")
     assert set(rows) == {name for name, condition in conditions.CONDITIONS.items() if condition.quick}
     for name, row in rows.items():
         assert row["measured"].keys() == row["limit"].keys()
         assert name in printed
-        assert f'id="chart-{name}"' in page
+        assert f'id="chart-{name}"' in written
     assert {name: row["measured"] for name, row in rows.items() if not row["ok"]} == {}
     assert status == 0
 
@@ -78,6 +80,22 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     printed = capsys.readouterr().out
     assert "0 of 2 conditions hold. Missed: missed, unknown." in printed
     assert table.MISSED in printed
+
+
+def test_estimates_that_are_not_finite_keep_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits = (Limit("f_n rms", most=1e9), Limit("f_n covered", least=0.1))
+    row = Condition("steady", "", Motion(duration=3.0), limits, start=1.0)
+    estimates = firmware.estimates
+
+    def spoilt(*arguments: Any) -> firmware.Track:
+        track = estimates(*arguments)
+        return replace(track, value={name: np.full_like(column, np.nan) for name, column in track.value.items()})
+
+    monkeypatch.setattr(firmware, "estimates", spoilt)
+    results = campaign.run([row], {}, 2, lambda *_: None)
+    assert not results[0].ok
+    assert table.rows(results)[0]["measured"] == {"f_n rms [%]": None, "f_n covered [%]": 0.0}
+    assert 'id="chart-steady"' in page.build(results, 2)
 
 
 @pytest.mark.usefixtures("short")
