@@ -116,7 +116,7 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1024 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1536 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];
@@ -237,7 +237,7 @@ const char *lever_parameter_unit(uint8_t model, uint32_t index);
 enum lever_fault {
     LEVER_FAULT_THETA = 1,          /* theta missing or invalid */
     LEVER_FAULT_THETA_DOT = 2,      /* theta_dot missing or invalid */
-    LEVER_FAULT_TORQUE = 4,         /* motor torque missing or invalid, taken as 0 */
+    LEVER_FAULT_TORQUE = 4,         /* motor torque missing or invalid, taken as what was asked for */
     LEVER_FAULT_BASE = 8,           /* base acceleration invalid, the last one held */
     LEVER_FAULT_GAP = 16,           /* samples were missing before this one */
     LEVER_FAULT_COMMUNICATION = 32, /* a frame since the last sample was corrupt, repeated or out of sequence */

@@ -8,7 +8,7 @@ void alignment_start_state(estimator_t *estimator, const float y[CDKF_OUTPUTS], 
 {
     const trim_t *trim = &estimator->trim;
     cdkf_t *cdkf = &estimator->cdkf;
-    const float x[MODEL_STATES] = {valid[0] ? y[0] : (trim->output[0].level - trim->origin[0]), valid[1] ? y[1] : 0.0f};
+    const float x[MODEL_STATES] = {valid[0] ? y[0] : (trim_angle(trim) - trim->origin[0]), valid[1] ? y[1] : 0.0f};
     const float sigma[MODEL_STATES] = {
         valid[0] ? cdkf->output_noise[0] : 0.1f, valid[1] ? cdkf->output_noise[1] : 1.0f};
     cdkf_start_state(cdkf, x, sigma);
@@ -20,12 +20,13 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
     alignment_t *alignment = &estimator->alignment;
     alignment->time += elapsed;
     estimator->mode = LEVER_MODE_ALIGN;
-    if (sample->valid[0]) {
-        alignment->theta_sum += sample->y[0];
-        alignment->count += 1.0f;
-        trim_start(&estimator->trim, alignment->theta_sum / alignment->count, settings->trim_corner,
-            estimator->setup.constants.trim);
-        estimator->trim_angle = sine_cosine(estimator->trim.output[0].level);
+    if (sample->valid[0] || sample->valid[1]) {
+        alignment->theta_sum += sample->valid[0] ? sample->y[0] : 0.0f;
+        alignment->count += sample->valid[0] ? 1.0f : 0.0f;
+        const bool seen = (alignment->count > 0.0f);
+        trim_start(&estimator->trim, seen ? (alignment->theta_sum / alignment->count) : settings->lever_preload_angle,
+            settings->trim_corner, estimator->setup.constants.trim);
+        estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
         estimator->z_ddot = sample->z_ddot;
         estimator->tau_m = sample->tau_m;
         const float y[CDKF_OUTPUTS] = {sample->y[0] - estimator->trim.origin[0], sample->y[1]};
@@ -41,6 +42,7 @@ void alignment_begin(estimator_t *estimator, const checked_t *sample)
     const float presumed = 2.0f * estimator->setup.settings->excitation_least;
     (void)memset(&estimator->alignment, 0, sizeof estimator->alignment);
     estimator->averages.excitation_square = presumed * presumed;
+    estimator->averages.motion_square = presumed * presumed;
     estimator->averages.innovation = 1.0f;
     alignment_step(estimator, sample, 0.0f);
 }

@@ -11,14 +11,16 @@
 typedef struct checked {
     float y[CDKF_OUTPUTS];
     bool valid[CDKF_OUTPUTS];
-    float z_ddot;
+    bool base;    /* the base acceleration is valid */
+    float z_ddot; /* compensated for gain and delay of the sensor */
     float tau_m;
 } checked_t;
 
 /* Begins with this sample. Excitation is presumed until it has been measured, so that annealing is not cut short. */
 void alignment_begin(estimator_t *estimator, const checked_t *sample);
 
-/* Averages angles until align_time has passed, then starts the state at a valid one. */
+/* Averages angles until align_time has passed, then starts the state. Without any angle the trim is taken to be where
+ * the lever's spring rests. */
 void alignment_step(estimator_t *estimator, const checked_t *sample, float elapsed);
 
 /* The state starts at outputs y, deviations in preload trim, with the uncertainty of the measurement. An angle that is

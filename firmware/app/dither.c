@@ -63,8 +63,8 @@ static float band_variance(const dither_t *dither)
 void dither_init(dither_t *dither, float low, float high, float period, float rms_most, float fade)
 {
     const float highest = HIGHEST / period;
-    dither->low = high_pass_corner((low < highest) ? low : highest);
-    dither->high = high_pass_corner((high < highest) ? high : highest);
+    dither->low = high_pass_corner((low < highest) ? low : highest, HIGH_PASS_BUTTERWORTH);
+    dither->high = high_pass_corner((high < highest) ? high : highest, HIGH_PASS_BUTTERWORTH);
     dither->period = period;
     dither->scale = sqrtf(3.0f / band_variance(dither)); /* uniform() has a variance of 1/3 */
     dither->rms_most = rms_most;

@@ -28,7 +28,7 @@ static model_step_t at_trim(const estimator_t *estimator)
 {
     const sine_cosine_t *angle = &estimator->trim_angle;
     const model_step_t step = {
-        .trim = estimator->trim.output[0].level, .trim_sine = angle->sine, .trim_cosine = angle->cosine};
+        .trim = trim_angle(&estimator->trim), .trim_sine = angle->sine, .trim_cosine = angle->cosine};
     return step;
 }
 
@@ -64,7 +64,7 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
     estimate->theta_dot = estimator_state(estimator, 1u);
     estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->setup.settings->trim_corner));
     estimate->theta_dot_sigma = state_sigma(estimator, 1u, 1.0f);
-    estimate->trim = estimator->trim.output[0].level;
+    estimate->trim = trim_angle(&estimator->trim);
     estimate->nis = estimator->nis;
     estimate->nis_size = estimator->nis_size;
     estimator_parameters(estimator, estimate->parameter);

@@ -8,6 +8,10 @@
 #define RESTARTS_TOLERATED 5.0f   /* not yet forgotten */
 #define INNOVATION_TOLERATED 3.0f /* mean of nis / nis_size; expected 1 */
 #define INNOVATION_MOST 1.0e6f    /* a single value is not averaged beyond this, so that the mean recovers */
+#define MOTION_TIME 0.2f          /* [s] */
+#define OUTAGE 0.0205f            /* a base acceleration missing for longer is out [s] */
+#define UNKNOWN 3.0f              /* process noise for an unknown base acceleration, in those that are set */
+#define STOP_RATE 0.002f          /* friction is at 71 % of its limit [rad/s] */
 #define SUBSTEPS_MOST 12u         /* predictions through a gap: bounds the time of one call */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
 #define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
@@ -39,6 +43,10 @@ static void start_filter(estimator_t *estimator)
     cdkf->process_noise[1] = s->theta_dot_process_noise;
     cdkf->output_noise[0] = s->theta_noise;
     cdkf->output_noise[1] = s->theta_dot_noise;
+    cdkf->considered_sigma[CDKF_BASE_GAIN] = s->z_ddot_gain_sigma;
+    cdkf->considered_sigma[CDKF_BASE_DELAY] = s->z_ddot_delay_sigma;
+    cdkf->considered_sigma[CDKF_TORQUE_GAIN] = s->tau_m_gain_sigma;
+    cdkf->considered_sigma[CDKF_FRICTION] = s->lever_friction_sigma;
     cdkf_start_state(cdkf, origin, cdkf->output_noise);
     learning_start(&estimator->learning, setup, cdkf);
 }
@@ -53,6 +61,8 @@ void estimator_start_over(estimator_t *estimator)
     estimator->mode = LEVER_MODE_INIT;
     estimator->frozen = false;
     estimator->last_z_ddot = 0.0f;
+    estimator->raw_z_ddot = 0.0f;
+    estimator->base_missing = 0.0f;
     estimator->last_tau_m = 0.0f;
     estimator->nis = 0.0f;
     estimator->nis_size = 0u;
@@ -83,16 +93,35 @@ static bool is_usable(estimator_t *estimator, float value, bool valid, float mos
     return usable;
 }
 
-/* Notes in the faults what is missing. */
-static checked_t check(estimator_t *estimator, const lever_sample_t *sample)
+/* A plausible value that has not stuck. */
+static bool is_alive(estimator_t *estimator, enum monitor_signal signal, float value, bool usable, float elapsed)
+{
+    return usable && !monitor_is_stuck(&estimator->learning.monitor, signal, value, elapsed);
+}
+
+/* The true base acceleration of a sensor with gain and delay, the delay by extrapolation. */
+static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
+{
+    const lever_settings_t *s = estimator->setup.settings;
+    const bool late = (s->z_ddot_delay > 0.0f) && (elapsed > 0.0f);
+    const float ahead = late ? (s->z_ddot_delay * ((z_ddot - estimator->raw_z_ddot) / elapsed)) : 0.0f;
+    estimator->raw_z_ddot = z_ddot;
+    return (z_ddot + ahead) * estimator->setup.base_scale;
+}
+
+/* Notes in the faults what is missing, `elapsed` seconds after the last sample. */
+static checked_t check(estimator_t *estimator, const lever_sample_t *sample, float own_torque, float elapsed)
 {
     checked_t checked = {.y = {sample->theta, sample->theta_dot}};
-    checked.valid[0] = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
-    checked.valid[1] = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
+    const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
+    const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
     const bool torque = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);
-    checked.tau_m = torque ? sample->tau_m : 0.0f;
-    checked.z_ddot = base ? sample->z_ddot : estimator->last_z_ddot;
+    checked.valid[0] = is_alive(estimator, MONITOR_THETA, sample->theta, theta, elapsed);
+    checked.valid[1] = is_alive(estimator, MONITOR_THETA_DOT, sample->theta_dot, theta_dot, elapsed);
+    checked.base = is_alive(estimator, MONITOR_Z_DDOT, sample->z_ddot, base, elapsed);
+    checked.tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
+    checked.z_ddot = checked.base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked.z_ddot;
     estimator->last_tau_m = checked.tau_m;
     estimator->time_us = sample->time_us;
@@ -102,7 +131,7 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample)
     note(estimator, !checked.valid[0], LEVER_FAULT_THETA);
     note(estimator, !checked.valid[1], LEVER_FAULT_THETA_DOT);
     note(estimator, !torque, LEVER_FAULT_TORQUE);
-    note(estimator, !base, LEVER_FAULT_BASE);
+    note(estimator, !checked.base || estimator->learning.monitor.base_wrong, LEVER_FAULT_BASE);
     note(estimator, estimator->communication_fault, LEVER_FAULT_COMMUNICATION);
     estimator->communication_fault = false;
     return checked;
@@ -110,22 +139,52 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample)
 
 /* --- time update ------------------------------------------------------------------------------------------------- */
 
-/* One step of the model, with the mean of the inputs at both ends. */
+/* Torque of one newton metre of Coulomb friction, smooth about standstill. */
+static float friction(float rate)
+{
+    return rate / sqrtf((rate * rate) + (STOP_RATE * STOP_RATE));
+}
+
+/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
+ * measured later by the delay. */
+static void considered_errors(const estimator_t *estimator, float z_ddot, float period, float error[CDKF_CONSIDERED])
+{
+    error[CDKF_BASE_GAIN] = -z_ddot;
+    error[CDKF_BASE_DELAY] = (z_ddot - estimator->z_ddot) / period;
+    error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
+    error[CDKF_FRICTION] = -friction(estimator->cdkf.x[1]);
+}
+
+/* One step of the model, with the mean of the inputs at both ends. A base that cannot be used is unknown: then the
+ * state has the process noise for it. */
 static void predict(estimator_t *estimator, float z_ddot, float tau_m, float period)
 {
     trim_t *trim = &estimator->trim;
+    cdkf_t *cdkf = &estimator->cdkf;
+    learning_t *learning = &estimator->learning;
     const setup_t *setup = &estimator->setup;
+    const lever_settings_t *s = setup->settings;
+    const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
+    const bool rubs = (s->lever_friction > 0.0f);
+    const float stop = rubs ? (s->lever_friction * friction(trim->origin[1] + cdkf->x[1])) : 0.0f;
     const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
-    const float next_tau_m = trim_input(trim, 1u, tau_m, period);
+    const float next_tau_m = trim_input(trim, 1u, tau_m - stop, period);
+    float error[CDKF_CONSIDERED];
     trim_set_origin(trim);
-    const model_step_t step = {.period = period,
+    model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
         .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
         .origin = trim->origin[0],
-        .trim = trim->output[0].level,
+        .trim = trim_angle(trim),
         .trim_sine = estimator->trim_angle.sine,
         .trim_cosine = estimator->trim_angle.cosine};
-    cdkf_time_update(&estimator->cdkf, setup->model_in_use, &setup->constants, &step);
+    hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
+    if (unknown) {
+        step.z_ddot = 0.0f;
+        cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
+    }
+    considered_errors(estimator, next_z_ddot, period, error);
+    cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
     estimator->z_ddot = next_z_ddot;
     estimator->tau_m = next_tau_m;
 }
@@ -134,7 +193,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
 static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], float period)
 {
     const bool back = trim_outputs(&estimator->trim, estimator->cdkf.x, y, valid, period);
-    estimator->trim_angle = sine_cosine(estimator->trim.output[0].level);
+    estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
     return back;
 }
 
@@ -160,6 +219,31 @@ static void cross_gap(
     }
 }
 
+/* After an outage of the base its level has to settle again. */
+static void follow_base(estimator_t *estimator, bool valid, float elapsed)
+{
+    if (valid && (estimator->base_missing > OUTAGE)) {
+        trim_unsettle(&estimator->trim);
+    }
+    estimator->base_missing = valid ? 0.0f : (estimator->base_missing + elapsed);
+}
+
+/* An output far from what is expected is not valid. */
+static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elapsed)
+{
+    const float average = estimator->averages.innovation;
+    const float level = (average > 1.0f) ? average : 1.0f;
+    monitor_t *monitor = &estimator->learning.monitor;
+    for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
+        const float y = sample->y[i] - estimator->trim.origin[i];
+        if (sample->valid[i] && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
+            sample->valid[i] = false;
+            estimator->corrupt++;
+            note(estimator, true, (i == 0u) ? LEVER_FAULT_THETA : LEVER_FAULT_THETA_DOT);
+        }
+    }
+}
+
 /* Predicts to the sample, `periods` sample periods after the last one. */
 static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed, uint32_t periods)
 {
@@ -169,7 +253,9 @@ static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *l
         period = elapsed / (float)substeps;
         cross_gap(estimator, sample, last, period, substeps);
     }
+    follow_base(estimator, sample->base, elapsed);
     predict(estimator, sample->z_ddot, sample->tau_m, period);
+    refuse_spikes(estimator, sample, elapsed);
     if (subtract_trim(estimator, sample->y, sample->valid, period)) {
         alignment_end_outage(estimator, sample);
     }
@@ -193,17 +279,26 @@ static bool restart_if_invalid(estimator_t *estimator, const checked_t *sample, 
     return !valid;
 }
 
+static bool is_excited(const estimator_t *estimator)
+{
+    const float least = squared(estimator->setup.settings->excitation_least);
+    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= least);
+}
+
 static void average(estimator_t *estimator, float elapsed)
 {
     const float time = estimator->setup.settings->excitation_time;
     averages_t *averages = &estimator->averages;
     const float share = (elapsed < time) ? (elapsed / time) : 1.0f;
     averages->excitation_square += share * (squared(estimator->cdkf.x[1]) - averages->excitation_square);
+    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed / MOTION_TIME) : 1.0f) *
+                               (squared(estimator->cdkf.x[1]) - averages->motion_square);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);
     }
     if (estimator->nis_size != 0u) {
         const float ratio = (estimator->nis_size == 2u) ? (0.5f * estimator->nis) : estimator->nis;
+        monitor_add(&estimator->learning.monitor, ratio, elapsed);
         averages->innovation += share * (((ratio < INNOVATION_MOST) ? ratio : INNOVATION_MOST) - averages->innovation);
     }
 }
@@ -227,12 +322,14 @@ static lesson_t update_filter(estimator_t *estimator, const checked_t *sample)
     const bool settled = (estimator->trim.unsettled < (0.5f * settings->sample_period));
     const bool measured = sample->valid[0] || sample->valid[1];
     const lesson_t lesson = {.walks = !estimator->frozen,
-        .teaches = !estimator->frozen && settled && measured,
-        .excited = (estimator->averages.excitation_square >= squared(settings->excitation_least))};
+        .measured = settled && measured && (estimator->base_missing <= 0.0f),
+        .excited = is_excited(estimator)};
     innovation_t innovation[CDKF_OUTPUTS];
-    cdkf_measurement_update(&estimator->cdkf, sample->y, sample->valid, lesson.teaches && lesson.excited, innovation);
+    cdkf_measurement_update(
+        &estimator->cdkf, sample->y, sample->valid, lesson.walks && lesson.measured && lesson.excited, innovation);
     if (lesson.excited) {
         noise_estimation_add(&estimator->learning.noise, innovation, sample->valid);
+        whiteness_add(&estimator->learning.whiteness, innovation[sample->valid[1] ? 1u : 0u].value);
     }
     estimator->nis = (squared(innovation[0].value) * innovation[0].inverse_variance) +
                      (squared(innovation[1].value) * innovation[1].inverse_variance);
@@ -245,6 +342,7 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     const learning_t *learning = &estimator->learning;
     const lesson_t lesson = update_filter(estimator, sample);
     const bool learnt = learning_step(&estimator->learning, &estimator->setup, &estimator->cdkf, &lesson, elapsed);
+    note(estimator, (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
     estimator->trim.unsettled -= elapsed;
     const bool restarted = restart_if_invalid(estimator, sample, learnt);
     average(estimator, elapsed);
@@ -252,6 +350,9 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     note(estimator, learning->bounded, LEVER_FAULT_BOUND);
     note(estimator, learning->changed > 0.0f, LEVER_FAULT_CHANGE);
     note(estimator, estimator->averages.innovation > INNOVATION_TOLERATED, LEVER_FAULT_INNOVATION);
+    note(estimator, learning->whiteness.coloured, LEVER_FAULT_MISMATCH);
+    note(estimator, learning->calibration.wrong, LEVER_FAULT_CALIBRATION);
+    note(estimator, learning->hands.off, LEVER_FAULT_HANDS_OFF);
     note(estimator, restarted, LEVER_FAULT_RECOVERED);
     estimator->mode = mode_of(estimator, sample->valid[0] || sample->valid[1]);
 }
@@ -305,7 +406,7 @@ static bool is_new_clock(estimator_t *estimator, uint32_t time_us)
     return (float)estimator->late_series_us > limit_us;
 }
 
-enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample)
+enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample, float own_torque)
 {
     const inputs_t last = {estimator->last_z_ddot, estimator->last_tau_m};
     const uint32_t elapsed_us = sample->time_us - estimator->time_us;
@@ -315,10 +416,11 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
     if (late && !new_clock) {
         estimator->faults = LEVER_FAULT_CLOCK; /* the sample is ignored */
     } else {
-        checked_t checked = check(estimator, sample); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+        const float elapsed = (started && !new_clock) ? ((float)elapsed_us * 1.0e-6f) : 0.0f;
+        checked_t checked = check(estimator, sample, own_torque, elapsed); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
         estimator->late_series_us = 0u;
         if (started && !new_clock) {
-            step(estimator, &checked, &last, (float)elapsed_us * 1.0e-6f);
+            step(estimator, &checked, &last, elapsed);
         } else {
             alignment_begin(estimator, &checked);
         }

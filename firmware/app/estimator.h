@@ -24,6 +24,7 @@ typedef struct alignment {
 /* Slow averages for health. */
 typedef struct averages {
     float excitation_square; /* mean square of theta_dot [rad^2/s^2] */
+    float motion_square;     /* the same over MOTION_TIME: whether the lever moves now */
     float innovation;        /* mean of nis / nis_size; expected 1 */
     float restarts;          /* number of restarts within about RESTART_MEMORY */
 } averages_t;
@@ -40,7 +41,9 @@ typedef struct estimator {
     uint32_t time_us;      /* of the last sample */
     uint32_t late_time_us; /* of the last late one, and by how much such samples have advanced */
     uint32_t late_series_us;
-    float last_z_ddot; /* inputs as they came [m/s^2], [N m] */
+    float raw_z_ddot;   /* as it came last [m/s^2] */
+    float base_missing; /* time since the base acceleration was valid last [s] */
+    float last_z_ddot;  /* inputs, compensated for what is known of the sensors [m/s^2], [N m] */
     float last_tau_m;
     float z_ddot; /* the same as the model takes them: deviations in preload trim */
     float tau_m;
@@ -62,8 +65,9 @@ void estimator_init(estimator_t *estimator, const lever_config_t *config);
 /* Back to before the first sample, with the choices as they are; counts go on. */
 void estimator_start_over(estimator_t *estimator);
 
-/* The functions of lever_cdkf.h of the same names. A command's dither is not the estimator's. */
-enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample);
+/* The functions of lever_cdkf.h of the same names. own_torque: what was asked of the motor until this sample [N m], for
+ * when the measured torque is missing. A command's dither is not the estimator's. */
+enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample, float own_torque);
 bool estimator_command(estimator_t *estimator, const lever_command_t *command);
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate);
 

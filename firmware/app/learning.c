@@ -1,58 +1,170 @@
 #include "app/learning.h"
 
-#define REPORTED 1.0f /* time for which a change is reported, and not followed by another [s] */
+#define REPORTED 3.0f         /* time for which a change is reported, and not followed by another [s] */
+#define TRANSIENT 2.0f        /* left of it when innovations are noise again, and not of the change [s] */
+#define KEEP_PERIOD 1.0f      /* [s] */
+#define REGRIP 0.6f           /* after the lever is held again [s] */
+#define AWAKE 0.3f            /* after a rest [s] */
+#define DISTURBANCE 2.0f      /* process noise after a change, in noise_range times the one that is set */
+#define DISTURBANCE_TIME 0.4f /* its time constant [s] */
 
 void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
 {
-    const adaptation_t adaptation = setup_adaptation(setup);
+    const adaptation_t adaptation = setup_adaptation(setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
     adaptation_start(&adaptation, cdkf);
     change_detection_init(&learning->change);
     noise_estimation_begin(&learning->noise);
+    whiteness_start(&learning->whiteness);
+    calibration_start(&learning->calibration);
+    monitor_start(&learning->monitor);
+    hands_start(&learning->hands);
+    cdkf_keep(cdkf, &learning->kept[0]);
+    learning->kept[1] = learning->kept[0];
+    learning->kept_ago = 0.0f;
     learning->elapsed = 0.0f;
+    learning->wait = 0.0f;
     learning->changed = 0.0f;
     learning->bounded = false;
 }
 
+bool learning_is_taught(const learning_t *learning, const lesson_t *lesson)
+{
+    return lesson->walks && lesson->measured && !learning->monitor.base_wrong &&
+           !monitor_has_stuck(&learning->monitor) && !learning->hands.off && (learning->wait <= 0.0f);
+}
+
+void learning_take_back(learning_t *learning, cdkf_t *cdkf)
+{
+    cdkf_return(cdkf, &learning->kept[1]);
+    learning->kept[0] = learning->kept[1];
+    learning->kept_ago = 0.0f;
+    noise_estimation_begin(&learning->noise);
+    whiteness_start(&learning->whiteness);
+}
+
+static void keep(learning_t *learning, const cdkf_t *cdkf, float period)
+{
+    learning->kept_ago += period;
+    if (learning->kept_ago >= KEEP_PERIOD) {
+        learning->kept_ago = 0.0f;
+        learning->kept[1] = learning->kept[0];
+        cdkf_keep(cdkf, &learning->kept[0]);
+    }
+}
+
+/* For a while the state is moved by torque that nobody knows. */
+static void disturb(const lever_settings_t *s, cdkf_t *cdkf)
+{
+    cdkf->disturbance = DISTURBANCE * (s->noise_range * s->theta_dot_process_noise);
+}
+
 /* A sudden change of the pilot counts as change_walk seconds of the walk, once: a disturbance that only looks like
- * one would widen the covariance again and again. What it did to the innovations is not noise. Returns those
- * seconds. */
+ * one would widen the covariance again and again. With his grip he mostly moves the lever, a torque that nobody knows:
+ * the state's process noise is large for a while, so that it is not taken for an arm. Returns those seconds. */
 static float detect_change(
-    learning_t *learning, const lever_settings_t *s, const correction_t *correction, float period)
+    learning_t *learning, const lever_settings_t *s, cdkf_t *cdkf, const correction_t *correction, float period)
 {
     const bool detected =
         change_detection_step(&learning->change, correction, period, s->change_memory, s->change_threshold);
     const bool changed = detected && (learning->changed <= 0.0f);
     if (changed) {
-        noise_estimation_begin(&learning->noise);
         learning->changed = REPORTED;
+        disturb(s, cdkf);
     }
     return changed ? s->change_walk : 0.0f;
 }
 
-static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, bool teaches, bool excited)
+/* Noise, unless the innovations are those of a start or a change. What was learnt with noise that was far too small is
+ * taken back. */
+static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float period)
+{
+    const noise_setting_t noise = setup_noise(setup);
+    const bool started = (learning->kept[1].trust < 1.0f);
+    if ((cdkf->trust < 1.0f) || (learning->changed > TRANSIENT)) {
+        noise_estimation_begin(&learning->noise);
+    } else if (noise_estimation_step(&learning->noise, cdkf, &noise, period) &&
+               (started || (learning->changed <= 0.0f))) {
+        learning_take_back(learning, cdkf);
+    } else {
+        keep(learning, cdkf, period);
+    }
+}
+
+/* What the block says against sensors, settings and model, before it is learnt. */
+static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float period)
+{
+    const bool held = !learning->hands.off;
+    const bool counts = lesson->measured && lesson->excited;
+    const score_t sudden = cdkf_sudden_score(cdkf); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    score_t constant[CDKF_CONSIDERED];
+    cdkf_constant_scores(cdkf, constant);
+    hands_step(
+        &learning->hands, &setup->constants, cdkf->x[1], period, counts && (setup->model_in_use == &model_lever));
+    const bool known = (learning->kept[1].trust >= 1.0f) || learning->monitor.base_wrong;
+    bool base_wrong = false;
+    if (known && !learning->hands.off) {
+        base_wrong = monitor_step(&learning->monitor, &sudden, period);
+    } else {
+        monitor_trust_base(&learning->monitor);
+    }
+    const bool stuck = monitor_has_stuck(&learning->monitor);
+    const bool fails = base_wrong || (stuck && !learning->monitor.had_stuck);
+    learning->monitor.had_stuck = stuck;
+    if (fails || (held && learning->hands.off)) {
+        learning_take_back(learning, cdkf);
+    } else if (!held && !learning->hands.off) { /* another grip */
+        cdkf_open(cdkf);
+        cdkf_keep(cdkf, &learning->kept[1]);
+        learning_take_back(learning, cdkf);
+        disturb(setup->settings, cdkf);
+        learning->wait = REGRIP;
+    } else {
+        /* as before */
+    }
+    const bool taught = counts && learning_is_taught(learning, lesson);
+    const bool settled = taught && (cdkf->trust >= 1.0f) && (learning->changed <= TRANSIENT);
+    whiteness_step(&learning->whiteness, period, settled);
+    if (settled) {
+        calibration_step(&learning->calibration, cdkf, constant, period);
+    }
+    if (!taught) {
+        cdkf_drop_pending(cdkf);
+    }
+}
+
+static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson)
 {
     const lever_settings_t *s = setup->settings;
     const bool joint = (setup->estimator == (uint8_t)LEVER_ESTIMATOR_JOINT);
-    const adaptation_t adaptation = setup_adaptation(setup);
-    const noise_setting_t noise = setup_noise(setup);
+    const adaptation_t adaptation = setup_adaptation(setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
     const float period = learning->elapsed;
     float variance[MODEL_PARAMETERS];
     correction_t correction;
     learning->elapsed = 0.0f;
+    learning->wait = (learning->wait > period) ? (learning->wait - period) : 0.0f;
+    if (!lesson->excited && (learning->wait < AWAKE)) {
+        learning->wait = AWAKE;
+    }
     learning->changed = (learning->changed > period) ? (learning->changed - period) : 0.0f;
-    if (teaches && excited && noise_estimation_step(&learning->noise, cdkf, &noise, period)) {
-        cdkf_open(cdkf); /* learnt with noise that was far too small, the parameters seem more certain than they are */
+    if (learning->hands.off) {
+        disturb(s, cdkf);
+    }
+    cdkf->disturbance -= cdkf->disturbance * ((period < DISTURBANCE_TIME) ? (period / DISTURBANCE_TIME) : 1.0f);
+    judge(learning, setup, cdkf, lesson, period);
+    const bool taught = learning_is_taught(learning, lesson);
+    if (taught && lesson->excited) {
+        estimate_noise(learning, setup, cdkf, period);
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
     learning->bounded = correction.bounded;
-    const float more = (teaches && excited) ? detect_change(learning, s, &correction, period) : 0.0f;
+    const float more = (taught && lesson->excited) ? detect_change(learning, s, cdkf, &correction, period) : 0.0f;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         variance[i] = adaptation.floor[i] * more;
     }
     cdkf_forget(cdkf, period, joint);
     cdkf_walk(cdkf, period, variance, joint);
-    if (teaches) {
-        adaptation_step(&adaptation, period, correction.w, excited, cdkf);
+    if (taught) {
+        adaptation_step(&adaptation, period, correction.w, lesson->excited, cdkf);
     } else {
         cdkf->growth = 0.0f; /* what cannot be learnt again is not forgotten */
     }
@@ -72,13 +184,14 @@ bool learning_step(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, con
         learning->bounded = false;
     }
     if (due) {
-        learn(learning, setup, cdkf, lesson->teaches, lesson->excited);
+        learn(learning, setup, cdkf, lesson);
     }
     return due;
 }
 
 void learning_skip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float elapsed)
 {
+    static const lesson_t none = {true, false, false};
     learning->elapsed += elapsed;
-    learn(learning, setup, cdkf, false, false);
+    learn(learning, setup, cdkf, &none);
 }

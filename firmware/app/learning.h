@@ -1,22 +1,34 @@
 /* When and how the parameters learn: once every learn_period, with a random walk that is adapted, more of it after a
- * sudden change of the pilot, and with the measurement and process noise that the innovations show.
+ * sudden change of the pilot, and with the measurement and process noise that the innovations show. And what the
+ * innovations of a block say against the model, the sensors and the settings.
  */
 #ifndef APP_LEARNING_H
 #define APP_LEARNING_H
 
+#include "app/hands.h"
+#include "app/monitor.h"
 #include "app/setup.h"
+#include "filter/calibration.h"
 #include "filter/cdkf.h"
 #include "filter/change_detection.h"
 #include "filter/noise_estimation.h"
+#include "filter/whiteness.h"
 
 #include <stdbool.h>
 
 typedef struct learning {
     change_detection_t change;
     noise_estimation_t noise;
-    float elapsed; /* since the parameters learnt last [s] */
-    float changed; /* time left to report a change [s] */
-    bool bounded;  /* a parameter rested on a bound then */
+    whiteness_t whiteness;
+    calibration_t calibration;
+    monitor_t monitor;
+    hands_t hands;
+    snapshot_t kept[2]; /* the belief one and two KEEP_PERIODs ago, to be taken back */
+    float kept_ago;     /* time since the first [s] */
+    float elapsed;      /* since the parameters learnt last [s] */
+    float wait;         /* time until anything is taught: what was before has to die away [s] */
+    float changed;      /* time left to report a change [s] */
+    bool bounded;       /* a parameter rested on a bound then */
 } learning_t;
 
 /* Starts, for parameters at their first guess. */
@@ -24,10 +36,13 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf);
 
 /* What may be learnt from a sample. */
 typedef struct lesson {
-    bool walks;   /* the parameters may walk: not frozen */
-    bool teaches; /* it was measured, and the levels have settled */
-    bool excited; /* there was enough motion lately: at rest, only the walk goes on */
+    bool walks;    /* the parameters may walk: not frozen */
+    bool measured; /* there was an output, the base acceleration is valid, and the levels have settled */
+    bool excited;  /* there was enough motion lately: at rest, only the walk goes on */
 } lesson_t;
+
+/* The lesson teaches the parameters: besides, the sensors are right and somebody holds the lever. */
+bool learning_is_taught(const learning_t *learning, const lesson_t *lesson);
 
 /* After the measurement update with a sample, `elapsed` seconds after the last one. Returns true when the parameters
  * have learnt. */
@@ -35,5 +50,8 @@ bool learning_step(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, con
 
 /* After `elapsed` seconds without samples: the parameters learn what is pending, and walk for that time. */
 void learning_skip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float elapsed);
+
+/* Takes back what was learnt in the last one to two seconds: they were not what they seemed. */
+void learning_take_back(learning_t *learning, cdkf_t *cdkf);
 
 #endif

@@ -44,7 +44,7 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
     estimator_t *estimator = &lever->estimator;
     const uint32_t last_us = estimator->time_us;
     const bool starts = (estimator->mode == LEVER_MODE_INIT);
-    const enum lever_mode mode = estimator_update(estimator, sample);
+    const enum lever_mode mode = estimator_update(estimator, sample, lever->gate.torque);
     const uint32_t faults = estimator->faults;
     const torque_sample_t torque = {.elapsed_us = starts ? lever->gate.period_us : (estimator->time_us - last_us),
         .advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u),

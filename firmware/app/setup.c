@@ -25,6 +25,8 @@ void setup_choose(setup_t *setup)
     constants->arm_preload_sine = sine_cosine(s->arm_preload_angle).sine;
     constants->lever_preload_angle = s->lever_preload_angle;
     constants->trim = (setup->preload == (uint8_t)LEVER_PRELOAD_TRIM);
+    setup->base_scale = 1.0f / s->z_ddot_gain;
+    setup->torque_scale = 1.0f / s->tau_m_gain;
     setup->model_in_use = setup_model(setup->model);
 }
 
@@ -63,6 +65,7 @@ adaptation_t setup_adaptation(const setup_t *setup)
         .ceiling = s->walk_ceiling * s->walk_ceiling,
         .annealing_time = s->annealing_time,
         .averaging_time = s->robbins_monro_time,
+        .memory = s->robbins_monro_memory,
         .forgetting_time = s->forgetting_time};
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         /* of the scaled parameter w, see model/scaling.h */

@@ -14,6 +14,8 @@ typedef struct setup {
     const lever_settings_t *settings; /* the caller's */
     const model_t *model_in_use;
     model_constants_t constants;
+    float base_scale;   /* true over measured base acceleration, */
+    float torque_scale; /* and torque */
     uint8_t model;      /* enum lever_model; commands change this and the following */
     uint8_t preload;    /* enum lever_preload */
     uint8_t estimator;  /* enum lever_estimator */

@@ -8,6 +8,7 @@ void adaptation_start(const adaptation_t *adaptation, cdkf_t *cdkf)
     const bool forgets = (adaptation->kind == (uint8_t)LEVER_ADAPTATION_FORGETTING);
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         cdkf->walk[i] = adaptation->floor[i] * (anneals ? adaptation->ceiling : 1.0f);
+        cdkf->drift[i] = 0.0f;
     }
     cdkf->growth = forgets ? (1.0f / adaptation->forgetting_time) : 0.0f;
 }
@@ -29,7 +30,9 @@ void adaptation_step(
         if (adaptation->kind == (uint8_t)LEVER_ADAPTATION_ANNEALING) {
             next = cdkf->walk[i] * (1.0f - share_of(period, adaptation->annealing_time));
         } else if (adaptation->kind == (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO) {
-            next = cdkf->walk[i] + (nu * (((correction[i] * correction[i]) / period) - cdkf->walk[i]));
+            cdkf->drift[i] += correction[i] - (share_of(period, adaptation->memory) * cdkf->drift[i]);
+            const float seen = (2.0f * (cdkf->drift[i] * cdkf->drift[i])) / adaptation->memory;
+            next = cdkf->walk[i] + (nu * (seen - cdkf->walk[i]));
         } else {
             /* the floor */
         }

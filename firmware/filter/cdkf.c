@@ -7,6 +7,7 @@
 #define N ((uint32_t)MODEL_STATES)
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define ROWS ((uint32_t)CDKF_ROWS)
+#define CONSIDERED ((uint32_t)CDKF_CONSIDERED)
 
 /* --- start ------------------------------------------------------------------------------------------------------ */
 
@@ -15,7 +16,10 @@ void cdkf_start_state(cdkf_t *cdkf, const float x[MODEL_STATES], const float sig
     for (uint32_t k = L * L; k < (ROWS * L); k++) {
         cdkf->s[k] = 0.0f;
     }
-    (void)memset(&cdkf->pending, 0, sizeof cdkf->pending);
+    cdkf_drop_pending(cdkf);
+    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+        (void)memset(cdkf->considered[c].x, 0, sizeof cdkf->considered[c].x);
+    }
     for (uint32_t i = 0u; i < N; i++) {
         cdkf->x[i] = x[i];
         cdkf->response[i] = 0.0f;
@@ -58,7 +62,8 @@ static inline void move(const model_response_t *response, float period, float *t
  * second differences along the parameters, in the same direction [T/2; 1]; and a walk of theta itself. */
 static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period)
 {
-    const float variance = cdkf->process_noise[1] * cdkf->process_noise[1] * period;
+    const float walk = cdkf->process_noise[1] + cdkf->disturbance;
+    const float variance = walk * walk * period;
     const float own = cdkf->process_noise[0] * cdkf->process_noise[0] * period;
     float square = 0.0f;
     for (uint32_t j = 0u; j < L; j++) {
@@ -73,7 +78,22 @@ static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response
     factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
 }
 
-void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step)
+/* The considered errors act through the inputs. */
+static void predict_considered(
+    cdkf_t *cdkf, const model_response_t *response, float period, const float error[CDKF_CONSIDERED])
+{
+    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+        const float input = (c <= (uint32_t)CDKF_BASE_DELAY) ? response->base : response->torque;
+        const float change = input * error[c];
+        float *x = cdkf->considered[c].x;
+        move(response, period, &x[0], &x[1]);
+        x[0] += 0.5f * (period * change);
+        x[1] += change;
+    }
+}
+
+void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
+    const float error[CDKF_CONSIDERED])
 {
     model_points_t points;
     model_response_t response;
@@ -87,6 +107,7 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
     model->respond(constants, step, &points, &response);
     predict_mean_and_parameter_columns(cdkf, &response, step->period);
     predict_state_columns(cdkf, &response, step->period);
+    predict_considered(cdkf, &response, step->period, error);
     move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
 }
 
@@ -137,7 +158,7 @@ static inline float correct(const gain_t *gain, float seen, float *theta, float 
 /* Takes output i, or nothing when it is not valid: row = H S_xw / S_y is what the output sees of each column of S_ww.
  * `step` adds up the correction of the state. */
 static inline void take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, float row[MODEL_PARAMETERS],
-    innovation_t *innovation, float step[MODEL_STATES])
+    float considered[CDKF_CONSIDERED], innovation_t *innovation, float step[MODEL_STATES])
 {
     if (valid) {
         /* cppcheck-suppress misra-c2012-9.3 ; D3 */
@@ -147,6 +168,10 @@ static inline void take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, fl
         const float *seen = (i == 0u) ? theta : theta_dot;
         for (uint32_t j = 0u; j < L; j++) {
             row[j] = correct(&gain, seen[j], &theta[j], &theta_dot[j]);
+        }
+        for (uint32_t c = 0u; c < CONSIDERED; c++) {
+            float *x = cdkf->considered[c].x;
+            considered[c] = correct(&gain, x[i], &x[0], &x[1]);
         }
         const float nu = y - cdkf->x[i];
         const float share = cdkf->output_noise[i] * gain.inverse;
@@ -159,6 +184,7 @@ static inline void take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, fl
         }
     } else {
         (void)memset(row, 0, L * sizeof row[0]);
+        (void)memset(considered, 0, CONSIDERED * sizeof considered[0]);
         (void)memset(innovation, 0, sizeof *innovation);
     }
 }
@@ -173,18 +199,33 @@ static inline void add_information(information_t *pending, const float row[MODEL
     }
 }
 
+/* The same of a considered error, both outputs at once. */
+static inline void add_considered(considered_t *considered, float row[2][MODEL_PARAMETERS],
+    const innovation_t innovation[CDKF_OUTPUTS], float first, float second)
+{
+    for (uint32_t i = 0u; i < L; i++) {
+        considered->cross[i] += (row[0][i] * first) + (row[1][i] * second);
+    }
+    considered->vector += (innovation[0].value * first) + (innovation[1].value * second);
+    considered->information += (first * first) + (second * second);
+}
+
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS])
 {
     float row[2][L];
+    float seen[2][CONSIDERED];
     float step[N] = {0.0f, 0.0f};
-    take_output(cdkf, 0u, y[0], valid[0], row[0], &innovation[0], step);
-    take_output(cdkf, 1u, y[1], valid[1], row[1], &innovation[1], step);
+    take_output(cdkf, 0u, y[0], valid[0], row[0], seen[0], &innovation[0], step);
+    take_output(cdkf, 1u, y[1], valid[1], row[1], seen[1], &innovation[1], step);
     cdkf->response[0] += step[0]; /* from now on it includes the response to this correction */
     cdkf->response[1] += step[1];
     if (learn) {
         add_information(&cdkf->pending, row[0], innovation[0].value);
         add_information(&cdkf->pending, row[1], innovation[1].value);
+        for (uint32_t c = 0u; c < CONSIDERED; c++) {
+            add_considered(&cdkf->considered[c], row, innovation, seen[0][c], seen[1][c]);
+        }
     }
     /* w makes both uncertain together: I + R R^T = L D L^T, and the second innovation is then given the first */
     const float covariance = factor_dot_three(row[0], row[1]);
@@ -194,6 +235,14 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
     innovation[1].value -= coupling * innovation[0].value;
     innovation[1].response -= coupling * innovation[0].response;
     innovation[1].inverse_variance = (variance > 1.0f) ? (1.0f / variance) : 1.0f; /* it is at least 1 */
+}
+
+float cdkf_output_variance(const cdkf_t *cdkf, uint32_t i)
+{
+    const float *row = &cdkf->s[(L + i) * L];
+    const float *own = &cdkf->s_xx[i * N];
+    return factor_dot_three(row, row) + (own[0] * own[0]) + (own[1] * own[1]) +
+           (cdkf->output_noise[i] * cdkf->output_noise[i]);
 }
 
 #define THETA_DOT_MOST 1.0e4f /* [rad/s] */

@@ -46,6 +46,20 @@
 
 enum { CDKF_OUTPUTS = MODEL_STATES, CDKF_ROWS = MODEL_PARAMETERS + MODEL_STATES };
 
+/* A calibration error: not learnt, but considered (Schmidt 1966; Bierman 1977, chapter VIII): the estimates' errors
+ * include what a unit of it makes of them. Those of w and x are the filter's own, + its standard deviation times w
+ * (in coordinates of the columns of S_ww) and S_xw w + x. The gain of the filter does not know of it, so estimates are
+ * what they are without. */
+typedef struct considered {
+    float w[MODEL_PARAMETERS];
+    float x[MODEL_STATES];
+    float cross[MODEL_PARAMETERS]; /* pending: sum of what the outputs see of S_ww times what they see of x */
+    float vector;                  /* pending: sum of what they see of x times the innovations */
+    float information;             /* pending: sum of its square */
+} considered_t;
+
+enum considered_error { CDKF_BASE_GAIN, CDKF_BASE_DELAY, CDKF_TORQUE_GAIN, CDKF_FRICTION, CDKF_CONSIDERED };
+
 /* What samples say of w in coordinates of the columns of S_ww. */
 typedef struct information {
     float matrix[MODEL_PARAMETERS * MODEL_PARAMETERS]; /* symmetric: its upper triangle */
@@ -56,14 +70,18 @@ typedef struct cdkf {
     float w[MODEL_PARAMETERS]; /* scaled parameters (model/scaling.h) */
     float x[MODEL_STATES];     /* theta [rad], theta_dot [rad/s] */
     /* cppcheck-suppress misra-c2012-10.4 ; D6 */
-    float s[CDKF_ROWS * MODEL_PARAMETERS];     /* [S_ww; S_xw] */
-    float s_xx[MODEL_STATES * MODEL_STATES];   /* factor of the covariance of x when w is given */
-    float process_noise[MODEL_STATES];         /* random walk of each state [unit / sqrt(s)] */
-    float output_noise[CDKF_OUTPUTS];          /* standard deviation of each output [unit] */
-    float walk[MODEL_PARAMETERS];              /* variance of the random walk of w, per second [1/s] */
-    float growth;                              /* forgetting: relative growth of the covariance of w [1/s] */
-    float response[MODEL_STATES];              /* of the state to past corrections (noise_estimation.h) */
-    information_t pending;                     /* not learnt yet */
+    float s[CDKF_ROWS * MODEL_PARAMETERS];   /* [S_ww; S_xw] */
+    float s_xx[MODEL_STATES * MODEL_STATES]; /* factor of the covariance of x when w is given */
+    float process_noise[MODEL_STATES];       /* random walk of each state [unit / sqrt(s)] */
+    float disturbance;                       /* more of theta_dot's, for a while [rad/s / sqrt(s)] */
+    float output_noise[CDKF_OUTPUTS];        /* standard deviation of each output [unit] */
+    float walk[MODEL_PARAMETERS];            /* variance of the random walk of w, per second [1/s] */
+    float drift[MODEL_PARAMETERS];           /* of w: see adaptation.h */
+    float growth;                            /* forgetting: relative growth of the covariance of w [1/s] */
+    float response[MODEL_STATES];            /* of the state to past corrections (noise_estimation.h) */
+    information_t pending;                   /* not learnt yet */
+    considered_t considered[CDKF_CONSIDERED];
+    float considered_sigma[CDKF_CONSIDERED];   /* [1], [s], [1], [N m] */
     float trust;                               /* the part of the information that counts: see cdkf_learn */
     float p[MODEL_PARAMETERS];                 /* the parameters at w, in the units of the model */
     model_coefficients_t points[MODEL_POINTS]; /* at the sigma points of S_ww */
@@ -85,13 +103,25 @@ void cdkf_init(cdkf_t *cdkf, const model_t *model, const model_constants_t *cons
 /* The state starts anew, independent of w: mean [rad, rad/s] and standard deviations. Drops pending information. */
 void cdkf_start_state(cdkf_t *cdkf, const float x[MODEL_STATES], const float sigma[MODEL_STATES]);
 
-/* Lines 2 to 5: one step of the model. The parameters stand still. */
-void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step);
+/* Drops what has not been learnt yet. */
+void cdkf_drop_pending(cdkf_t *cdkf);
+
+/* Lines 2 to 5: one step of the model. The parameters stand still. `error`: what a unit of each considered error takes
+ * from the inputs, [m/s^2] per unit for those of the base, [N m] per unit for the others. */
+void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
+    const float error[CDKF_CONSIDERED]);
 
 /* Lines 6 to 10 for the outputs that are valid, one scalar at a time; y in the units of the state. With `learn` what
  * the sample says of w is added to the pending information. An output that is not valid has the innovation 0. */
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS]);
+
+/* What innovations say of a considered error b, by themselves: its estimate is vector / information, of variance
+ * 1 / information (Friedland 1969). */
+typedef struct score {
+    float vector;
+    float information;
+} score_t;
 
 /* What a block has taught: the change of w, and by how much its variances have become smaller. */
 typedef struct correction {
@@ -99,6 +129,11 @@ typedef struct correction {
     float variance[MODEL_PARAMETERS];
     bool bounded; /* w rests on a bound of the model */
 } correction_t;
+
+/* The pending scores: of an error of CDKF_BASE_GAIN that has just come about, and of each considered error as if it had
+ * always been. */
+score_t cdkf_sudden_score(const cdkf_t *cdkf);
+void cdkf_constant_scores(const cdkf_t *cdkf, score_t score[CDKF_CONSIDERED]);
 
 /* Line 11: conditions w, and x with it, on the pending information of the last `period` seconds. From the start, or
  * an opened covariance, on it counts in part only, and fully after `caution` seconds of information: far from the
@@ -110,6 +145,19 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
  * uncertainty stays with the state. */
 void cdkf_open(cdkf_t *cdkf);
 
+/* The belief of the parameters alone, kept to return to. */
+typedef struct snapshot {
+    float w[MODEL_PARAMETERS];
+    float s_ww[MODEL_PARAMETERS * MODEL_PARAMETERS];
+    float trust;
+} snapshot_t;
+
+void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot);
+
+/* Takes back what was learnt since, and drops pending information. What w explained of the state's uncertainty stays
+ * with the state. */
+void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot);
+
 /* Forgetting for `period` seconds: P_w / lambda, 1 / lambda = 1 + growth period. The covariance of x and w stays. */
 void cdkf_forget(cdkf_t *cdkf, float period, bool joint);
 
@@ -119,6 +167,9 @@ void cdkf_walk(cdkf_t *cdkf, float period, const float variance[MODEL_PARAMETERS
 
 /* Draws the sigma points of w: after all of the above. Standard deviations of w stay at or below the prior's. */
 void cdkf_draw(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants);
+
+/* Variance with which output i is expected about its prediction. */
+float cdkf_output_variance(const cdkf_t *cdkf, uint32_t i);
 
 /* Standard deviation of state i, and of parameter i in the units of the model (to first order). */
 float cdkf_state_sigma(const cdkf_t *cdkf, uint32_t i);

@@ -1,5 +1,7 @@
 #include "filter/derived.h"
 
+#include "math/factor.h"
+
 #include <math.h>
 
 #define TURN 6.28318531f
@@ -16,23 +18,41 @@ typedef struct deviation {
     float covariance;
 } deviation_t;
 
-/* From the two quantities at the sigma points of the parameters: each pair adds its first and second difference. */
-static deviation_t deviation_of(const couple_t value[MODEL_POINTS])
+/* Sums of squares and product. */
+typedef struct moments {
+    couple_t square;
+    float product;
+} moments_t;
+
+static void add(moments_t *moments, float first, float second)
 {
-    couple_t variance = {0.0f, 0.0f};
-    deviation_t result = {{0.0f, 0.0f}, 0.0f};
-    for (uint32_t j = 1u; j < (uint32_t)MODEL_POINTS; j += 2u) {
-        const couple_t plus = {value[j].first - value[0].first, value[j].second - value[0].second};
-        const couple_t minus = {value[j + 1u].first - value[0].first, value[j + 1u].second - value[0].second};
-        const couple_t slope = {SIGMA_FIRST * (plus.first - minus.first), SIGMA_FIRST * (plus.second - minus.second)};
-        const couple_t curvature = {
-            SIGMA_SECOND * (plus.first + minus.first), SIGMA_SECOND * (plus.second + minus.second)};
-        variance.first += (slope.first * slope.first) + (curvature.first * curvature.first);
-        variance.second += (slope.second * slope.second) + (curvature.second * curvature.second);
-        result.covariance += (slope.first * slope.second) + (curvature.first * curvature.second);
+    moments->square.first += first * first;
+    moments->square.second += second * second;
+    moments->product += first * second;
+}
+
+/* From the two quantities at the sigma points of the parameters: each pair adds its first and second difference, each
+ * considered error what it makes of the parameters, along the first differences. */
+static deviation_t deviation_of(const cdkf_t *cdkf, const couple_t value[MODEL_POINTS])
+{
+    moments_t moments = {{0.0f, 0.0f}, 0.0f};
+    float first[MODEL_PARAMETERS];
+    float second[MODEL_PARAMETERS];
+    for (uint32_t j = 0u; j < (uint32_t)MODEL_PARAMETERS; j++) {
+        const couple_t *pair = &value[1u + (2u * j)];
+        const couple_t plus = {pair[0].first - value[0].first, pair[0].second - value[0].second};
+        const couple_t minus = {pair[1].first - value[0].first, pair[1].second - value[0].second};
+        first[j] = SIGMA_FIRST * (plus.first - minus.first);
+        second[j] = SIGMA_FIRST * (plus.second - minus.second);
+        add(&moments, first[j], second[j]);
+        add(&moments, SIGMA_SECOND * (plus.first + minus.first), SIGMA_SECOND * (plus.second + minus.second));
     }
-    result.sigma.first = sqrtf(variance.first);
-    result.sigma.second = sqrtf(variance.second);
+    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+        const float *w = cdkf->considered[c].w;
+        const float sigma = cdkf->considered_sigma[c];
+        add(&moments, sigma * factor_dot_three(w, first), sigma * factor_dot_three(w, second));
+    }
+    const deviation_t result = {{sqrtf(moments.square.first), sqrtf(moments.square.second)}, moments.product};
     return result;
 }
 
@@ -66,7 +86,7 @@ derived_dynamics_t derived_dynamics(
         const model_dynamics_t dynamics = model->dynamics(constants, step, &cdkf->points[k]);
         value[k] = oscillation(&dynamics);
     }
-    const deviation_t deviation = deviation_of(value);
+    const deviation_t deviation = deviation_of(cdkf, value);
     const derived_dynamics_t result = {.natural_frequency = value[0].first,
         .natural_frequency_sigma = deviation.sigma.first,
         .damping_ratio = value[0].second,
@@ -90,7 +110,7 @@ derived_feedthrough_t derived_feedthrough(const cdkf_t *cdkf, const model_t *mod
         value[k].first = inverse * ((at.first * mean.first) + (at.second * mean.second));
         value[k].second = inverse * ((at.second * mean.first) - (at.first * mean.second));
     }
-    const deviation_t deviation = deviation_of(value);
+    const deviation_t deviation = deviation_of(cdkf, value);
     const float product = deviation.sigma.first * deviation.sigma.second;
     const derived_feedthrough_t result = {.real = mean.first,
         .imaginary = mean.second,

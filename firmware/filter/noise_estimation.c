@@ -6,7 +6,7 @@
 #define OUTPUTS ((uint32_t)CDKF_OUTPUTS)
 #define SAMPLES_LEAST 20.0f /* of an output, for a variance to mean anything */
 #define FAR 0.5f            /* a factor further than this from 1 is done at once, */
-#define STEP_MOST 3.0f      /* up to this one; of a nearer one only */
+#define STEP_MOST 10.0f     /* up to this one; of a nearer one only */
 #define SHARE 0.2f          /* this part, which averages over about five windows */
 
 void noise_estimation_begin(noise_estimation_t *noise)
@@ -48,7 +48,7 @@ static float scaled(float now, float factor, float set, float range)
 static float factor_of(const noise_estimation_t *noise, uint32_t i)
 {
     const float factor = sqrtf(noise->ratio[i] / noise->samples[i]);
-    return (factor > (1.0f + FAR)) ? factor : (1.0f + (noise->share[i] * (factor - 1.0f)));
+    return (factor > 3.0f) ? factor : (1.0f + (noise->share[i] * (factor - 1.0f)));
 }
 
 bool noise_estimation_step(noise_estimation_t *noise, cdkf_t *cdkf, const noise_setting_t *setting, float period)
@@ -57,8 +57,15 @@ bool noise_estimation_step(noise_estimation_t *noise, cdkf_t *cdkf, const noise_
     noise->elapsed += period;
     if ((setting->window > 0.0f) && (noise->elapsed >= setting->window)) {
         float level = 1.0f; /* geometric mean of both outputs' factors: the gain stays when everything scales alike */
+        const float gain = (noise->variance > 0.0f) ? (1.0f + (noise->covariance / noise->variance)) : 1.0f;
+        const bool starved = (gain > 1.15f); /* far too little gain: it is Q that is too small, not R */
         for (uint32_t i = 0u; i < OUTPUTS; i++) {
-            if (noise->samples[i] >= SAMPLES_LEAST) {
+            const float raw = sqrtf(noise->ratio[i] / (noise->samples[i] + 1.0f));
+            if (starved && (raw < 3.0f)) {
+                if (cdkf->output_noise[i] > setting->output_noise[i]) {
+                    cdkf->output_noise[i] = sqrtf(cdkf->output_noise[i] * setting->output_noise[i]);
+                }
+            } else if (noise->samples[i] >= SAMPLES_LEAST) {
                 const float factor = factor_of(noise, i);
                 cdkf->output_noise[i] = scaled(cdkf->output_noise[i], factor, setting->output_noise[i], setting->range);
                 level *= sqrtf(factor);
@@ -66,9 +73,10 @@ bool noise_estimation_step(noise_estimation_t *noise, cdkf_t *cdkf, const noise_
             }
         }
         if (noise->variance > 0.0f) {
-            const float gain = 1.0f + (noise->covariance / noise->variance);
-            cdkf->process_noise[1] =
-                scaled(cdkf->process_noise[1], level * gain, setting->process_noise, setting->range);
+            const float factor = starved ? (gain * gain) : (level * gain);
+            const float before = cdkf->process_noise[1];
+            cdkf->process_noise[1] = scaled(before, factor, setting->process_noise, setting->range);
+            far_too_small = far_too_small || (cdkf->process_noise[1] > ((1.0f + FAR) * before));
         }
         noise_estimation_begin(noise);
     }

@@ -4,17 +4,16 @@
 #include <string.h>
 
 #define TURN 6.28318531f
-#define SQRT_TWO 1.41421356f
 #define OUTAGE 0.0205f /* an output missing for longer is out [s]; not a whole number of periods */
 
-high_pass_corner_t high_pass_corner(float frequency)
+high_pass_corner_t high_pass_corner(float frequency, float damping)
 {
     const float w = TURN * frequency;
-    const high_pass_corner_t corner = {w * w, SQRT_TWO * w};
+    const high_pass_corner_t corner = {w * w, damping * w};
     return corner;
 }
 
-/* level/signal = (sqrt(2) w s + w^2) / (s^2 + sqrt(2) w s + w^2), by semi-implicit Euler. */
+/* level/signal = (d w s + w^2) / (s^2 + d w s + w^2), by semi-implicit Euler. */
 float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period)
 {
     const float deviation = value - filter->level;
@@ -23,13 +22,26 @@ float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t 
     return deviation;
 }
 
+static float level_of(const level_t *level)
+{
+    return level->section[0].level + level->section[1].level + level->section[2].level;
+}
+
+float trim_angle(const trim_t *trim)
+{
+    return level_of(&trim->output[0]);
+}
+
 void trim_start(trim_t *trim, float angle, float corner, bool deviations)
 {
+    static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f}; /* 2 cos(pi / 12), ... */
     (void)memset(trim, 0, sizeof *trim);
-    trim->corner = high_pass_corner(corner);
-    trim->settling_time = 1.0f / corner;
+    for (uint32_t i = 0u; i < (uint32_t)TRIM_SECTIONS; i++) {
+        trim->corner[i] = high_pass_corner(corner, damping[i]);
+    }
+    trim->settling_time = 0.9f / corner;
     trim->deviations = deviations;
-    trim->output[0].level = angle;
+    trim->output[0].section[0].level = angle;
     trim_set_origin(trim);
     trim_unsettle(trim);
 }
@@ -37,7 +49,7 @@ void trim_start(trim_t *trim, float angle, float corner, bool deviations)
 void trim_set_origin(trim_t *trim)
 {
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
-        trim->origin[i] = trim->deviations ? trim->output[i].level : 0.0f;
+        trim->origin[i] = trim->deviations ? level_of(&trim->output[i]) : 0.0f;
     }
 }
 
@@ -46,9 +58,12 @@ void trim_unsettle(trim_t *trim)
     trim->unsettled = trim->deviations ? trim->settling_time : 0.0f;
 }
 
-static float pass(const trim_t *trim, high_pass_t *filter, float value, float period)
+static float pass(const trim_t *trim, level_t *level, float value, float period)
 {
-    const float deviation = high_pass_step(filter, value, &trim->corner, period);
+    float deviation = value;
+    for (uint32_t i = 0u; i < (uint32_t)TRIM_SECTIONS; i++) {
+        deviation = high_pass_step(&level->section[i], deviation, &trim->corner[i], period);
+    }
     return trim->deviations ? deviation : value;
 }
 
@@ -75,7 +90,9 @@ bool trim_outputs(
         } else {
             trim->missing[i] += period;
             if (waiting) {
-                trim->output[i].slope = 0.0f;
+                for (uint32_t k = 0u; k < (uint32_t)TRIM_SECTIONS; k++) {
+                    trim->output[i].section[k].slope = 0.0f;
+                }
             } else {
                 const float predicted = trim->origin[i] + ((fabsf(x[i]) <= MODEL_THETA_MOST) ? x[i] : 0.0f);
                 (void)pass(trim, &trim->output[i], predicted, period);

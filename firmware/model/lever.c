@@ -83,6 +83,8 @@ static inline void respond_at_mean(const shared_t *shared, const float *c, const
     response->mean = change;
     response->slope[0] = slope;
     response->slope[1] = (shared->half * slope) - ((shared->period * at->damping) * inverse);
+    response->torque = shared->period * inverse;
+    response->base = -(angle.cosine * c[FORCING]) * response->torque;
 }
 
 /* Sine and cosine of an angle that is mostly near the trim, of which they are known. */

@@ -37,6 +37,8 @@ void linear_respond(const model_constants_t *constants, const model_step_t *step
     const quotient_t gain = gain_of(c, step->period);
     const float inverse = 1.0f / mean.inertia;
     response->mean = mean.force * inverse;
+    response->base = (gain.force * inverse) * c[LINEAR_BASE];
+    response->torque = (gain.force * inverse) * c[LINEAR_TORQUE];
     response->slope[0] = -((gain.force * inverse) * c[LINEAR_STIFFNESS]);
     response->slope[1] = (half * response->slope[0]) - ((gain.force * inverse) * c[LINEAR_DAMPING]);
     for (uint32_t j = 0u; j < (uint32_t)MODEL_PARAMETERS; j++) {

@@ -39,6 +39,8 @@ typedef struct model_points {
 typedef struct model_response {
     float mean;                                /* f at the mean */
     float slope[MODEL_STATES];                 /* df / dtheta and df / dtheta_dot there */
+    float base;                                /* df / dz_ddot there */
+    float torque;                              /* df / dtau_m there */
     float difference[MODEL_PARAMETERS];        /* of each pair: f(+) - f(-) */
     float second_difference[MODEL_PARAMETERS]; /* f(+) + f(-) - 2 f(mean) */
 } model_response_t;

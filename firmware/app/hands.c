@@ -1,0 +1,35 @@
+#include "app/hands.h"
+
+#include <string.h>
+
+#define MEMORY 0.15f /* [s] */
+#define OFF 0.04f    /* residual over change, in squares; a hand leaves several times 1 */
+#define ON 0.12f
+
+void hands_start(hands_t *hands)
+{
+    (void)memset(hands, 0, sizeof *hands);
+    hands->residual = 1.0f;
+}
+
+void hands_predict(
+    hands_t *hands, const model_constants_t *constants, const model_step_t *step, const float x[MODEL_STATES])
+{
+    const float base = (constants->length * constants->mass_moment) * (step->trim_cosine * step->z_ddot);
+    const float own = (constants->damping * x[1]) + (constants->stiffness * x[0]);
+    hands->impulse += step->period * ((step->tau_m - base) - own);
+}
+
+void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts)
+{
+    const float change = theta_dot - hands->begin;
+    const float residual = change - (hands->impulse / constants->inertia);
+    hands->begin = theta_dot;
+    hands->impulse = 0.0f;
+    if (counts) {
+        const float share = (period < MEMORY) ? (period / MEMORY) : 1.0f;
+        hands->change += share * ((change * change) - hands->change);
+        hands->residual += share * ((residual * residual) - hands->residual);
+        hands->off = (hands->residual < ((hands->off ? ON : OFF) * hands->change));
+    }
+}

@@ -1,0 +1,31 @@
+/* Whether anybody holds the lever.
+ *
+ * The lever alone is known. Over each block its rate changes as known torque, base and its own spring and damper make
+ * it, when no hand is on it: then what is left over is small against the change itself. With a hand, whose inertia is
+ * several times that of the lever, the lever alone would move much more than it does.
+ */
+#ifndef APP_HANDS_H
+#define APP_HANDS_H
+
+#include "model/model.h"
+
+#include <stdbool.h>
+
+typedef struct hands {
+    float begin;    /* theta_dot at the beginning of the block [rad/s] */
+    float impulse;  /* since then, without hands [N m s] */
+    float change;   /* mean square of a block's change [rad^2/s^2] */
+    float residual; /* mean square of what the lever alone does not explain of it, likewise */
+    bool off;       /* the verdict */
+} hands_t;
+
+void hands_start(hands_t *hands);
+
+/* A step of the model, from the state x = [theta, theta_dot] (deviations from the trim) on. */
+void hands_predict(
+    hands_t *hands, const model_constants_t *constants, const model_step_t *step, const float x[MODEL_STATES]);
+
+/* The end of a block of `period` seconds at theta_dot; `counts`: there was motion enough. */
+void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts);
+
+#endif

@@ -1,0 +1,93 @@
+#include "app/monitor.h"
+
+#include <math.h>
+#include <string.h>
+
+#define STUCK_TIME 0.1f      /* [s] */
+#define ALIVE 200u           /* changes without a pause of STUCK_TIME */
+#define SURPRISE 1.3f        /* of `surprise`; its standard deviation in flight is 0.07 */
+#define SURPRISE_TIME 0.1f   /* [s] */
+#define SURPRISE_MOST 100.0f /* of a single sample */
+#define SPIKE 6.0f           /* standard deviations */
+#define SPIKE_TIME 0.02f     /* longer than this it is no spike [s] */
+#define BASE_MEMORY 0.5f     /* [s] */
+#define BASE_MEMORY_AGAIN 0.3f
+#define BASE_WRONG 0.4f  /* gain of the base's response below which it is wrong, */
+#define BASE_RIGHT 0.7f  /* and above which it is right again; wrong and right beyond 2 minus these, too */
+#define BASE_SURE 0.1f   /* standard deviation of that gain up to which it counts, */
+#define BASE_AGAIN 0.25f /* and while it is wrong, when the state hardly follows the base */
+
+void monitor_start(monitor_t *monitor)
+{
+    (void)memset(monitor, 0, sizeof *monitor);
+    monitor->surprise = 1.0f;
+}
+
+bool monitor_is_stuck(monitor_t *monitor, enum monitor_signal signal, float value, float elapsed)
+{
+    stillness_t *of = &monitor->stillness[signal];
+    if ((value < of->last) || (value > of->last)) {
+        of->unchanged = 0.0f;
+        of->stuck = false;
+        if (of->changes < ALIVE) {
+            of->changes++;
+        }
+    } else {
+        of->unchanged += elapsed;
+        if (of->unchanged > STUCK_TIME) {
+            const bool noisy = (signal == MONITOR_Z_DDOT) && (of->changes == ALIVE);
+            of->stuck = of->stuck || noisy || (monitor->surprise > SURPRISE);
+            of->changes = 0u;
+        }
+    }
+    of->last = value;
+    return of->stuck;
+}
+
+bool monitor_has_stuck(const monitor_t *monitor)
+{
+    const stillness_t *of = monitor->stillness;
+    return of[MONITOR_THETA].stuck || of[MONITOR_THETA_DOT].stuck || of[MONITOR_Z_DDOT].stuck;
+}
+
+bool monitor_is_spike(monitor_t *monitor, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed)
+{
+    const float innovation = y - cdkf->x[i];
+    const float square = (innovation * innovation) * (1.0f / (SPIKE * SPIKE));
+    const float noise = cdkf->output_noise[i]; /* the least that the variance can be */
+    const bool far = (square > (noise * noise)) && (square > (level * cdkf_output_variance(cdkf, i)));
+    monitor->refused[i] = far ? (monitor->refused[i] + elapsed) : 0.0f;
+    return far && (monitor->refused[i] < SPIKE_TIME);
+}
+
+void monitor_add(monitor_t *monitor, float ratio, float elapsed)
+{
+    const float share = (elapsed < SURPRISE_TIME) ? (elapsed / SURPRISE_TIME) : 1.0f;
+    monitor->surprise += share * (((ratio < SURPRISE_MOST) ? ratio : SURPRISE_MOST) - monitor->surprise);
+}
+
+bool monitor_step(monitor_t *monitor, const score_t *sudden, float period)
+{
+    const bool before = monitor->base_wrong;
+    const float memory = before ? BASE_MEMORY_AGAIN : BASE_MEMORY;
+    const float keep = (period < memory) ? (1.0f - (period / memory)) : 0.0f;
+    score_t *base = &monitor->base;
+    base->vector = (keep * base->vector) + sudden->vector;
+    base->information = (keep * base->information) + sudden->information;
+    const float sure = before ? BASE_AGAIN : BASE_SURE;
+    if ((base->information * (sure * sure)) > 1.0f) {
+        const float gain = (before ? 0.0f : 1.0f) - (base->vector / base->information);
+        const float away = fabsf(gain - 1.0f);
+        monitor->base_wrong = (away > (1.0f - (before ? BASE_RIGHT : BASE_WRONG)));
+    }
+    if (monitor->base_wrong != before) {
+        (void)memset(base, 0, sizeof *base);
+    }
+    return monitor->base_wrong && !before;
+}
+
+void monitor_trust_base(monitor_t *monitor)
+{
+    (void)memset(&monitor->base, 0, sizeof monitor->base);
+    monitor->base_wrong = false;
+}

@@ -1,0 +1,38 @@
+/* Whether the innovations are white, which those of a filter with the right model are (Kailath 1968).
+ *
+ * At 1 kHz what a wrong model leaves over is far below the noise of a sample: NIS does not see it. It stays alike for
+ * some time, which the noise does not: so innovations are averaged over a block, and blocks correlated with those
+ * before them. Seen by it: torque that nobody knows below some 10 Hz, an arm of another order. Not seen: errors that
+ * the parameters can take up, of gain, of delay, of friction.
+ */
+#ifndef FILTER_WHITENESS_H
+#define FILTER_WHITENESS_H
+
+#include <stdbool.h>
+
+enum { WHITENESS_LAGS = 4 }; /* blocks: 20 to 80 ms */
+
+typedef struct whiteness {
+    float sum;                     /* of this block */
+    float before[WHITENESS_LAGS];  /* sums of the last blocks, the latest first */
+    float variance;                /* mean square of a sum */
+    float product[WHITENESS_LAGS]; /* mean product of a sum and that so many blocks before */
+    float time;                    /* that these means are made of, up to their memory [s] */
+    bool coloured;                 /* the verdict */
+} whiteness_t;
+
+void whiteness_start(whiteness_t *whiteness);
+
+/* Adds a normalised innovation. */
+static inline void whiteness_add(whiteness_t *whiteness, float innovation)
+{
+    whiteness->sum += innovation;
+}
+
+/* At the end of a block of `period` seconds; `counts`: it was flight, and nothing was missing. */
+void whiteness_step(whiteness_t *whiteness, float period, bool counts);
+
+/* Largest correlation, 0 before enough has been seen. */
+float whiteness_correlation(const whiteness_t *whiteness);
+
+#endif
