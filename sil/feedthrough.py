@@ -37,7 +37,7 @@ class Feedthrough:
         if not set(COLUMNS) <= trace.keys():
             return
         rows = np.column_stack([np.asarray(trace[name], dtype=np.float64) for name in COLUMNS])
-        rows = rows[np.isin(rows[:, 1], FREQUENCIES)]
+        rows = rows[np.isin(rows[:, 1], FREQUENCIES)][::-1]  # the last of each is kept
         slot = np.floor(rows[:, 0] / _THINNED) * 16.0 + rows[:, 1]
         self._parts.append(rows[np.unique(slot, return_index=True)[1]])
 

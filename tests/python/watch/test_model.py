@@ -59,7 +59,8 @@ def test_feedthrough_of_every_frequency_is_kept(make_flight: Callable[..., Fligh
         assert entry.frequency == frequency
         assert entry.response == pytest.approx(expected.response, abs=6e-6 + 0.01 * abs(expected.response))
         assert entry.gain_sigma == pytest.approx(expected.gain_sigma, rel=0.01, abs=0.0012)
-        assert entry.phase_sigma == pytest.approx(expected.phase_sigma, rel=0.01, abs=0.0012)
+        phase_sigma = expected.phase_sigma if expected.phase_sigma < 0.508 else math.nan  # not available
+        assert entry.phase_sigma == pytest.approx(phase_sigma, rel=0.01, abs=0.0012, nan_ok=True)
     picture.take([], 10.0)
     assert all(math.isnan(entry.gain_sigma) for entry in picture.feedthrough())
 
