@@ -74,7 +74,7 @@ class Paired:
 
 
 def _values(data: NDArray[np.uint8]) -> FloatArray:
-    """Time [us], z_ddot [m/s²] and theta [rad] of pairs of frames; NaN for what is not valid, no row for a corrupt one."""
+    """Time [us], z_ddot [m/s²] and theta [rad] of pairs of frames; NaN: not valid. A corrupt one has no row."""
     lever, base = np.ascontiguousarray(data[:, :8]), np.ascontiguousarray(data[:, 8:])
     good = codec.check_columns("LEVER_SAMPLE", lever) & codec.check_columns("BASE_SAMPLE", base)
     of_lever, of_base = fields.columns("LEVER_SAMPLE", lever), fields.columns("BASE_SAMPLE", base)
