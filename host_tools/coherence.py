@@ -49,11 +49,11 @@ class Coherence:
 
     def spectrum(self) -> tuple[FloatArray, FloatArray]:
         """Frequencies [Hz] and coherence [1]; NaN where a signal has no power, and with fewer than two windows."""
-        frequency = np.fft.rfftfreq(self._length, self._period)
-        if self.windows < 2:
-            return frequency, np.full(len(frequency), np.nan)
+        frequency: FloatArray = np.fft.rfftfreq(self._length, self._period).astype(np.float64)
+        coherence: FloatArray = np.full(len(frequency), np.nan)
         power = self._power.prod(axis=0)
-        coherence = np.divide(np.abs(self._cross) ** 2, power, out=np.full(len(power), np.nan), where=power > 0.0)
+        if self.windows > 1:
+            np.divide(np.abs(self._cross) ** 2, power, out=coherence, where=power > 0.0)
         return frequency, coherence
 
     def chance(self) -> float:

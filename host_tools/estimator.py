@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 FRAME_SAMPLE: int = lib.LEVER_FRAME_SAMPLE
 """What on_frame() returns when a sample is complete: call step() now."""
 
+FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
+"""What FEEDTHROUGH is sent for on the bus, one after the other [Hz]."""
+
 _MODES = enum_names("lever_mode")
 
 

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
-"""What FEEDTHROUGH is sent for, one after the other [Hz]."""
-
 COUNTS = {"lost": 1 << 16, "corrupt": 1 << 16, "late": 1 << 16, "restarts": 1 << 8}
 """What the estimator counts in LINK_HEALTH and HEALTH, and where it wraps."""
 

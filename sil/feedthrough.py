@@ -7,13 +7,19 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.fields import FEEDTHROUGH_FREQUENCIES
+from lever_cdkf.host_tools.estimator import FEEDTHROUGH_FREQUENCIES
 from numpy.typing import NDArray
-
-from .trace import FEEDTHROUGH
 
 FloatArray = NDArray[np.float64]
 
+# column of the trace, its message and field
+FEEDTHROUGH = (
+    ("feedthrough_frequency_Hz", "FEEDTHROUGH", "frequency"),
+    ("feedthrough_real_rad_s2_m", "FEEDTHROUGH", "real"),
+    ("feedthrough_imaginary_rad_s2_m", "FEEDTHROUGH", "imaginary"),
+    ("feedthrough_gain_sigma", "FEEDTHROUGH", "gain_sigma"),
+    ("feedthrough_phase_sigma_rad", "FEEDTHROUGH", "phase_sigma"),
+)
 COLUMNS = ("time_s", *(column for column, _, _ in FEEDTHROUGH))
 FREQUENCIES: FloatArray = np.array(FEEDTHROUGH_FREQUENCIES, dtype=np.float64)
 """[Hz]"""
@@ -31,7 +37,7 @@ class Feedthrough:
         if not set(COLUMNS) <= trace.keys():
             return
         rows = np.column_stack([np.asarray(trace[name], dtype=np.float64) for name in COLUMNS])
-        rows = rows[np.isin(rows[:, 1], FREQUENCIES)]
+        rows = rows[np.isin(rows[:, 1], FREQUENCIES)][::-1]  # the last of each is kept
         slot = np.floor(rows[:, 0] / _THINNED) * 16.0 + rows[:, 1]
         self._parts.append(rows[np.unique(slot, return_index=True)[1]])
 

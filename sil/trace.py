@@ -19,6 +19,7 @@ from lever_cdkf.host_tools import codec, fields
 from numpy.typing import NDArray
 
 from .buslog import Frames
+from .feedthrough import FEEDTHROUGH
 from .loop import Recording
 from .quantities import DYNAMICS, quantities
 
@@ -52,14 +53,6 @@ HEALTH = (
     ("restarts", "HEALTH", "restarts"),
     ("excitation_rad_s", "HEALTH", "excitation"),
 )
-FEEDTHROUGH = (
-    ("feedthrough_frequency_Hz", "FEEDTHROUGH", "frequency"),
-    ("feedthrough_real_rad_s2_m", "FEEDTHROUGH", "real"),
-    ("feedthrough_imaginary_rad_s2_m", "FEEDTHROUGH", "imaginary"),
-    ("feedthrough_gain_sigma", "FEEDTHROUGH", "gain_sigma"),
-    ("feedthrough_phase_sigma_rad", "FEEDTHROUGH", "phase_sigma"),
-)
-"""As it is sent: one frequency after the other. feedthrough.py puts them side by side."""
 
 
 def build(recording: Recording, frames: Frames) -> Trace:

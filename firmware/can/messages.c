@@ -155,7 +155,7 @@ bool message_pilot_dynamics_decode(message_pilot_dynamics_t *message, const leve
 
 static const place_t feedthrough_code[] = {CODE(12u, 15u), CODE(16u, 1u)};
 static const quantity_t feedthrough_quantity[] = {SIGNED(17u, 32767u, 200000.0f), SIGNED(32u, 32767u, 200000.0f),
-    UNSIGNED(47u, 255u, 250.0f), UNSIGNED(55u, 255u, 250.0f)};
+    UNSIGNED(47u, 511u, 500.0f), UNSIGNED(56u, 255u, 500.0f)};
 static const layout_t feedthrough = LAYOUT(MESSAGE_FEEDTHROUGH_ID, feedthrough_code, feedthrough_quantity);
 
 bool message_feedthrough_encode(lever_frame_t *frame, const message_feedthrough_t *message)

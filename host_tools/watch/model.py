@@ -12,7 +12,7 @@ import numpy as np
 from .. import codec, fields
 from ..commander import ACCEPTED, refusal, result_of
 from ..config import model_parameters
-from ..estimator import fault_names
+from ..estimator import FEEDTHROUGH_FREQUENCIES, fault_names
 from ..identity import Identity
 from ..library import enum_names
 from .paired import Measured, Paired
@@ -174,7 +174,7 @@ class Picture:
     def feedthrough(self) -> list[Feedthrough]:
         """θ/z̈ at each frequency that is sent."""
         found = []
-        for frequency in fields.FEEDTHROUGH_FREQUENCIES:
+        for frequency in FEEDTHROUGH_FREQUENCIES:
             heard, entry = self._feedthrough.get(frequency, (-math.inf, None))
             fresh = self.now - heard <= STALE_AFTER
             found.append(entry if entry and fresh else Feedthrough(frequency, complex(NAN, NAN), NAN, NAN))

@@ -34,7 +34,7 @@ class Paired:
     """A LEVER_SAMPLE belongs to the next BASE_SAMPLE if that has the same counter. Lost samples are left out."""
 
     def __init__(self) -> None:
-        self._lever: bytes | bytearray = bytes(8)
+        self._lever: bytes | bytearray | None = None  # that waits for its BASE_SAMPLE
         self._pieces: deque[tuple[float, FloatArray]] = deque()  # when taken [s]; rows of time [us], z_ddot, theta
         self._measured: Measured | None = None
         self._measured_at = -np.inf
@@ -45,8 +45,10 @@ class Paired:
         for identifier, data in frames:
             if identifier == _LEVER and len(data) == 8:
                 self._lever = data
-            elif identifier == _BASE and len(data) == 8 and (self._lever[1] ^ data[1]) & 15 == 0:
-                pairs.append(bytes(self._lever) + bytes(data))
+            elif identifier == _BASE and len(data) == 8:
+                if self._lever is not None and (self._lever[1] ^ data[1]) & 15 == 0:
+                    pairs.append(bytes(self._lever) + bytes(data))
+                self._lever = None
         if pairs:
             self._pieces.append((now, _values(np.frombuffer(b"".join(pairs), dtype=np.uint8).reshape(-1, 16))))
         while self._pieces and now - self._pieces[0][0] > SPAN:
@@ -72,7 +74,7 @@ class Paired:
 
 
 def _values(data: NDArray[np.uint8]) -> FloatArray:
-    """Time [us], z_ddot [m/s²] and theta [rad] of pairs of frames; NaN for what is not valid, no row for a corrupt one."""
+    """Time [us], z_ddot [m/s²] and theta [rad] of pairs of frames; NaN: not valid. A corrupt one has no row."""
     lever, base = np.ascontiguousarray(data[:, :8]), np.ascontiguousarray(data[:, 8:])
     good = codec.check_columns("LEVER_SAMPLE", lever) & codec.check_columns("BASE_SAMPLE", base)
     of_lever, of_base = fields.columns("LEVER_SAMPLE", lever), fields.columns("BASE_SAMPLE", base)

@@ -91,7 +91,7 @@ def feedthrough(picture: Picture) -> Table:
         ("± σ [deg]", [_number(math.degrees(entry.phase_sigma), 2) for entry in entries]),
         ("coherence", [_number(_at(measured, entry.frequency), 2) for entry in entries]),
     ]
-    table.add_row(*(Text(title, style="dim") for title in ("θ/z̈ at", *(f"{entry.frequency} Hz" for entry in entries))))
+    table.add_row(*(Text(title, style="dim") for title in ("", *(f"{entry.frequency} Hz" for entry in entries))))
     for title, cells in rows:
         table.add_row(Text(title, style="bold"), *cells)
     return table

@@ -10,8 +10,8 @@ from rich.console import Console, Group, RenderableType
 from rich.rule import Rule
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
-from textual.events import Resize
 from textual.containers import Horizontal, Vertical
+from textual.events import Resize
 from textual.widgets import Footer, Static
 
 from . import panels

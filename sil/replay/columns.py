@@ -12,8 +12,9 @@ from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Rows
 from lever_cdkf.host_tools.fields import COUNTS
 from numpy.typing import NDArray
 
+from ..feedthrough import FEEDTHROUGH
 from ..quantities import recorded_name
-from ..trace import ESTIMATED, FEEDTHROUGH, HEALTH, MEASURED, Trace, quantity_fields
+from ..trace import ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
 from .timeline import Timeline
 
 FloatArray = NDArray[np.float64]

@@ -17,8 +17,9 @@ from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.later import allow
 from numpy.typing import NDArray
 
+from ..feedthrough import FEEDTHROUGH
 from ..quantities import quantities, recorded_name
-from ..trace import ESTIMATED, FEEDTHROUGH, HEALTH, MEASURED, Trace
+from ..trace import ESTIMATED, HEALTH, MEASURED, Trace
 from .outputs import writing
 
 Signals = list[tuple[str, str, str]]

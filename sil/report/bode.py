@@ -45,8 +45,8 @@ _TRANSFERS: Mapping[str, Callable[[Lever, Array, Array], Transfer]] = {
 
 
 def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
-    """Of a response over frequency. The phase [deg] goes on downwards, from -180 where the lever moves against the floor
-    at first (the arm's weight does so), from 0 where it moves along."""
+    """Of a response over frequency. The phase [deg] goes on downwards, from -180 where the lever moves against the
+    floor at first (the arm's weight does so), from 0 where it moves along."""
     start = -180.0 if response[0].real < 0.0 else 0.0
     along = response if start == 0.0 else -response
     return np.abs(response), np.degrees(np.unwrap(np.angle(along))) + start

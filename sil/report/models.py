@@ -72,10 +72,10 @@ def dynamics_caption(run: Run) -> str:
 def feedthrough_caption(run: Run) -> str:
     """What the Bode diagram with its band shows, and how good it was where the truth is known."""
     told = [
-        "The same at one time, as a Bode diagram: magnitude, phase, and below the measured coherence of floor and lever "
-        "over the whole run: where it is low, noise, torque or the pilot's own movement move the lever, and there is "
-        "little to learn from the floor. Between 2 and 8 Hz the shaded band is ±2σ, as the estimator sends it; it holds "
-        "what the parameters leave open, not what the model cannot do. Drag the slider through the run."
+        "The same at one time, as a Bode diagram: magnitude and phase, and below the measured coherence of floor and "
+        "lever over the whole run. Where that is low, noise, torque or the pilot's own movement move the lever, and "
+        "there is little to learn from the floor. Between 2 and 8 Hz the shaded band is ±2σ, as the estimator sends "
+        "it; it contains what the parameters leave open, not what the model cannot do. Drag the slider through the run."
     ]
     if (found := transfer.accuracy(run)) is not None:
         told.append(

@@ -18,7 +18,6 @@ from ..transfer import Transfer
 from .bode import slow_trim
 from .series import Array, jumps, welch
 
-
 COHERENT = ("z_ddot_measured_m_s2", "theta_measured_rad")
 """Columns of which the coherence is shown."""
 

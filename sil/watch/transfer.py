@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.host_tools.config import Config
-from lever_cdkf.host_tools.fields import FEEDTHROUGH_FREQUENCIES
+from lever_cdkf.host_tools.estimator import FEEDTHROUGH_FREQUENCIES
 from lever_cdkf.host_tools.watch.model import Feedthrough
 from numpy.typing import NDArray
 

@@ -47,7 +47,7 @@ def contents(message: Message, field: Signal | None = None) -> dict[str, float]:
     ids = (field.multiplexer_ids if field is not None else None) or [0]
     present = [signal for signal in message.signals if signal.multiplexer_ids in (None, ids)]
     values: dict[str, float] = {
-        signal.name: 1 if signal.choices is None or code(signal) is not None else 0
+        signal.name: int((signal.choices is None or code(signal) is not None) and (signal.maximum or 0) >= 1)
         for signal in present
         if signal.name not in FRAMING
     }
@@ -72,8 +72,8 @@ def by_cantools(message: Message, values: dict[str, float], counter: int) -> byt
 
 
 def test_catalogue_has_the_fields() -> None:
-    assert len(MESSAGES) == 13
-    assert len(FIELDS) == 17 + 2 * 3 * len(MODELS)
+    assert len(MESSAGES) == 14
+    assert len(FIELDS) == 21 + 2 * 3 * len(MODELS)
     assert codec.contract() == 2
     assert [name for name, (_, signal) in zip(FIELD_NAMES, FIELDS, strict=True) if code(signal) is None] == [
         "COMMAND.dither_rms"

@@ -15,6 +15,7 @@ from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.native import enum_names
 from lever_cdkf.sil.report import picture, write_report
 from lever_cdkf.sil.report.charts.health import FAULT_WORDS
+from lever_cdkf.sil.report.run import COHERENT
 from lever_cdkf.sil.runner import Result
 
 from .reading import Reader, figures, first_number, read, unpack
@@ -172,11 +173,38 @@ def test_maps_and_slices_are_the_response_of_the_parameters(page: Reader, result
         _, expected = signal.freqs([forcing], [inertia, damping, stiffness], 2 * np.pi * frequency)
         expected *= 180.0 / np.pi
         np.testing.assert_allclose(z[:, index], np.abs(expected), rtol=1e-4)
-    magnitude, phase = (np.array(curve) for curve in slice_of[-1]["args"][0]["y"][:2])  # at the end, as the last above
+    magnitude, phase = (np.array(curve) for curve in slice_of[-1]["args"][0]["y"][4:6])  # at the end, as the last above
     np.testing.assert_allclose(magnitude, np.abs(expected), rtol=1e-3)
     np.testing.assert_allclose(np.exp(1j * np.radians(phase)), expected / np.abs(expected), atol=2e-3)
     assert phase[0] > -200.0
     assert phase[-1] < -320.0
+
+
+def test_the_band_of_the_feedthrough_is_what_was_sent(page: Reader, result: Result) -> None:
+    """At the end of the run, at the frequencies that are sent: those of the slider's grid that are whole."""
+    figure = figures(page)["figure-slices"]
+    step = figure["layout"]["sliders"][0]["steps"][-1]["args"]
+    curves = dict(zip((f"{name}{k}" for k, name in enumerate(("low", "high") * 2)), step[0]["y"], strict=False))
+    grid = unpack(traces(page, "figure-slices", "estimate ± 2σ")[0]["x"])
+    assert (grid[0], grid[-1]) == (2.0, 8.0)
+    for place, frequency in enumerate(grid):
+        sent = np.flatnonzero(result.trace["feedthrough_frequency_Hz"] == frequency)
+        if sent.size:
+            gain, phase = (result.trace[f"feedthrough_{name}"][sent[-1]] for name in ("gain_sigma", "phase_sigma_rad"))
+            assert np.log(curves["high1"][place] / curves["low0"][place]) == pytest.approx(4.0 * gain, abs=2e-3)
+            width = curves["high3"][place] - curves["low2"][place]
+            assert np.radians(width) == pytest.approx(4.0 * phase, abs=5e-3)
+    assert step[1] == list(range(8))  # band and curves, not the coherence
+
+
+def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result) -> None:
+    signal = pytest.importorskip("scipy.signal")
+    (trace,) = traces(page, "figure-slices", "measured coherence")
+    frequency, coherence = unpack(trace["x"]), unpack(trace["y"])
+    inside = [np.where(np.isfinite(c), c, np.nanmean(c)) for c in (result.trace[name] for name in COHERENT)]
+    expected_frequency, expected = signal.coherence(*inside, 1000.0, nperseg=2000)
+    np.testing.assert_allclose(coherence, np.interp(frequency, expected_frequency, expected), atol=0.02)
+    assert "complex error was" in "".join(page.text)
 
 
 def test_overview_of_the_motion_keeps_the_extremes(page: Reader, result: Result) -> None:

@@ -21,7 +21,8 @@ trim_true_rad m_p_true_kg c_p_true_N_s_m k_p_true_N_m natural_frequency_true_Hz 
 theta_measured_rad theta_dot_measured_rad_s z_ddot_measured_m_s2 tau_m_measured_N_m
 theta_estimate_rad theta_dot_estimate_rad_s nis m_p_estimate_kg m_p_sigma_kg c_p_estimate_N_s_m c_p_sigma_N_s_m
 k_p_estimate_N_m k_p_sigma_N_m natural_frequency_estimate_Hz natural_frequency_sigma_Hz damping_ratio_estimate
-damping_ratio_sigma mode faults lost corrupt late restarts excitation_rad_s dither_N_m
+damping_ratio_sigma feedthrough_frequency_Hz feedthrough_real_rad_s2_m feedthrough_imaginary_rad_s2_m
+feedthrough_gain_sigma feedthrough_phase_sigma_rad mode faults lost corrupt late restarts excitation_rad_s dither_N_m
 """.split()  # noqa: SIM905
 
 

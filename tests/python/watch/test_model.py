@@ -8,6 +8,7 @@ import random
 import sys
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.commander import KEEP
@@ -15,6 +16,7 @@ from lever_cdkf.host_tools.config import Config, model_parameters
 from lever_cdkf.host_tools.library import enum_names, ffi, lib
 from lever_cdkf.host_tools.watch import model, words
 from lever_cdkf.host_tools.watch.model import Frame, Picture
+from lever_cdkf.host_tools.watch.paired import Paired
 from python.watch.conftest import Flight
 
 
@@ -47,6 +49,45 @@ def test_shows_what_the_estimator_knows(name: str, make_flight: Callable[..., Fl
     assert picture.mode == health.mode
     assert picture.field("HEALTH", "excitation") == pytest.approx(health.excitation, abs=0.003)
     assert picture.theta() == pytest.approx(0.35, abs=0.002)
+
+
+def test_feedthrough_of_every_frequency_is_kept(make_flight: Callable[..., Flight]) -> None:
+    picture, flight = Picture(), make_flight(Config(settings={"publish_period": 1e-3}))
+    watch(picture, flight, 1.0)
+    for frequency, entry in zip(range(2, 9), picture.feedthrough(), strict=True):
+        expected = flight.bus.estimator.feedthrough(frequency)
+        assert entry.frequency == frequency
+        assert entry.response == pytest.approx(expected.response, abs=6e-6 + 0.01 * abs(expected.response))
+        assert entry.gain_sigma == pytest.approx(expected.gain_sigma, rel=0.01, abs=0.0012)
+        phase_sigma = expected.phase_sigma if expected.phase_sigma < 0.508 else math.nan  # not available
+        assert entry.phase_sigma == pytest.approx(phase_sigma, rel=0.01, abs=0.0012, nan_ok=True)
+    picture.take([], 10.0)
+    assert all(math.isnan(entry.gain_sigma) for entry in picture.feedthrough())
+
+
+def test_coherence_is_that_of_the_samples_that_came() -> None:
+    """Against scipy; where a LEVER_SAMPLE is lost its sample is left out, however many are."""
+    signal = pytest.importorskip("scipy.signal")
+    rng, count = np.random.default_rng(7), 12_000
+    z_ddot = np.round(np.convolve(rng.standard_normal(count), np.ones(40) / 40.0, "same"), 3)
+    theta = np.round(0.02 * z_ddot + 0.002 * rng.standard_normal(count), 4)
+    there = np.ones(count, dtype=bool)
+    there[5000:5100] = False
+    lever, base, paired = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE"), Paired()
+    for start in range(0, count, 100):
+        frames: list[Frame] = []
+        for k in range(start, start + 100):
+            frames += [(0x110, lever(k, theta[k], 0.0, 0.0))] if there[k] else []
+            frames.append((0x111, base(k, z_ddot[k], (2**32 - 5_000_000 + 1000 * k) % 2**32)))
+        paired.take(frames, start * 1e-3)
+    measured = paired.coherence(12.0)
+    assert measured is not None
+    frequency, expected = signal.coherence(z_ddot[there], theta[there], 1000.0, nperseg=2000)
+    np.testing.assert_allclose(measured.frequency, frequency)
+    np.testing.assert_allclose(measured.coherence, expected, rtol=1e-6)
+    assert 0.2 < measured.chance < 0.4
+    paired.take([], 40.0)
+    assert paired.coherence(40.0) is None
 
 
 def test_dither_is_measured_over_a_window(flight: Flight) -> None:
@@ -141,7 +182,7 @@ def test_rates_are_frames_a_second(flight: Flight) -> None:
     assert rates.pop("BASE_SAMPLE") == pytest.approx(1000)
     assert rates.pop("STATE_ESTIMATE") == pytest.approx(1000)
     assert rates.pop("IDENTITY") == pytest.approx(3, abs=1)
-    assert set(rates) == {"PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH", "LINK_HEALTH"}
+    assert set(rates) == {"PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH", "HEALTH", "LINK_HEALTH"}
     assert all(rate == pytest.approx(50) for rate in rates.values())  # publish_period
     picture.take([], 6.1)
     picture.take([], 8.2)

@@ -15,7 +15,7 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.watch import panels
 from lever_cdkf.host_tools.watch.model import Frame
 from lever_cdkf.host_tools.watch.sources import Source
-from lever_cdkf.host_tools.watch.terminal import SPANS, Monitor
+from lever_cdkf.host_tools.watch.terminal import SPANS, TALL, Monitor
 from python.watch.conftest import LEVER, Flight
 from rich.segment import Segment
 
@@ -75,13 +75,14 @@ def test_everything_fits_on_the_screen(size: tuple[int, int], flight: Flight) ->
             assert row is not None
             assert float(row[1]) == pytest.approx(value, rel=0.1)  # which is up to 20 ms newer
         assert re.search(r"natural_frequency +\d\.\d\d\d +± 0\.\d+ Hz .*[▁▂▃▄▅▆▇█]{5}", text)
+        assert (re.search(r"gain \[deg s²/m\]( +[\d.]+){7} ", text) is not None) == (size[1] >= TALL)
         assert re.search(r"LEVER_SAMPLE +1000 +0 +0 +0 ", text)
         assert re.search(r"HEALTH +50 +0 +0 +0 ", text)
         assert re.search(r"LINK_HEALTH +50 +0 +0 +0 ", text)
         assert "PLATFORM_HEALTH" not in text  # which never came
         for label in ("mode +run", "excitation +0.[0-9]+ rad/s", "dither +off", "mean NIS", "theta +20.0"):
             assert re.search(label, text), label
-        for key in ("q quit", "space hold the picture", "t time span", "c clear counts"):
+        for key in ("q quit", "space hold the picture", "t time span", "f feedthrough", "c clear counts"):
             assert key in lines[-1], lines[-1]
 
     asyncio.run(drive())
@@ -110,6 +111,9 @@ def test_keys(flight: Flight) -> None:
             assert "30 s [%]" in "\n".join(screen(app))
             await pilot.press("t")
             assert f"{SPANS[1]:.0f} s [%]" in "\n".join(screen(app))
+            await pilot.press("f")
+            await pilot.pause()
+            assert "phase [deg]" in "\n".join(screen(app))
             await pilot.press("q")
         assert app.return_code == 0
         assert not source._thread.is_alive()

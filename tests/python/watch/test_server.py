@@ -231,6 +231,7 @@ def test_before_the_first_estimate_nothing_is_made_up(flight: Flight) -> None:
     (message,) = state.advance()
     update = json.loads(message, parse_constant=pytest.fail)["update"]
     assert update["bode"] is None
+    assert update["coherence"] is None
     assert update["silence"] is None
     assert update["mode"] is None
     assert set(update["row"][1:7]) == {None}

@@ -136,8 +136,8 @@ static void test_feedthrough_says_one_frequency_after_the_other(void)
         lever_feedthrough(lever, (float)message.frequency, &feedthrough);
         TEST_ASSERT_DOUBLE_WITHIN(2.6e-6, (double)feedthrough.real, (double)message.real);
         TEST_ASSERT_DOUBLE_WITHIN(2.6e-6, (double)feedthrough.imaginary, (double)message.imaginary);
-        TEST_ASSERT_DOUBLE_WITHIN(2.1e-3, (double)feedthrough.gain_sigma, (double)message.gain_sigma);
-        TEST_ASSERT_DOUBLE_WITHIN(2.1e-3, (double)feedthrough.phase_sigma, (double)message.phase_sigma);
+        TEST_ASSERT_DOUBLE_WITHIN(1.1e-3, (double)feedthrough.gain_sigma, (double)message.gain_sigma);
+        TEST_ASSERT_DOUBLE_WITHIN(1.1e-3, (double)feedthrough.phase_sigma, (double)message.phase_sigma);
     }
 }
 

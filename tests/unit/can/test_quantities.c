@@ -78,8 +78,8 @@ static const quantity_t quantities[] = {
     ROW(identity, dither_rms, 0x217u, 0.001, 32u, 16u, false),
     ROW(feedthrough, real, 0x21Au, 0.000005, 17u, 15u, true),
     ROW(feedthrough, imaginary, 0x21Au, 0.000005, 32u, 15u, true),
-    ROW(feedthrough, gain_sigma, 0x21Au, 0.004, 47u, 8u, false),
-    ROW(feedthrough, phase_sigma, 0x21Au, 0.004, 55u, 8u, false),
+    ROW(feedthrough, gain_sigma, 0x21Au, 0.002, 47u, 9u, false),
+    ROW(feedthrough, phase_sigma, 0x21Au, 0.002, 56u, 8u, false),
 };
 enum { QUANTITIES = (int)(sizeof quantities / sizeof quantities[0]) };
 
