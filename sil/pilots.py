@@ -48,7 +48,7 @@ class Pilot(ABC):
     def truth(self, time: FloatArray, stream: Callable[[str], np.random.Generator], lever: plant.Lever) -> Truth:
         """The pilot on `lever` at the times [s]; `stream` gives the random numbers of a parameter.
 
-        Raises ValueError for a parameter that loses its sign.
+        Raises ValueError for a parameter that loses its sign, or a trim beyond the vertical.
         """
         values = {name: each.values(time, stream(name)) for name, each in self.trajectories().items()}
         for name, sign in self.signs.items():
@@ -59,6 +59,8 @@ class Pilot(ABC):
             trim = np.full_like(time, lever.lever_preload_angle)
         else:
             trim = self.trim.values(time, stream("trim"))
+            if not np.abs(trim).max() < 0.5 * math.pi:
+                raise ValueError(f"trim: moves by {np.degrees(np.abs(trim).max()):.0f} deg; it must stay below 90 deg")
         return self.build(time, values, trim, lever)
 
     @abstractmethod

@@ -183,7 +183,7 @@ class Scenario:
         return sensor.corruption(time, self.stream("fault", VALUES.index(what)))
 
     def truth(self, time: FloatArray) -> Truth:
-        """The pilot on his lever at the times `time` [s]. Raises ScenarioError when a parameter loses its sign."""
+        """The pilot on his lever at the times `time` [s]. Raises ScenarioError when he cannot be."""
         try:
             return self.pilot.truth(time, self.stream, self.true_lever)
         except ValueError as error:

@@ -172,6 +172,7 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
         (LEAST.replace('"3 kg"', '"3 g/s"'), "pilot.m_p: '3 g/s' has unit 'g/s'; allowed: kg, g"),
         (LEAST.replace('"1 s"', '"2 h"'), "duration: '2 h' is out of range; it must be above 0 and at most 3600 s"),
         (LEAST.replace('"3 kg"', '"-3 kg"'), "pilot.m_p: falls to -3; it must stay above 0"),
+        (LEAST.replace("20 deg", "-95 deg"), "pilot.trim: moves by 95 deg; it must stay below 90 deg"),
         (BLACK_BOX.replace("-9 1/s", "1 1/s"), "pilot.a22: rises to 1; it must stay below 0"),
         (BLACK_BOX + SINE_TORQUE, "torque: no torque acts on a pilot of model linear_black_box; remove it"),
         (MAYO + SINE_TORQUE, "torque: no torque acts on a pilot of model mayo; remove it"),
