@@ -1,6 +1,7 @@
-"""What shakes the lever: base acceleration [m/s^2] and identification torque [N m].
+"""What shakes the lever: base acceleration [m/s^2], identification torque and disturbances [N m].
 
-Each class is one kind of [[base]] or [[torque]] table in a scenario. It acts from `start` to `end`; outside it is zero.
+Each class is one kind of [[base]], [[torque]] or [[disturbance]] table in a scenario. It acts from `start` to `end`;
+outside it is zero.
 The rms over that window is exact, whatever the kind and the seed: the waveform is scaled to it. `rms` and `amplitude`
 are in the unit of what is excited.
 """
@@ -133,6 +134,23 @@ class Noise(Band):
 
 
 @dataclass(frozen=True, kw_only=True)
+class GaussMarkov(Normalised):
+    """First-order Gauss-Markov noise: correlation exp(-|t| / correlation_time); slow, without a lowest frequency."""
+
+    correlation_time: float = quantity("s", above=0.0)
+
+    def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        from scipy import signal  # takes long to import
+
+        step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+        left = math.exp(-step / self.correlation_time)
+        white = math.sqrt(1.0 - left * left) * rng.standard_normal(len(time))
+        white[0] = rng.standard_normal()
+        wave: FloatArray = signal.lfilter([1.0], [1.0, -left], white)
+        return wave
+
+
+@dataclass(frozen=True, kw_only=True)
 class Rotor(Normalised):
     """Vibration at multiples of the rotor's frequency (N/rev), equally strong, each with a phase of its own."""
 
@@ -171,6 +189,7 @@ KINDS: dict[str, type[Excitation]] = {
     "multisine": Multisine,
     "chirp": Chirp,
     "noise": Noise,
+    "gauss_markov": GaussMarkov,
     "rotor": Rotor,
     "pulses": Pulses,
 }

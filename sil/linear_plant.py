@@ -112,9 +112,11 @@ _Row = tuple[float, float, float, float, list[list[float]]]
 def _rows(system: System, conditions: Conditions) -> Iterator[_Row]:
     """The sample periods between the samples, in order."""
     columns = (system.stiffness, system.damping, system.compliance, system.rest)
-    for block, base, normal in conditions.blocks():
-        drive = np.stack((system.gain[block, None] * base, conditions.kick * normal), axis=2).tolist()
-        yield from zip(*(column[block].tolist() for column in columns), drive, strict=True)
+    for block in conditions.blocks():
+        at = block.periods
+        noise = block.kick + system.compliance[at, None] * block.push
+        drive = np.stack((system.gain[at, None] * block.z_ddot, noise), axis=2).tolist()
+        yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
 class Plant:

@@ -61,6 +61,8 @@ class Inputs:
     z_ddot_measured: FloatArray
     torque: FloatArray
     """Commanded by the scenario itself [N m]."""
+    disturbance: FloatArray
+    """Torque in the lever that nobody measures [N m]."""
     missing: dict[str, NDArray[np.bool_]]
     """For each of sensors.VALUES and sensors.FRAMES."""
 
@@ -103,12 +105,14 @@ def prepare(scenario: Scenario) -> Inputs:
     gone = {}
     for what in (*sensors.VALUES, *sensors.FRAMES):
         gone[what] = sensors.missing(dropouts, what, time, period, scenario.streams("dropout", dropouts))
+    measured = scenario.sensors.z_ddot.measure(base, period, scenario.stream("z_ddot"))
     return Inputs(
         time=time,
         truth=scenario.truth(time),
         z_ddot=base,
-        z_ddot_measured=scenario.sensors.z_ddot.measure(base, period, scenario.stream("z_ddot")),
+        z_ddot_measured=scenario.corruption("z_ddot", time).of(measured),
         torque=excitation.total(scenario.torque, time, scenario.streams("torque", scenario.torque)),
+        disturbance=excitation.total(scenario.disturbance, time, scenario.streams("disturbance", scenario.disturbance)),
         missing=gone,
     )
 
@@ -284,8 +288,16 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
 
 
 def _body(scenario: Scenario, inputs: Inputs) -> Body:
-    noise, lag = scenario.pilot.process_noise, scenario.motor.lag
-    return inputs.truth.body(Conditions(inputs.z_ddot, scenario.period, noise, lag, scenario.stream("process")))
+    return inputs.truth.body(
+        Conditions(
+            inputs.z_ddot,
+            scenario.period,
+            scenario.pilot.process_noise,
+            scenario.motor.lag,
+            scenario.stream("process"),
+            disturbance=inputs.disturbance,
+        )
+    )
 
 
 def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec.Value]]:
@@ -309,8 +321,10 @@ def _lever_sensors(recording: Recording) -> Callable[[int], tuple[float, float, 
     for name in ("theta", "theta_dot", "tau_m"):
         sensor: sensors.Sensor = getattr(scenario.sensors, name)
         offsets = sensor.offsets(len(inputs.time), scenario.stream(name))
-        offsets[inputs.missing[name]] = np.nan
-        readers.append(_reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period))
+        corruption = scenario.corruption(name, inputs.time)
+        corruption.offset[inputs.missing[name]] = np.nan
+        reader = _reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period)
+        readers.append(_corrupted(reader, corruption))
     theta, theta_dot, tau_m = readers
     return lambda sample: (theta(sample), theta_dot(sample), tau_m(sample))
 
@@ -329,6 +343,12 @@ def _reader(
         return gain * (newer + part * (older - newer)) + offsets[sample]
 
     return delayed
+
+
+def _corrupted(reader: Callable[[int], float], corruption: sensors.Corruption) -> Callable[[int], float]:
+    """What `reader` reads, with the faults in it; as Corruption.of() otherwise."""
+    source, factor, offset = (column.tolist() for column in vars(corruption).values())
+    return lambda sample: factor[sample] * reader(source[sample]) + offset[sample]
 
 
 def _pace(period: float) -> Iterator[None]:

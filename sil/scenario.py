@@ -8,6 +8,7 @@ estimator is told of but for what [lever] overrides.
 from __future__ import annotations
 
 import dataclasses
+import math
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ import numpy as np
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.native import Config, enum_names, settings_table
 
-from . import excitation, pilots, plant, quantities, sensors
+from . import excitation, pilots, plant, quantities
 from .reading import (
     SIGNAL,
     Place,
@@ -37,6 +38,7 @@ from .reading import (
     text,
     whole,
 )
+from .sensors import VALUES, Corruption, Sensor, Sensors
 from .truth import FloatArray, Truth
 
 if sys.version_info >= (3, 11):
@@ -49,7 +51,7 @@ CONVERGED_AFTER = 15.0
 
 STREAMS = (
     "process", "theta", "theta_dot", "tau_m", "z_ddot", "m_p", "c_p", "k_p", "trim", "base", "torque", "dropout",
-    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t",
+    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t", "k_r", "c_r", "disturbance", "fault",
 )  # fmt: skip
 """Purposes of random numbers; the order is part of what a seed means, so append only."""
 
@@ -102,10 +104,18 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
     return reader
 
 
-def _read_settings(allowed: Iterable[str]) -> Reader:
+def _read_settings() -> Reader:
     """Reader of a table of settings by the names of lever_settings.def, each in a unit of its dimension."""
-    known = set(allowed)
-    return _read_numbers({row.name: read_quantity(row.unit) for row in settings_table() if row.name in known})
+    return _read_numbers({row.name: read_quantity(row.unit) for row in settings_table()})
+
+
+def _read_lever() -> Reader:
+    """Reader of a table of what is constant in a lever; only angles may be below 0."""
+    units = {row.name: row.unit for row in settings_table()} | {"lever_friction": "N m"}
+    readers = {}
+    for name in plant.Lever.__dataclass_fields__:
+        readers[name] = read_quantity(units[name], least=-math.inf if units[name] == "rad" else 0.0)
+    return _read_numbers(readers)
 
 
 def _read_limits() -> Reader:
@@ -129,11 +139,12 @@ class Scenario:
     pilot: pilots.Pilot = item(pilots.read_pilot)
     base: tuple[excitation.Excitation, ...] = tables(excitation.read_excitation, "m/s^2")
     torque: tuple[excitation.Excitation, ...] = tables(_read_torque, "N m")
+    disturbance: tuple[excitation.Excitation, ...] = tables(excitation.read_excitation, "N m")
     motor: Motor = table(Motor)
-    sensors: sensors.Sensors = table(sensors.Sensors)
+    sensors: Sensors = table(Sensors)
     estimator: Estimator = table(Estimator)
-    settings: Mapping[str, float] | None = item(_read_settings(row.name for row in settings_table()), default=None)
-    lever: Mapping[str, float] | None = item(_read_settings(plant.Lever.__dataclass_fields__), default=None)
+    settings: Mapping[str, float] | None = item(_read_settings(), default=None)
+    lever: Mapping[str, float] | None = item(_read_lever(), default=None)
     limits: Mapping[str, float] | None = item(_read_limits(), default=None)
 
     @cached_property
@@ -166,8 +177,13 @@ class Scenario:
         """One stream for each of `items`."""
         return [self.stream(purpose, index) for index, _ in enumerate(items)]
 
+    def corruption(self, what: str, time: FloatArray) -> Corruption:
+        """What the faults of the sensor of `what` (one of sensors.VALUES) do at the times `time` [s]."""
+        sensor: Sensor = getattr(self.sensors, what)
+        return sensor.corruption(time, self.stream("fault", VALUES.index(what)))
+
     def truth(self, time: FloatArray) -> Truth:
-        """The pilot on his lever at the times `time` [s]. Raises ScenarioError when a parameter loses its sign."""
+        """The pilot on his lever at the times `time` [s]. Raises ScenarioError when he cannot be."""
         try:
             return self.pilot.truth(time, self.stream, self.true_lever)
         except ValueError as error:
@@ -181,10 +197,9 @@ class Scenario:
     def check(self) -> None:
         """Raises ScenarioError for what only shows when the parts are put together."""
         truth = self.truth(self.time())
-        if self.torque and not truth.takes_torque:
-            raise ScenarioError(
-                f"{self.file}: torque: no motor torque acts on a pilot of model {truth.model}; remove it"
-            )
+        for key, excitations in (("torque", self.torque), ("disturbance", self.disturbance)):
+            if excitations and not truth.takes_torque:
+                raise ScenarioError(f"{self.file}: {key}: no torque acts on a pilot of model {truth.model}; remove it")
         judged = {quantity.key for quantity in self.judged()} | {"coverage"}
         for name in self.limits or ():
             if name not in judged:
@@ -192,8 +207,7 @@ class Scenario:
 
     def changes(self) -> tuple[float, ...]:
         """Times [s] after which the parameters have to be found anew: the start, and every jump of one of them."""
-        jumps = {time for trajectory in self.pilot.trajectories().values() for time in trajectory.changes()}
-        return (0.0, *sorted(time for time in jumps if time < self.duration))
+        return (0.0, *sorted(time for time in self.pilot.changes() if 0.0 < time < self.duration))
 
     def dithers(self) -> list[tuple[float, float]]:
         """When [s] the firmware is to be asked for which rms [N m], in order of time."""

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import excitation
 from .reading import SIGNAL, Place, Reader, item, quantities, quantity, read_kind, read_list, read_quantity
 
 FloatArray = NDArray[np.float64]
@@ -109,6 +110,16 @@ class Sinusoid(Trajectory):
         return self.mean + self.amplitude * np.sin(2.0 * math.pi * self.frequency * time + self.phase)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Noise(excitation.Noise, Trajectory):
+    """`mean` and Gaussian noise about it, white from `low` to `high`, of exactly `rms` from `start` to `end`."""
+
+    mean: float = quantity(SIGNAL)
+
+    def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        return self.mean + self.samples(time, rng)
+
+
 @dataclass(frozen=True)
 class RandomWalk(Trajectory):
     """A random walk of the logarithm at `rate`, reflected at the values `least` and `greatest`."""
@@ -163,14 +174,15 @@ KINDS: Mapping[str, type[Trajectory]] = {
     "ramp": Ramp,
     "fatigue": Fatigue,
     "sinusoid": Sinusoid,
+    "noise": Noise,
     "random_walk": RandomWalk,
     "sequence": Sequence,
 }
 
 
-def read_trajectory(kinds: Mapping[str, type[Trajectory]] = KINDS) -> Reader:
-    """Reader of a bare quantity (a constant) or a table with one of `kinds`."""
-    read_value, read_moving = read_quantity(SIGNAL), read_kind(kinds)
+def read_trajectory() -> Reader:
+    """Reader of a bare quantity (a constant) or a table with one of KINDS."""
+    read_value, read_moving = read_quantity(SIGNAL), read_kind(KINDS)
 
     def reader(value: Any, place: Place) -> Trajectory:
         if isinstance(value, dict):

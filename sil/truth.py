@@ -1,6 +1,7 @@
 """What every truth has: a pilot with his lever as a run needs them, and how they move from sample to sample.
 
-One module each: plant.py (the lever of DESIGN section 3), linear_plant.py, two_dof_plant.py, mayo_plant.py.
+One module each: plant.py (the lever of DESIGN section 3), linear_plant.py, two_dof_plant.py, mayo_plant.py,
+hysteretic_plant.py, reflex_plant.py.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ class Conditions:
     rng: np.random.Generator
     substeps: int | None = None
     """In a period; None: as few as LONGEST_SUBSTEP allows."""
+    disturbance: FloatArray | float = 0.0
+    """Torque in the lever that nobody measures, at the samples [N m]; linear between them."""
 
     @property
     def count(self) -> int:
@@ -69,15 +72,37 @@ class Conditions:
         """What is left after that many substeps of a difference between torque and command."""
         return math.exp(-substeps * self.step / self.motor_lag) if self.motor_lag > 0.0 else 0.0
 
-    def blocks(self) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
-        """The periods between the samples in order, some thousand at a time: which, and of shape (periods, substeps)
-        the base acceleration in the middle of each substep and standard normal numbers."""
-        middles = (np.arange(self.count) + 0.5) / self.count
+    def blocks(self) -> Iterator[Block]:
+        """The periods between the samples in order, some thousand at a time."""
+        disturbance = np.broadcast_to(self.disturbance, self.z_ddot.shape)
         last = len(self.z_ddot) - 1
         for begin in range(0, last, _BLOCK):
             end = min(begin + _BLOCK, last)
-            base = self.z_ddot[begin:end, None] + np.diff(self.z_ddot[begin : end + 1])[:, None] * middles
-            yield slice(begin, end), base, self.rng.standard_normal((end - begin, self.count))
+            yield Block(
+                slice(begin, end),
+                self._middles(self.z_ddot[begin : end + 1]),
+                self.kick * self.rng.standard_normal((end - begin, self.count)),
+                self.step * self._middles(disturbance[begin : end + 1]),
+            )
+
+    def _middles(self, signal: FloatArray) -> FloatArray:
+        """A signal, given at the samples and linear between them, in the middle of each substep."""
+        part = (np.arange(self.count) + 0.5) / self.count
+        middles: FloatArray = signal[:-1, None] + np.diff(signal)[:, None] * part
+        return middles
+
+
+@dataclass(frozen=True)
+class Block:
+    """What acts in some periods: arrays of shape (periods, substeps)."""
+
+    periods: slice
+    z_ddot: FloatArray
+    """Base acceleration in the middle of the substep [m/s^2]."""
+    kick: FloatArray
+    """What process noise adds to theta_dot [rad/s]."""
+    push: FloatArray
+    """Impulse of the disturbance [N m s]."""
 
 
 class Body(Protocol):
@@ -100,12 +125,12 @@ class Truth(ABC):
     model: ClassVar[str]
     """Key `model` of [pilot]; a model of the firmware has the same name."""
     takes_torque: ClassVar[bool] = True
-    """Whether a motor torque means something to it."""
+    """Whether a torque, of the motor or a disturbance, means something to it."""
 
     @property
     @abstractmethod
     def parameters(self) -> Mapping[str, FloatArray]:
-        """The model's parameters by name, SI units."""
+        """The model's parameters by name, SI units; NaN while nobody holds the lever."""
 
     @property
     @abstractmethod
@@ -115,7 +140,8 @@ class Truth(ABC):
     @property
     @abstractmethod
     def dynamics(self) -> Dynamics:
-        """Natural frequency and damping ratio; of the mode that an observer of theta sees, where there are several."""
+        """Natural frequency and damping ratio; of the mode that an observer of theta sees, where there are several. NaN
+        while nobody holds the lever."""
 
     @abstractmethod
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
@@ -124,3 +150,12 @@ class Truth(ABC):
     @abstractmethod
     def body(self, conditions: Conditions) -> Body:
         """The lever at the first sample."""
+
+
+def dominant_dynamics(truth: Truth, *columns: FloatArray) -> Dynamics:
+    """Those of the dominant mode of its transfer function, worked out only where one of its `columns` has changed:
+    eigenvalues take long."""
+    new = np.append(True, np.any(np.diff(np.stack(columns), axis=1) != 0.0, axis=0))
+    frequency, ratio = truth.transfer(np.flatnonzero(new)).dominant_mode()
+    held = np.cumsum(new) - 1
+    return Dynamics(frequency[held], ratio[held])

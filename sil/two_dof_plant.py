@@ -12,11 +12,12 @@ grip, whose vertical distance is stretched by e = l sin theta - s:
 Springs are preloaded so that all rests at theta = theta_0, s = 0, whatever the parameters: theta_l = theta_0,
 e_0 = l sin theta_0 + g mu / k_p, s_0 = g (m_t + mu) / k_t. Lagrange's equations (tests/python/sil derives them again):
 
-    M theta_ddot + l cos(theta) F + c_l theta_dot + k_l (theta - theta_0) = -l mu cos(theta) z_ddot + tau_m
+    M theta_ddot + l cos(theta) F + c_l theta_dot + k_l (theta - theta_0) = -l mu cos(theta) z_ddot + tau_m + tau_d
     m_t s_ddot - F + c_t s_dot + k_t s = -m_t z_ddot
     F = k_p (l (sin theta - sin theta_0) - s) + c_p (l cos(theta) theta_dot - s_dot)
 
-with M and mu of plant.py; a seat that does not give way (k_t without bound) makes it that lever.
+with M, mu, tau_d and the friction beside c_l as in plant.py; a seat that does not give way (k_t without bound) makes it
+that lever.
 
 The trunk's default is 45 kg at 4.5 Hz with a damping ratio of 0.39. On a rigid seat 60 people had their main resonance
 at 5 Hz with a damping ratio of 0.475 (Fairley and Griffin, J. Biomechanics 22, 1989); a cushion in series lowers both.
@@ -36,7 +37,7 @@ from numpy.typing import NDArray
 
 from . import plant
 from .transfer import Transfer
-from .truth import Conditions, Dynamics, FloatArray, Truth
+from .truth import Conditions, Dynamics, FloatArray, Truth, dominant_dynamics
 
 TRUNK_MASS, TRUNK_DAMPING, TRUNK_STIFFNESS = 45.0, 1000.0, 36000.0
 """m_t [kg], c_t [N s/m] and k_t [N/m] where nothing else is said."""
@@ -71,12 +72,7 @@ class TwoDof(Truth):
 
     @property
     def dynamics(self) -> Dynamics:
-        """Worked out only where something has changed: eigenvalues take long."""
-        columns = np.stack((*self.parameters.values(), self.trim))
-        new = np.append(True, np.any(np.diff(columns, axis=1) != 0.0, axis=0))
-        frequency, ratio = self.transfer(np.flatnonzero(new)).dominant_mode()
-        held = np.cumsum(new) - 1
-        return Dynamics(frequency[held], ratio[held])
+        return dominant_dynamics(self, *self.parameters.values(), self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
         """By Cramer's rule from the two equations, linearised; a = l cos theta_0 is the grip's rise per angle."""
@@ -112,9 +108,10 @@ def _rows(truth: TwoDof, conditions: Conditions) -> Iterator[_Row]:
     mass, moment = plant.inertia(truth.lever, truth.arm), plant.moment(truth.lever, truth.arm)
     springs = (truth.m_t, truth.c_p, truth.k_p, truth.c_t, truth.k_t)
     columns = (mass, moment, *springs, np.sin(truth.trim), truth.trim)
-    for block, base, normal in conditions.blocks():
-        drive = np.stack((base, conditions.kick * mass[block, None] * normal), axis=2).tolist()
-        yield from zip(*(column[block].tolist() for column in columns), drive, strict=True)
+    for block in conditions.blocks():
+        at = block.periods
+        drive = np.stack((block.z_ddot, mass[at, None] * block.kick + block.push), axis=2).tolist()
+        yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
 class Plant:
@@ -136,11 +133,7 @@ class Plant:
         theta, theta_dot, s, s_dot, torque = self.theta, self.theta_dot, self.s, self.s_dot, self.tau_m - command
         inertia, moment, m_t, c_p, k_p, c_t, k_t, rest_sine, rest, drive = next(self._rows)
         step, lag_middle, lag = self._step, self._lag_middle, self._lag
-        length, own_damping, own_stiffness = (
-            self._lever.lever_length,
-            self._lever.lever_damping,
-            self._lever.lever_stiffness,
-        )
+        length, own_stiffness = self._lever.lever_length, self._lever.lever_stiffness
         half = 0.5 * step
         for base, noise in drive:
             middle, trunk = theta + half * theta_dot, s + half * s_dot
@@ -148,11 +141,12 @@ class Plant:
             rise = length * cosine
             arm = k_p * (length * (math.sin(middle) - rest_sine) - trunk) + c_p * (rise * theta_dot - s_dot)
             lever = command + torque * lag_middle - moment * cosine * base - rise * arm
-            lever -= own_damping * theta_dot + own_stiffness * (middle - rest)
+            resistance, slope = plant.resistance(self._lever, theta_dot)
+            lever -= resistance + own_stiffness * (middle - rest)
             seat = arm - m_t * base - c_t * s_dot - k_t * trunk
             lever, seat = step * lever + noise, step * seat
             cross = -half * c_p * rise
-            lever_mass, trunk_mass = inertia + half * own_damping - cross * rise, m_t + half * (c_p + c_t)
+            lever_mass, trunk_mass = inertia + half * slope - cross * rise, m_t + half * (c_p + c_t)
             determinant = lever_mass * trunk_mass - cross * cross
             change = (trunk_mass * lever - cross * seat) / determinant
             trunk_change = (lever_mass * seat - cross * lever) / determinant

@@ -22,11 +22,16 @@ ABOUT_TRUTH = {
     "linear_black_box": "a linear second-order system",
     "two_dof": "the arm hangs on a trunk that gives way on its seat, so that two masses swing",
     "mayo": "a hand that follows the cabin as Mayo (1989) measured it on people, by a transfer function",
+    "hysteretic": "an arm whose tissue loses the same share of the energy of a cycle at every frequency, where a "
+    "damper loses more the faster it moves",
+    "reflex": "an arm with a stretch reflex, which pulls against the motion a few hundredths of a second late",
 }
 """Every model of [pilot]."""
 DYNAMICS = {
     "two_dof": "The truth is the one of its two modes that answers more between 2 and 8 Hz.",
     "mayo": "The truth is that of the poles of the hand's transfer function.",
+    "hysteretic": "The truth is the mode that answers most between 2 and 8 Hz.",
+    "reflex": "The truth is the mode that answers most between 2 and 8 Hz.",
 }
 """What the true natural frequency is, where the truth has more than one mode or none of its own."""
 

@@ -18,6 +18,7 @@ NORMALISED: list[dict[str, Any]] = [
     {"kind": "chirp", **BAND, "sweep": "7 s"},
     {"kind": "noise", **BAND},
     {"kind": "rotor", "rms": "0.1 g", "rotor_frequency": "395 rpm", "harmonics": [1, 4]},
+    {"kind": "gauss_markov", "rms": "0.1 g", "correlation_time": "0.3 s"},
 ]
 
 
@@ -62,6 +63,16 @@ def test_noise_is_flat_in_its_band_gaussian_and_nothing_outside() -> None:
     assert spectrum[(lines < 0.999) | (lines > 10.001)].sum() < 1e-20 * spectrum.sum()
     kurtosis = np.mean(values**4) / np.mean(values**2) ** 2
     assert kurtosis == pytest.approx(3.0, abs=0.5)
+
+
+def test_gauss_markov_noise_has_its_variance_and_its_correlation() -> None:
+    """Mean over 40 seeds of the autocorrelation, unscaled, against exp(-t / T) and the variance 1."""
+    kind = excitation.GaussMarkov(rms=1.0, correlation_time=0.3)
+    waves = np.stack([kind.waveform(TIME, np.random.default_rng(seed)) for seed in range(40)])
+    for lag in (0, 100, 300, 600):
+        products = waves[:, lag:] * waves[:, : len(TIME) - lag]
+        assert products.mean() == pytest.approx(math.exp(-lag * PERIOD / 0.3), abs=0.05)
+    assert np.var(waves[:, 0]) == pytest.approx(1.0, rel=0.6)  # stationary from the first sample on
 
 
 def test_schroeder_phases_keep_the_crest_factor_low() -> None:
@@ -127,7 +138,7 @@ def test_torque_takes_units_of_torque() -> None:
         ({"kind": "sine", "rms": "1 g", "frequency": "0 Hz"}, "out of range; it must be above 0 Hz"),
         ({"kind": "sine", "rms": "1 g", "frequency": "1 Hz", "start": "2 s", "end": "1 s"}, "start 2 s is not before"),
         ({"kind": "noise", **BAND, "colour": "pink"}, "unknown key 'colour'; allowed: .*low, high"),
-        ({"kind": "quake", "rms": "1 g"}, "kind = one of sine, multisine, chirp, noise, rotor, pulses"),
+        ({"kind": "quake", "rms": "1 g"}, "kind = one of sine, multisine, chirp, noise, gauss_markov, rotor, pulses"),
         ({"kind": "sine", "rms": "1 g"}, "key 'frequency' is missing"),
         (
             {"kind": "pulses", "amplitude": "1 g", "width": "2 s", "period": "1 s"},

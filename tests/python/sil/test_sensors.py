@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.files import native_file
-from lever_cdkf.sil.sensors import Dropout, Sensor, Sensors, missing
+from lever_cdkf.sil.sensors import Dropout, Fault, Scale, Sensor, Sensors, Spikes, Stuck, missing
+from numpy.typing import NDArray
 from scipy import stats
 
 PERIOD = 1e-3
@@ -68,6 +69,38 @@ def test_only_the_dropouts_of_that_value_count_and_they_add_up() -> None:
     ]
     gone = missing(dropouts, "theta", TIME, PERIOD, [rng(i) for i in range(3)])
     assert np.array_equal(gone, ((TIME >= 1) & (TIME < 2)) | ((TIME >= 5) & (TIME < 6)))
+
+
+def faulty(*faults: Fault) -> NDArray[np.float64]:
+    """What a sensor with these faults makes of the readings sin(t) + 2."""
+    return Sensor(fault=faults).corruption(TIME, rng()).of(np.sin(TIME) + 2.0)
+
+
+def test_faults_act_in_their_window_and_only_there() -> None:
+    right = np.sin(TIME) + 2.0
+    inside = (TIME >= 5.0) & (TIME < 7.0)
+    window = {"start": 5.0, "end": 7.0}
+    for fault, expected in (
+        (Stuck(**window), right[4999]),
+        (Scale(factor=0.0, **window), 0.0),
+        (Scale(factor=-1.0, **window), -right[inside]),
+        (Scale(factor=0.5, **window), 0.5 * right[inside]),
+    ):
+        found = faulty(fault)
+        assert np.array_equal(found[~inside], right[~inside])
+        assert np.all(found[inside] == expected)
+    both = faulty(Stuck(**window), Scale(factor=-1.0, start=6.0))
+    assert np.all(both[inside] == np.where(TIME[inside] < 6.0, 1.0, -1.0) * right[4999])
+    assert np.all(faulty(Stuck(end=1.0))[:1000] == right[0])
+
+
+def test_spikes_hit_their_share_of_the_samples_up_and_down_alike() -> None:
+    off = faulty(Spikes(share=0.01, size=0.3, start=50.0)) - faulty()
+    assert not off[:50_000].any()
+    hit = off[50_000:][np.abs(off[50_000:]) > 1e-9]
+    assert np.abs(hit) == pytest.approx(0.3)
+    assert len(hit) == pytest.approx(1500, abs=4 * np.sqrt(1500))
+    assert np.sum(hit > 0.0) == pytest.approx(len(hit) / 2, abs=2 * np.sqrt(len(hit)))
 
 
 def test_what_reaches_the_estimator_is_quantised_or_not_available_as_cantools_has_it() -> None:

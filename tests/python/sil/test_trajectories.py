@@ -49,6 +49,18 @@ def test_sinusoid_has_its_mean_amplitude_and_frequency() -> None:
     assert wave[[0, 1000, 2000, 3000]] == pytest.approx([10.0, 13.0, 10.0, 7.0])
 
 
+def test_noise_has_its_mean_and_exactly_its_rms_in_its_band_and_its_window() -> None:
+    noise = {"kind": "noise", "mean": "10 N/m", "rms": "2 N/m", "low": "0.05 Hz", "high": "0.5 Hz", "start": "8 s"}
+    path = values(noise)
+    assert np.all(path[:8000] == 10.0)
+    moving = path[8000:] - 10.0
+    assert math.sqrt(np.mean(moving**2)) == pytest.approx(2.0, rel=1e-12)
+    frequency, power = np.fft.rfftfreq(len(moving), 1e-3), np.abs(np.fft.rfft(moving)) ** 2
+    assert power[(frequency < 0.049) | (frequency > 0.501)].sum() < 1e-20 * power.sum()
+    assert not np.allclose(path, values(noise, seed=1))
+    assert made(noise).changes() == ()
+
+
 def test_random_walk_has_its_rate_and_stays_between_its_limits() -> None:
     walk = {
         "kind": "random_walk",
@@ -87,7 +99,11 @@ def test_sequence_takes_one_part_after_the_other_and_knows_its_jumps() -> None:
             {"kind": "random_walk", "first": "1 N/m", "rate": "1 %/sqrt(s)", "least": "2 N/m", "greatest": "3 N/m"},
             "least <= first",
         ),
-        ({"kind": "wobble"}, "kind = one of steps, ramp, fatigue, sinusoid, random_walk, sequence"),
+        (
+            {"kind": "noise", "mean": "1 N/m", "rms": "1 N/m", "low": "2 Hz", "high": "1 Hz"},
+            "low 2 Hz is not below high 1 Hz",
+        ),
+        ({"kind": "wobble"}, "one of steps, ramp, fatigue, sinusoid, noise, random_walk, sequence"),
     ],
 )
 def test_nonsense_is_refused_with_place_and_remedy(value: Any, message: str) -> None:
