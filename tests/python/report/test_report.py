@@ -204,7 +204,7 @@ def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Re
     used = nis > 0.0
     middle = np.flatnonzero(np.isclose(unpack(trace["x"]), 4.1245, atol=1e-3))[0]
     assert unpack(trace["y"])[middle] == pytest.approx(nis[used].sum() / outputs[used].sum(), rel=1e-5)
-    upper = traces(page, "figure-innovations", "95 % of an honest filter")[1]
+    upper = traces(page, "figure-innovations", "95 % if σ is right")[1]
     x, height = unpack(upper["x"]), unpack(upper["y"])
     assert height[np.abs(x - 12.5) < 0.3].min() > height[np.abs(x - 5.0) < 0.3].max()  # one output: more scatter
 
@@ -220,7 +220,7 @@ def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, re
     assert float(values["largest correlation of residuals (white noise: 0)"]) == pytest.approx(
         told["largest"], rel=5e-3
     )
-    assert "Here it is noise." in "".join(page.text)
+    assert "Here the residual passes as white." in "".join(page.text)
 
 
 def test_health_names_what_happened_when_it_happened(page: Reader) -> None:
