@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from . import whiteness
 from .innovations import Innovations, freedom
 from .loop import Recording
-from .quantities import DYNAMICS, Quantity
+from .quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from .scenario import Scenario
 from .trace import Trace
 
@@ -28,9 +28,6 @@ BoolArray = NDArray[np.bool_]
 
 MOST_TRANSFERS = 50
 """How often, spread over the run, the transfer function of a truth is looked at for changes."""
-
-LEAST_COVERAGE = 0.9
-"""Least share of the time with the truth within +-2 sigma, or sigma is called too small; Gaussian errors: 95.4 %."""
 
 WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mismatch", "calibration", "hands_off")
 """Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""

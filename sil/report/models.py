@@ -39,7 +39,7 @@ def about(run: Run) -> list[str]:
         told.append(
             f"<strong>The truth of this run is of another kind:</strong> {ABOUT_TRUTH[run.mismatch]}. The "
             "parameters of the estimator's model have no true values then; what can be compared are natural frequency "
-            "and damping ratio, the answer to the floor, and whether the innovations are still noise."
+            "and damping ratio, the answer to the floor, and whether the innovations are white."
         )
     return told
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from lever_cdkf.host_tools import native
 
-from ..quantities import Quantity
+from ..quantities import LEAST_COVERAGE, Quantity
 from .run import Run
 
 NOTHING = "–"
@@ -51,11 +51,18 @@ def figures_of(run: Run, quantity: Quantity) -> dict[str, Any]:
 def verdict(run: Run) -> str:
     """The headline."""
     text = run.summary.get("verdict") or "A recorded run, with no truth to compare with: what the estimator made of it."
-    mood = {True: "good", False: "bad", None: ""}[run.summary.get("passed")]
+    mood = {True: "" if _in_doubt(run) else "good", False: "bad", None: ""}[run.summary.get("passed")]
     escaped = html.escape(text)
     for quantity in run.parameters:
         escaped = re.sub(rf"\b{quantity.key}\b", quantity.symbol, escaped)
     return f'<p class="verdict {mood}">{escaped}</p>'
+
+
+def _in_doubt(run: Run) -> bool:
+    """Whether the stated sigma, or the model, is not right by this run, whatever its limits allow."""
+    covered = [entry.get("coverage_2sigma") for entry in run.summary.get("parameters", {}).values()]
+    too_small = any(share is not None and share < LEAST_COVERAGE for share in covered)
+    return too_small or (run.whiteness or {}).get("white") is False
 
 
 def cards(run: Run) -> str:

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.native import enum_names
-from lever_cdkf.sil.report import picture, write_report
+from lever_cdkf.sil.report import picture, words, write_report
 from lever_cdkf.sil.report.charts.health import FAULT_WORDS
+from lever_cdkf.sil.report.run import Run
 from lever_cdkf.sil.runner import Result
 
 from .reading import Reader, figures, first_number, read, unpack
@@ -105,8 +106,23 @@ def test_cards_and_headline_say_what_the_summary_says(page: Reader, result: Resu
         assert f"{100 * expected['coverage_2sigma']:.0f} % {name}" in text
     verdict = result.summary["verdict"]
     assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
-    mood = "good" if result.summary["passed"] else "bad"
-    assert ("p", {"class": f"verdict {mood}"}) in page.tags
+
+
+@pytest.mark.parametrize(
+    ("passed", "covered", "white", "mood"),
+    [
+        (True, 0.95, True, "good"),
+        (True, 0.85, True, ""),  # what the limits allow is no proof of the stated sigma
+        (True, 0.95, False, ""),
+        (False, 0.95, True, "bad"),
+    ],
+)
+def test_the_headline_is_good_only_if_sigma_and_whiteness_are(
+    passed: bool, covered: float, white: bool, mood: str, result: Result
+) -> None:
+    entries = {key: entry | {"coverage_2sigma": covered} for key, entry in result.summary["parameters"].items()}
+    made = {"passed": passed, "parameters": entries, "whiteness": result.summary["whiteness"] | {"white": white}}
+    assert f'class="verdict {mood}"' in words.verdict(Run(result.trace, result.summary | made))
 
 
 def test_all_settings_are_shown(page: Reader, result: Result) -> None:
