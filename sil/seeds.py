@@ -134,7 +134,9 @@ def verdict(summaries: Sequence[Summary]) -> str:
     if not covered:
         return "Too short to judge: the runs end before the estimates were to have converged."
     least = min(covered, key=lambda key: covered[key])
-    told.append(f"Over all runs ±2σ covers the truth for {covered[least]:.0f} % of the time or more (least: {least}).")
+    told.append(
+        f"Over all runs ±2σ covers every truth for at least {covered[least]:.0f} % of the time (least: {least})."
+    )
     tested = [summary["whiteness"]["white"] for summary in summaries if summary["whiteness"] is not None]
     if tested:
         told.append(f"Residuals of {sum(tested)} of {len(tested)} runs pass the test for whiteness. {CANNOT_SEE}")

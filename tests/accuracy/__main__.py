@@ -35,9 +35,9 @@ def main() -> int:
         tables.written(_text(table.file), table.file)  # before runs that could then not be compared
     made = _made()
     if args.accept:
-        for file, table in made.items():
-            write_text(ROOT / file, tables.replaced(_text(file), file, table))
-            print(f"Written to {file}:\n{table}")
+        for file, text in made.items():
+            write_text(ROOT / file, tables.replaced(_text(file), file, text))
+            print(f"Written to {file}:\n{text}")
         return 0
     wrong = [
         f"{file}: {difference}"

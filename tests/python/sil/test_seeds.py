@@ -66,7 +66,7 @@ def test_limits_are_for_the_median_error_and_all_coverage(runs: list[Any], expec
 def test_the_verdict_says_what_was_tested_and_what_that_cannot_see() -> None:
     said = seeds.verdict(RUNS)
     assert said.startswith(
-        "All limits kept. Over all runs ±2σ covers the truth for 70 % of the time or more (least: m_p)."
+        "All limits kept. Over all runs ±2σ covers every truth for at least 70 % of the time (least: m_p)."
     )
     assert "Residuals of 1 of 3 runs pass the test for whiteness. That test does not see friction" in said
     assert seeds.verdict([summary(1, None, None, [None])]).startswith("Too short to judge")
