@@ -12,7 +12,7 @@ import multiprocessing
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from lever_cdkf.host_tools.tables import Row, Tables
@@ -20,6 +20,9 @@ from numpy.typing import NDArray
 
 from .summary import missed_limits
 from .whiteness import CANNOT_SEE
+
+_Task = TypeVar("_Task")
+_Done = TypeVar("_Done")
 
 FloatArray = NDArray[np.float64]
 Summary = dict[str, Any]
@@ -42,26 +45,33 @@ class Task:
 
 
 def run(tasks: Sequence[Task], jobs: int, progress: Progress | None = None) -> list[Summary]:
-    """The summaries of all runs in the order of `tasks`, from `jobs` processes. Interrupted, it leaves no process
-    behind. Raises LeverError."""
-    summaries = []
-    for done, (task, summary) in enumerate(zip(tasks, _summaries(tasks, jobs), strict=True), 1):
-        summaries.append(summary)
+    """The summaries of all runs in the order of `tasks`, from `jobs` processes. Raises LeverError."""
+    return in_processes(simulate, tasks, jobs, progress)
+
+
+def in_processes(
+    function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: int, progress: Progress | None = None
+) -> list[_Done]:
+    """function(task) of all tasks, in their order, from `jobs` processes. Interrupted, it leaves no process behind."""
+    results = []
+    for done, (task, result) in enumerate(zip(tasks, _results(function, tasks, jobs), strict=True), 1):
+        results.append(result)
         if progress is not None:
             progress(done, len(tasks), str(task))
-    return summaries
+    return results
 
 
-def _summaries(tasks: Sequence[Task], jobs: int) -> Iterator[Summary]:
+def _results(function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
     if jobs == 1 or len(tasks) == 1:
-        yield from map(_simulate, tasks)
+        yield from map(function, tasks)
         return
     context = multiprocessing.get_context("spawn")
     with context.Pool(min(jobs, len(tasks)), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        yield from pool.imap(_simulate, tasks)
+        yield from pool.imap(function, tasks)
 
 
-def _simulate(task: Task) -> Summary:
+def simulate(task: Task) -> Summary:
+    """The summary of one run. Raises LeverError."""
     from lever_cdkf.host_tools.bus import LeverBus
 
     from . import runner, scenario

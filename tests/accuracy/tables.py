@@ -18,7 +18,7 @@ from lever_cdkf.sil.seeds import FloatArray, Summary
 
 SEEDS = 20
 """Runs of each scenario: seeds 1 to 20."""
-BEGIN = "<!-- accuracy: written by `cmake --build build --target accuracy-accept` -->\n"
+BEGIN = "<!-- accuracy of {name}: written by `cmake --build build --target accuracy-accept` -->\n"
 END = "<!-- accuracy: end -->\n"
 
 _FREQUENCY, _DAMPING = (each.key for each in DYNAMICS)
@@ -26,10 +26,22 @@ _NOTHING = "–"
 
 
 @dataclass(frozen=True)
+class Place:
+    """Where a table stands."""
+
+    file: str
+    name: str
+    """In the mark above it."""
+
+    def __str__(self) -> str:
+        return f"{self.file}, {self.name}"
+
+
+@dataclass(frozen=True)
 class Table:
     """A table in a README, a row for each scenario."""
 
-    file: str
+    place: Place
     scenarios: tuple[str, ...]
     columns: tuple[str, ...]
     cells: Callable[[Sequence[Summary]], tuple[str, ...]]
@@ -38,9 +50,13 @@ class Table:
     def text(self, summaries: Mapping[str, Sequence[Summary]]) -> str:
         """As Markdown; `summaries` by the name of the scenario."""
         count = len(summaries[self.scenarios[0]])
-        rows = [(f"{count} seeds", *self.columns), ("---",) * (1 + len(self.columns))]
-        rows += [(f"`{name}`", *self.cells(summaries[name])) for name in self.scenarios]
-        return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+        rows = [(f"`{name}`", *self.cells(summaries[name])) for name in self.scenarios]
+        return markdown((f"{count} seeds", *self.columns), rows)
+
+
+def markdown(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    """A table as Markdown."""
+    return "".join(f"| {' | '.join(row)} |\n" for row in (header, ("---",) * len(header), *rows))
 
 
 def _all_quantities(summaries: Sequence[Summary]) -> tuple[str, ...]:
@@ -75,7 +91,7 @@ def _dynamics(summaries: Sequence[Summary]) -> tuple[str, ...]:
 
 TABLES = (
     Table(
-        "README.md",
+        Place("README.md", "scenarios"),
         (
             "steady", "fatigue_drift", "sudden_grip", "re_trim", "high_noise", "sensor_dropout", "base_only", "two_dof",
             "mayo_ectomorphic", "mayo_mesomorphic",
@@ -84,7 +100,7 @@ TABLES = (
         _all_quantities,
     ),
     Table(
-        "sil/README.md",
+        Place("sil/README.md", "pilots"),
         ("two_dof", "mayo_ectomorphic", "mayo_mesomorphic", "steady"),
         (
             "f_n: bias", "rms", "±2σ covers", "ζ: bias", "rms", "±2σ covers", "NIS ÷ expected", "correlation",
@@ -123,23 +139,24 @@ def _number(value: float, digits: int = 1) -> str:
 # --- in the files ----------------------------------------------------------------------------------------------------
 
 
-def written(text: str, file: str) -> str:
+def written(text: str, place: Place) -> str:
     """The table in the text of a README. Raises LeverError."""
-    return _parts(text, file)[1]
+    return _parts(text, place)[1]
 
 
-def replaced(text: str, file: str, table: str) -> str:
+def replaced(text: str, place: Place, table: str) -> str:
     """The text of a README with another table. Raises LeverError."""
-    before, _, after = _parts(text, file)
+    before, _, after = _parts(text, place)
     return before + table + after
 
 
-def _parts(text: str, file: str) -> tuple[str, str, str]:
-    begin, end = text.find(BEGIN), text.find(END)
-    if begin < 0 or end < begin:
-        raise LeverError(f"{file}: has no table between the lines {BEGIN.strip()} and {END.strip()}")
-    begin += len(BEGIN)
-    return text[:begin], text[begin:end], text[end:]
+def _parts(text: str, place: Place) -> tuple[str, str, str]:
+    mark = BEGIN.format(name=place.name)
+    before, begin, rest = text.partition(mark)
+    table, end, after = rest.partition(END)
+    if not (begin and end):
+        raise LeverError(f"{place.file}: has no table between the lines {mark.strip()} and {END.strip()}")
+    return before + begin, table, end + after
 
 
 def rows(table: str) -> list[list[str]]:
