@@ -183,7 +183,7 @@ def _quantity_row(summaries: Sequence[Summary], key: str, numbers: Sequence[int]
         "coverage worst [%]": _finite(np.min(covered)),
         "to 5 % median [s]": _finite(np.median(times)),
         "to 5 % worst [s]": _finite(np.max(times)),
-        "never to 5 % [%]": 100.0 * float(np.mean(np.isinf(times))),
+        "never to 5 % [%]": _finite(100.0 * np.mean(np.isinf(times))),
     }
 
 
@@ -194,8 +194,8 @@ def _fault_rows(summaries: Sequence[Summary]) -> list[Row]:
     return [
         {
             "fault": name,
-            "share median [%]": float(np.median(values)),
-            "share largest [%]": max(values),
+            "share median [%]": _finite(np.median(values)),
+            "share largest [%]": _finite(max(values)),
             "runs with it [1]": sum(value > 0.0 for value in values),
         }
         for name, values in shares.items()
@@ -208,15 +208,15 @@ def _runs_row(summaries: Sequence[Summary]) -> Row:
     return {
         "runs [1]": len(summaries),
         "samples a run [1]": summaries[0]["samples"],
-        "NIS / expected median [1]": float(np.median(ratios)) if ratios else None,
-        "NIS / expected largest [1]": max(ratios, default=None),
-        "correlation median [1]": float(np.median(correlations)) if correlations else None,
-        "correlation largest [1]": max(correlations, default=None),
+        "NIS / expected median [1]": _finite(np.median(ratios)) if ratios else None,
+        "NIS / expected largest [1]": _finite(max(ratios, default=math.nan)),
+        "correlation median [1]": _finite(np.median(correlations)) if correlations else None,
+        "correlation largest [1]": _finite(max(correlations, default=math.nan)),
         "simulated time [s]": sum(summary["simulated_time_s"] for summary in summaries),
         "firmware": summaries[0]["firmware"]["version"],
     }
 
 
 def _finite(value: float | np.floating[Any]) -> float | None:
-    """None where there is no such error, share or time."""
-    return float(value) if math.isfinite(value) else None
+    """To two decimals, which is more than seeds can tell; None where there is no such error, share or time."""
+    return round(float(value), 2) if math.isfinite(value) else None
