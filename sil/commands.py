@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,6 +29,19 @@ before the next one is sent. Prints how good the estimates were; with --out also
   summary.json  errors, coverage, times to converge, innovations, counts, and a verdict
   report.html   all of it as one page for a browser
 
+With --seeds N it runs the scenario N times, each time with other random numbers, in as many processes as there are
+cores, and prints median and worst over the runs: a single run is one draw of noise and vibration. Its only file is
+that of --json. The columns are, for each quantity,
+
+  rms         error relative to the truth from converged_after on, of a run: its median and worst over the runs
+  coverage    share of that time for which +-2 sigma holds the truth: of all runs together, of the median and worst run
+  to 5 %      time from the start and from each jump of the truth until the error stays within 5 %
+  never       share of the starts and jumps after which it does not
+
+and of faults the share of that time with each. Those that warn say that the estimates are not to be trusted: a sensor
+(theta, theta_dot, torque, base), innovation, bound, mismatch, calibration, hands_off.
+
+
 With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
 is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
 and lever_can with --lock-step; bus.log is the same to the byte but for the channel's name.
@@ -38,13 +52,16 @@ examples:
   lever sim steady --out out/steady
   lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
   lever sim my_own.toml
+  lever sim steady --seeds 20 --json steady.json           median and worst of 20 runs, a minute on two cores
+  lever sim steady --seed 7 --out out/seed7                one of these runs, with its report
   lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
   lever sim steady --settings > steady.settings; lever_can --can vcan0 --lock-step --settings steady.settings &
   lever sim steady --interface socketcan --channel vcan0
   lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
 
 Exit status: 0 when every sample was answered, the estimator never was in fault, and the limits of the scenario were
-kept; 1 when not, with one line on standard error.
+kept; 1 when not, with one line on standard error. With --seeds the first two are asked of every run, and the limits of
+the median rms error and of the coverage of all runs together.
 """
 _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
 _DEMO = "demo"
@@ -63,7 +80,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     sim.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
     )
-    sim.add_argument("--seed", type=int, help="set the seed of all random numbers")
+    sim.add_argument("--seed", type=int, help="set the seed of all random numbers; with --seeds the first (default: 1)")
+    sim.add_argument("--seeds", type=int, metavar="N", help="run N times, with consecutive seeds: median and worst")
+    sim.add_argument("--jobs", type=int, metavar="N", help="with --seeds: processes (default: one a core)")
     sim.add_argument("--realtime", action="store_true", help="pace the samples by the clock")
     sim.add_argument(
         "--settings",
@@ -91,7 +110,12 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         return _list(args.json)
     overrides = _from_file(args.settings) if args.settings not in (None, _PRINT) else []
-    overrides += args.set + ([] if args.seed is None else [f"seed={args.seed}"])
+    overrides += args.set
+    if args.seeds is not None:
+        return _simulate_seeds(args, overrides)
+    if args.jobs is not None:
+        raise LeverError("--jobs is for --seeds: a single run is one process")
+    overrides += [] if args.seed is None else [f"seed={args.seed}"]
     scenario = load(args.scenario, overrides)
     if args.settings == _PRINT:
         from lever_cdkf.host_tools.settings_file import format_config
@@ -102,6 +126,46 @@ def run(args: argparse.Namespace) -> int:
     if channel is None:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
     return _simulate(scenario, args.interface, channel, chosen_options(args), args.out, args.json, args.realtime)
+
+
+def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
+    """`lever sim --seeds`."""
+    from lever_cdkf.host_tools.progress import Progress
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from . import seeds
+    from .scenario import load
+
+    _check_seeds(args)
+    load(args.scenario, overrides)  # what is wrong with it is said once, and at once
+    first = 1 if args.seed is None else args.seed
+    tasks = [seeds.Task(args.scenario, seed, tuple(overrides)) for seed in range(first, first + args.seeds)]
+    with Progress("sim") as progress:
+        summaries = seeds.run(tasks, args.jobs or os.cpu_count() or 1, progress.show)
+    print_tables(seeds.tables(summaries), args.json)
+    print(seeds.verdict(summaries))
+    reasons = seeds.troubles(summaries) + seeds.missed(summaries)
+    if reasons:
+        print(f"lever: {args.scenario}: {'; '.join(reasons)}", file=sys.stderr)
+    return 1 if reasons else 0
+
+
+def _check_seeds(args: argparse.Namespace) -> None:
+    """Raises LeverError for what does not go with --seeds."""
+    for option, number in (("--seeds", args.seeds), ("--jobs", args.jobs)):
+        if number is not None and number < 1:
+            raise LeverError(f"{option} {number}: must be at least 1")
+    for option, given in (
+        ("--out", args.out is not None),
+        ("--realtime", args.realtime),
+        ("--settings without a file", args.settings == _PRINT),
+        (f"--interface {args.interface}", args.interface != "lever"),
+        ("--channel", args.channel is not None),
+        ("--bitrate", args.bitrate is not None),
+        ("--bus-option", bool(args.bus_option)),
+    ):
+        if given:
+            raise LeverError(f"{option} is for a single run: leave out --seeds, and name the run by --seed")
 
 
 def _from_file(path: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Normalised innovations squared against what an honest filter gives, from any number of pieces of a run."""
+"""Normalised innovations squared against what the right covariances give, from any number of pieces of a run."""
 
 from __future__ import annotations
 

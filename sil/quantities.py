@@ -24,6 +24,10 @@ _WORDS = {
 }
 
 
+LEAST_COVERAGE = 0.9
+"""Least share of the time with the truth within +-2 sigma, or sigma is called too small; Gaussian errors: 95.4 %."""
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Something that is estimated."""

@@ -7,6 +7,7 @@ after each jump of the truth on; how long the estimates need until then is what 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from . import whiteness
 from .innovations import Innovations, freedom
 from .loop import Recording
-from .quantities import DYNAMICS, Quantity
+from .quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from .scenario import Scenario
 from .trace import Trace
 
@@ -28,8 +29,8 @@ BoolArray = NDArray[np.bool_]
 MOST_TRANSFERS = 50
 """How often, spread over the run, the transfer function of a truth is looked at for changes."""
 
-HONEST_COVERAGE = 0.9
-"""Share of the time for which +-2 sigma has to cover the truth to be called honest; 95.4 % if Gaussian and white."""
+WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mismatch", "calibration", "hands_off")
+"""Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,12 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
     nis = _nis(scenario, trace)
     count = len(recording.inputs.time)
     modes = _modes(trace)
-    missed = _missed(scenario, quality)
+    fault_shares, flagged_share = _faults(scenario, trace)
+    missed = missed_limits(
+        scenario.limits,
+        {name: entry.rms_percent for name, entry in quality.items()},
+        {name: entry.coverage_2sigma for name, entry in quality.items()},
+    )
     summary: dict[str, Any] = {
         "scenario": {
             "name": scenario.name,
@@ -75,6 +81,8 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
         "unanswered": recording.unanswered,
         "misplaced": recording.misplaced,
         "modes_s": modes,
+        "fault_shares": fault_shares,
+        "flagged_share": flagged_share,
         "missed": missed,
         "simulated_time_s": count * scenario.period,
     }
@@ -178,19 +186,32 @@ def _modes(trace: Trace) -> dict[str, float]:
     return {name: round(count * step, 9) for name, count in samples.items() if count}
 
 
-def _missed(scenario: Scenario, quality: dict[str, Quality]) -> list[str]:
-    """The limits of the scenario that were not kept, in words."""
+def _faults(scenario: Scenario, trace: Trace) -> tuple[dict[str, float], float | None]:
+    """Shares (0 to 1) of the judged time with each fault that there was, and with any of WARNINGS (null: not known)."""
+    column = trace["faults"][judged_samples(scenario, trace["time_s"])]
+    faults = column[np.isfinite(column)].astype(np.int64)
+    if not len(faults):
+        return {}, None
+    bits = {name: bit for bit, name in enum_names("lever_fault").items()}
+    shares = {name: float(np.mean(faults & bit != 0)) for name, bit in bits.items()}
+    warnings = sum(bits[name] for name in WARNINGS)
+    return {name: share for name, share in shares.items() if share > 0.0}, float(np.mean(faults & warnings != 0))
+
+
+def missed_limits(
+    limits: Mapping[str, float] | None, rms_percent: Mapping[str, float | None], coverage: Mapping[str, float | None]
+) -> list[str]:
+    """The limits of a scenario that were not kept, in words; None is not judged."""
     missed = []
-    limits = scenario.limits or {}
-    for name, entry in quality.items():
+    limits = limits or {}
+    for name, rms in rms_percent.items():
         limit = limits.get(name)
-        if limit is not None and entry.rms_percent is not None and entry.rms_percent > 100.0 * limit:
-            missed.append(f"rms error of {name} {entry.rms_percent:.1f} % (limit {100.0 * limit:g} %)")
+        if limit is not None and rms is not None and rms > 100.0 * limit:
+            missed.append(f"rms error of {name} {rms:.1f} % (limit {100.0 * limit:g} %)")
     least = limits.get("coverage")
-    for name, entry in quality.items():
-        coverage = entry.coverage_2sigma
-        if least is not None and coverage is not None and coverage < least:
-            missed.append(f"coverage of {name} {100.0 * coverage:.0f} % (limit {100.0 * least:g} %)")
+    for name, share in coverage.items():
+        if least is not None and share is not None and share < least:
+            missed.append(f"coverage of {name} {100.0 * share:.0f} % (limit {100.0 * least:g} %)")
     return missed
 
 
@@ -257,9 +278,9 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
         return ""
     worst = min(covered, key=lambda name: covered[name])
     percent = f"{100.0 * covered[worst]:.0f} % of the time"
-    if covered[worst] >= HONEST_COVERAGE:
-        return f"The stated uncertainties are honest: ±2σ covers the truth at least {percent}."
-    return f"The stated uncertainty of {_words(worst)} is too small: ±2σ covers the truth only {percent}."
+    if covered[worst] >= LEAST_COVERAGE:
+        return f"In this run ±2σ covers every truth for at least {percent}."
+    return f"In this run the stated σ of {_words(worst)} is too small: ±2σ covers the truth for {percent}."
 
 
 def verdict_nis(nis: dict[str, Any]) -> str:
@@ -273,15 +294,19 @@ def verdict_nis(nis: dict[str, Any]) -> str:
 
 
 def verdict_whiteness(told: dict[str, Any] | None) -> str:
-    """What the autocorrelation of the residual says, in a sentence."""
+    """What the autocorrelation of the residual says, and what it cannot see."""
     if told is None:
         return ""
-    size = f"correlation {told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"
+    size = f"{told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"
     if told["white"]:
-        return f"They are white ({size}): nothing is left over that the model could explain."
+        last = told["average_s"] * len(told["autocorrelation"])
+        return (
+            f"Residuals of the rate pass the test for whiteness up to a lag of {last:g} s (largest correlation {size})."
+            f" {whiteness.CANNOT_SEE}"
+        )
     return (
-        f"They are coloured ({size}; white noise stays within ±{told['band_95']:.2f}): the arm, or a sensor, is not "
-        "what the model assumes."
+        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{told['band_95']:.2f}): "
+        "the arm, or a sensor, is not what the model assumes."
     )
 
 

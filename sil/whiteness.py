@@ -1,9 +1,12 @@
-"""Whether what is left over is noise: the autocorrelation of the residual of theta_dot.
+"""A test for whiteness: the autocorrelation of the residual of theta_dot.
 
 A Kalman filter whose model is right has white innovations (Kailath 1968), and with a settled gain its residual,
 measured minus estimated, is white with them: it is R / S times the innovation. A model that is wrong leaves something
 of the motion in both. At 1 kHz that is far below the noise of a sample, and NIS does not see it; averages over 20 ms
 show it, as the motion stays alike in that time and the noise does not.
+
+The test sees motion, and torque, that the model lacks. It does not see an error that the parameters absorb: friction in
+the lever, a gain or a delay of a sensor. Residuals stay white then, and the parameters are biased.
 """
 
 from __future__ import annotations
@@ -24,6 +27,8 @@ LAGS = 25
 COLOURED = 0.2
 """A correlation that is not put down to chance or tuning. Seen: models that are right leave 0.05 to 0.11 in 40 s, those
 that are asked for the pilots of two_dof and mayo 0.5."""
+CANNOT_SEE = "That test does not see friction in the lever, nor gain and delay of a sensor: these bias the parameters."
+"""For every verdict that says that residuals are white."""
 
 _ONE, _ANY = 1.960, 3.083  # normal deviates that one, or any of LAGS, exceeds with a probability of 5 %
 

@@ -1,5 +1,6 @@
 """What a reader is told of the estimator's model, and of a truth that is of another kind."""
 
+from .. import whiteness
 from .charts import transfer
 from .run import Run
 
@@ -43,7 +44,7 @@ def about(run: Run) -> list[str]:
         told.append(
             f"<strong>The truth of this run is of another kind:</strong> {ABOUT_TRUTH[run.mismatch]}. The "
             "parameters of the estimator's model have no true values then; what can be compared are natural frequency "
-            "and damping ratio, the answer to the floor, and whether the innovations are still noise."
+            "and damping ratio, the answer to the floor, and whether the innovations are white."
         )
     return told
 
@@ -111,9 +112,13 @@ def whiteness_caption(run: Run) -> str:
     told = run.whiteness
     found = ""
     if told is not None:
-        found = " Here it is noise." if told["white"] else " Here it is not: the arm, or a sensor, is not as assumed."
+        found = (
+            f" Here the residual passes as white. {whiteness.CANNOT_SEE}"
+            if told["white"]
+            else " Here the residual is coloured: the arm, or a sensor, is not as assumed."
+        )
     return (
-        "Is what is left over only noise? Measured minus estimated rate, averaged over 20 ms, and how alike it is to "
-        "itself so much later. Noise stays about the band; bars beyond 0.2 mean that something moves the lever in a "
-        f"way that the model does not know.{found}"
+        "Is the residual white? Autocorrelation of measured minus estimated rate, averaged over 20 ms. White noise "
+        "stays about the band; bars beyond 0.2 mean that something moves the lever in a way that the model does not "
+        f"know.{found}"
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from lever_cdkf.host_tools import native
 
-from ..quantities import Quantity
+from ..quantities import LEAST_COVERAGE, Quantity
 from .run import Run
 
 NOTHING = "–"
@@ -51,11 +51,18 @@ def figures_of(run: Run, quantity: Quantity) -> dict[str, Any]:
 def verdict(run: Run) -> str:
     """The headline."""
     text = run.summary.get("verdict") or "A recorded run, with no truth to compare with: what the estimator made of it."
-    mood = {True: "good", False: "bad", None: ""}[run.summary.get("passed")]
+    mood = {True: "" if _in_doubt(run) else "good", False: "bad", None: ""}[run.summary.get("passed")]
     escaped = html.escape(text)
     for quantity in run.parameters:
         escaped = re.sub(rf"\b{quantity.key}\b", quantity.symbol, escaped)
     return f'<p class="verdict {mood}">{escaped}</p>'
+
+
+def _in_doubt(run: Run) -> bool:
+    """Whether the stated sigma, or the model, is not right by this run, whatever its limits allow."""
+    covered = [entry.get("coverage_2sigma") for entry in run.summary.get("parameters", {}).values()]
+    too_small = any(share is not None and share < LEAST_COVERAGE for share in covered)
+    return too_small or (run.whiteness or {}).get("white") is False
 
 
 def cards(run: Run) -> str:
@@ -83,9 +90,10 @@ def _judgement_cards(run: Run, judged: list[Quantity]) -> list[str]:
             f"Root mean square of the error, in % of the truth{since}.",
         ),
         _card(
-            "How honest about its uncertainty",
+            "Coverage of ±2σ",
             rows("coverage_2sigma", percent),
-            "Of the time the truth lay within ±2σ. About 95 % is honest, more is cautious, less is over-confident.",
+            "Of the time the truth lay within ±2σ: 95 % of Gaussian errors do. Errors last for seconds, so a single "
+            "run is partly luck; lever sim --seeds tells of many.",
         ),
         _card(
             "How fast",
@@ -205,16 +213,21 @@ RUN_FIGURES = (
 
 
 def run_table(run: Run) -> str:
-    """Innovations, traffic and time."""
+    """Innovations, traffic, time and faults."""
     nis = run.summary.get("nis") or {}
     inside = nis.get("inside_95_percent")
     rows = [
         ("mean normalised innovation squared", number(nis.get("mean")), "1"),
-        ("the same of an honest filter", number(nis.get("expected")), "1"),
+        ("the same if σ is right", number(nis.get("expected")), "1"),
         ("innovations inside their 95 % bound", number(None if inside is None else 100.0 * inside), "%"),
         ("largest correlation of residuals (white noise: 0)", number((run.whiteness or {}).get("largest")), "1"),
     ]
     rows += [(label, number(run.summary.get(key)), unit) for key, label, unit in RUN_FIGURES]
+    shares = {**run.summary.get("fault_shares", {}), "any that warns": run.summary.get("flagged_share")}
+    rows += [
+        (f"of the judged time with fault: {html.escape(name)}", number(None if share is None else 100.0 * share), "%")
+        for name, share in shares.items()
+    ]
     return table(("", "value", "unit"), [row for row in rows if row[1] != NOTHING])
 
 

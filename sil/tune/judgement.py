@@ -39,7 +39,7 @@ class Fit:
 
     @property
     def nis(self) -> float:
-        """Mean of the normalised innovation squared, an output [1]: 1 where the filter is honest about itself."""
+        """Mean of the normalised innovation squared, an output [1]: 1 where the stated covariance is right."""
         return float(np.sum(self.innovations["nis"]) / max(1, int(np.sum(self.innovations["size"]))))
 
     @property

@@ -12,6 +12,7 @@ from ..report.document import document
 from ..report.figure import Figure, Spec, axis, band, dots, line
 from ..report.page import Page
 from ..report.words import number, table
+from ..whiteness import CANNOT_SEE
 from .judgement import Fit
 from .search import Found
 
@@ -94,8 +95,8 @@ def _innovations(page: Page, fits: Sequence[Fit]) -> tuple[str, ...]:
         page.figure(
             "correlation",
             _correlation(shown),
-            f"Autocorrelation of the innovations of θ̇ on the part {part}, as averages over 20 ms. In the band (95 %) "
-            "they are white: other settings could not explain more.",
+            f"Autocorrelation of the innovations of θ̇ on the part {part}, as averages over 20 ms. White noise stays in "
+            f"the band at 95 % of the lags. {CANNOT_SEE}",
         ),
     )
 

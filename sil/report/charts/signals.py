@@ -95,7 +95,7 @@ def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
     greatest = float(ratio.max())
     scale = {"type": "log"} if greatest > 10.0 else {"range": [0.0, max(2.0, 1.1 * greatest)]}
     figure = Figure([axis("NIS per output [1]", **scale)], time_axis(run.end), 280)
-    figure.add(*band(time, low, high, "95 % of an honest filter", "chance-band"))
+    figure.add(*band(time, low, high, "95 % if σ is right", "chance-band"))
     figure.add(dots(time, ratio, f"average over {averages.seconds:g} s", "estimate"))
     figure.mark(run.changes)
     return figure

@@ -90,7 +90,7 @@ def test_every_model_of_the_truth_has_words(tmp_path: Path) -> None:
     text = "".join(page.text)
     assert "a hand that follows the cabin as Mayo (1989) measured it" in text
     assert "poles of the hand's transfer function" in text
-    assert "Here it is not: the arm, or a sensor, is not as assumed." in text
+    assert "Here the residual is coloured: the arm, or a sensor, is not as assumed." in text
 
 
 def test_without_a_summary_the_model_is_that_of_the_columns(black_box: tuple[Result, Reader], tmp_path: Path) -> None:

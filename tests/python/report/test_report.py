@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.native import enum_names
-from lever_cdkf.sil.report import picture, write_report
+from lever_cdkf.sil.report import picture, words, write_report
 from lever_cdkf.sil.report.charts.health import FAULT_WORDS
-from lever_cdkf.sil.report.run import COHERENT
+from lever_cdkf.sil.report.run import COHERENT, Run
 from lever_cdkf.sil.runner import Result
 
 from .reading import Reader, figures, first_number, read, unpack
@@ -106,8 +106,23 @@ def test_cards_and_headline_say_what_the_summary_says(page: Reader, result: Resu
         assert f"{100 * expected['coverage_2sigma']:.0f} % {name}" in text
     verdict = result.summary["verdict"]
     assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
-    mood = "good" if result.summary["passed"] else "bad"
-    assert ("p", {"class": f"verdict {mood}"}) in page.tags
+
+
+@pytest.mark.parametrize(
+    ("passed", "covered", "white", "mood"),
+    [
+        (True, 0.95, True, "good"),
+        (True, 0.85, True, ""),  # what the limits allow is no proof of the stated sigma
+        (True, 0.95, False, ""),
+        (False, 0.95, True, "bad"),
+    ],
+)
+def test_the_headline_is_good_only_if_sigma_and_whiteness_are(
+    passed: bool, covered: float, white: bool, mood: str, result: Result
+) -> None:
+    entries = {key: entry | {"coverage_2sigma": covered} for key, entry in result.summary["parameters"].items()}
+    made = {"passed": passed, "parameters": entries, "whiteness": result.summary["whiteness"] | {"white": white}}
+    assert f'class="verdict {mood}"' in words.verdict(Run(result.trace, result.summary | made))
 
 
 def test_all_settings_are_shown(page: Reader, result: Result) -> None:
@@ -232,7 +247,7 @@ def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Re
     used = nis > 0.0
     middle = np.flatnonzero(np.isclose(unpack(trace["x"]), 4.1245, atol=1e-3))[0]
     assert unpack(trace["y"])[middle] == pytest.approx(nis[used].sum() / outputs[used].sum(), rel=1e-5)
-    upper = traces(page, "figure-innovations", "95 % of an honest filter")[1]
+    upper = traces(page, "figure-innovations", "95 % if σ is right")[1]
     x, height = unpack(upper["x"]), unpack(upper["y"])
     assert height[np.abs(x - 12.5) < 0.3].min() > height[np.abs(x - 5.0) < 0.3].max()  # one output: more scatter
 
@@ -248,7 +263,7 @@ def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, re
     assert float(values["largest correlation of residuals (white noise: 0)"]) == pytest.approx(
         told["largest"], rel=5e-3
     )
-    assert "Here it is noise." in "".join(page.text)
+    assert "Here the residual passes as white." in "".join(page.text)
 
 
 def test_health_names_what_happened_when_it_happened(page: Reader) -> None:

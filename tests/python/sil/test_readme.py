@@ -21,7 +21,7 @@ def blocks(root: Path, language: str) -> list[str]:
 def test_shell(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     lines = "".join(blocks(root, "sh")).splitlines()
-    assert len(lines) == 8
+    assert len(lines) == 9
     for line in lines:
         assert cli.main(shlex.split(line)[1:]) == 0, line
     assert (tmp_path / "out/steady/report.html").is_file()

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.native import enum_names
 from lever_cdkf.sil import loop, summary
 from lever_cdkf.sil.quantities import quantities
 from lever_cdkf.sil.scenario import Scenario
@@ -50,7 +51,7 @@ def perfect(recording: loop.Recording) -> Trace:
         trace[quantity.column("sigma")] = 0.01 * values[quantity.key]
     trace["nis"] = random.chisquare(2, COUNT)
     trace["mode"] = np.where(TIME < 0.1, 1.0, 2.0)
-    return trace | {name: np.zeros(COUNT) for name in ("lost", "corrupt", "late", "restarts")}
+    return trace | {name: np.zeros(COUNT) for name in ("faults", "lost", "corrupt", "late", "restarts")}
 
 
 def test_a_perfect_estimate_is_perfect(recording: loop.Recording) -> None:
@@ -60,7 +61,7 @@ def test_a_perfect_estimate_is_perfect(recording: loop.Recording) -> None:
         assert entry["time_to_10_percent_s"] == entry["time_to_5_percent_s"] == [0.0, 0.0]
     assert made["passed"]
     assert made["verdict"].startswith("All limits kept. Rms errors after convergence: m_p 0.0 %")
-    assert "honest" in made["verdict"]
+    assert "In this run ±2σ covers every truth for at least 100 % of the time." in made["verdict"]
     assert made["modes_s"] == {"align": 0.1, "run": 9.9}
     assert made["scenario"]["changes_s"] == [0.0, 4.0]
 
@@ -77,7 +78,7 @@ def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.R
     assert not made["passed"]
     assert made["missed"] == ["rms error of m_p 5.4 % (limit 5 %)", "coverage of m_p 0 % (limit 90 %)"]
     assert "Limits missed: rms error of m_p 5.4 % (limit 5 %)" in made["verdict"]
-    assert "stated uncertainty of m_p is too small" in made["verdict"]
+    assert "In this run the stated σ of m_p is too small" in made["verdict"]
 
 
 def test_coverage_of_a_gaussian_error_is_that_of_two_sigma(recording: loop.Recording) -> None:
@@ -141,6 +142,23 @@ def test_faults_and_missing_answers_fail_a_run(recording: loop.Recording) -> Non
     assert "the estimator was in fault for 0.1 s" in made["verdict"]
 
 
+def test_faults_are_shares_of_the_judged_time(recording: loop.Recording) -> None:
+    """6 s of 10 are judged: those from 2 s after the start and after the jump at 4 s on."""
+    bits = {name: bit for bit, name in enum_names("lever_fault").items()}
+    trace = perfect(recording)
+    trace["faults"][:2500] = bits["mismatch"] + bits["change"]  # half a second of it judged
+    trace["faults"][7000:8000] = bits["bound"]
+    trace["faults"][8000:8500] = bits["excitation"]
+    trace["faults"][9400:] = np.nan  # HEALTH has not told
+    made = summary.build(recording, trace)
+    expected = {"bound": 1.0, "change": 0.5, "mismatch": 0.5, "excitation": 0.5}
+    assert made["fault_shares"] == pytest.approx({name: seconds / 5.4 for name, seconds in expected.items()})
+    assert made["flagged_share"] == pytest.approx(1.5 / 5.4)
+    trace["faults"][:] = np.nan
+    made = summary.build(recording, trace)
+    assert (made["fault_shares"], made["flagged_share"]) == ({}, None)
+
+
 def test_settings_of_the_estimator_that_are_not_the_scenarios_are_told(recording: loop.Recording) -> None:
     crc = recording.scenario.config.settings_crc
     pages = {"firmware_major": 0.0, "firmware_minor": 2.0, "firmware_patch": 0.0, "contract": 2.0}
@@ -195,12 +213,23 @@ def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(
         assert denominator == pytest.approx(expected)
 
 
+def test_white_residuals_are_a_test_passed_and_no_proof_of_the_model() -> None:
+    told = {"largest": 0.08, "largest_after_s": 0.06, "band_95": 0.04, "average_s": 0.02, "autocorrelation": [0.0] * 25}
+    said = summary.verdict_whiteness(told | {"white": True})
+    assert said.startswith(
+        "Residuals of the rate pass the test for whiteness up to a lag of 0.5 s (largest correlation 0.08"
+    )
+    assert all(unseen in said for unseen in ("friction", "gain", "delay"))
+    assert "coloured (correlation 0.08 after 60 ms; white" in summary.verdict_whiteness(told | {"white": False})
+    assert summary.verdict_whiteness(None) == ""
+
+
 def test_the_keys_are_those_of_the_contract(recording: loop.Recording) -> None:
     made = summary.build(recording, perfect(recording))
     summary.add_wall_time(made, 1.0)
     assert set(made) >= {
         "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "restarts", "unanswered",
-        "misplaced", "firmware", "wall_time_s",
+        "misplaced", "firmware", "fault_shares", "flagged_share", "wall_time_s",
         "simulated_time_s", "wall_time_per_simulated_time", "verdict",
     }  # fmt: skip
     assert set(made["parameters"]) == {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
