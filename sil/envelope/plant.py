@@ -106,7 +106,8 @@ class Plant:
         self._hardware, self._period = h, lanes.period
         self._spring, self._damper = k_p * h.length, wide["c_p"] * h.length
         rest = self._spring * np.sin(trim) + h.stiffness * (trim - trim[0]) / (h.length * np.cos(trim))
-        self._drive = h.forcing_mass(m_p) * lanes.z_ddot - np.where(k_p > 0.0, rest, 0.0)
+        self._drive = h.forcing_mass(m_p) * lanes.z_ddot
+        self._rest = np.where(k_p > 0.0, rest, 0.0)
         self._inverse = np.broadcast_to(1.0 / h.moving_inertia(m_p), (count, width))
         self._torque = np.broadcast_to(lanes.tau_m + lanes.disturbance + h.stiffness * trim[0], (count, width))
         self._friction = np.broadcast_to(lanes.friction, (count, width))
@@ -132,7 +133,7 @@ class Plant:
 
     def _acceleration(self, i: int, drive: FloatArray, torque: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
         cosine = np.cos(x)
-        arm = drive + self._spring[i] * np.sin(x) + self._damper[i] * cosine * v
+        arm = drive - self._rest[i] + self._spring[i] * np.sin(x) + self._damper[i] * cosine * v
         other = torque - self._hardware.damping * v - self._hardware.stiffness * x
         if self._rubs:
             other -= self._friction[i] * v / np.sqrt(v * v + STOP_RATE**2)
