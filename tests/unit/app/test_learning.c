@@ -35,7 +35,7 @@ static enum lever_mode run(uint32_t count, bool blind)
     enum lever_mode mode = LEVER_MODE_INIT;
     for (uint32_t k = 0u; k < count; k++) {
         const lever_sample_t sample = blind ? rig_sample_blind(&rig) : rig_sample(&rig);
-        mode = estimator_update(&estimator, &sample);
+        mode = estimator_update(&estimator, &sample, 0.0f);
     }
     return mode;
 }
