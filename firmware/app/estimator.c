@@ -41,7 +41,7 @@ static void start_filter(estimator_t *estimator)
     cdkf->output_noise[0] = s->theta_noise;
     cdkf->output_noise[1] = s->theta_dot_noise;
     cdkf->considered_sigma[CDKF_BASE_GAIN] = s->z_ddot_gain_sigma;
-    cdkf->considered_sigma[CDKF_BASE_DELAY] = s->z_ddot_delay_sigma;
+    cdkf->considered_sigma[CDKF_BASE_DELAY] = s->z_ddot_delay_sigma / s->sample_period;
     cdkf->considered_sigma[CDKF_TORQUE_GAIN] = s->tau_m_gain_sigma;
     cdkf->considered_sigma[CDKF_FRICTION] = s->lever_friction_sigma;
     cdkf_start_state(cdkf, origin, cdkf->output_noise);
@@ -90,12 +90,6 @@ static bool is_usable(estimator_t *estimator, float value, bool valid, float mos
     return usable;
 }
 
-/* A plausible value that has not stuck. */
-static bool is_alive(estimator_t *estimator, enum monitor_signal signal, float value, bool usable, float elapsed)
-{
-    return usable && !monitor_is_stuck(&estimator->learning.monitor, signal, value, elapsed);
-}
-
 /* The true base acceleration of a sensor with gain and delay, the delay by extrapolation. */
 static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 {
@@ -110,13 +104,14 @@ static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 static checked_t check(estimator_t *estimator, const lever_sample_t *sample, float own_torque, float elapsed)
 {
     checked_t checked = {.y = {sample->theta, sample->theta_dot}};
+    monitor_t *monitor = &estimator->learning.monitor;
     const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
     const bool torque = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);
-    checked.valid[0] = is_alive(estimator, MONITOR_THETA, sample->theta, theta, elapsed);
-    checked.valid[1] = is_alive(estimator, MONITOR_THETA_DOT, sample->theta_dot, theta_dot, elapsed);
-    checked.base = is_alive(estimator, MONITOR_Z_DDOT, sample->z_ddot, base, elapsed);
+    checked.valid[0] = theta && monitor_is_alive(monitor, MONITOR_THETA, sample->theta);
+    checked.valid[1] = theta_dot && monitor_is_alive(monitor, MONITOR_THETA_DOT, sample->theta_dot);
+    checked.base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked.tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
     checked.z_ddot = checked.base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked.z_ddot;
@@ -128,7 +123,7 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample, flo
     note(estimator, !checked.valid[0], LEVER_FAULT_THETA);
     note(estimator, !checked.valid[1], LEVER_FAULT_THETA_DOT);
     note(estimator, !torque, LEVER_FAULT_TORQUE);
-    note(estimator, !checked.base || estimator->learning.monitor.base_wrong, LEVER_FAULT_BASE);
+    note(estimator, !checked.base || monitor->base_wrong, LEVER_FAULT_BASE);
     note(estimator, estimator->communication_fault, LEVER_FAULT_COMMUNICATION);
     estimator->communication_fault = false;
     return checked;
@@ -164,7 +159,7 @@ static void average(estimator_t *estimator, float elapsed)
     averages_t *averages = &estimator->averages;
     const float share = (elapsed < time) ? (elapsed / time) : 1.0f;
     averages->excitation_square += share * (squared(estimator->cdkf.x[1]) - averages->excitation_square);
-    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed / MOTION_TIME) : 1.0f) *
+    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed * (1.0f / MOTION_TIME)) : 1.0f) *
                                (squared(estimator->cdkf.x[1]) - averages->motion_square);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);

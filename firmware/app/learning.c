@@ -107,9 +107,7 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     } else {
         monitor_trust_base(&learning->monitor);
     }
-    const bool stuck = monitor_has_stuck(&learning->monitor);
-    const bool fails = base_wrong || (stuck && !learning->monitor.had_stuck);
-    learning->monitor.had_stuck = stuck;
+    const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong;
     if (fails || (held && learning->hands.off)) {
         learning_take_back(learning, cdkf);
     } else if (!held && !learning->hands.off) { /* another grip */

@@ -10,15 +10,15 @@
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. */
 static float friction(float rate)
 {
-    return rate / sqrtf((rate * rate) + (STOP_RATE * STOP_RATE));
+    return rate / (fabsf(rate) + STOP_RATE);
 }
 
 /* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
  * measured later by the delay. */
-static void considered_errors(const estimator_t *estimator, float z_ddot, float period, float error[CDKF_CONSIDERED])
+static void considered_errors(const estimator_t *estimator, float z_ddot, float error[CDKF_CONSIDERED])
 {
     error[CDKF_BASE_GAIN] = -z_ddot;
-    error[CDKF_BASE_DELAY] = (z_ddot - estimator->z_ddot) / period;
+    error[CDKF_BASE_DELAY] = z_ddot - estimator->z_ddot; /* in sample periods */
     error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
     error[CDKF_FRICTION] = -friction(estimator->cdkf.x[1]);
 }
@@ -51,7 +51,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
         step.z_ddot = 0.0f;
         cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
     }
-    considered_errors(estimator, next_z_ddot, period, error);
+    considered_errors(estimator, next_z_ddot, error);
     cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
     estimator->z_ddot = next_z_ddot;
     estimator->tau_m = next_tau_m;
