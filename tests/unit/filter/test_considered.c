@@ -104,17 +104,18 @@ static double found_effect(uint32_t c, uint32_t i)
     const cdkf_t *with = &filter[c];
     const cdkf_t *without = &filter[C];
     const uint32_t k = i - (uint32_t)L; /* of the state */
-    const double difference = (i < (uint32_t)L) ? ((double)without->w[i] - (double)with->w[i])
-                                                : ((truth[c][k] - (double)with->x[k]) -
-                                                      (truth[C][k] - (double)without->x[k]));
+    const double difference = (i < (uint32_t)L)
+                                  ? ((double)without->w[i] - (double)with->w[i])
+                                  : ((truth[c][k] - (double)with->x[k]) - (truth[C][k] - (double)without->x[k]));
     return difference / ERROR;
 }
 
 /* Through learning in part and fully, walk and forgetting, missing outputs; in the dual filter and the joint. */
 static void test_an_error_makes_of_the_estimates_what_is_said(void)
 {
+    const double least[PAIR_Z] = {0.05, 0.05, 0.05, 1.0e-4, 5.0e-3};
+    double largest[PAIR_Z] = {0.0};
     for (uint32_t repeat = 0u; repeat < 10u; repeat++) {
-        double largest[PAIR_Z] = {0.0};
         start(repeat);
         for (uint32_t block = 0u; block < (uint32_t)BLOCKS; block++) {
             for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
@@ -126,13 +127,13 @@ static void test_an_error_makes_of_the_estimates_what_is_said(void)
                 for (uint32_t i = 0u; i < (uint32_t)PAIR_Z; i++) {
                     const double wanted = effect(&filter[C], c, i);
                     largest[i] = fmax(largest[i], fabs(wanted));
-                    TEST_ASSERT_DOUBLE_WITHIN((5.0e-3 * largest[i]) + 1.0e-5, wanted, found_effect(c, i));
+                    TEST_ASSERT_DOUBLE_WITHIN((1.0e-2 * largest[i]) + 4.0e-5, wanted, found_effect(c, i));
                 }
             }
         }
-        for (uint32_t i = 0u; i < (uint32_t)PAIR_Z; i++) {
-            TEST_ASSERT_TRUE(largest[i] > 0.02); /* it did make something of each */
-        }
+    }
+    for (uint32_t i = 0u; i < (uint32_t)PAIR_Z; i++) {
+        TEST_ASSERT_TRUE(largest[i] > least[i]); /* they did make something of each */
     }
 }
 
@@ -140,6 +141,7 @@ static void test_an_error_makes_of_the_estimates_what_is_said(void)
 static void test_the_score_of_an_error_estimates_it(void)
 {
     static const bool valid[N] = {true, true};
+    double seen[C] = {0.0};
     start(3u);
     for (uint32_t block = 0u; block < (uint32_t)BLOCKS; block++) {
         for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
@@ -148,11 +150,11 @@ static void test_the_score_of_an_error_estimates_it(void)
         for (uint32_t c = 0u; c < (uint32_t)C; c++) {
             score_t score[C];
             cdkf_constant_scores(&filter[c], score);
-            TEST_ASSERT_TRUE(score[c].information > 1.0f);
-            const double information = (double)score[c].information;
-            TEST_ASSERT_DOUBLE_WITHIN(0.02 * ERROR, ERROR, (double)score[c].vector / information);
+            const double wanted = ERROR * (double)score[c].information;
+            TEST_ASSERT_DOUBLE_WITHIN((0.05 * wanted) + 1.0e-5, wanted, (double)score[c].vector);
+            seen[c] += wanted;
             cdkf_constant_scores(&filter[C], score);
-            TEST_ASSERT_DOUBLE_WITHIN(1.0e-3 * ERROR, 0.0, (double)score[c].vector / information);
+            TEST_ASSERT_DOUBLE_WITHIN(1.0e-5 + (1.0e-3 * wanted), 0.0, (double)score[c].vector);
         }
         if (block == 0u) { /* nothing has been learnt with it: it is as if it had come about now */
             score_t score[C];
@@ -161,6 +163,9 @@ static void test_the_score_of_an_error_estimates_it(void)
             TEST_ASSERT_EQUAL_MEMORY(&score[CDKF_BASE_GAIN], &sudden, sizeof sudden);
         }
         end_block(false);
+    }
+    for (uint32_t c = 0u; c < (uint32_t)C; c++) {
+        TEST_ASSERT_TRUE(seen[c] > 0.01); /* many times the rounding that is allowed for */
     }
 }
 
