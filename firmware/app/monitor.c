@@ -31,7 +31,9 @@ static void watch(stillness_t *of, bool noisy, bool surprised)
     if (changed) {
         of->same = 0u;
         of->stuck = false;
-        of->changes += (of->changes < ALIVE) ? 1 : 0;
+        if (of->changes < ALIVE) {
+            of->changes++;
+        }
     } else if (of->same < STILL) {
         of->same++;
     } else {
