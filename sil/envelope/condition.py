@@ -1,0 +1,85 @@
+"""What a condition is: how the lever moves, what the sensors make of it, and what the firmware must show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .motions import Motion
+from .sensors import Sensors
+
+Interval = tuple[float, float]
+
+REPORTED = ("f_n rms", "f_n covered", "zeta rms", "zeta covered", "flagged")
+"""Figures of every condition whose pilot has a natural frequency."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a figure of measure.FIGURES may be."""
+
+    figure: str
+    most: float | None = None
+    least: float | None = None
+    over: str = "all"
+    """Of the runs: "all" pooled, "median" or "worst"."""
+
+    def holds(self, value: float) -> bool:
+        """Whether a value keeps it; NaN does not."""
+        return (self.most is None or value <= self.most) and (self.least is None or value >= self.least)
+
+    def __str__(self) -> str:
+        bound = f"≤ {self.most:g}" if self.least is None else f"≥ {self.least:g}"
+        return bound if self.over == "all" else f"{self.over} {bound}"
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """The firmware makes the dither itself, and a share of its samples is lost."""
+
+    dither: float = 0.3
+    """rms [N m]"""
+    lost: float = 0.5
+    whole: bool = False
+    """The whole sample, not LEVER_SAMPLE alone."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A row of the table."""
+
+    name: str
+    title: str
+    motion: Motion = field(default_factory=Motion)
+    limits: tuple[Limit, ...] = ()
+    """All must hold; without any the row is reported only."""
+    unless: tuple[Limit, ...] = ()
+    """Or these."""
+    sensors: Sensors = field(default_factory=Sensors)
+    settings: Mapping[str, float] = field(default_factory=dict)
+    """Of the firmware, besides its defaults."""
+    start: float = 20.0
+    """Judged from here on [s]."""
+    end: float | None = None
+    """To here [s]; None: to the end."""
+    events: tuple[Interval, ...] = ()
+    also: tuple[str, ...] = ()
+    """Further figures, reported without a limit."""
+    against: str | None = None
+    """Condition that it is measured against."""
+    runs: int = 1
+    """Runs for each seed, of which each draws anew."""
+    quick: bool = False
+    closed_loop: ClosedLoop | None = None
+
+    @property
+    def window(self) -> Interval:
+        """Judged from and to [s]."""
+        return self.start, self.motion.duration + 1.0 if self.end is None else self.end
+
+    @property
+    def figures(self) -> list[str]:
+        """All that are measured."""
+        always = REPORTED if self.motion.pilot == "arm" else ("flagged",)
+        limited = (limit.figure for limit in (*self.limits, *self.unless))
+        return list(dict.fromkeys((*limited, *self.also, *always)))

@@ -1,0 +1,258 @@
+"""The conditions that a real collective meets, and what the firmware must show in each.
+
+0.3 N m of dither, 1 m/s^2 of base motion, default settings and 60 s unless said; estimates are judged from 20 s on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from .condition import ClosedLoop, Condition, Limit
+from .motions import EVENT, Motion
+from .sensors import Fault, Sensors
+
+_PARAMETERS = ("m_p", "c_p", "k_p")
+
+
+def _most(figure: str, value: float, over: str = "all") -> Limit:
+    return Limit(figure, most=value, over=over)
+
+
+def _least(figure: str, value: float) -> Limit:
+    return Limit(figure, least=value)
+
+
+def _right(rms: float, covered: float = 90.0) -> tuple[Limit, ...]:
+    """Of the natural frequency [%]."""
+    return _most("f_n rms", rms), _least("f_n covered", covered)
+
+
+def _within(sigmas: float) -> tuple[Limit, ...]:
+    """No error is ever larger."""
+    return tuple(_most(f"{name} largest", sigmas) for name in ("f_n", "zeta", "m_p"))
+
+
+_FLAGGED = (_least("flagged", 90.0),)
+_QUIET = _most("flagged", 2.0)
+_ALL_COVERED = tuple(_least(f"{name} covered", 90.0) for name in ("f_n", "zeta", *_PARAMETERS))
+_OF_PARAMETERS = tuple(f"{name} {what}" for name in _PARAMETERS for what in ("rms", "covered"))
+_NO_DITHER = Motion(dither=0.0)
+
+_STEADY = (
+    Condition("steady", "steady flight", limits=(*_right(1.0), _QUIET), also=_OF_PARAMETERS, quick=True),
+    Condition("steady_base_only", "steady flight, no dither", _NO_DITHER, (*_right(2.0), _QUIET), also=_OF_PARAMETERS),
+)
+
+_MOVEMENT = (
+    Condition("sway_2deg_0.3hz", "the pilot moves the lever, ±2° at 0.3 Hz", Motion(sway=(2.0, 0.3)), _right(2.0)),
+    Condition(
+        "sway_5deg_0.3hz", "the pilot moves the lever, ±5° at 0.3 Hz", Motion(sway=(5.0, 0.3)), _right(3.0), quick=True
+    ),
+    Condition("sway_1deg_0.5hz", "the pilot moves the lever, ±1° at 0.5 Hz", Motion(sway=(1.0, 0.5)), _right(2.0)),
+    Condition("wander_1deg", "random movement, 0.05–0.5 Hz, 1° rms", Motion(wander=1.0), _right(1.5)),
+    Condition("wander_1deg_base_only", "the same, no dither", replace(_NO_DITHER, wander=1.0), _right(1.5)),
+    Condition("wander_3deg", "random movement, 0.05–0.5 Hz, 3° rms", Motion(wander=3.0), _right(3.0)),
+    Condition("wander_3deg_base_only", "the same, no dither", replace(_NO_DITHER, wander=3.0), _right(3.0)),
+    Condition("retrim", "re-trim by 8° in 4 s", Motion(retrim=8.0), (_most("f_n rms", 1.2),), quick=True),
+    Condition(
+        "grip_step",
+        "grip step of 30 % that moves the rest angle by 1° in 50 ms",
+        Motion(grip=1.3),
+        (_most("settled", 0.9, "median"), _most("settled", 2.0, "worst")),
+        events=((EVENT, EVENT),),
+        runs=2,
+    ),
+)
+
+_ROUGH = Motion(process_noise=0.5)
+_TORQUES = (
+    Condition(
+        "slow_torque",
+        "unknown torque, 1 N m rms, 0.3 s of correlation",
+        Motion(slow_torque=1.0),
+        _right(3.0, 85.0),
+        _FLAGGED,
+    ),
+    Condition("tremor", "tremor of 0.2 N m, 3–5 Hz", Motion(tremor=0.2), _right(3.0, 85.0), _FLAGGED),
+    Condition("rough_told", "process noise 0.5, told", _ROUGH, settings={"theta_dot_process_noise": 0.5}),
+    Condition(
+        "rough",
+        "rough air: process noise 0.5, set 0.05",
+        _ROUGH,
+        (_most("zeta ratio", 1.3), _least("zeta covered", 85.0)),
+        against="rough_told",
+    ),
+    Condition(
+        "damping_ramp",
+        "c_p from 42 to 18 N s/m as a ramp of 30 s",
+        Motion(damping=(42.0, 18.0, 20.0, 50.0)),
+        (_least("c_p covered", 90.0), _most("lag", 1.5)),
+        start=22.0,
+        end=50.0,
+        also=("c_p rms",),
+    ),
+)
+
+_INVALID = ((25.0, 25.2), (28.0, 29.0), (33.0, 36.0), (41.0, 51.0))
+_OUTAGES = (
+    Condition("rest_20s", "lever and base at rest for 20 s", Motion(pause=(20.0, 40.0)), _within(4.0), quick=True),
+    Condition(
+        "rest_120s", "lever and base at rest for 120 s", Motion(duration=160.0, pause=(20.0, 140.0)), _within(4.0)
+    ),
+    Condition(
+        "base_invalid",
+        "z̈ marked invalid for 0.2, 1, 3 and 10 s",
+        limits=(*_within(3.0), _most("learnt at once", 0.1)),
+        sensors=Sensors(faults=tuple(Fault("z_ddot", "invalid", *interval) for interval in _INVALID)),
+        start=25.0,
+        events=_INVALID,
+        also=("back",),
+        quick=True,
+    ),
+    Condition(
+        "lever_lost",
+        "half of the LEVER_SAMPLEs lost while the firmware dithers",
+        replace(_NO_DITHER, duration=40.0),
+        _within(3.5),
+        closed_loop=ClosedLoop(),
+    ),
+    Condition(
+        "sample_lost",
+        "half of all samples never come while the firmware dithers",
+        replace(_NO_DITHER, duration=40.0),
+        _within(3.5),
+        closed_loop=ClosedLoop(whole=True),
+    ),
+)
+
+
+def _fault(name: str, title: str, what: str, kind: str, soon: float = 0.5, quick: bool = False) -> Condition:
+    """A sensor that fails for 10 s without saying so."""
+    fault = Fault(what, kind, EVENT, EVENT + 10.0)
+    learnt = "learnt" if soon == 0.5 else "learnt late"
+    return Condition(
+        name,
+        title,
+        limits=(_most("to flag", soon), _most(learnt, 0.1), _most("back", 1.0)),
+        sensors=Sensors(faults=(fault,)),
+        start=fault.start,
+        end=fault.end + 8.0,
+        events=((fault.start, fault.end),),
+        also=tuple(limit.figure for limit in _within(0.0)),
+        quick=quick,
+    )
+
+
+def _missing(name: str, title: str, what: str) -> Condition:
+    """A sensor that is not there."""
+    sensors = Sensors(faults=(Fault(what, "invalid"),))
+    return Condition(name, title, limits=(_least("running", 99.0), *_right(3.0, 85.0)), sensors=sensors)
+
+
+def _hands_off(name: str, title: str, dither: float) -> Condition:
+    return Condition(
+        name,
+        title,
+        Motion(dither=dither, released=(25.0, 35.0)),
+        (_most("to HANDS_OFF", 1.0), _most("settled", 2.0)),
+        events=((25.0, 35.0),),
+        start=40.0,
+        also=("learnt late", "back"),
+    )
+
+
+_FAULTS = (
+    _fault("base_stuck", "z̈ stuck but “valid” for 10 s", "z_ddot", "stuck", quick=True),
+    _fault("base_zero", "z̈ zero but “valid” for 10 s", "z_ddot", "zero"),
+    _fault("base_sign", "z̈ of the wrong sign for 10 s", "z_ddot", "sign", 2.0),
+    _fault("theta_stuck", "θ stuck for 10 s", "theta", "stuck"),
+    _fault("theta_dot_stuck", "θ̇ stuck for 10 s", "theta_dot", "stuck", quick=True),
+    Condition(
+        "spikes",
+        "1 % of the θ samples off by 0.3 rad",
+        limits=(_most("σ ratio", 1.2), *_right(1.5)),
+        sensors=Sensors(faults=(Fault("theta", "spikes"),)),
+        against="steady",
+        quick=True,
+    ),
+    _missing("only_theta", "only θ from the start", "theta_dot"),
+    replace(_missing("only_rate", "only θ̇ from the start", "theta"), quick=True),
+    _hands_off("hands_off", "hands off for 10 s, then on", 0.3),
+    _hands_off("hands_off_base_only", "the same, no dither", 0.0),
+)
+
+
+def _off(name: str, title: str, sensors: Sensors) -> Condition:
+    """A sensor that is off, and no setting says so."""
+    return Condition(name, title, limits=_ALL_COVERED, unless=_FLAGGED, sensors=sensors)
+
+
+def _rubbing(friction: float) -> Condition:
+    title = f"Coulomb friction of {friction:g} N m in the lever"
+    return Condition(f"friction_{friction:g}", title, Motion(friction=friction), _ALL_COVERED, _FLAGGED)
+
+
+def _drawn(name: str, title: str, dither: float) -> Condition:
+    """Errors drawn from what the settings state."""
+    gain, delay, friction = 0.02, 0.5e-3, 0.05
+    return Condition(
+        name,
+        title,
+        Motion(friction_sigma=friction, dither=dither),
+        _ALL_COVERED,
+        sensors=Sensors(z_ddot_gain_sigma=gain, z_ddot_delay_sigma=delay, tau_m_gain_sigma=gain),
+        settings={
+            "z_ddot_gain_sigma": gain,
+            "z_ddot_delay_sigma": delay,
+            "tau_m_gain_sigma": gain,
+            "lever_friction_sigma": friction,
+        },
+        also=_OF_PARAMETERS,
+        runs=4,
+    )
+
+
+_CALIBRATION = (
+    _off("base_gain_up", "accelerometer gain 5 % too high", Sensors(z_ddot_gain=1.05)),
+    _off("base_gain_down", "accelerometer gain 5 % too low", Sensors(z_ddot_gain=0.95)),
+    _off("base_late_1ms", "accelerometer 1 ms late", Sensors(z_ddot_delay=1e-3)),
+    _off("base_late_5ms", "accelerometer 5 ms late", Sensors(z_ddot_delay=5e-3)),
+    _off("torque_gain_up", "torque gain 10 % too high", Sensors(tau_m_gain=1.1)),
+    _off("torque_gain_down", "torque gain 10 % too low", Sensors(tau_m_gain=0.9)),
+    _off("angle_gain", "angle and rate gain 2 % too high", Sensors(angle_gain=1.02)),
+    _rubbing(0.1),
+    _rubbing(0.3),
+    Condition(
+        "calibration_told",
+        "gain 1.05, delay 3 ms, torque gain 0.9, friction 0.2 N m, as set",
+        Motion(friction=0.2),
+        (*_right(2.0), *_ALL_COVERED[1:]),
+        sensors=Sensors(z_ddot_gain=1.05, z_ddot_delay=3e-3, tau_m_gain=0.9),
+        settings={"z_ddot_gain": 1.05, "z_ddot_delay": 3e-3, "tau_m_gain": 0.9, "lever_friction": 0.2},
+    ),
+    _drawn("calibration_drawn", "gains, delay and friction drawn from their stated σ", 0.3),
+    _drawn("calibration_drawn_base_only", "the same, no dither", 0.0),
+)
+
+
+def _pilot(name: str, title: str, dither: float) -> Condition:
+    """A pilot whose arm is none that the firmware models."""
+    limits = (_most("θ/z̈ rms", 10.0), _least("θ/z̈ covered", 85.0))
+    return Condition(name, title, Motion(pilot=name, dither=dither), limits, (_least("mismatch", 90.0),))
+
+
+def _reported(condition: Condition) -> Condition:
+    """The same without limits."""
+    return replace(condition, limits=(), unless=(), also=tuple(condition.figures))
+
+
+_PILOTS = (
+    _pilot("two_dof", "arm on a trunk on a seat", 0.3),
+    _pilot("mayo_ectomorphic", "Mayo's ectomorphic pilot", 0.0),
+    _pilot("mayo_mesomorphic", "Mayo's mesomorphic pilot", 0.0),
+    _reported(_pilot("hysteretic", "arm with hysteretic damping", 0.3)),
+    _reported(_pilot("reflex", "arm with a stretch reflex after 35 ms", 0.3)),
+)
+
+CONDITIONS = {row.name: row for row in (*_STEADY, *_MOVEMENT, *_TORQUES, *_OUTAGES, *_FAULTS, *_CALIBRATION, *_PILOTS)}
+"""All by name, in the order of the table."""

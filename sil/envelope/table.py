@@ -1,0 +1,108 @@
+"""The results as rows: for a terminal, for the page, and for other programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from lever_cdkf.host_tools.tables import Row
+
+from .campaign import Result
+from .condition import Limit
+from .measure import FIGURES
+
+HOLDS, MISSED, REPORTED = "holds", "MISSED", "reported"
+
+
+def state(result: Result) -> str:
+    """Whether its limits hold, in a word."""
+    if result.ok:
+        return HOLDS if result.condition.limits else REPORTED
+    return MISSED
+
+
+def lines(results: Sequence[Result]) -> list[Row]:
+    """A line for each figure that has a limit, or for all where none has; the condition stands on its first."""
+    found: list[Row] = []
+    for result in results:
+        everything = figures(result)
+        for i, line in enumerate([line for line in everything if line["limit"]] or everything):
+            head = (result.condition.name, state(result)) if i == 0 else ("", "")
+            found.append({"condition": head[0], "result": head[1], **line})
+    return found
+
+
+def figures(result: Result) -> list[Row]:
+    """A line for each figure of a condition."""
+    return [_line(result, name) for name in result.condition.figures] if result.values else [_problem(result)]
+
+
+def _line(result: Result, name: str) -> Row:
+    figure, values = FIGURES[name], result.values[name]
+    shown = {"all runs": figure.pool(values), "median": _median(values), "worst": figure.worst(values)}
+    return {
+        "figure": name,
+        "unit": figure.unit,
+        **{column: "never" if math.isinf(value) else f"{value:.3g}" for column, value in shown.items()},
+        "limit": limit_text(result, name),
+    }
+
+
+def _problem(result: Result) -> Row:
+    nothing = dict.fromkeys(("unit", "all runs", "median", "worst", "limit"), "")
+    return {"figure": f"not run: {result.problem}", **nothing}
+
+
+def _median(values: Any) -> float:
+    import numpy as np
+
+    return float(np.median(values))
+
+
+def limit_text(result: Result, name: str) -> str:
+    """The limits of a figure; those that do instead of the others come after "or"."""
+    own = ", ".join(str(limit) for limit in result.condition.limits if limit.figure == name)
+    instead = ", ".join(f"or {limit}" for limit in result.condition.unless if limit.figure == name)
+    return "; ".join(part for part in (own, instead) if part)
+
+
+def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
+    """A row for each condition, as JSON has it: what is held against the limits, and all figures of all runs."""
+    return [_row(result) for result in results]
+
+
+def _row(result: Result) -> dict[str, Any]:
+    condition = result.condition
+    limits = (*condition.limits, *condition.unless)
+    return {
+        "name": condition.name,
+        "title": condition.title,
+        "measured": {_key(limit): _number(result.of(limit)) for limit in limits},
+        "limit": {_key(limit): f"{'or ' if limit in condition.unless else ''}{limit}" for limit in limits},
+        "ok": result.ok,
+        "problem": result.problem or None,
+        "runs": max((len(values) for values in result.values.values()), default=0),
+        "figures": [_figure(name, values) for name, values in result.values.items()],
+    }
+
+
+def _key(limit: Limit) -> str:
+    over = "" if limit.over == "all" else f", {limit.over}"
+    return f"{limit.figure}{over} [{FIGURES[limit.figure].unit}]"
+
+
+def _figure(name: str, values: Any) -> dict[str, Any]:
+    figure = FIGURES[name]
+    return {
+        "figure": name,
+        "unit": figure.unit,
+        "all runs": _number(figure.pool(values)),
+        "median": _number(_median(values)),
+        "worst": _number(figure.worst(values)),
+    }
+
+
+def _number(value: float) -> float | None:
+    """JSON has neither infinity, "never", nor NaN, "not measured"."""
+    return float(f"{value:.6g}") if math.isfinite(value) else None

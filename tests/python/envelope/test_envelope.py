@@ -1,0 +1,262 @@
+"""The plant of the envelope against other plants and closed forms, its sensors, and its figures on made-up outcomes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.config import settings_table
+from lever_cdkf.sil import plant as sil_plant
+from lever_cdkf.sil.envelope import feedthrough, measure, motions, pilots, plant
+from lever_cdkf.sil.envelope.condition import Limit
+from lever_cdkf.sil.envelope.conditions import CONDITIONS
+from lever_cdkf.sil.envelope.firmware import Track
+from lever_cdkf.sil.envelope.measure import FIGURES, Outcome, fault_mask
+from lever_cdkf.sil.envelope.motions import Motion, Recording
+from lever_cdkf.sil.envelope.plant import FloatArray
+from lever_cdkf.sil.envelope.sensors import NOISE, Fault, Sensors, measured
+from lever_cdkf.sil.truth import Conditions
+
+QUIET = Motion(duration=8.0, process_noise=0.0)
+SEEDS = range(3)
+
+
+def lever() -> sil_plant.Lever:
+    return sil_plant.Lever.from_settings({row.name: row.default for row in settings_table()})
+
+
+# --- plant -----------------------------------------------------------------------------------------------------------
+
+
+def test_plant_is_the_one_of_sil_by_another_integration() -> None:
+    given = motions.lanes(replace(QUIET, dither=0.0), SEEDS)
+    theta, theta_dot = plant.run(given)
+    for run in SEEDS:
+        columns = [np.full(len(theta), getattr(given, name)[0, run]) for name in ("m_p", "c_p", "k_p", "trim")]
+        truth = sil_plant.LeverTruth(lever(), sil_plant.Truth(*columns), "trim")
+        body = truth.body(Conditions(given.z_ddot[:, run], motions.PERIOD, 0.0, 0.0, np.random.default_rng(1)))
+        other = [(body.theta, body.theta_dot)]
+        for _ in range(len(theta) - 1):
+            body.advance(0.0)
+            other.append((body.theta, body.theta_dot))
+        np.testing.assert_allclose(np.transpose(other), (theta[:, run], theta_dot[:, run]), atol=2e-4)
+        f_n, zeta = (motions.truth(given)[name][0, run] for name in ("f_n", "zeta"))
+        assert f_n == pytest.approx(truth.dynamics.natural_frequency[0], rel=1e-12)
+        assert zeta == pytest.approx(truth.dynamics.damping_ratio[0], rel=1e-12)
+
+
+def test_a_moved_trim_is_a_rest() -> None:
+    given = motions.lanes(replace(QUIET, base=0.0, dither=0.0), SEEDS)
+    ramp = np.clip(np.arange(len(given.z_ddot)) / 2000.0, 0.0, 1.0)[:, None]
+    trim = given.trim + math.radians(8.0) * ramp
+    theta, _ = plant.run(replace(given, trim=trim, k_p=given.k_p * (1.0 + ramp)))
+    np.testing.assert_allclose(theta[-1], trim[-1], atol=1e-6)
+
+
+def test_friction_takes_its_share_of_each_half_swing() -> None:
+    """Coulomb friction T on a spring K: each half swing is smaller by 2 T / K (Den Hartog)."""
+    hardware = plant.Hardware(damping=0.0)
+    given = motions.lanes(replace(QUIET, duration=2.0, base=0.0, dither=0.0, friction=0.05), range(1))
+    given = replace(given, c_p=np.zeros((1, 1)), trim=np.full((1, 1), 0.3), hardware=hardware)
+    lanes = plant.Plant(given)
+    lanes.theta = given.trim[0] + 0.01
+    swing = []
+    for i in range(1500):
+        lanes.advance(i)
+        swing.append(float(lanes.theta[0] - 0.3))
+    angle = np.array(swing)
+    peaks = np.abs(angle[1:-1][np.diff(np.sign(np.diff(angle))) != 0])
+    stiffness = (hardware.length * math.cos(0.3)) ** 2 * given.k_p[0, 0] + hardware.stiffness
+    assert len(peaks) > 5
+    np.testing.assert_allclose(np.diff(peaks[:6]), -2.0 * 0.05 / stiffness, rtol=0.1)
+
+
+def test_a_lever_that_nobody_holds_swings_on_its_own_spring() -> None:
+    motion = replace(QUIET, base=0.0, dither=0.05, released=(0.0, 9.0))
+    given = replace(motions.lanes(motion, SEEDS), hardware=plant.Hardware(damping=0.0))
+    theta, theta_dot = plant.run(replace(given, tau_m=given.tau_m * (np.arange(8001)[:, None] < 2000)))
+    energy = 0.5 * 0.08075 * theta_dot**2 + 0.5 * 5.0 * (theta - given.trim) ** 2
+    np.testing.assert_allclose(energy[-1], energy[2001], rtol=1e-6)
+
+
+def test_linear_pilots_move_as_the_plant_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the ordinary arm in place of theirs; periodic signals, so the second of two periods counts."""
+
+    def ordinary(c_p: FloatArray, k_p: FloatArray, frequency: FloatArray) -> feedthrough.ComplexArray:
+        stiffness: feedthrough.ComplexArray = k_p + 2j * np.pi * frequency * c_p
+        return stiffness
+
+    monkeypatch.setitem(pilots.LINEAR, "ordinary", ordinary)
+    motion = replace(QUIET, base=0.05, dither=0.05, pilot="ordinary")
+    recording = pilots.record(motion, SEEDS)
+    given = motions.lanes(motion, SEEDS)
+    z_ddot, tau_m, kick = (np.tile(column, (2, 1)) for column in (given.z_ddot, given.tau_m, given.kick))
+    theta, _ = plant.run(replace(given, z_ddot=z_ddot, tau_m=tau_m, kick=kick))
+    np.testing.assert_allclose(theta[len(recording.theta) :], recording.theta, atol=2e-5)
+    parameters = np.stack([given.m_p[0], given.c_p[0], given.k_p[0]], axis=-1)
+    response = feedthrough.response(plant.Hardware(), parameters, given.trim[0])
+    assert recording.response is not None
+    np.testing.assert_allclose(recording.response, response, rtol=1e-9)
+
+
+@pytest.mark.parametrize("pilot", ["two_dof", "mayo_ectomorphic"])
+def test_pilots_of_sil_answer_the_base_as_their_response_says(pilot: str) -> None:
+    recording = pilots.record(Motion(duration=20.0, dither=0.0, process_noise=0.0, pilot=pilot), range(1))
+    spectrum = [np.fft.rfft(column[:-1, 0] * np.hanning(20000)) for column in (recording.theta, recording.z_ddot)]
+    at = np.arange(2 * 20, 8 * 20 + 1, 5)
+    seen = np.array([np.vdot(spectrum[1][i - 3 : i + 4], spectrum[0][i - 3 : i + 4]) for i in at])
+    seen /= [np.vdot(spectrum[1][i - 3 : i + 4], spectrum[1][i - 3 : i + 4]).real for i in at]
+    assert recording.response is not None
+    assert np.linalg.norm(seen - recording.response[0]) < 0.08 * np.linalg.norm(recording.response[0])
+
+
+# --- sensors ---------------------------------------------------------------------------------------------------------
+
+
+def ramps(runs: int = 3) -> Recording:
+    time = np.arange(2001, dtype=np.float64) * motions.PERIOD
+    signal = np.outer(time, np.ones(runs))
+    return Recording(time, signal, signal, signal, signal, {})
+
+
+def test_gain_and_delay() -> None:
+    clean = measured(ramps(), Sensors(), SEEDS)
+    off = measured(ramps(), Sensors(z_ddot_gain=1.1, z_ddot_delay=2.5e-3, tau_m_gain=0.5, angle_gain=1.02), SEEDS)
+    expected = {"theta": 1.02, "theta_dot": 1.02, "tau_m": 0.5, "z_ddot": 1.1}
+    for name, gain in expected.items():
+        late = 2.5e-3 if name == "z_ddot" else 0.0
+        np.testing.assert_allclose(
+            (off[name] - clean[name])[10:], (gain * (ramps().theta - late) - ramps().theta)[10:], atol=1e-12
+        )
+        assert np.std(clean[name] - ramps().theta) == pytest.approx(NOISE[name], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        ("stuck", lambda clean: np.broadcast_to(clean[499], (500, 3))),
+        ("zero", lambda clean: np.zeros((500, 3))),
+        ("sign", lambda clean: -clean[500:1000]),
+        ("invalid", lambda clean: np.full((500, 3), np.nan)),
+    ],
+)
+def test_faults(kind: str, expected: Callable[[FloatArray], FloatArray]) -> None:
+    clean = measured(ramps(), Sensors(), SEEDS)["z_ddot"]
+    spoilt = measured(ramps(), Sensors(faults=(Fault("z_ddot", kind, 0.5, 1.0),)), SEEDS)["z_ddot"]
+    np.testing.assert_array_equal(spoilt[500:1000], expected(clean))
+    np.testing.assert_array_equal(np.delete(spoilt, np.s_[500:1000], axis=0), np.delete(clean, np.s_[500:1000], axis=0))
+
+
+def test_spikes() -> None:
+    clean = measured(ramps(), Sensors(), SEEDS)["theta"]
+    off = measured(ramps(), Sensors(faults=(Fault("theta", "spikes"),)), SEEDS)["theta"] - clean
+    np.testing.assert_allclose(np.abs(off[off != 0.0]), 0.3, rtol=1e-9)
+    assert 0.005 < np.mean(off != 0.0) < 0.015
+
+
+def test_drawn_errors_differ_between_runs_only() -> None:
+    clean = measured(ramps(40), Sensors(), range(40))["tau_m"]
+    gain = measured(ramps(40), Sensors(tau_m_gain_sigma=0.02), range(40))["tau_m"] - clean
+    gain = gain[1:] / ramps(40).theta[1:]
+    np.testing.assert_allclose(gain, np.broadcast_to(gain[-1], gain.shape), atol=1e-9)
+    assert np.std(gain[-1]) == pytest.approx(0.02, rel=0.4)
+
+
+# --- figures ---------------------------------------------------------------------------------------------------------
+
+
+def outcome(error: dict[str, FloatArray] | None = None, faults: FloatArray | None = None) -> Outcome:
+    """Two runs of 20 s whose truth is 1 and whose σ is 0.1, with these errors and faults of the first."""
+    time, first = np.arange(0.0, 20.0, 0.01), np.array((1.0, 0.0))
+    nothing = np.zeros((len(time), 2))
+    truth, sigma = (dict.fromkeys(measure.QUANTITIES, nothing + each) for each in (1.0, 0.1))
+    errors = dict.fromkeys(measure.QUANTITIES, np.zeros_like(time)) | (error or {})
+    value = {name: 1.0 + np.outer(column, first) for name, column in errors.items()}
+    shown = nothing.astype(np.uint32)
+    if faults is not None:
+        shown[:, 0] = faults
+    track = Track(time, value, sigma, np.zeros((len(time), 2, 3)), nothing, shown, shown)
+    return Outcome(Recording(time, nothing, nothing, nothing, nothing, truth), track, (5.0, 15.0), ((10.0, 12.0),))
+
+
+TIME = np.arange(0.0, 20.0, 0.01)
+STUCK = fault_mask("BASE")
+
+
+@pytest.mark.parametrize(
+    ("figure", "error", "faults", "expected"),
+    [
+        ("f_n rms", {"f_n": np.where(TIME < 10.0, 0.04, 0.0)}, None, 4.0 / math.sqrt(2.0)),
+        ("f_n covered", {"f_n": np.where(TIME < 7.5, 0.21, 0.19)}, None, 75.0),
+        ("c_p largest", {"c_p": np.where(TIME < 5.0, 9.0, -0.35 * (TIME > 8.0))}, None, 3.5),
+        ("settled", {"f_n": np.where(TIME < 13.5, 0.06, 0.04)}, None, 1.5),
+        ("settled", {"f_n": np.full_like(TIME, -0.06)}, None, math.inf),
+        ("flagged", None, STUCK * (TIME >= 14.0), 10.0),
+        ("flagged", None, fault_mask("CHANGE", "SETTLING", "GAP") * (TIME > 0.0), 0.0),
+        ("mismatch", None, fault_mask("MISMATCH") * (TIME < 14.0), 90.0),
+        ("to flag", None, STUCK * (TIME >= 10.4), 0.4),
+        ("to flag", None, STUCK * (TIME >= 12.4), math.inf),
+        ("to HANDS_OFF", None, STUCK * (TIME >= 10.0) + fault_mask("HANDS_OFF") * (TIME >= 11.0), 1.0),
+        ("back", None, STUCK * ((TIME < 12.3) | ((TIME >= 12.5) & (TIME < 12.8))), 0.8),
+        ("back", None, fault_mask("SETTLING") * (TIME > 0.0), math.inf),
+        ("learnt at once", {"m_p": np.where(TIME < 10.04, 0.5, 0.02 * (TIME > 11.0))}, None, 0.2),
+        ("learnt", {"m_p": np.where(TIME < 10.5, 0.5, 0.0)}, None, 0.0),
+        ("learnt late", {"k_p": np.where(TIME < 11.0, 0.5, 0.0)}, None, 0.0),
+    ],
+)
+def test_figures(figure: str, error: dict[str, FloatArray] | None, faults: FloatArray | None, expected: float) -> None:
+    first, second = FIGURES[figure].compute(outcome(error, faults))
+    assert first == pytest.approx(expected, abs=1e-6)
+    assert second == pytest.approx(
+        math.inf if figure.startswith("to ") else 100.0 * figure.endswith("covered"), abs=1e-6
+    )
+
+
+def test_lag_of_a_ramp() -> None:
+    late = outcome({"c_p": 0.1 * 1.5 + np.zeros_like(TIME)})
+    late.recording.truth["c_p"][:] -= 0.1 * TIME[:, None]
+    late.track.value["c_p"][:] -= 0.1 * TIME[:, None]
+    np.testing.assert_allclose(FIGURES["lag"].compute(late), (1.5, 0.0), atol=1e-9)
+
+
+def test_against_a_reference() -> None:
+    told, not_told = outcome({"zeta": np.full_like(TIME, 0.02)}), outcome({"zeta": np.full_like(TIME, 0.05)})
+    for case in (told, not_told):
+        case.track.value["zeta"][:, 1] += 0.01
+    not_told = replace(not_told, reference=told)
+    np.testing.assert_allclose(FIGURES["zeta ratio"].compute(not_told), (2.5, 1.0))
+    not_told.track.sigma["m_p"][:, 0] = 0.3
+    np.testing.assert_allclose(FIGURES["σ ratio"].compute(not_told), (3.0, 1.0))
+
+
+def test_feedthrough_sigma_is_the_scatter_of_drawn_parameters() -> None:
+    mean, sigma = np.array((2.5, 42.0, 1500.0)), np.array((0.05, 1.0, 20.0))
+    correlation = np.array((0.6, 0.8, 0.5))
+    covariance = np.array(((1.0, 0.6, 0.8), (0.6, 1.0, 0.5), (0.8, 0.5, 1.0))) * np.outer(sigma, sigma)
+    drawn = np.random.default_rng(1).multivariate_normal(mean, covariance, 20_000)
+    trim = np.asarray(0.35)
+    value, stated = feedthrough.estimated(plant.Hardware(), mean, sigma, correlation, trim)
+    scatter = feedthrough.response(plant.Hardware(), drawn, trim) - value
+    np.testing.assert_allclose(np.sqrt(np.mean(np.abs(scatter) ** 2, axis=0)), stated, rtol=0.05)
+
+
+# --- table -----------------------------------------------------------------------------------------------------------
+
+
+def test_every_condition_asks_for_figures_that_there_are() -> None:
+    for condition in CONDITIONS.values():
+        assert set(condition.figures) <= set(FIGURES), condition.name
+        assert condition.against is None or CONDITIONS[condition.against].motion == condition.motion
+        assert condition.limits or not condition.unless
+
+
+@pytest.mark.parametrize(
+    ("limit", "kept", "broken"), [(Limit("lag", most=1.5), 1.5, 1.6), (Limit("f_n covered", least=90.0), 90.0, 89.0)]
+)
+def test_limits(limit: Limit, kept: float, broken: float) -> None:
+    assert limit.holds(kept)
+    assert not limit.holds(broken)
+    assert not limit.holds(math.nan)
