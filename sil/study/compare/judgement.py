@@ -173,7 +173,7 @@ def judged_errors(results: Results, case: str, estimator: str) -> Array:
 
 
 def compare(results: Results, rows: list[Row]) -> tuple[Differences, Differences]:
-    """Of the errors, and of the times after a step, of each two estimators of a case that did all of its runs."""
+    """Of the errors, and of the times after a step, of those that did all runs of a case, against the best of them."""
     errors: Differences = {}
     times: Differences = {}
     for case in {row.case: None for row in rows}:

@@ -46,7 +46,7 @@ def _name(row: Row) -> str:
 
 def _winner(ranked: Sequence[Row], errors: Differences) -> str:
     best, *others = ranked
-    alike = [row for row in others if not errors[row.case, row.estimator, best.estimator].significant]
+    alike = [row for row in others if not errors[row.case, row.estimator].significant]
     names = ", ".join(f"{_name(row)} (+{100.0 * (row.score / best.score - 1.0):.0f} %)" for row in alike)
     beside = f"; no significant difference to {names}" if alike else "; all others are significantly worse"
     return f"{_name(best)}{_size(best)}{beside if others else ''}."
@@ -65,7 +65,7 @@ def _behind(ranked: Sequence[Row], errors: Differences) -> str:
     ours = next((row for row in ranked if row.ours), None)
     if ours is None:
         return "None of ours took part with all runs."
-    found = errors[ours.case, ours.estimator, ranked[0].estimator]
+    found = errors[ours.case, ours.estimator]
     low, high = (100.0 * (edge - 1.0) for edge in found.interval())
     more = f"{_name(ours)} has {100.0 * math.expm1(found.more):.0f} % larger errors ({low:.0f} to {high:.0f} %)"
     if found.significant:
@@ -84,7 +84,8 @@ def _fastest(rows: Sequence[Row], times: Differences) -> str:
     if others:
         second = min(others, key=lambda row: row.settled_median)
         who = "baseline" if best.ours else "of ours"
-        chance = "" if times[best.case, best.estimator, second.estimator].significant else ", which may be chance"
+        found = times.get((best.case, second.estimator))  # None: as fast
+        chance = "" if found is not None and found.significant else ", which may be chance"
         beside = f"; the fastest {who}, {second.estimator}: {second.settled_median:.2f} s{chance}"
     return f"Fastest after the step: {_name(best)} (median {best.settled_median:.2f} s, {worst}){beside}."
 

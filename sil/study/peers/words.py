@@ -62,12 +62,12 @@ def rows(results: Sequence[Result]) -> list[Row]:
 
 
 def differences(results: Sequence[Result]) -> Differences:
-    """Of the errors of each two estimators in each condition; without those that broke down in a run."""
+    """Of the peers' errors against the firmware's in each condition; without those that broke down in a run."""
     found: Differences = {}
     for condition, group in groupby(results, key=lambda result: result.condition):
         squares = {one.estimator: np.square(one.rms)[:, np.newaxis] for one in group if np.isfinite(one.rms).all()}
-        if len(squares) > 1:
-            found |= of_errors(condition, squares)
+        if FIRMWARE in squares and len(squares) > 1:
+            found |= of_errors(condition, squares, FIRMWARE)
     return corrected(found)[0]
 
 
@@ -78,11 +78,11 @@ def verdicts(results: Sequence[Result]) -> Iterator[str]:
         return
     found = differences(results)
     for peer in PEERS:
-        pairs = {case: one for (case, first, second), one in found.items() if (first, second) == (FIRMWARE, peer)}
+        pairs = {condition: one for (condition, name), one in found.items() if name == peer}
         if not pairs:
             continue
-        larger = [case for case, one in pairs.items() if one.significant and one.more > 0.0]
-        smaller = [case for case, one in pairs.items() if one.significant and one.more < 0.0]
+        larger = [condition for condition, one in pairs.items() if one.significant and one.more < 0.0]
+        smaller = [condition for condition, one in pairs.items() if one.significant and one.more > 0.0]
         names = f" ({', '.join(larger)})" if larger else ""
         alike = len(pairs) - len(larger) - len(smaller)
         yield (
