@@ -8,7 +8,7 @@ For z = [w; x] of a run with additive Gaussian noise:
 Each run has its own covariance, given its inputs and its truth; mean squares of errors are held against the mean of
 these over runs. For a linear model this is the covariance of the Kalman filter and nobody does better. For ours it is
 no lower bound: an estimator may do better, above all while the prior still counts. Its mean is never below the
-posterior Cramér–Rao bound of the same runs (bound.py): a Schur complement is concave in the matrix it is taken of.
+posterior Cramér–Rao bound of the same ensemble (bound.py): a Schur complement is concave in the matrix it is taken of.
 
 It starts as an estimator does: at the first sample, knowing theta and theta_dot as well as they are measured and w as
 well as it is guessed. That the lever rests there is not used.

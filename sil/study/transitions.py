@@ -22,7 +22,7 @@ _BLOCK = 500  # samples linearised at a time, so that the arrays stay in the cac
 def true_parameters(batch: Batch) -> Array:
     """(B, K, 3) in physical units. Raises ValueError where the truth is no member of the model."""
     if batch.truth.p is None:
-        raise ValueError("no bound: the truth is no member of the model")
+        raise ValueError("nothing to linearise: the truth is no member of the model")
     return batch.truth.p
 
 

@@ -144,7 +144,7 @@ def _assembled(page: Page, results: Results, claims: Sequence[Claim]) -> str:
     said = (
         f"{kept} of {known} things that the firmware has to show are shown."
         if known
-        else "A preview: too few runs to judge."
+        else "A preview: what the firmware has to show takes 20 whole runs of each case."
     )
     plan = results.plan
     length = "" if plan.duration is None else f" of {plan.duration:g} s"
