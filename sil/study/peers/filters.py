@@ -64,14 +64,14 @@ def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
     trim = np.broadcast_to(np.concatenate([log.trim for log in logs]), signals.shape[:2])
     invalid = np.isnan(signals)
     missing = invalid[..., :2] | invalid[..., 2:].any(axis=-1, keepdims=True)  # without inputs no output is of use
+    if not high_passed:
+        signals[..., 0] -= trim  # first, so that a theta that is never valid is held at the trim
     signals = held(signals)
     if high_passed:
         start = np.zeros(signals.shape[1:])
         start[:, 0] = signals[: round(settings["align_time"] / PERIOD), :, 0].mean(axis=0)
         trim = low_pass(signals[..., :1], settings["trim_corner"], start[:, :1])[..., 0]
         signals = high_pass(signals, settings["trim_corner"], start)
-    else:
-        signals[..., 0] -= trim
     told = settings | {
         "theta_noise": NOISE["theta"],
         "theta_dot_noise": NOISE["theta_dot"],
