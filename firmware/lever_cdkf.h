@@ -212,6 +212,21 @@ typedef struct lever_estimate {
 /* The estimate after the last sample. Derived values are computed here, so this is not free (1,500 instructions). */
 void lever_estimate(const lever_t *lever, lever_estimate_t *estimate);
 
+/* Biodynamic feedthrough theta/z_ddot at one frequency, of the model linearised about the trim. The standard deviations
+ * are those of the error along the phasor (the gain's) and across it (the phase's), by the covariance of the parameters:
+ * they do not contain what the model itself cannot do, of which LEVER_FAULT_MISMATCH warns. */
+typedef struct lever_feedthrough {
+    float real;        /* [rad/(m/s^2)] */
+    float imaginary;   /* negative where theta lags */
+    float gain_sigma;  /* of the gain, relative to it [1] */
+    float phase_sigma; /* [rad] */
+    float correlation; /* of the errors of gain and phase [1] */
+} lever_feedthrough_t;
+
+/* At a frequency [Hz], after the last sample; collective bounce is at 2 to 8 Hz. Not finite where there is no response,
+ * or an undamped model is in resonance. Not free (1,000 instructions). */
+void lever_feedthrough(const lever_t *lever, float frequency, lever_feedthrough_t *feedthrough);
+
 /* Name ("m_p") and unit ("kg") of a parameter of a model; NULL for an index or model that does not exist. */
 const char *lever_parameter_name(uint8_t model, uint32_t index);
 const char *lever_parameter_unit(uint8_t model, uint32_t index);

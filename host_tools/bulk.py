@@ -33,7 +33,7 @@ ANSWER: int = _lib.BULK_ANSWER
 LONGEST_LINE: int = _lib.BULK_LINE
 
 ANSWERS = (
-    *("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH", "LINK_HEALTH"),
+    *("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH", "HEALTH", "LINK_HEALTH"),
     "MOTOR_COMMAND",
 )
 """The messages of the estimator that rows hold, in the order of their slots."""

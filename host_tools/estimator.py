@@ -48,6 +48,19 @@ class Estimate(NamedTuple):
     nis_size: int
 
 
+class Feedthrough(NamedTuple):
+    """lever_feedthrough_t: θ/z̈ of the estimated model at one frequency, and how sure it is."""
+
+    response: complex
+    """[rad/(m/s²)]"""
+    gain_sigma: float
+    """Standard deviation of the gain, relative to it [1]: of the error along the phasor."""
+    phase_sigma: float
+    """Standard deviation of the phase [rad]: of the error across the phasor."""
+    correlation: float
+    """Of the errors of gain and phase [1]."""
+
+
 class Health(NamedTuple):
     """lever_health_t: mode, faults at the last sample, and counts since the start."""
 
@@ -91,6 +104,7 @@ class Estimator:
             raise LeverError("the firmware refused its configuration: Config.pointer was changed after its check")
         self._sample = ffi.new("lever_sample_t *")
         self._estimate = ffi.new("lever_estimate_t *")
+        self._feedthrough = ffi.new("lever_feedthrough_t *")
         self._health = ffi.new("lever_health_t *")
         self._received = ffi.new("lever_frame_t *")
         self._received_data = ffi.buffer(self._received.data)
@@ -150,6 +164,13 @@ class Estimator:
         for name in ("parameter", "parameter_sigma", "parameter_correlation"):
             values[name] = tuple(values[name])
         return Estimate(**values)
+
+    def feedthrough(self, frequency: float) -> Feedthrough:
+        """Biodynamic feedthrough θ/z̈ at a frequency [Hz] after the last sample."""
+        found = self._feedthrough
+        lib.lever_feedthrough(self.pointer, frequency, found)
+        response = complex(found.real, found.imaginary)
+        return Feedthrough(response, found.gain_sigma, found.phase_sigma, found.correlation)
 
     def health(self) -> Health:
         """Mode, faults and counts after the last sample."""

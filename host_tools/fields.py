@@ -17,10 +17,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
+"""What FEEDTHROUGH is sent for, one after the other [Hz]."""
+
 COUNTS = {"lost": 1 << 16, "corrupt": 1 << 16, "late": 1 << 16, "restarts": 1 << 8}
 """What the estimator counts in LINK_HEALTH and HEALTH, and where it wraps."""
 
-_ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS")
+_ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH")
 
 
 def columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]]:

@@ -5,7 +5,7 @@ instance, `run_samples` a whole recording at once, `model_parameters` what a mod
 """
 
 from .config import Config, Parameter, Setting, model_parameters, settings_table
-from .estimator import FRAME_SAMPLE, Estimate, Estimator, Health, fault_names, run_samples
+from .estimator import FRAME_SAMPLE, Estimate, Estimator, Feedthrough, Health, fault_names, run_samples
 from .library import enum_names, ffi, lib
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "Config",
     "Estimate",
     "Estimator",
+    "Feedthrough",
     "Health",
     "Parameter",
     "Setting",

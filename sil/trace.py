@@ -52,6 +52,14 @@ HEALTH = (
     ("restarts", "HEALTH", "restarts"),
     ("excitation_rad_s", "HEALTH", "excitation"),
 )
+FEEDTHROUGH = (
+    ("feedthrough_frequency_Hz", "FEEDTHROUGH", "frequency"),
+    ("feedthrough_real_rad_s2_m", "FEEDTHROUGH", "real"),
+    ("feedthrough_imaginary_rad_s2_m", "FEEDTHROUGH", "imaginary"),
+    ("feedthrough_gain_sigma", "FEEDTHROUGH", "gain_sigma"),
+    ("feedthrough_phase_sigma_rad", "FEEDTHROUGH", "phase_sigma"),
+)
+"""As it is sent: one frequency after the other. feedthrough.py puts them side by side."""
 
 
 def build(recording: Recording, frames: Frames) -> Trace:
@@ -64,7 +72,8 @@ def build(recording: Recording, frames: Frames) -> Trace:
         trace[column] = decoded.at_samples(message, field)
     for column, message, field in ESTIMATED:
         trace[column] = decoded.at_samples(message, field)
-    for column, message, field in (*quantity_fields(recording.scenario.config.choices["model"]), *HEALTH):
+    model = recording.scenario.config.choices["model"]
+    for column, message, field in (*quantity_fields(model), *FEEDTHROUGH, *HEALTH):
         trace[column] = decoded.held(message, field)
     trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
     return trace

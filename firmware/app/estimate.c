@@ -24,13 +24,26 @@ void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_P
     }
 }
 
-void estimator_derive(const estimator_t *estimator, derived_t *derived)
+static model_step_t at_trim(const estimator_t *estimator)
 {
     const sine_cosine_t *angle = &estimator->trim_angle;
-    const model_step_t at_trim = {
+    const model_step_t step = {
         .trim = estimator->trim.output[0].level, .trim_sine = angle->sine, .trim_cosine = angle->cosine};
+    return step;
+}
+
+derived_dynamics_t estimator_dynamics(const estimator_t *estimator)
+{
     const setup_t *setup = &estimator->setup;
-    derived_compute(derived, &estimator->cdkf, setup->model_in_use, &setup->constants, &at_trim);
+    const model_step_t step = at_trim(estimator);
+    return derived_dynamics(&estimator->cdkf, setup->model_in_use, &setup->constants, &step);
+}
+
+derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float frequency)
+{
+    const setup_t *setup = &estimator->setup;
+    const model_step_t step = at_trim(estimator);
+    return derived_feedthrough(&estimator->cdkf, setup->model_in_use, &setup->constants, &step, frequency);
 }
 
 /* Standard deviation of state i. While its level waits for samples, what moves slower than trim_corner is not
@@ -45,7 +58,7 @@ static float state_sigma(const estimator_t *estimator, uint32_t i, float scale)
 
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate)
 {
-    derived_t derived;
+    const derived_dynamics_t dynamics = estimator_dynamics(estimator);
     estimate->time_us = estimator->time_us;
     estimate->theta = estimator_state(estimator, 0u);
     estimate->theta_dot = estimator_state(estimator, 1u);
@@ -57,11 +70,10 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
     estimator_parameters(estimator, estimate->parameter);
     estimator_parameter_sigma(estimator, estimate->parameter_sigma);
     cdkf_correlation(&estimator->cdkf, estimate->parameter_correlation);
-    estimator_derive(estimator, &derived);
-    estimate->natural_frequency = derived.mean.natural_frequency;
-    estimate->natural_frequency_sigma = sqrtf(derived.variance.natural_frequency);
-    estimate->damping_ratio = derived.mean.damping_ratio;
-    estimate->damping_ratio_sigma = sqrtf(derived.variance.damping_ratio);
+    estimate->natural_frequency = dynamics.natural_frequency;
+    estimate->natural_frequency_sigma = dynamics.natural_frequency_sigma;
+    estimate->damping_ratio = dynamics.damping_ratio;
+    estimate->damping_ratio_sigma = dynamics.damping_ratio_sigma;
 }
 
 void estimator_health(const estimator_t *estimator, lever_health_t *health)

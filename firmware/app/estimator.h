@@ -74,8 +74,9 @@ float estimator_state(const estimator_t *estimator, uint32_t i);
 void estimator_parameters(const estimator_t *estimator, float parameter[LEVER_PARAMETERS]);
 void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_PARAMETERS]);
 
-/* The quantities that are derived from the parameters. */
-void estimator_derive(const estimator_t *estimator, derived_t *derived);
+/* The quantities that are derived from the parameters; frequency [Hz]. */
+derived_dynamics_t estimator_dynamics(const estimator_t *estimator);
+derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float frequency);
 
 /* Mode, faults and counts; what concerns torque and machine is not the estimator's. */
 void estimator_health(const estimator_t *estimator, lever_health_t *health);

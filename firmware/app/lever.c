@@ -140,6 +140,16 @@ void lever_estimate(const lever_t *lever, lever_estimate_t *estimate)
     estimator_estimate(&lever->estimator, estimate);
 }
 
+void lever_feedthrough(const lever_t *lever, float frequency, lever_feedthrough_t *feedthrough)
+{
+    const derived_feedthrough_t derived = estimator_feedthrough(&lever->estimator, frequency);
+    feedthrough->real = derived.real;
+    feedthrough->imaginary = derived.imaginary;
+    feedthrough->gain_sigma = derived.gain_sigma;
+    feedthrough->phase_sigma = derived.phase_sigma;
+    feedthrough->correlation = derived.correlation;
+}
+
 void lever_health(const lever_t *lever, lever_health_t *health)
 {
     estimator_health(&lever->estimator, health);

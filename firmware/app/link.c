@@ -13,14 +13,14 @@
 
 /* The divided messages, in the order in which they are sent in each publish_period. */
 static const uint16_t parts[] = {(uint16_t)BIT(OUTPUT_HEALTH), (uint16_t)BIT(OUTPUT_PARAMETERS),
-    (uint16_t)BIT(OUTPUT_SIGMA), (uint16_t)BIT(OUTPUT_DYNAMICS), (uint16_t)BIT(OUTPUT_LINK_HEALTH),
-    (uint16_t)BIT(OUTPUT_PLATFORM)};
+    (uint16_t)BIT(OUTPUT_SIGMA), (uint16_t)BIT(OUTPUT_DYNAMICS), (uint16_t)BIT(OUTPUT_FEEDTHROUGH),
+    (uint16_t)BIT(OUTPUT_LINK_HEALTH), (uint16_t)BIT(OUTPUT_PLATFORM)};
 #define PARTS ((uint32_t)(sizeof(parts) / sizeof(parts[0])))
 
 static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_COMMAND_ACK_DATA_ID,
     MESSAGE_PILOT_PARAMETERS_DATA_ID, MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID,
-    MESSAGE_HEALTH_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID,
-    MESSAGE_STATE_ESTIMATE_DATA_ID};
+    MESSAGE_FEEDTHROUGH_DATA_ID, MESSAGE_HEALTH_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID,
+    MESSAGE_IDENTITY_DATA_ID, MESSAGE_STATE_ESTIMATE_DATA_ID};
 
 /* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame
  * that is repeated or one step late (which a sample's time would tell, too). */
@@ -47,6 +47,7 @@ void link_init(link_t *link, const lever_settings_t *settings)
     link->period_us = (uint32_t)period_us;
     link->publish_us = (uint32_t)publish_us;
     link->identity_us = LONG_AGO_US;
+    link->frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;
     link->settings_crc = lever_settings_crc(settings);
     e2e_receiver_init(&link->command_receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, command_tolerance);
     start_session(link);

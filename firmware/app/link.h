@@ -16,6 +16,7 @@ enum link_output {
     OUTPUT_PARAMETERS,
     OUTPUT_SIGMA,
     OUTPUT_DYNAMICS,
+    OUTPUT_FEEDTHROUGH,
     OUTPUT_HEALTH,
     OUTPUT_LINK_HEALTH,
     OUTPUT_PLATFORM,
@@ -44,6 +45,7 @@ typedef struct link {
     uint16_t due;            /* messages still to fetch, a bit each */
     uint8_t parts;           /* how many of the set are out, or due */
     uint8_t pages;           /* of IDENTITY still to send, a bit each */
+    uint8_t frequency;       /* of the next FEEDTHROUGH [Hz] */
     uint8_t command_counter; /* of the last COMMAND, and what became of it */
     uint8_t command_result;
     uint8_t counter[OUTPUTS]; /* E2E counter of the next frame of each */

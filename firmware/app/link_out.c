@@ -75,17 +75,31 @@ static bool encode_sigma(lever_t *lever, lever_frame_t *frame)
 
 static bool encode_dynamics(lever_t *lever, lever_frame_t *frame)
 {
-    derived_t derived;
-    message_pilot_dynamics_t message;
-    estimator_derive(&lever->estimator, &derived);
-    message.natural_frequency = derived.mean.natural_frequency;
-    message.natural_frequency_sigma = sqrtf(derived.variance.natural_frequency);
-    message.damping_ratio = derived.mean.damping_ratio;
-    message.damping_ratio_sigma = sqrtf(derived.variance.damping_ratio);
-    message.model = lever->estimator.setup.model;
-    message.valid =
-        is_estimating(lever) && is_finite(message.natural_frequency_sigma) && is_finite(message.damping_ratio_sigma);
+    const derived_dynamics_t dynamics = estimator_dynamics(&lever->estimator);
+    const message_pilot_dynamics_t message = {.natural_frequency = dynamics.natural_frequency,
+        .natural_frequency_sigma = dynamics.natural_frequency_sigma,
+        .damping_ratio = dynamics.damping_ratio,
+        .damping_ratio_sigma = dynamics.damping_ratio_sigma,
+        .model = lever->estimator.setup.model,
+        .valid = is_estimating(lever) && is_finite(dynamics.natural_frequency_sigma) &&
+                 is_finite(dynamics.damping_ratio_sigma)};
     return message_pilot_dynamics_encode(frame, &message);
+}
+
+/* One frequency after the other, each time the next. */
+static bool encode_feedthrough(lever_t *lever, lever_frame_t *frame)
+{
+    link_t *link = &lever->link;
+    const derived_feedthrough_t feedthrough = estimator_feedthrough(&lever->estimator, (float)link->frequency);
+    const message_feedthrough_t message = {.real = feedthrough.real,
+        .imaginary = feedthrough.imaginary,
+        .gain_sigma = feedthrough.gain_sigma,
+        .phase_sigma = feedthrough.phase_sigma,
+        .frequency = link->frequency,
+        .valid = is_estimating(lever) && is_finite(feedthrough.gain_sigma) && is_finite(feedthrough.phase_sigma)};
+    const bool is_last = (link->frequency == (uint8_t)MESSAGE_FEEDTHROUGH_HIGHEST);
+    link->frequency = is_last ? (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST : (uint8_t)(link->frequency + 1u);
+    return message_feedthrough_encode(frame, &message);
 }
 
 static bool encode_health(lever_t *lever, lever_frame_t *frame)
@@ -163,8 +177,8 @@ static bool encode_state_estimate(lever_t *lever, lever_frame_t *frame)
 
 /* In the order of enum link_output. */
 static bool (*const encoders[OUTPUTS])(lever_t *lever, lever_frame_t *frame) = {encode_motor_command,
-    encode_command_ack, encode_parameters, encode_sigma, encode_dynamics, encode_health, encode_link_health,
-    encode_platform, encode_identity, encode_state_estimate};
+    encode_command_ack, encode_parameters, encode_sigma, encode_dynamics, encode_feedthrough, encode_health,
+    encode_link_health, encode_platform, encode_identity, encode_state_estimate};
 
 bool link_encode(lever_t *lever, enum link_output output, lever_frame_t *frame)
 {

@@ -151,6 +151,36 @@ bool message_pilot_dynamics_decode(message_pilot_dynamics_t *message, const leve
     return fits;
 }
 
+/* --- FEEDTHROUGH -------------------------------------------------------------------------------------------------- */
+
+static const place_t feedthrough_code[] = {CODE(12u, 15u), CODE(16u, 1u)};
+static const quantity_t feedthrough_quantity[] = {SIGNED(17u, 32767u, 200000.0f), SIGNED(32u, 32767u, 200000.0f),
+    UNSIGNED(47u, 255u, 250.0f), UNSIGNED(55u, 255u, 250.0f)};
+static const layout_t feedthrough = LAYOUT(MESSAGE_FEEDTHROUGH_ID, feedthrough_code, feedthrough_quantity);
+
+bool message_feedthrough_encode(lever_frame_t *frame, const message_feedthrough_t *message)
+{
+    const uint32_t code[] = {message->frequency, bit_of(message->valid)};
+    const float value[] = {message->real, message->imaginary, message->gain_sigma, message->phase_sigma};
+    return layout_encode(frame, &feedthrough, code, value);
+}
+
+bool message_feedthrough_decode(message_feedthrough_t *message, const lever_frame_t *frame)
+{
+    uint32_t code[COUNT(feedthrough_code)];
+    float value[COUNT(feedthrough_quantity)];
+    const bool fits = layout_decode(code, value, &feedthrough, frame);
+    if (fits) {
+        message->frequency = (uint8_t)code[0];
+        message->valid = (code[1] != 0u);
+        message->real = value[0];
+        message->imaginary = value[1];
+        message->gain_sigma = value[2];
+        message->phase_sigma = value[3];
+    }
+    return fits;
+}
+
 /* --- HEALTH ------------------------------------------------------------------------------------------------------- */
 
 static const place_t health_code[] = {CODE(12u, 15u), CODE(16u, 0xFFFFFFu), CODE(40u, 255u)};

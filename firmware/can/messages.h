@@ -41,7 +41,8 @@ enum message_id {
     MESSAGE_PLATFORM_HEALTH_ID = 0x216,
     MESSAGE_IDENTITY_ID = 0x217,
     MESSAGE_COMMAND_ACK_ID = 0x218,
-    MESSAGE_LINK_HEALTH_ID = 0x219
+    MESSAGE_LINK_HEALTH_ID = 0x219,
+    MESSAGE_FEEDTHROUGH_ID = 0x21A
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -58,7 +59,8 @@ enum message_data_id {
     MESSAGE_PLATFORM_HEALTH_DATA_ID = 145,
     MESSAGE_IDENTITY_DATA_ID = 161,
     MESSAGE_COMMAND_ACK_DATA_ID = 177,
-    MESSAGE_LINK_HEALTH_DATA_ID = 193
+    MESSAGE_LINK_HEALTH_DATA_ID = 193,
+    MESSAGE_FEEDTHROUGH_DATA_ID = 209
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -135,6 +137,21 @@ typedef struct message_pilot_dynamics {
 
 bool message_pilot_dynamics_encode(lever_frame_t *frame, const message_pilot_dynamics_t *message);
 bool message_pilot_dynamics_decode(message_pilot_dynamics_t *message, const lever_frame_t *frame);
+
+/* Frequencies that FEEDTHROUGH is sent for, one after the other in steps of 1 Hz [Hz]. */
+enum { MESSAGE_FEEDTHROUGH_LOWEST = 2, MESSAGE_FEEDTHROUGH_HIGHEST = 8 };
+
+typedef struct message_feedthrough {
+    float real;        /* of theta/z_ddot [rad/(m/s^2)] */
+    float imaginary;   /* [rad/(m/s^2)] */
+    float gain_sigma;  /* relative [1] */
+    float phase_sigma; /* [rad] */
+    uint8_t frequency; /* [Hz] */
+    bool valid;
+} message_feedthrough_t;
+
+bool message_feedthrough_encode(lever_frame_t *frame, const message_feedthrough_t *message);
+bool message_feedthrough_decode(message_feedthrough_t *message, const lever_frame_t *frame);
 
 typedef struct message_health {
     float excitation; /* [rad/s] */

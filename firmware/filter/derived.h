@@ -1,17 +1,34 @@
-/* Quantities derived from the parameters, with standard deviations. */
+/* Quantities derived from the parameters, with standard deviations: the values are those at the estimate, the deviations
+ * by the central difference transform over the covariance of the parameters (cdkf.h). */
 #ifndef FILTER_DERIVED_H
 #define FILTER_DERIVED_H
 
 #include "filter/cdkf.h"
 #include "model/model.h"
 
-typedef struct derived {
-    model_dynamics_t mean;     /* natural frequency [Hz] and damping ratio [1] at the estimate */
-    model_dynamics_t variance; /* of them */
-} derived_t;
+/* Without a restoring stiffness there is no natural frequency: it and the damping ratio are 0. */
+typedef struct derived_dynamics {
+    float natural_frequency; /* undamped [Hz] */
+    float natural_frequency_sigma;
+    float damping_ratio; /* [1] */
+    float damping_ratio_sigma;
+} derived_dynamics_t;
 
-/* Both by the central difference transform over the covariance of the parameters (cdkf.h). */
-void derived_compute(derived_t *derived, const cdkf_t *cdkf, const model_t *model, const model_constants_t *constants,
-    const model_step_t *step);
+/* Biodynamic feedthrough theta/z_ddot at one frequency. Its error is given along the phasor, relative to its length:
+ * the gain's; and across: the phase's. Not finite where there is no response, or an
+ * undamped model is in resonance. */
+typedef struct derived_feedthrough {
+    float real; /* [rad/(m/s^2)] */
+    float imaginary;
+    float gain_sigma;  /* relative [1] */
+    float phase_sigma; /* [rad] */
+    float correlation; /* of the errors of gain and phase [1]; 0 without any */
+} derived_feedthrough_t;
+
+/* Of the model linearised about the trim, whose angle, sine and cosine are in `step`; frequency [Hz]. */
+derived_dynamics_t derived_dynamics(
+    const cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step);
+derived_feedthrough_t derived_feedthrough(const cdkf_t *cdkf, const model_t *model, const model_constants_t *constants,
+    const model_step_t *step, float frequency);
 
 #endif

@@ -133,8 +133,7 @@ static void respond(const model_constants_t *constants, const model_step_t *step
     }
 }
 
-/* K = d/dtheta of the restoring torque and D at the trim; omega = sqrt(K/M), zeta = D / (2 M omega). A trim at which
- * the lever would fall (K <= 0) has frequency 0 and damping ratio 0. */
+/* K = d/dtheta of the restoring torque, D and l mu cos theta at the trim, each over M. */
 static model_dynamics_t dynamics(
     const model_constants_t *constants, const model_step_t *step, const model_coefficients_t *coefficients)
 {
@@ -145,12 +144,10 @@ static model_dynamics_t dynamics(
         constants->trim ? 0.0f : ((c[STIFFNESS] * (constants->arm_preload_sine - step->trim_sine)) - weight);
     const float stiffness = (c[STIFFNESS] * squared) + (geometric * step->trim_sine) + constants->stiffness;
     const float damping = (c[DAMPING] * squared) + constants->damping;
-    model_dynamics_t result = {0.0f, 0.0f};
-    if (stiffness > 0.0f) {
-        const float omega = sqrtf(stiffness / c[INERTIA]);
-        result.natural_frequency = omega * MODEL_INVERSE_TURN;
-        result.damping_ratio = damping / (2.0f * (c[INERTIA] * omega));
-    }
+    const float inverse = 1.0f / c[INERTIA];
+    const model_dynamics_t result = {.stiffness = stiffness * inverse,
+        .damping = damping * inverse,
+        .forcing = -((c[FORCING] * step->trim_cosine) * inverse)};
     return result;
 }
 

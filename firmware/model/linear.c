@@ -1,7 +1,5 @@
 #include "model/linear.h"
 
-#include <math.h>
-
 /* Change of x_dot as a quotient, force / inertia: see linear.h. */
 typedef struct quotient {
     float force;
@@ -55,12 +53,8 @@ model_dynamics_t linear_dynamics(
 {
     (void)constants;
     (void)step;
-    model_dynamics_t result = {0.0f, 0.0f};
-    const float stiffness = coefficients->c[LINEAR_STIFFNESS];
-    if (stiffness > 0.0f) {
-        const float omega = sqrtf(stiffness);
-        result.natural_frequency = omega * MODEL_INVERSE_TURN;
-        result.damping_ratio = coefficients->c[LINEAR_DAMPING] / (2.0f * omega);
-    }
+    const model_dynamics_t result = {.stiffness = coefficients->c[LINEAR_STIFFNESS],
+        .damping = coefficients->c[LINEAR_DAMPING],
+        .forcing = coefficients->c[LINEAR_BASE]};
     return result;
 }

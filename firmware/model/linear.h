@@ -20,8 +20,7 @@ enum {
     LINEAR_TORQUE     /* and to the motor torque [unit of x / (s^2 N m)] */
 };
 
-/* model_t.respond and model_t.dynamics of the linear models. Without a restoring stiffness there is no natural
- * frequency: it and the damping ratio are 0. */
+/* model_t.respond and model_t.dynamics of the linear models. */
 void linear_respond(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
     model_response_t *response);
 model_dynamics_t linear_dynamics(

@@ -74,9 +74,11 @@ typedef struct model_parameter {
     float greatest;
 } model_parameter_t;
 
+/* theta_ddot + damping theta_dot + stiffness theta = forcing z_ddot */
 typedef struct model_dynamics {
-    float natural_frequency; /* undamped [Hz] */
-    float damping_ratio;     /* [1] */
+    float stiffness; /* [1/s^2] */
+    float damping;   /* [1/s] */
+    float forcing;   /* [unit of theta / m] */
 } model_dynamics_t;
 
 typedef struct model {
@@ -91,8 +93,7 @@ typedef struct model {
     void (*respond)(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
         model_response_t *response);
 
-    /* Natural frequency and damping ratio of the model linearised about the trim: its angle, sine and cosine in
-     * `step`. */
+    /* The model linearised about the trim: its angle, sine and cosine in `step`. */
     model_dynamics_t (*dynamics)(
         const model_constants_t *constants, const model_step_t *step, const model_coefficients_t *coefficients);
 } model_t;

@@ -34,8 +34,8 @@ enum bulk_limits {
     BULK_BUS_NAME = 32, /* bytes of a name, with its final 0 */
     BULK_LINE = 512,    /* longest line of text */
     BULK_OUT_ROOM = 16, /* frames that one frame can become in bulk_feed(), at most */
-    BULK_ANSWERS = 7,   /* messages of the estimator that rows hold */
-    BULK_SLOTS = 16     /* 2 messages of a sample, the answers, and the same answers as they were recorded */
+    BULK_ANSWERS = 8,   /* messages of the estimator that rows hold */
+    BULK_SLOTS = 18     /* 2 messages of a sample, the answers, and the same answers as they were recorded */
 };
 
 /* Names of the buses in the order of their first frame. */

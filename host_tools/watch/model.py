@@ -15,6 +15,7 @@ from ..config import model_parameters
 from ..estimator import fault_names
 from ..identity import Identity
 from ..library import enum_names
+from .paired import Measured, Paired
 from .traffic import Traffic
 
 Frame = tuple[int, bytes | bytearray]
@@ -35,7 +36,7 @@ _PATIENCE = 3.0  # [s] for an IDENTITY, which comes each second
 _PLATFORM_COUNTS = dict.fromkeys(("bus_offs", "overruns", "dropped"), 1 << 8)
 _WRAPS = fields.COUNTS | _PLATFORM_COUNTS
 # Of the others the last frame tells all.
-_EVERY = ("STATE_ESTIMATE", "MOTOR_COMMAND", "HEALTH", "PLATFORM_HEALTH", "IDENTITY", "COMMAND_ACK")
+_EVERY = ("STATE_ESTIMATE", "FEEDTHROUGH", "MOTOR_COMMAND", "HEALTH", "PLATFORM_HEALTH", "IDENTITY", "COMMAND_ACK")
 
 
 class Estimated(NamedTuple):
@@ -46,6 +47,19 @@ class Estimated(NamedTuple):
     """"1" without one."""
     value: float
     sigma: float
+
+
+class Feedthrough(NamedTuple):
+    """θ/z̈ at one frequency; NaN is not known or too old."""
+
+    frequency: int
+    """[Hz]"""
+    response: complex
+    """[rad/(m/s²)]"""
+    gain_sigma: float
+    """Relative [1]."""
+    phase_sigma: float
+    """[rad]"""
 
 
 DYNAMICS = (("natural_frequency", "Hz"), ("damping_ratio", "1"))
@@ -78,6 +92,8 @@ class Picture:
         self.refusals: deque[str] = deque(maxlen=16)
         """Why COMMANDs were refused; to be taken from here."""
         self._first_estimate: float | None = None
+        self._feedthrough: dict[int, tuple[float, Feedthrough]] = {}  # by frequency: when heard, and what
+        self._paired = Paired()
 
     def clear_counts(self) -> None:
         """All counts start again from 0."""
@@ -92,6 +108,8 @@ class Picture:
         """Takes what has come since the last call; also to be called when that is nothing."""
         self.now = now
         groups: dict[int, list[bytes | bytearray]] = {}
+        frames = list(frames)
+        self._paired.take(frames, now)
         for identifier, data in frames:
             groups.setdefault(identifier, []).append(data)
         for identifier, group in groups.items():
@@ -153,6 +171,19 @@ class Picture:
         name = "PILOT_DYNAMICS"
         return [Estimated(key, unit, self.field(name, key), self.field(name, f"{key}_sigma")) for key, unit in DYNAMICS]
 
+    def feedthrough(self) -> list[Feedthrough]:
+        """θ/z̈ at each frequency that is sent."""
+        found = []
+        for frequency in fields.FEEDTHROUGH_FREQUENCIES:
+            heard, entry = self._feedthrough.get(frequency, (-math.inf, None))
+            fresh = self.now - heard <= STALE_AFTER
+            found.append(entry if entry and fresh else Feedthrough(frequency, complex(NAN, NAN), NAN, NAN))
+        return found
+
+    def coherence(self) -> Measured | None:
+        """Measured, of base acceleration and lever angle over the last seconds; None while there is too little."""
+        return self._paired.coherence(self.now)
+
     @property
     def mode(self) -> str | None:
         """A name of enum lever_mode; None when the estimator says nothing."""
@@ -200,7 +231,7 @@ class Picture:
             self._count(("restarts",), columns)
         elif name == "LINK_HEALTH":
             self._count(("lost", "corrupt", "late"), columns)
-        elif name in ("IDENTITY", "COMMAND_ACK"):
+        elif name in ("IDENTITY", "COMMAND_ACK", "FEEDTHROUGH"):
             for row in range(len(data)):
                 self._take_once(name, {key: float(column[row]) for key, column in columns.items()})
         elif name == "PLATFORM_HEALTH":
@@ -213,6 +244,10 @@ class Picture:
     def _take_once(self, name: str, values: dict[str, float]) -> None:
         if name == "IDENTITY":
             self.identity.take(values)
+        elif name == "FEEDTHROUGH":
+            frequency, response = int(values["frequency"]), complex(values["real"], values["imaginary"])
+            sigmas = values["gain_sigma"], values["phase_sigma"]
+            self._feedthrough[frequency] = self.now, Feedthrough(frequency, response, *sigmas)
         elif (result := result_of(values)) != ACCEPTED:
             self.refusals.append(refusal(result))
 

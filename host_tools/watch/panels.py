@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 
+import numpy as np
 from rich.console import JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
 from . import words
 from .model import STEP, Estimated, Picture
+from .paired import Measured
 from .sources import Source
 
 NOTHING = "–"
@@ -23,6 +26,7 @@ _COLUMNS: tuple[tuple[JustifyMethod, int], ...] = (
     *(("left", 17), ("right", 8), ("right", 8)),
     *(("left", 6), ("right", 6), ("right", 9)),
 )
+_FEEDTHROUGH_WIDTH = 15
 ESTIMATES_WIDTH = sum(width + 1 for _, width in _COLUMNS)
 """Of estimates() without its sparkline."""
 
@@ -70,6 +74,36 @@ def estimates(picture: Picture, span: float, width: int) -> Table:
     if not picture.parameters():
         table.add_row(Text("parameters", style="bold"), Text("none yet", style="dim"))
     return table
+
+
+def feedthrough(picture: Picture) -> Table:
+    """θ/z̈ of the estimate by frequency, with sigma, and the measured coherence of the two."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    table.add_column(width=_FEEDTHROUGH_WIDTH, no_wrap=True)
+    entries = picture.feedthrough()
+    for _ in entries:
+        table.add_column(justify="right", width=7, no_wrap=True)
+    measured = picture.coherence()
+    rows: list[tuple[str, list[str]]] = [
+        ("gain [deg s²/m]", [_number(math.degrees(abs(entry.response)), 3) for entry in entries]),
+        ("± σ [%]", [_number(100.0 * entry.gain_sigma, 2) for entry in entries]),
+        ("phase [deg]", [_number(_lag(entry.response), 3) for entry in entries]),
+        ("± σ [deg]", [_number(math.degrees(entry.phase_sigma), 2) for entry in entries]),
+        ("coherence", [_number(_at(measured, entry.frequency), 2) for entry in entries]),
+    ]
+    table.add_row(*(Text(title, style="dim") for title in ("θ/z̈ at", *(f"{entry.frequency} Hz" for entry in entries))))
+    for title, cells in rows:
+        table.add_row(Text(title, style="bold"), *cells)
+    return table
+
+
+def _lag(response: complex) -> float:
+    """The phase [deg] as the page has it, from -360 to 0: a lever lags the floor, or starts against it at -180."""
+    return -(-math.degrees(cmath.phase(response)) % 360.0)
+
+
+def _at(measured: Measured | None, frequency: float) -> float:
+    return math.nan if measured is None else float(np.interp(frequency, measured.frequency, measured.coherence))
 
 
 def sparkline(values: Sequence[float], least_range: float, width: int) -> str:

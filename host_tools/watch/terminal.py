@@ -10,6 +10,7 @@ from rich.console import Console, Group, RenderableType
 from rich.rule import Rule
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
+from textual.events import Resize
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer, Static
 
@@ -19,6 +20,8 @@ from .sources import LogSource, Source
 
 SPANS = (30.0, 120.0, 300.0, 10.0)
 """[s] that trends are shown over, in the order of the key."""
+TALL = 32
+"""[lines] from which on the feedthrough is shown unasked."""
 _PIPE_WIDTH = 100
 
 
@@ -30,7 +33,7 @@ class Monitor(App[None]):
     CSS = """
     Screen { layout: vertical; overflow: hidden; }
     #headline, #condition { height: 1; padding: 0 1; }
-    #estimates { height: auto; }
+    #estimates, #feedthrough { height: auto; }
     .panel { border: round $primary; padding: 0 1; }
     #lower { height: 1fr; }
     #health { width: 1fr; height: 100%; overflow-y: auto; scrollbar-size-vertical: 1; }
@@ -40,6 +43,7 @@ class Monitor(App[None]):
         Binding("q", "quit", "quit"),
         Binding("space", "hold", "hold the picture"),
         Binding("t", "span", "time span"),
+        Binding("f", "feedthrough", "feedthrough"),
         Binding("c", "clear", "clear counts"),
     ]
 
@@ -50,13 +54,15 @@ class Monitor(App[None]):
         self.held = False
         self.span = SPANS[0]
         self._duration = duration
+        self._feedthrough_chosen = False
         self._lines = {name: Static(id=name) for name in ("headline", "condition")}
-        self._tables = {name: Static() for name in ("estimates", "health", "messages")}
+        self._tables = {name: Static() for name in ("estimates", "feedthrough", "health", "messages")}
         self._panels = {name: Vertical(table, id=name, classes="panel") for name, table in self._tables.items()}
 
     def compose(self) -> ComposeResult:
         yield from self._lines.values()
         yield self._panels["estimates"]
+        yield self._panels["feedthrough"]
         yield Horizontal(self._panels["health"], self._panels["messages"], id="lower")
         yield Footer()
 
@@ -67,6 +73,10 @@ class Monitor(App[None]):
         self.set_interval(STEP, self.advance)
         if self._duration is not None:
             self.set_timer(self._duration, self.exit)
+
+    def on_resize(self, event: Resize) -> None:
+        if not self._feedthrough_chosen:
+            self._panels["feedthrough"].display = event.size.height >= TALL
 
     def on_unmount(self) -> None:
         self.source.stop()
@@ -82,6 +92,7 @@ class Monitor(App[None]):
         self._lines["headline"].update(panels.headline(picture, source))
         self._lines["condition"].update(panels.condition(picture, source))
         tables["estimates"].update(panels.estimates(picture, self.span, tables["estimates"].size.width))
+        tables["feedthrough"].update(panels.feedthrough(picture))
         tables["health"].update(panels.health(picture, source))
         tables["messages"].update(panels.messages(picture))
 
@@ -89,6 +100,11 @@ class Monitor(App[None]):
         """Stops or goes on redrawing; frames are counted meanwhile."""
         self.held = not self.held
         self._panels["estimates"].border_title = "estimates (held: space goes on)" if self.held else "estimates"
+
+    def action_feedthrough(self) -> None:
+        """Shows the feedthrough, or not; before the first time the height of the terminal decides."""
+        self._feedthrough_chosen = True
+        self._panels["feedthrough"].display = not self._panels["feedthrough"].display
 
     def action_span(self) -> None:
         """The next span of SPANS."""
@@ -113,6 +129,8 @@ def print_once(source: Source, listen: float) -> Picture:
         panels.condition(picture, source),
         Rule("estimates", align="left"),
         panels.estimates(picture, SPANS[0], console.width),
+        Rule("feedthrough", align="left"),
+        panels.feedthrough(picture),
         Rule("health", align="left"),
         panels.health(picture, source),
         Rule("messages", align="left"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +18,12 @@ from .motions import Motion, Recording, lanes, truth
 from .sensors import measured
 
 LANES = 64
-"""Simulated at a time; 60 s of them take 300 MB."""
+"""Runs simulated at a time, which bounds the memory."""
 
 Show = Callable[[int, int, str], None]
 """Progress: done, total, what."""
+Tick = Callable[[], None]
+"""Called now and then in what takes long."""
 
 
 class Group(NamedTuple):
@@ -30,6 +32,13 @@ class Group(NamedTuple):
     motion: Motion
     runs: int
     closed_loop: ClosedLoop | None
+
+
+class Job(NamedTuple):
+    """Some seeds of a group, which are simulated together."""
+
+    group: Group
+    seeds: range
 
 
 @dataclass(frozen=True)
@@ -62,66 +71,84 @@ class Result:
         return next(held) or (bool(condition.unless) and next(held))
 
 
-def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: int, show: Show) -> Iterator[Result]:
-    """The results of the rows, in no particular order; `seeds` runs of each, or some times as many where runs draw."""
-    wanted = {row.name for row in rows}
-    references = [everything[row.against] for row in rows if row.against is not None and row.against not in wanted]
+def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: int, show: Show) -> list[Result]:
+    """The results of the rows, in their order; `seeds` runs of each, or some times as many where runs draw."""
+    references = [everything[row.against] for row in rows if row.against is not None]
     groups: dict[Group, list[Condition]] = {}
-    for row in (*references, *rows):  # a reference has the motion of what is measured against it
+    for row in {row.name: row for row in (*references, *rows)}.values():  # a reference has the motion of its row
         groups.setdefault(Group(row.motion, row.runs, row.closed_loop), []).append(row)
-    done = 0
-    for group, recording in _recordings(groups, seeds):
+    parts: dict[str, list[Result]] = {row.name: [] for own in groups.values() for row in own}
+    jobs = [Job(group, each) for group in groups for each in _portions(seeds * group.runs)]
+    total = sum(len(groups[job.group]) for job in jobs)
+
+    def tick(what: str = "simulating") -> None:
+        show(sum(len(each) for each in parts.values()), total, what)
+
+    for job, recording in _recordings(jobs, tick):
         outcomes: dict[str, Outcome] = {}
-        for row in sorted(groups[group], key=lambda row: row.against is not None):
-            show(done, len(rows), row.name)
-            try:
-                outcome = _outcome(row, recording, range(seeds * row.runs), outcomes.get(row.against or ""))
-            except SettingsError as error:
-                result = Result(row, {}, problem=str(error))
-            else:
-                outcomes[row.name] = outcome
-                values = {name: FIGURES[name].compute(outcome) for name in row.figures}
-                result = Result(row, values, excerpt(outcome))
-            if row.name in wanted:
-                done += 1
-                yield result
+        for row in groups[job.group]:
+            tick(row.name)
+            parts[row.name].append(_result(row, job.seeds, recording, outcomes, tick))
+    return [_joined(parts[row.name]) for row in rows]
 
 
-def _outcome(row: Condition, recording: Recording | None, seeds: Sequence[int], reference: Outcome | None) -> Outcome:
-    config = Config(settings=row.settings)
+def _portions(runs: int) -> list[range]:
+    """Seeds, not too many at a time."""
+    return [range(first, min(first + LANES, runs)) for first in range(0, runs, LANES)]
+
+
+def _joined(parts: Sequence[Result]) -> Result:
+    """One result of some for different seeds; the excerpt is of the first."""
+    first = parts[0]
+    return replace(first, values={name: np.concatenate([part.values[name] for part in parts]) for name in first.values})
+
+
+def _result(
+    row: Condition, seeds: range, recording: Recording | None, outcomes: dict[str, Outcome], tick: Tick
+) -> Result:
+    """Runs a condition; its outcome becomes one of `outcomes`, which later ones may be measured against."""
+    try:
+        config = Config(settings=row.settings)
+    except SettingsError as error:
+        return Result(row, {}, problem=str(error).partition(";")[0])
     if recording is None:
         loop = row.closed_loop or ClosedLoop()
-        recording, track = firmware.closed_loop(config, row.motion, seeds, loop.dither, loop.lost, loop.whole)
+        recording, track = firmware.closed_loop(config, row.motion, seeds, loop, tick)
     else:
-        track = firmware.estimates(config, measured(recording, row.sensors, seeds))
-    return Outcome(recording, track, row.window, row.events, reference)
+        track = firmware.estimates(config, measured(recording, row.sensors, seeds), recording.response is not None)
+    outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""))
+    outcomes[row.name] = outcome
+    with np.errstate(all="ignore"):  # an estimate that is not finite is no warning but a figure that keeps no limit
+        return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt(outcome))
 
 
-def _recordings(groups: Iterable[Group], seeds: int) -> Iterator[tuple[Group, Recording | None]]:
+def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recording | None]]:
     """What happens in each; None where the firmware itself has a part in it."""
-    batches: dict[float, list[Group]] = {}
-    for group in groups:
-        if group.closed_loop is not None:
-            yield group, None
-        elif group.motion.pilot != "arm":
-            yield group, pilots.record(group.motion, range(seeds * group.runs))
+    batches: dict[float, list[Job]] = {}
+    for job in jobs:
+        if job.group.closed_loop is not None:
+            yield job, None
+        elif job.group.motion.pilot != "arm":
+            yield job, pilots.record(job.group.motion, job.seeds, tick)
         else:
-            batch = batches.setdefault(group.motion.duration, [])
-            if batch and seeds * sum(each.runs for each in (*batch, group)) > LANES:
-                yield from _simulated(batch, seeds)
+            batch = batches.setdefault(job.group.motion.duration, [])
+            if sum(len(each.seeds) for each in (*batch, job)) > LANES:
+                yield from _simulated(batch, tick)
                 batch.clear()
-            batch.append(group)
+            batch.append(job)
     for batch in batches.values():
-        yield from _simulated(batch, seeds)
+        yield from _simulated(batch, tick)
 
 
-def _simulated(batch: Sequence[Group], seeds: int) -> Iterator[tuple[Group, Recording]]:
+def _simulated(batch: Sequence[Job], tick: Tick) -> Iterator[tuple[Job, Recording]]:
     """Motions of one duration, side by side."""
-    given = [lanes(group.motion, range(seeds * group.runs)) for group in batch]
-    theta, theta_dot = plant.run(plant.beside(given))
+    if not batch:
+        return
+    given = [lanes(job.group.motion, job.seeds) for job in batch]
+    theta, theta_dot = plant.run(plant.beside(given), tick)
     first = 0
-    for group, part in zip(batch, given, strict=True):
-        own = slice(first, first + seeds * group.runs)
+    for job, part in zip(batch, given, strict=True):
+        own = slice(first, first + len(job.seeds))
         first = own.stop
         signals = (theta[:, own], theta_dot[:, own], part.tau_m, part.z_ddot)
-        yield group, Recording(group.motion.time, *signals, truth(part))
+        yield job, Recording(job.group.motion.time, *signals, truth(part))

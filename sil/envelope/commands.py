@@ -13,6 +13,7 @@ from lever_cdkf.host_tools.files import make_folder, write_text
 from lever_cdkf.host_tools.progress import Progress
 
 if TYPE_CHECKING:
+    from .campaign import Result
     from .condition import Condition
 
 _DESCRIPTION = """\
@@ -23,7 +24,7 @@ plant that shares nothing with the filter's model; samples go straight into the 
 A condition holds when the natural frequency (f_n), damping ratio (zeta) and parameters are right within the limit, when
 the stated ±2σ covers the truth as often as the limit asks, or, where the limit says so, when the firmware flags that
 it is not to be trusted. "all runs" pools them (rms of errors, mean of shares, the longest time); a limit is held
-against that unless it says median or worst.
+against that unless it says median or worst. The page that is written has a chart and all figures of each condition.
 
 Exit status: 0 when all conditions hold, 1 when one misses, 2 when the command line is wrong.
 """
@@ -31,10 +32,10 @@ _EPILOG = """\
 examples:
   lever envelope --list
   lever envelope --quick                          some conditions, three pilots each: ten seconds
-  lever envelope --only retrim base_stuck --seeds 24
-  lever envelope --json envelope.json             all conditions, ten pilots each: some minutes
+  lever envelope --only retrim base_stuck --seeds 50
+  lever envelope --json envelope.json             all conditions, 20 pilots each: three minutes
 """
-_SEEDS, _QUICK_SEEDS = 10, 3
+_SEEDS, _QUICK_SEEDS = 20, 3
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -48,7 +49,13 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--quick", action="store_true", help=f"some conditions, {_QUICK_SEEDS} pilots each")
     parser.add_argument("--seeds", type=int, metavar="N", help=f"random pilots a condition (default: {_SEEDS})")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="conditions of --list (default: all)")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="folder for the page, envelope.html (default: no page)")
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        type=Path,
+        default=Path("lever_envelope"),
+        help="folder for the page, envelope.html (default: %(default)s)",
+    )
     parser.add_argument(
         "--json", metavar="FILE", help='also write the rows to FILE: {"rows": [{"name", "measured", …}]}'
     )
@@ -69,8 +76,7 @@ def run(args: argparse.Namespace) -> int:
     seeds = args.seeds if args.seeds is not None else _QUICK_SEEDS if args.quick else _SEEDS
     if not 1 <= seeds <= 1000:
         raise LeverError(f"--seeds {seeds}: must be from 1 to 1000")
-    if args.out is not None:
-        make_folder(args.out)  # before a campaign that could then not be kept
+    make_folder(args.out)  # before a campaign that could then not be kept
     results = _run(chosen, seeds)
     print_tables({f"{seeds} random pilots a condition": table.lines(results)})
     missed = [result.condition.name for result in results if not result.ok]
@@ -80,16 +86,15 @@ def run(args: argparse.Namespace) -> int:
     return 1 if missed else 0
 
 
-def _run(chosen: Sequence[Condition], seeds: int) -> list[Any]:
+def _run(chosen: Sequence[Condition], seeds: int) -> list[Result]:
     from . import campaign
     from .conditions import CONDITIONS
 
     with Progress("envelope") as progress:
-        found = {each.condition.name: each for each in campaign.run(chosen, CONDITIONS, seeds, progress.show)}
-    return [found[condition.name] for condition in chosen]
+        return campaign.run(chosen, CONDITIONS, seeds, progress.show)
 
 
-def _write(args: argparse.Namespace, results: Sequence[Any], seeds: int) -> None:
+def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
     """The files that were asked for."""
     import json
 
@@ -98,9 +103,8 @@ def _write(args: argparse.Namespace, results: Sequence[Any], seeds: int) -> None
     if args.json is not None:
         text = json.dumps({"rows": table.rows(results)}, indent=2, ensure_ascii=False, allow_nan=False)
         write_text(args.json, text + "\n")
-    if args.out is not None:
-        write_text(args.out / "envelope.html", page.build(results, seeds))
-        print(f"Written to {args.out}: envelope.html")
+    write_text(args.out / "envelope.html", page.build(results, seeds))
+    print(f"Written to {args.out}: envelope.html")
 
 
 def _listed(condition: Condition) -> dict[str, str | bool]:

@@ -29,6 +29,8 @@ class Limit:
         return (self.most is None or value <= self.most) and (self.least is None or value >= self.least)
 
     def __str__(self) -> str:
+        if self.most is None and self.least is None:
+            return ""
         bound = f"≤ {self.most:g}" if self.least is None else f"≥ {self.least:g}"
         return bound if self.over == "all" else f"{self.over} {bound}"
 

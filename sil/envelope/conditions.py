@@ -60,7 +60,6 @@ _MOVEMENT = (
         Motion(grip=1.3),
         (_most("settled", 0.9, "median"), _most("settled", 2.0, "worst")),
         events=((EVENT, EVENT),),
-        runs=2,
     ),
 )
 

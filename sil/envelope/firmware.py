@@ -3,24 +3,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.config import Config
-from lever_cdkf.host_tools.estimator import Estimator, run_samples
+from lever_cdkf.host_tools.estimator import Estimator
 from lever_cdkf.host_tools.library import ffi, lib, struct_dtype
 from numpy.typing import NDArray
 
-from .motions import PERIOD, STRIDE, Motion, Recording, columns, lanes, stream, truth
+from .condition import ClosedLoop
+from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, stream, truth
 from .plant import FloatArray, Plant
 from .sensors import NOISE
 
 PARAMETERS = ("m_p", "c_p", "k_p")
 MOTOR_LAG = 2e-3
 """Time constant with which the motor's torque follows the firmware's [s]."""
+RESPONSE_STRIDE = 50
+"""Rows of a track between two responses."""
 _KEEP_ALIVE = 250  # samples between two commands
+
+
+@dataclass(frozen=True)
+class Feedthrough:
+    """theta/z_ddot as the firmware has it at every RESPONSE_STRIDE-th row of a track, (times, runs, FREQUENCIES)."""
+
+    response: NDArray[np.complex128]
+    """[rad/(m/s^2)]"""
+    gain_sigma: FloatArray
+    """Of the gain, relative [1]."""
+    phase_sigma: FloatArray
+    """[rad]"""
 
 
 @dataclass(frozen=True)
@@ -31,12 +46,9 @@ class Track:
     value: Mapping[str, FloatArray]
     """f_n [Hz], zeta [1], m_p [kg], c_p [N s/m], k_p [N/m]."""
     sigma: Mapping[str, FloatArray]
-    correlation: FloatArray
-    """Of the parameters' errors (times, runs, 3)."""
-    trim: FloatArray
-    """[rad]"""
     faults: NDArray[np.uint32]
     mode: NDArray[np.uint32]
+    feedthrough: Feedthrough | None = None
 
     def parameters(self, which: str) -> FloatArray:
         """`value` or `sigma` of the three parameters, (times, runs, 3)."""
@@ -44,49 +56,57 @@ class Track:
         return np.stack([found[name] for name in PARAMETERS], axis=-1)
 
 
-def estimates(config: Config, signals: Mapping[str, FloatArray]) -> Track:
-    """Feeds each run to an estimator of its own."""
+def estimates(config: Config, signals: Mapping[str, FloatArray], response: bool = False) -> Track:
+    """Feeds each run to an estimator of its own; `response`: with the feedthrough."""
     count, width = signals["theta"].shape
-    at = np.arange(0, count, STRIDE)
-    time_us = np.arange(count) * round(PERIOD * 1e6)
-    runs = [
-        run_samples(config, {"time_us": time_us} | {what: column[:, run] for what, column in signals.items()}, at)
-        for run in range(width)
-    ]
-    return _track(runs, at)
+    samples = np.zeros(count, struct_dtype("lever_sample_t"))
+    samples["time_us"] = np.arange(count) * round(PERIOD * 1e6)
+    runs = []
+    for run in range(width):
+        for what, column in signals.items():
+            samples[what], samples[f"{what}_valid"] = column[:, run], ~np.isnan(column[:, run])
+        runs.append(_Live(config, count, response))
+        runs[-1].feed(samples)
+    return _track(runs)
 
 
-def _track(runs: Sequence[Mapping[str, NDArray[Any]]], at: NDArray[np.intp]) -> Track:
-    def beside(name: str) -> NDArray[Any]:
-        return np.stack([run[name] for run in runs], axis=1)
+def _track(runs: Sequence[_Live]) -> Track:
+    def beside(array: str, name: str) -> NDArray[Any]:
+        return np.stack([getattr(run, array)[name] for run in runs], axis=1)
 
-    value = {"f_n": beside("natural_frequency"), "zeta": beside("damping_ratio")}
-    sigma = {"f_n": beside("natural_frequency_sigma"), "zeta": beside("damping_ratio_sigma")}
+    def single(name: str) -> FloatArray:
+        return beside("estimates", name).astype(np.float64)
+
+    value = {"f_n": single("natural_frequency"), "zeta": single("damping_ratio")}
+    sigma = {"f_n": single("natural_frequency_sigma"), "zeta": single("damping_ratio_sigma")}
     for i, name in enumerate(PARAMETERS):
-        value[name], sigma[name] = beside("parameter")[..., i], beside("parameter_sigma")[..., i]
+        value[name], sigma[name] = single("parameter")[..., i], single("parameter_sigma")[..., i]
+    feedthrough = None
+    if runs[0].responses.size:
+        of = {name: beside("responses", name) for name in ("real", "imaginary", "gain_sigma", "phase_sigma")}
+        feedthrough = Feedthrough(of["real"] + 1j * of["imaginary"], of["gain_sigma"], of["phase_sigma"])
     return Track(
-        time=(at * PERIOD).astype(np.float64),
-        value={name: column.astype(np.float64) for name, column in value.items()},
-        sigma={name: column.astype(np.float64) for name, column in sigma.items()},
-        correlation=beside("parameter_correlation").astype(np.float64),
-        trim=beside("trim").astype(np.float64),
-        faults=beside("faults"),
-        mode=beside("mode"),
+        time=np.arange(len(value["f_n"]), dtype=np.float64) * STRIDE * PERIOD,
+        value=value,
+        sigma=sigma,
+        faults=beside("healths", "faults"),
+        mode=beside("healths", "mode"),
+        feedthrough=feedthrough,
     )
 
 
 def closed_loop(
-    config: Config, motion: Motion, seeds: Sequence[int], dither: float, lost: float, whole: bool
+    config: Config, motion: Motion, seeds: Sequence[int], loop: ClosedLoop, tick: Callable[[], None]
 ) -> tuple[Recording, Track]:
-    """The firmware dithers [N m rms] the lever itself, and a share of its samples is lost at random.
+    """The firmware dithers the lever itself, and samples are lost at random; `tick` is called now and then.
 
-    A lost sample lacks what LEVER_SAMPLE carries, theta, theta_dot and tau_m; `whole`: it never comes at all. The motor
-    holds the last torque that it was asked for.
+    A lost sample lacks what LEVER_SAMPLE carries, theta, theta_dot and tau_m, or never comes at all. The motor holds
+    the last torque that it was asked for.
     """
     given = lanes(motion, seeds)
     plant, (count, width) = Plant(given), given.z_ddot.shape
     noise = {what: sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()}
-    gone = np.stack([stream("lost", seed).random(count) < lost for seed in seeds], axis=1)
+    gone = np.stack([stream("lost", seed).random(count) < loop.lost for seed in seeds], axis=1)
     theta, theta_dot, tau_m = (np.empty((count, width)) for _ in range(3))
     decay, torque = math.exp(-PERIOD / MOTOR_LAG), np.zeros(width)
     runs = [_Live(config, count) for _ in seeds]
@@ -95,10 +115,11 @@ def closed_loop(
         values = np.stack((theta[i], theta_dot[i], torque, given.z_ddot[i]))
         values += np.stack([noise[what][i] for what in ("theta", "theta_dot", "tau_m", "z_ddot")])
         if i % _KEEP_ALIVE == 0:
+            tick()
             for run in runs:
-                run.estimator.command(dither_rms=dither)
+                run.estimator.command(dither_rms=loop.dither)
         for run, column, missing in zip(runs, values.T.tolist(), gone[i].tolist(), strict=True):
-            if not (missing and whole):
+            if not (missing and loop.whole):
                 run.take(i, column, missing)
             if i % STRIDE == 0:
                 run.note(i // STRIDE)
@@ -108,21 +129,32 @@ def closed_loop(
             plant.advance(i, torque, after)
             torque = after
     recording = Recording(motion.time, theta, theta_dot, tau_m, given.z_ddot, truth(given))
-    return recording, _track([run.columns for run in runs], np.arange(0, count, STRIDE))
+    return recording, _track(runs)
 
 
 class _Live:
-    """One estimator in the loop, and what it said."""
+    """One estimator, and what it says at every STRIDE-th of `count` samples."""
 
-    def __init__(self, config: Config, count: int) -> None:
+    def __init__(self, config: Config, count: int, response: bool = False) -> None:
         self.estimator = Estimator(config)
         self.torque = 0.0
-        size = (count - 1) // STRIDE + 1
-        self._estimates = np.zeros(size, struct_dtype("lever_estimate_t"))
-        self._healths = np.zeros(size, struct_dtype("lever_health_t"))
-        self._estimate = ffi.from_buffer("lever_estimate_t[]", self._estimates)
-        self._health = ffi.from_buffer("lever_health_t[]", self._healths)
+        rows = (count - 1) // STRIDE + 1
+        self.estimates = np.zeros(rows, struct_dtype("lever_estimate_t"))
+        self.healths = np.zeros(rows, struct_dtype("lever_health_t"))
+        size = ((rows - 1) // RESPONSE_STRIDE + 1 if response else 0, len(FREQUENCIES))
+        self.responses = np.zeros(size, struct_dtype("lever_feedthrough_t"))
+        self._estimate = ffi.from_buffer("lever_estimate_t[]", self.estimates)
+        self._health = ffi.from_buffer("lever_health_t[]", self.healths)
+        self._response = ffi.from_buffer("lever_feedthrough_t[]", self.responses)
         self._now = ffi.new("lever_health_t *")
+
+    def feed(self, samples: NDArray[Any]) -> None:
+        """All samples, in bulk."""
+        lever, sample = self.estimator.pointer, ffi.from_buffer("lever_sample_t[]", samples)
+        for i in range(len(samples)):
+            lib.lever_update(lever, sample + i)
+            if i % STRIDE == 0:
+                self.note(i // STRIDE)
 
     def take(self, i: int, values: Sequence[float], missing: bool) -> None:
         """Takes theta, theta_dot, tau_m and z_ddot of sample i; `missing`: z_ddot alone."""
@@ -137,11 +169,10 @@ class _Live:
 
     def note(self, row: int) -> None:
         """Keeps what the estimator says now."""
-        lib.lever_estimate(self.estimator.pointer, self._estimate + row)
-        lib.lever_health(self.estimator.pointer, self._health + row)
-
-    @property
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """All that was kept, by field."""
-        kept = {name: self._estimates[name] for name in self._estimates.dtype.names or ()}
-        return kept | {name: self._healths[name] for name in ("mode", "faults")}
+        lever = self.estimator.pointer
+        lib.lever_estimate(lever, self._estimate + row)
+        lib.lever_health(lever, self._health + row)
+        if self.responses.size and row % RESPONSE_STRIDE == 0:
+            first = row // RESPONSE_STRIDE * len(FREQUENCIES)
+            for i, frequency in enumerate(FREQUENCIES.tolist()):
+                lib.lever_feedthrough(lever, frequency, self._response + (first + i))

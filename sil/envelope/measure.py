@@ -12,10 +12,9 @@ import numpy as np
 from lever_cdkf.host_tools.library import lib
 from numpy.typing import NDArray
 
-from .feedthrough import estimated
-from .firmware import PARAMETERS, Track
+from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from .motions import Recording
-from .plant import FloatArray, Hardware
+from .plant import FloatArray
 
 BoolArray = NDArray[np.bool_]
 
@@ -28,7 +27,6 @@ FOLLOWED = 8.0
 """Errors and settling are followed for so long after an event [s]."""
 _CALM = 0.5  # [s] without a flag: the firmware is back
 _PENDING = 0.05  # [s] in which what was gathered before a flag may still be learnt
-_RESPONSE_EVERY = 50  # estimates
 
 
 def fault_mask(*names: str) -> int:
@@ -74,19 +72,6 @@ class Outcome:
         """Where the firmware shows any of these faults."""
         shown: BoolArray = (self.track.faults & fault_mask(*names)) != 0
         return shown
-
-    @cached_property
-    def response(self) -> tuple[NDArray[np.complex128], FloatArray]:
-        """Error of theta/z_ddot relative to the rms of its truth over the band, and its stated standard deviation, at
-        some of the judged times (times, runs, frequencies)."""
-        truth = self.recording.response
-        if truth is None:
-            raise ValueError("this condition has no true theta/z_ddot")
-        at = np.flatnonzero(self.judged)[::_RESPONSE_EVERY]
-        value, sigma = (self.track.parameters(which)[at] for which in ("value", "sigma"))
-        answer, deviation = estimated(Hardware(), value, sigma, self.track.correlation[at], self.track.trim[at])
-        scale = np.sqrt(np.mean(np.abs(truth) ** 2, axis=-1, keepdims=True))
-        return (answer - truth) / scale, deviation / scale
 
 
 Values = FloatArray
@@ -203,14 +188,28 @@ def _sigma_ratio(outcome: Outcome) -> Values:
     return widest
 
 
+def _judged_feedthrough(outcome: Outcome) -> tuple[NDArray[np.complex128], Feedthrough]:
+    """True theta/z_ddot, and the firmware's at the judged times."""
+    truth, stated = outcome.recording.response, outcome.track.feedthrough
+    if truth is None or stated is None:
+        raise ValueError("this condition has no theta/z_ddot")
+    at = outcome.judged[::RESPONSE_STRIDE]
+    return truth, Feedthrough(stated.response[at], stated.gain_sigma[at], stated.phase_sigma[at])
+
+
 def _response_rms(outcome: Outcome) -> Values:
-    error, _ = outcome.response
-    return _percent_rms(error, (0, 2))
+    """Over times and frequencies, relative to the rms of the truth over the band."""
+    truth, stated = _judged_feedthrough(outcome)
+    scale = np.sqrt(np.mean(np.abs(truth) ** 2, axis=-1, keepdims=True))
+    return _percent_rms((stated.response - truth) / scale, (0, 2))
 
 
 def _response_covered(outcome: Outcome) -> Values:
-    error, sigma = outcome.response
-    return _percent(np.abs(error) <= 2.0 * sigma, (0, 2))
+    """Gain and phase both."""
+    truth, stated = _judged_feedthrough(outcome)
+    ratio = truth / stated.response
+    gain = np.abs(np.abs(ratio) - 1.0) <= 2.0 * stated.gain_sigma
+    return _percent(gain & (np.abs(np.angle(ratio)) <= 2.0 * stated.phase_sigma), (0, 2))
 
 
 def _pooled_rms(values: Values) -> float:
@@ -265,7 +264,7 @@ def _figures() -> dict[str, Figure]:
         "learnt late": Figure("σ", "the same from 2 s after its begin on", partial(_learnt, 2.0), _max),
         "σ ratio": Figure("1", "widest relative σ of a parameter ÷ that of the reference", _sigma_ratio, _max),
         "θ/z̈ rms": Figure("%", "complex rms error of theta/z_ddot over 2 to 8 Hz", _response_rms, _pooled_rms),
-        "θ/z̈ covered": Figure("%", "share of it within ±2σ", _response_covered, _mean, False),
+        "θ/z̈ covered": Figure("%", "share of it whose gain and phase are within ±2σ", _response_covered, _mean, False),
     }
 
 

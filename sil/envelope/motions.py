@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from ..transfer import BAND as BOUNCE_BAND
 from .plant import FloatArray, Hardware, Lanes, natural_frequency_and_damping
 
 PERIOD = 1e-3
@@ -19,6 +20,8 @@ STRIDE = 10
 """Estimates are judged at every so many-th sample."""
 BAND = (1.0, 10.0)
 """Of base motion and dither [Hz]."""
+FREQUENCIES = np.linspace(*BOUNCE_BAND, 25)
+"""At which theta/z_ddot is compared [Hz]."""
 EVENT = 30.0
 """When what happens once begins [s]."""
 
@@ -78,7 +81,7 @@ class Recording:
     truth: Mapping[str, FloatArray]
     """f_n [Hz], zeta [1], m_p [kg], c_p [N s/m], k_p [N/m]; nothing for pilots that have no such parameters."""
     response: NDArray[np.complex128] | None = None
-    """theta/z_ddot at feedthrough.FREQUENCIES, (runs, frequencies), where it stays the same."""
+    """theta/z_ddot at FREQUENCIES, (runs, frequencies), where it stays the same."""
 
 
 def stream(what: str, seed: int) -> np.random.Generator:

@@ -17,9 +17,9 @@ import numpy as np
 from lever_cdkf.host_tools.config import settings_table
 
 from .. import mayo_plant, plant, two_dof_plant
+from ..transfer import ComplexArray
 from ..truth import Conditions, Truth
-from .feedthrough import FREQUENCIES, ComplexArray
-from .motions import PERIOD, Motion, Recording, arms, excitation, stream
+from .motions import FREQUENCIES, PERIOD, Motion, Recording, arms, excitation, stream
 from .plant import FloatArray, Hardware
 
 LOSS = 0.6
@@ -44,9 +44,12 @@ def _reflex(c_p: FloatArray, k_p: FloatArray, frequency: FloatArray) -> ComplexA
 LINEAR: dict[str, DynamicStiffness] = {"hysteretic": _hysteretic, "reflex": _reflex}
 
 
-def record(motion: Motion, seeds: Sequence[int]) -> Recording:
-    """The recording of such a pilot; his trim and his arm are those of other pilots with that seed."""
-    return _linear(motion, seeds) if motion.pilot in LINEAR else _of_sil(motion, seeds)
+def record(motion: Motion, seeds: Sequence[int], tick: Callable[[], None] = lambda: None) -> Recording:
+    """The recording of such a pilot, with the trim and the linear arm that others of that seed have.
+
+    `tick` is called now and then.
+    """
+    return _linear(motion, seeds) if motion.pilot in LINEAR else _of_sil(motion, seeds, tick)
 
 
 def _linear(motion: Motion, seeds: Sequence[int]) -> Recording:
@@ -72,12 +75,13 @@ def _linear(motion: Motion, seeds: Sequence[int]) -> Recording:
     return Recording(motion.time, theta, theta_dot, tau_m, z_ddot, {}, response)
 
 
-def _of_sil(motion: Motion, seeds: Sequence[int]) -> Recording:
+def _of_sil(motion: Motion, seeds: Sequence[int], tick: Callable[[], None]) -> Recording:
     z_ddot, command, _ = excitation(motion, seeds)
     trim = arms(seeds)[3][0]
     theta, theta_dot, tau_m = np.empty_like(z_ddot), np.empty_like(z_ddot), np.empty_like(z_ddot)
     responses = []
     for run, seed in enumerate(seeds):
+        tick()
         pilot = _pilot_of_sil(motion.pilot, np.full(len(z_ddot), trim[run]), stream("pilot", seed))
         rng = stream("process", seed)
         body = pilot.body(Conditions(z_ddot[:, run], PERIOD, motion.process_noise, MOTOR_LAG, rng))

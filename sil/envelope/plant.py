@@ -12,6 +12,7 @@ m_p, c_p, k_p and the friction are held.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -139,12 +140,14 @@ class Plant:
         return acceleration
 
 
-def run(lanes: Lanes) -> tuple[FloatArray, FloatArray]:
-    """theta [rad] and theta_dot [rad/s] of every lane at every sample."""
+def run(lanes: Lanes, tick: Callable[[], None] = lambda: None) -> tuple[FloatArray, FloatArray]:
+    """theta [rad] and theta_dot [rad/s] of every lane at every sample; `tick` is called now and then."""
     plant = Plant(lanes)
     theta, theta_dot = np.empty_like(lanes.z_ddot), np.empty_like(lanes.z_ddot)
     for i in range(len(theta)):
         theta[i], theta_dot[i] = plant.theta, plant.theta_dot
         if i + 1 < len(theta):
             plant.advance(i)
+        if i % 1000 == 0:
+            tick()
     return theta, theta_dot

@@ -74,12 +74,14 @@ def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
 
 def _row(result: Result) -> dict[str, Any]:
     condition = result.condition
-    limits = (*condition.limits, *condition.unless)
+    limits = (*condition.limits, *condition.unless) or tuple(Limit(name) for name in result.values)
     return {
         "name": condition.name,
         "title": condition.title,
         "measured": {_key(limit): _number(result.of(limit)) for limit in limits},
-        "limit": {_key(limit): f"{'or ' if limit in condition.unless else ''}{limit}" for limit in limits},
+        "limit": {
+            _key(limit): f"{'or ' if limit in condition.unless else ''}{limit}" for limit in limits if str(limit)
+        },
         "ok": result.ok,
         "problem": result.problem or None,
         "runs": max((len(values) for values in result.values.values()), default=0),

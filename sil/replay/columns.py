@@ -13,7 +13,7 @@ from lever_cdkf.host_tools.fields import COUNTS
 from numpy.typing import NDArray
 
 from ..quantities import recorded_name
-from ..trace import ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
+from ..trace import ESTIMATED, FEEDTHROUGH, HEALTH, MEASURED, Trace, quantity_fields
 from .timeline import Timeline
 
 FloatArray = NDArray[np.float64]
@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 Continued = Callable[[str, FloatArray], FloatArray]
 """From the name and values of a field to values that go on from the piece before."""
 
-_HELD = ("PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "HEALTH", "LINK_HEALTH")
+_HELD = ("PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH", "HEALTH", "LINK_HEALTH")
 """Messages that come at a divided rate."""
 
 
@@ -30,7 +30,7 @@ class Columns:
 
     def __init__(self, timeline: Timeline, model: str, with_recorded: bool) -> None:
         self._timeline = timeline
-        self._fields = (*quantity_fields(model), *HEALTH)
+        self._fields = (*quantity_fields(model), *FEEDTHROUGH, *HEALTH)
         self._with_recorded = with_recorded
         self._compared = (*ESTIMATED, *quantity_fields(model), *(entry for entry in HEALTH if entry[0] == "mode"))
         self._counts = dict.fromkeys(COUNTS, 0)

@@ -18,7 +18,7 @@ from lever_cdkf.host_tools.later import allow
 from numpy.typing import NDArray
 
 from ..quantities import quantities, recorded_name
-from ..trace import ESTIMATED, HEALTH, MEASURED, Trace
+from ..trace import ESTIMATED, FEEDTHROUGH, HEALTH, MEASURED, Trace
 from .outputs import writing
 
 Signals = list[tuple[str, str, str]]
@@ -61,7 +61,7 @@ class Mf4:
         from asammdf import MDF
 
         self._path = path
-        self._groups = {"samples": _samples(with_recorded), "estimates": _pilot(model) + _health()}
+        self._groups = {"samples": _samples(with_recorded), "estimates": _pilot(model) + _others()}
         if with_recorded:
             self._groups["recorded estimates"] = _recorded(_pilot(model))
         self._indices: dict[str, int] = {}
@@ -102,8 +102,9 @@ class Mf4:
             self._file.close()
 
 
-def _health() -> Signals:
-    return [(column, field, _unit(message, field)) for column, message, field in HEALTH]
+def _others() -> Signals:
+    feedthrough = [(column, f"feedthrough_{field}", _unit(message, field)) for column, message, field in FEEDTHROUGH]
+    return feedthrough + [(column, field, _unit(message, field)) for column, message, field in HEALTH]
 
 
 def _history(start: datetime) -> Any:

@@ -7,11 +7,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.coherence import Coherence
 from numpy.typing import NDArray
 
+from ..feedthrough import Feedthrough
 from ..innovations import freedom
 from ..report.bode import LONGEST_STEP, slow_trim
-from ..report.run import Averages, Run, nis_averages
+from ..report.run import COHERENT, Averages, Run, nis_averages
 from ..report.series import Welch
 from ..trace import Trace
 from .reduction import Ends, Groups, Stretches
@@ -35,6 +37,8 @@ class Kept:
         self.stretches = Stretches()
         self.ends = Ends(_CLOSE_UP)
         self.spectra = {name: Welch(sample_period) for name in _SPECTRA}
+        self.feedthrough = Feedthrough()
+        self.coherence = Coherence(sample_period)
         size = max(1, round(_NIS_AVERAGE / sample_period))
         self.nis = Groups(size, lambda time, nis, outputs: nis_averages(time, nis, outputs, size, _NIS_AVERAGE)[:3])
 
@@ -48,6 +52,8 @@ class Kept:
         self.nis.add(trace["time_s"], trace["nis"], outputs)
         for name, spectrum in self.spectra.items():
             spectrum.add(trace[name])
+        self.feedthrough.add(trace)
+        self.coherence.add(*(trace[name] for name in COHERENT))
 
 
 class RecordedRun(Run):
@@ -84,6 +90,14 @@ class RecordedRun(Run):
 
     def spectrum(self, name: str) -> tuple[FloatArray, FloatArray]:
         return self._kept.spectra[name].spectrum()
+
+    @cached_property
+    def feedthrough(self) -> Feedthrough:
+        return self._kept.feedthrough
+
+    @cached_property
+    def coherence(self) -> Coherence:
+        return self._kept.coherence
 
     @cached_property
     def followed_trim(self) -> FloatArray | None:

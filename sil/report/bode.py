@@ -6,7 +6,7 @@ import numpy as np
 
 from ..oracle.detrend import Detrend
 from ..oracle.lever import Lever
-from ..transfer import Transfer
+from ..transfer import ComplexArray, Transfer
 from .series import Array
 
 LONGEST_STEP = 0.05  # [s] that the trim moves on by after a gap
@@ -42,6 +42,14 @@ _TRANSFERS: Mapping[str, Callable[[Lever, Array, Array], Transfer]] = {
     "linear_physical": _of_linear_physical,
     "linear_black_box": _of_linear_black_box,
 }
+
+
+def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
+    """Of a response over frequency. The phase [deg] goes on downwards, from -180 where the lever moves against the floor
+    at first (the arm's weight does so), from 0 where it moves along."""
+    start = -180.0 if response[0].real < 0.0 else 0.0
+    along = response if start == 0.0 else -response
+    return np.abs(response), np.degrees(np.unwrap(np.angle(along))) + start
 
 
 def slow_trim(time: Array, theta: Array, corner: float, longest_step: float = LONGEST_STEP) -> Array:

@@ -1,5 +1,6 @@
 """What a reader is told of the estimator's model, and of a truth that is of another kind."""
 
+from .charts import transfer
 from .run import Run
 
 ABOUT_MODEL = {
@@ -65,6 +66,23 @@ def dynamics_caption(run: Run) -> str:
         told.append("Both are usually known better than the three parameters, whose common scale cancels in them.")
     if run.mismatch in DYNAMICS:
         told.append(DYNAMICS[run.mismatch])
+    return " ".join(told)
+
+
+def feedthrough_caption(run: Run) -> str:
+    """What the Bode diagram with its band shows, and how good it was where the truth is known."""
+    told = [
+        "The same at one time, as a Bode diagram: magnitude, phase, and below the measured coherence of floor and lever "
+        "over the whole run: where it is low, noise, torque or the pilot's own movement move the lever, and there is "
+        "little to learn from the floor. Between 2 and 8 Hz the shaded band is ±2σ, as the estimator sends it; it holds "
+        "what the parameters leave open, not what the model cannot do. Drag the slider through the run."
+    ]
+    if (found := transfer.accuracy(run)) is not None:
+        told.append(
+            f"After the first third of the run the complex error was {100.0 * found.error:.1f} % rms; ±2σ held the "
+            f"true magnitude {100.0 * found.gain_covered:.0f} % and the true phase {100.0 * found.phase_covered:.0f} % "
+            "of the time."
+        )
     return " ".join(told)
 
 

@@ -134,12 +134,12 @@ def _transfer(page: Page, run: Run) -> None:
     page.section(
         "bode",
         "Bode diagram",
-        "How the floor moves the lever: the Bode diagram in time",
+        "Biodynamic feedthrough: how the floor moves the lever",
         f'<div class="pair">{pair}</div>' if pair else "",
         page.figure(
             "figure-slices",
             transfer.slices(run),
-            "The same at one time, as a Bode diagram: magnitude above, phase below. Drag the slider through the run.",
+            models.feedthrough_caption(run),
         ),
     )
 

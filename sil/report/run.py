@@ -7,14 +7,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from lever_cdkf.host_tools import native
+from lever_cdkf.host_tools.coherence import Coherence
 from numpy.typing import NDArray
 
 from .. import quantities, whiteness
+from ..feedthrough import Feedthrough
 from ..oracle.lever import Lever
 from ..quantities import Quantity
 from ..transfer import Transfer
 from .bode import slow_trim
 from .series import Array, jumps, welch
+
+
+COHERENT = ("z_ddot_measured_m_s2", "theta_measured_rad")
+"""Columns of which the coherence is shown."""
 
 
 class Averages(NamedTuple):
@@ -129,6 +135,23 @@ class Run:
     def spectrum(self, name: str) -> tuple[Array, Array]:
         """Frequencies [Hz] and power spectral density of a column."""
         return welch(np.asarray(self.trace[name], dtype=np.float64), self.sample_period)
+
+    @cached_property
+    def feedthrough(self) -> Feedthrough:
+        """θ/z̈ as the estimator sent it; empty where the trace has none."""
+        kept = Feedthrough()
+        kept.add(self.trace)
+        return kept
+
+    @cached_property
+    def coherence(self) -> Coherence | None:
+        """Measured, of z̈ and θ; None where one was not."""
+        base, theta = (self.column(name) for name in COHERENT)
+        if base is None or theta is None:
+            return None
+        measured = Coherence(self.sample_period)
+        measured.add(base, theta)
+        return measured
 
     @cached_property
     def followed_trim(self) -> Array | None:

@@ -22,7 +22,7 @@ waits for the terminal. Works over ssh and from 80 by 24 characters on.
 Instead of a bus, LOG is played at the pace it was recorded at, or the pilot of --scenario is simulated in real time.
 """
 _MONITOR_EPILOG = """\
-keys: q quits, space holds the picture, t changes the time span of the trends, c clears the counts
+keys: q quits, space holds the picture, t changes the time span of the trends, f shows the feedthrough, c clears the counts
 
 examples:
   lever monitor --interface socketcan --channel can0

@@ -12,7 +12,7 @@ import numpy as np
 from lever_cdkf.host_tools.config import Config, setting
 from lever_cdkf.host_tools.fields import COUNTS
 from lever_cdkf.host_tools.library import enum_names
-from lever_cdkf.host_tools.watch import words
+from lever_cdkf.host_tools.watch import paired, words
 from lever_cdkf.host_tools.watch.model import STEP, Picture
 from lever_cdkf.host_tools.watch.sources import Source
 
@@ -25,9 +25,10 @@ SPAN = 60.0
 MAP_STEP = 0.5
 """[s] between two columns of the map of magnitude over time."""
 MAP_FREQUENCIES: FloatArray = FREQUENCIES[::2]
+COHERENCE_FREQUENCIES: FloatArray = np.arange(0.5, 12.25, 0.5)
 OTHERS = ("nis", "excitation", "dither")
 _DIGITS = 4
-_DECIMALS = 5  # of curves, which are finite
+_DECIMALS = 5  # of curves
 
 
 class State:
@@ -60,6 +61,7 @@ class State:
         update["row"] = self._rows[-1]
         update["bode"] = None if response is None else _bode(response)
         update["truth"] = None if truth is None else np.degrees(np.abs(truth[1]))
+        update["coherence"] = self._coherence()
         if not self._map or picture.now - self._map[-1][0] >= 0.99 * MAP_STEP:
             self._map.append((picture.now, np.zeros(0) if response is None else response.magnitude[::2]))
             update["map"] = self._map[-1]
@@ -81,6 +83,8 @@ class State:
             "map_step": MAP_STEP,
             "frequencies": FREQUENCIES,
             "map_frequencies": MAP_FREQUENCIES,
+            "coherence_frequencies": COHERENCE_FREQUENCIES,
+            "coherence_span": paired.SPAN,
             "quantities": [
                 {"key": q.key, "name": q.name, "symbol": q.symbol, "unit": q.shown_unit} for q in self._quantities()
             ],
@@ -105,14 +109,16 @@ class State:
         picture = self.picture
         if picture.model is None:
             return None
-        parameters, (frequency, damping) = picture.parameters(), picture.dynamics()
-        return self._geometry.response(
-            picture.model,
-            [entry.value for entry in parameters],
-            [entry.sigma for entry in parameters],
-            (frequency.sigma, damping.sigma),
-            picture.theta(),
-        )
+        parameters = [entry.value for entry in picture.parameters()]
+        return self._geometry.response(picture.model, parameters, picture.theta(), picture.feedthrough())
+
+    def _coherence(self) -> dict[str, Any] | None:
+        """Measured, over COHERENCE_FREQUENCIES, and what chance alone would give."""
+        measured = self.picture.coherence()
+        if measured is None:
+            return None
+        values = np.interp(COHERENCE_FREQUENCIES, measured.frequency, measured.coherence)
+        return {"values": values, "chance": measured.chance}
 
     def _present(self) -> dict[str, Any]:
         """How it stands."""
@@ -173,7 +179,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return _short(value)
     if isinstance(value, np.ndarray):
-        return np.round(value, _DECIMALS).tolist()
+        return [number if math.isfinite(number) else None for number in np.round(value, _DECIMALS).tolist()]
     if isinstance(value, Iterable):
         return [_plain(each) for each in value]
     raise TypeError(f"{type(value)} is nothing for the page")

@@ -27,7 +27,7 @@ function reach(values, part = 0.03) {
 export function drawBode(story) {
   const { start, update } = story, bode = update?.bode, frequency = { low: start.frequencies[0], high: start.frequencies.at(-1), log: true, unit: " Hz" };
   const past = start.map.filter(([time, column]) => column.length && update && update.row[0] - time < PAST);
-  const shown = bode ? [...bode.magnitude, ...bode.low.map((low, k) => Math.max(low, bode.magnitude[k] / WIDEST)), ...bode.high.map((high, k) => Math.min(high, bode.magnitude[k] * WIDEST))] : [];
+  const shown = bode ? [...bode.magnitude, ...bode.magnitude.map((middle, k) => Math.max(bode.low[k] ?? middle, middle / WIDEST)), ...bode.magnitude.map((middle, k) => Math.min(bode.high[k] ?? middle, middle * WIDEST))] : [];
   const all = [...shown, ...known(update?.truth ?? []), ...past.flatMap(([, column]) => column)].filter((value) => value > 0);
   let axes = new Axes(document.getElementById("magnitude"), "θ/z̈ [deg per m/s²]", frequency, range("magnitude", true).follow(Math.min(...all), Math.max(...all)));
   for (const [time, column] of past)
@@ -44,6 +44,17 @@ export function drawBode(story) {
     axes.band(start.frequencies, bode.phase_low, bode.phase_high, "estimate-band");
     axes.line(start.frequencies, bode.phase, "estimate", { width: 2.2 });
   } else axes.say("no estimate yet");
+  drawCoherence(story, frequency);
+}
+
+// Measured, and what chance alone would give.
+function drawCoherence({ start, update }, frequency) {
+  const axes = new Axes(document.getElementById("coherence"), `measured coherence of θ and z̈, last ${start.coherence_span} s`, frequency, { low: 0, high: 1.05, ticks: [0, 0.5, 1] });
+  const measured = update?.coherence;
+  if (!measured) return axes.say("not enough samples yet");
+  axes.line(start.coherence_frequencies, measured.values, "base", { width: 2 });
+  axes.line([frequency.low, frequency.high], [measured.chance, measured.chance], "quiet", { dash: [5, 4], width: 1.2 });
+  return undefined;
 }
 
 export function drawMap(story) {

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.envelope import conditions, table
-from lever_cdkf.sil.envelope.condition import Condition, Limit
+from lever_cdkf.host_tools.config import Config
+from lever_cdkf.sil.envelope import campaign, conditions, firmware, page, table
+from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
+from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
 
 
@@ -16,12 +21,12 @@ def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[s
     status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
-    page = (tmp_path / "envelope.html").read_text(encoding="utf-8")
+    written = (tmp_path / "envelope.html").read_text(encoding="utf-8")
     assert set(rows) == {name for name, condition in conditions.CONDITIONS.items() if condition.quick}
     for name, row in rows.items():
         assert row["measured"].keys() == row["limit"].keys()
         assert name in printed
-        assert f'id="chart-{name}"' in page
+        assert f'id="chart-{name}"' in written
     assert {name: row["measured"] for name, row in rows.items() if not row["ok"]} == {}
     assert status == 0
 
@@ -38,9 +43,35 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(conditions, "CONDITIONS", {row.name: row for row in rows})
 
 
+def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [
+        Condition("wander", "", Motion(duration=3.0, wander=3.0), start=1.0),
+        Condition("steady", "", Motion(duration=3.0, friction=0.1), start=1.0),
+    ]
+    together = campaign.run(rows, {}, 3, lambda *_: None)
+    monkeypatch.setattr(campaign, "LANES", 2)
+    apart = campaign.run(rows, {}, 3, lambda *_: None)
+    for left, right in zip(together, apart, strict=True):
+        assert left.condition is right.condition
+        assert len(left.values["f_n rms"]) == 3
+        for name, values in left.values.items():
+            np.testing.assert_allclose(values, right.values[name], rtol=1e-9)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> None:
+    motion, loop = Motion(duration=4.0, dither=0.0), ClosedLoop(dither=0.3, lost=0.5, whole=whole)
+    recording, track = firmware.closed_loop(Config(), motion, range(2), loop, lambda: None)
+    assert np.all(np.std(recording.tau_m[2000:], axis=0) > 0.15)
+    missing = np.mean(track.faults & fault_mask("THETA") != 0)
+    assert missing == 0.0 if whole else 0.4 < missing < 0.6
+    assert np.any(track.faults & fault_mask("GAP")) == whole
+    assert np.all(np.diff(track.value["f_n"][200:], axis=0).any(axis=0))
+
+
 @pytest.mark.usefixtures("short")
 def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["envelope", "--seeds", "2", "--json", str(tmp_path / "rows.json")]) == 1
+    assert cli.main(["envelope", "--seeds", "2", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]) == 1
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     assert {name: row["ok"] for name, row in rows.items()} == {"missed": False, "unknown": False, "reported": True}
     assert rows["unknown"]["measured"] == {"f_n rms [%]": None}
@@ -49,6 +80,22 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     printed = capsys.readouterr().out
     assert "0 of 2 conditions hold. Missed: missed, unknown." in printed
     assert table.MISSED in printed
+
+
+def test_estimates_that_are_not_finite_keep_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits = (Limit("f_n rms", most=1e9), Limit("f_n covered", least=0.1))
+    row = Condition("steady", "", Motion(duration=3.0), limits, start=1.0)
+    estimates = firmware.estimates
+
+    def spoilt(*arguments: Any) -> firmware.Track:
+        track = estimates(*arguments)
+        return replace(track, value={name: np.full_like(column, np.nan) for name, column in track.value.items()})
+
+    monkeypatch.setattr(firmware, "estimates", spoilt)
+    results = campaign.run([row], {}, 2, lambda *_: None)
+    assert not results[0].ok
+    assert table.rows(results)[0]["measured"] == {"f_n rms [%]": None, "f_n covered [%]": 0.0}
+    assert 'id="chart-steady"' in page.build(results, 2)
 
 
 @pytest.mark.usefixtures("short")

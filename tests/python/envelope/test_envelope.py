@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.config import settings_table
 from lever_cdkf.sil import plant as sil_plant
-from lever_cdkf.sil.envelope import feedthrough, measure, motions, pilots, plant
+from lever_cdkf.sil.envelope import measure, motions, pilots, plant
 from lever_cdkf.sil.envelope.condition import Limit
 from lever_cdkf.sil.envelope.conditions import CONDITIONS
-from lever_cdkf.sil.envelope.firmware import Track
+from lever_cdkf.sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_cdkf.sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_cdkf.sil.envelope.motions import Motion, Recording
 from lever_cdkf.sil.envelope.plant import FloatArray
 from lever_cdkf.sil.envelope.sensors import NOISE, Fault, Sensors, measured
+from lever_cdkf.sil.transfer import ComplexArray
 from lever_cdkf.sil.truth import Conditions
 
 QUIET = Motion(duration=8.0, process_noise=0.0)
@@ -85,8 +86,8 @@ def test_a_lever_that_nobody_holds_swings_on_its_own_spring() -> None:
 def test_linear_pilots_move_as_the_plant_does(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the ordinary arm in place of theirs; periodic signals, so the second of two periods counts."""
 
-    def ordinary(c_p: FloatArray, k_p: FloatArray, frequency: FloatArray) -> feedthrough.ComplexArray:
-        stiffness: feedthrough.ComplexArray = k_p + 2j * np.pi * frequency * c_p
+    def ordinary(c_p: FloatArray, k_p: FloatArray, frequency: FloatArray) -> ComplexArray:
+        stiffness: ComplexArray = k_p + 2j * np.pi * frequency * c_p
         return stiffness
 
     monkeypatch.setitem(pilots.LINEAR, "ordinary", ordinary)
@@ -96,8 +97,10 @@ def test_linear_pilots_move_as_the_plant_does(monkeypatch: pytest.MonkeyPatch) -
     z_ddot, tau_m, kick = (np.tile(column, (2, 1)) for column in (given.z_ddot, given.tau_m, given.kick))
     theta, _ = plant.run(replace(given, z_ddot=z_ddot, tau_m=tau_m, kick=kick))
     np.testing.assert_allclose(theta[len(recording.theta) :], recording.theta, atol=2e-5)
-    parameters = np.stack([given.m_p[0], given.c_p[0], given.k_p[0]], axis=-1)
-    response = feedthrough.response(plant.Hardware(), parameters, given.trim[0])
+    truth = sil_plant.LeverTruth(
+        lever(), sil_plant.Truth(given.m_p[0], given.c_p[0], given.k_p[0], given.trim[0]), "trim"
+    )
+    response = truth.transfer(np.arange(3)).response(motions.FREQUENCIES)
     assert recording.response is not None
     np.testing.assert_allclose(recording.response, response, rtol=1e-9)
 
@@ -178,7 +181,7 @@ def outcome(error: dict[str, FloatArray] | None = None, faults: FloatArray | Non
     shown = nothing.astype(np.uint32)
     if faults is not None:
         shown[:, 0] = faults
-    track = Track(time, value, sigma, np.zeros((len(time), 2, 3)), nothing, shown, shown)
+    track = Track(time, value, sigma, shown, shown)
     return Outcome(Recording(time, nothing, nothing, nothing, nothing, truth), track, (5.0, 15.0), ((10.0, 12.0),))
 
 
@@ -232,15 +235,23 @@ def test_against_a_reference() -> None:
     np.testing.assert_allclose(FIGURES["σ ratio"].compute(not_told), (3.0, 1.0))
 
 
-def test_feedthrough_sigma_is_the_scatter_of_drawn_parameters() -> None:
-    mean, sigma = np.array((2.5, 42.0, 1500.0)), np.array((0.05, 1.0, 20.0))
-    correlation = np.array((0.6, 0.8, 0.5))
-    covariance = np.array(((1.0, 0.6, 0.8), (0.6, 1.0, 0.5), (0.8, 0.5, 1.0))) * np.outer(sigma, sigma)
-    drawn = np.random.default_rng(1).multivariate_normal(mean, covariance, 20_000)
-    trim = np.asarray(0.35)
-    value, stated = feedthrough.estimated(plant.Hardware(), mean, sigma, correlation, trim)
-    scatter = feedthrough.response(plant.Hardware(), drawn, trim) - value
-    np.testing.assert_allclose(np.sqrt(np.mean(np.abs(scatter) ** 2, axis=0)), stated, rtol=0.05)
+def test_feedthrough() -> None:
+    """Off by 6 % in gain and 0.05 rad in phase, in the first run."""
+    case = outcome()
+    truth = np.exp(1j * np.linspace(0.0, -3.0, 25)) * np.linspace(1.0, 3.0, 25) * np.ones((2, 1))
+    response = np.tile(truth, (2000 // RESPONSE_STRIDE, 1, 1))
+    response[:, 0] *= 1.06 * np.exp(0.05j)
+    sigma = np.full(response.shape, 0.04)
+    recording = replace(case.recording, response=truth)
+    case = replace(
+        case, recording=recording, track=replace(case.track, feedthrough=Feedthrough(response, sigma, sigma))
+    )
+    expected = 100.0 * abs(1.06 * np.exp(0.05j) - 1.0)
+    np.testing.assert_allclose(FIGURES["θ/z̈ rms"].compute(case), (expected, 0.0), atol=1e-9)
+    for gain_sigma, phase_sigma, covered in ((0.04, 0.04, 100.0), (0.02, 0.04, 0.0), (0.04, 0.02, 0.0)):
+        stated = Feedthrough(response, np.full(response.shape, gain_sigma), np.full(response.shape, phase_sigma))
+        stating = replace(case, track=replace(case.track, feedthrough=stated))
+        np.testing.assert_array_equal(FIGURES["θ/z̈ covered"].compute(stating), (covered, 100.0))
 
 
 # --- table -----------------------------------------------------------------------------------------------------------

@@ -68,15 +68,18 @@ static void test_every_estimate_says_whether_it_may_be_used(void)
         const uint32_t count = fetch_all(lever, frames);
         message_pilot_parameters_t parameters;
         message_pilot_sigma_t sigma;
+        message_feedthrough_t feedthrough;
         message_link_health_t link;
         TEST_ASSERT_TRUE(message_pilot_parameters_decode(&parameters, &frames[0]));
         TEST_ASSERT_TRUE(message_pilot_sigma_decode(&sigma, &frames[1]));
         TEST_ASSERT_TRUE(message_pilot_dynamics_decode(&dynamics, &frames[2]));
-        TEST_ASSERT_TRUE(message_link_health_decode(&link, &frames[4]));
+        TEST_ASSERT_TRUE(message_feedthrough_decode(&feedthrough, &frames[3]));
+        TEST_ASSERT_TRUE(message_link_health_decode(&link, &frames[5]));
         TEST_ASSERT_TRUE(message_state_estimate_decode(&state, &frames[count - 1u]));
         TEST_ASSERT_EQUAL(rows[k].valid, parameters.valid);
         TEST_ASSERT_EQUAL(rows[k].valid, sigma.valid);
         TEST_ASSERT_EQUAL(rows[k].valid, dynamics.valid);
+        TEST_ASSERT_EQUAL(rows[k].valid, feedthrough.valid);
         TEST_ASSERT_EQUAL(rows[k].valid, link.valid);
         TEST_ASSERT_EQUAL(rows[k].valid, state.valid);
         TEST_ASSERT_TRUE(rows[k].blind == (isnan(state.innovation) != 0) || rows[k].stands);
@@ -116,6 +119,28 @@ static void test_dynamics_say_what_the_estimate_says(void)
     TEST_ASSERT_DOUBLE_WITHIN(5.1e-4, (double)estimate.damping_ratio_sigma, (double)message.damping_ratio_sigma);
 }
 
+/* Each of 2 to 8 Hz in its turn, and again from the first. */
+static void test_feedthrough_says_one_frequency_after_the_other(void)
+{
+    publish_always();
+    (void)sender_run(&sender, lever, 2000u);
+    (void)answers();
+    message_feedthrough_t message;
+    TEST_ASSERT_TRUE(message_feedthrough_decode(&message, &frames[3]));
+    for (uint32_t k = 0u; k < 15u; k++) {
+        const uint8_t next = (message.frequency == 8u) ? 2u : (uint8_t)(message.frequency + 1u);
+        lever_feedthrough_t feedthrough;
+        (void)answers();
+        TEST_ASSERT_TRUE(message_feedthrough_decode(&message, &frames[3]));
+        TEST_ASSERT_EQUAL_UINT8(next, message.frequency);
+        lever_feedthrough(lever, (float)message.frequency, &feedthrough);
+        TEST_ASSERT_DOUBLE_WITHIN(2.6e-6, (double)feedthrough.real, (double)message.real);
+        TEST_ASSERT_DOUBLE_WITHIN(2.6e-6, (double)feedthrough.imaginary, (double)message.imaginary);
+        TEST_ASSERT_DOUBLE_WITHIN(2.1e-3, (double)feedthrough.gain_sigma, (double)message.gain_sigma);
+        TEST_ASSERT_DOUBLE_WITHIN(2.1e-3, (double)feedthrough.phase_sigma, (double)message.phase_sigma);
+    }
+}
+
 /* c_p with a standard deviation of 200 was sent as 131. */
 static void test_a_sigma_that_does_not_fit_is_not_available(void)
 {
@@ -138,7 +163,7 @@ static void test_health_says_mode_faults_and_excitation(void)
     (void)sender_run(&sender, lever, 1000u);
     (void)answers();
     const lever_health_t health = rig_health(lever);
-    TEST_ASSERT_TRUE(message_health_decode(&message, &frames[3]));
+    TEST_ASSERT_TRUE(message_health_decode(&message, &frames[4]));
     TEST_ASSERT_EQUAL_UINT8(LEVER_MODE_RUN, message.mode);
     TEST_ASSERT_EQUAL_UINT32(health.faults, message.faults);
     TEST_ASSERT_EQUAL_UINT8(0u, message.restarts);
@@ -279,6 +304,7 @@ int main(void)
     RUN_TEST(test_every_estimate_says_whether_it_may_be_used);
     RUN_TEST(test_parameters_and_sigma_say_what_the_estimate_says);
     RUN_TEST(test_dynamics_say_what_the_estimate_says);
+    RUN_TEST(test_feedthrough_says_one_frequency_after_the_other);
     RUN_TEST(test_a_sigma_that_does_not_fit_is_not_available);
     RUN_TEST(test_health_says_mode_faults_and_excitation);
     RUN_TEST(test_health_has_every_fault_since_the_last_one);

@@ -27,18 +27,18 @@ static void test_nothing_is_sent_before_the_first_sample(void)
     TEST_ASSERT_EQUAL_UINT32(0u, fetch_all(lever, frames));
 }
 
-/* Part k of six, of which PLATFORM_HEALTH is not sent without a report, at the first sample after k sixths of the
+/* Part k of seven, of which PLATFORM_HEALTH is not sent without a report, at the first sample after k sevenths of the
  * period; the pages of IDENTITY each second. */
 static void test_a_set_of_divided_messages_is_spread_over_a_publish_period(void)
 {
     const struct {
         uint32_t sample;
         uint32_t id;
-    } wanted[] = {{0u, 0x214u}, {4u, 0x211u}, {7u, 0x212u}, {10u, 0x213u}, {14u, 0x219u}};
+    } wanted[] = {{0u, 0x214u}, {3u, 0x211u}, {6u, 0x212u}, {9u, 0x213u}, {12u, 0x21Au}, {15u, 0x219u}};
     for (uint32_t k = 0u; k < 2100u; k++) {
         uint32_t next[3] = {0u};
         uint32_t count = 0u;
-        for (uint32_t m = 0u; m < 5u; m++) {
+        for (uint32_t m = 0u; m < 6u; m++) {
             if (wanted[m].sample == (k % 20u)) {
                 next[count++] = wanted[m].id;
             }
@@ -53,7 +53,7 @@ static void test_a_set_of_divided_messages_is_spread_over_a_publish_period(void)
 
 static void test_when_all_are_due_state_estimate_comes_last(void)
 {
-    const uint32_t wanted[] = {0x215u, 0x218u, 0x211u, 0x212u, 0x213u, 0x214u, 0x219u, 0x216u, 0x217u, 0x210u};
+    const uint32_t wanted[] = {0x215u, 0x218u, 0x211u, 0x212u, 0x213u, 0x21Au, 0x214u, 0x219u, 0x216u, 0x217u, 0x210u};
     const lever_platform_t report = {.faults = 0u};
     publish_always();
     lever_platform(lever, &report);
@@ -62,7 +62,7 @@ static void test_when_all_are_due_state_estimate_comes_last(void)
     command.dither_rms = 0.3f;
     const lever_frame_t frame = sender_command(&sender, &command);
     TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
-    assert_ids(wanted, 10u, answers());
+    assert_ids(wanted, 11u, answers());
 }
 
 static void test_the_motor_comes_first_while_dither_is_on(void)
@@ -125,7 +125,7 @@ static void test_frames_not_fetched_are_replaced_and_do_not_pile_up(void)
         (void)sender_deliver(&sender, lever);
     }
     const uint32_t count = fetch_all(lever, frames);
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(7u, count);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(8u, count);
     message_state_estimate_t message;
     TEST_ASSERT_TRUE(message_state_estimate_decode(&message, &frames[count - 1u]));
     TEST_ASSERT_DOUBLE_WITHIN(1.1e-4, (double)rig_estimate(lever).theta, (double)message.theta);
@@ -189,9 +189,9 @@ static void test_publication_goes_on_when_time_wraps(void)
 
 static void test_every_message_has_its_own_gapless_counter_and_a_right_crc(void)
 {
-    const uint8_t data_ids[10] = {
-        49u, 65u, 81u, 97u, 113u, 129u, 145u, 161u, 177u, 193u}; /* E2EDataIdBase of the DBC */
-    uint32_t received[10] = {0u};
+    const uint8_t data_ids[11] = {
+        49u, 65u, 81u, 97u, 113u, 129u, 145u, 161u, 177u, 193u, 209u}; /* E2EDataIdBase of the DBC */
+    uint32_t received[11] = {0u};
     const lever_platform_t report = {.faults = 0u};
     lever_platform(lever, &report);
     for (uint32_t k = 0u; k < 1000u; k++) {
@@ -202,7 +202,7 @@ static void test_every_message_has_its_own_gapless_counter_and_a_right_crc(void)
         const uint32_t count = answers();
         for (uint32_t f = 0u; f < count; f++) {
             const uint32_t m = frames[f].id - 0x210u;
-            TEST_ASSERT_LESS_THAN_UINT32(10u, m);
+            TEST_ASSERT_LESS_THAN_UINT32(11u, m);
             const uint8_t counter = (uint8_t)(received[m] & 15u);
             TEST_ASSERT_EQUAL_UINT8(counter, e2e_counter(&frames[f]));
             TEST_ASSERT_EQUAL_HEX8(
@@ -210,8 +210,8 @@ static void test_every_message_has_its_own_gapless_counter_and_a_right_crc(void)
             received[m]++;
         }
     }
-    const uint32_t expected[10] = {1000u, 50u, 50u, 50u, 50u, 700u, 50u, 3u, 1000u, 50u};
-    TEST_ASSERT_EQUAL_UINT32_ARRAY(expected, received, 10);
+    const uint32_t expected[11] = {1000u, 50u, 50u, 50u, 50u, 700u, 50u, 3u, 1000u, 50u, 50u};
+    TEST_ASSERT_EQUAL_UINT32_ARRAY(expected, received, 11);
 }
 
 int main(void)

@@ -67,6 +67,7 @@ static const message_state_estimate_t blank_state_estimate = {0};
 static const message_pilot_parameters_t blank_pilot_parameters = {0};
 static const message_pilot_sigma_t blank_pilot_sigma = {0};
 static const message_pilot_dynamics_t blank_pilot_dynamics = {0};
+static const message_feedthrough_t blank_feedthrough = {0};
 static const message_health_t blank_health = {0};
 static const message_platform_health_t blank_platform_health = {0};
 static const message_motor_command_t blank_motor_command = {0};

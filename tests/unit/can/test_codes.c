@@ -25,6 +25,8 @@ FLAG(pilot_parameters, valid)
 FLAG(pilot_sigma, valid)
 CODE(pilot_dynamics, model, uint8_t)
 FLAG(pilot_dynamics, valid)
+CODE(feedthrough, frequency, uint8_t)
+FLAG(feedthrough, valid)
 CODE(health, mode, uint8_t)
 CODE(health, faults, uint32_t)
 CODE(health, restarts, uint8_t)
@@ -124,6 +126,8 @@ static const code_t codes[] = {
     CODE_ROW(link_health, lost, 0x219u, 16u, 16u, UINT16_MAX),
     CODE_ROW(link_health, corrupt, 0x219u, 32u, 16u, UINT16_MAX),
     CODE_ROW(link_health, late, 0x219u, 48u, 16u, UINT16_MAX),
+    CODE_ROW(feedthrough, frequency, 0x21Au, 12u, 4u, UINT8_MAX),
+    CODE_ROW(feedthrough, valid, 0x21Au, 16u, 1u, 1u),
 };
 enum { CODES = (int)(sizeof codes / sizeof codes[0]) };
 

@@ -31,6 +31,7 @@ AGAIN(state_estimate)
 AGAIN(pilot_parameters)
 AGAIN(pilot_sigma)
 AGAIN(pilot_dynamics)
+AGAIN(feedthrough)
 AGAIN(health)
 AGAIN(platform_health)
 AGAIN(motor_command)
@@ -62,6 +63,7 @@ static const kind_t kinds[] = {
     {identity_again, 0x217u, 0x20u, 0u, {[6] = 0xFFu, [7] = 0xFFu}},
     {command_ack_again, 0x218u, 0u, 0xF0u, {[4] = 0xF0u, [5] = 0xFFu}},
     {link_health_again, 0x219u, 0u, 0xF0u, {0u}},
+    {feedthrough_again, 0x21Au, 0u, 0xF0u, {[7] = 0x80u}},
 };
 enum { KINDS = (int)(sizeof kinds / sizeof kinds[0]) };
 

@@ -28,6 +28,10 @@ QUANTITY(pilot_dynamics, natural_frequency)
 QUANTITY(pilot_dynamics, damping_ratio)
 QUANTITY(pilot_dynamics, natural_frequency_sigma)
 QUANTITY(pilot_dynamics, damping_ratio_sigma)
+QUANTITY(feedthrough, real)
+QUANTITY(feedthrough, imaginary)
+QUANTITY(feedthrough, gain_sigma)
+QUANTITY(feedthrough, phase_sigma)
 QUANTITY(health, excitation)
 QUANTITY(motor_command, torque)
 QUANTITY(motor_command, dither)
@@ -72,6 +76,10 @@ static const quantity_t quantities[] = {
     ROW(motor_command, dither, 0x215u, 0.001, 32u, 16u, true),
     ROW(command_ack, dither_rms, 0x218u, 0.001, 48u, 16u, false),
     ROW(identity, dither_rms, 0x217u, 0.001, 32u, 16u, false),
+    ROW(feedthrough, real, 0x21Au, 0.000005, 17u, 15u, true),
+    ROW(feedthrough, imaginary, 0x21Au, 0.000005, 32u, 15u, true),
+    ROW(feedthrough, gain_sigma, 0x21Au, 0.004, 47u, 8u, false),
+    ROW(feedthrough, phase_sigma, 0x21Au, 0.004, 55u, 8u, false),
 };
 enum { QUANTITIES = (int)(sizeof quantities / sizeof quantities[0]) };
 
