@@ -9,17 +9,18 @@ two Butterworth filters of second order at `trim_corner` on all four signals, th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from lever_cdkf.host_tools.config import settings_table
 from lever_cdkf.host_tools.library import lib
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from ...envelope.firmware import PARAMETERS, Track
-from ...envelope.motions import PERIOD, STRIDE
+from ...envelope.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
+from ...envelope.motions import FREQUENCIES, PERIOD, STRIDE
 from ...envelope.sensors import NOISE
 from ...oracle.cdkf import Array
+from ...oracle.lever import Lever
 from ..baselines.joint_ekf import Joint, JointEkf
 from ..baselines.joint_ukf import JointUkf
 from ..baselines.recursion import follow
@@ -29,7 +30,7 @@ from ..transitions import dynamics_gradient, with_dynamics
 from .logs import Log
 
 _SIGNALS = ("theta", "theta_dot", "z_ddot", "tau_m")
-_PAIRS = ((0, 1), (0, 2), (1, 2))
+_STEP = 1e-4  # of w, for derivatives
 
 
 class Peer(NamedTuple):
@@ -109,14 +110,14 @@ def _filtered(sections: Array, signals: Array, start: Array) -> Array:
 
 
 def _track(batch: Batch, estimates: Estimates) -> Track:
-    """In the firmware's terms; a filter that breaks down has no estimate, and so no fault or mode either."""
+    """In the firmware's terms; peers have neither faults nor modes."""
     assert estimates.covariance is not None
     parameters = batch.knowledge.physical(estimates.w)
     with np.errstate(all="ignore"):  # of runs that broke down
         dynamics = batch.model.dynamics(np.moveaxis(parameters, -1, 0), batch.rest(estimates.at))
-        variance = with_dynamics(estimates.covariance, dynamics_gradient(batch, estimates.at, estimates.w))
-        relative = np.sqrt(variance)
-        correlation = [estimates.covariance[..., i, j] / (relative[..., i] * relative[..., j]) for i, j in _PAIRS]
+        gradient = dynamics_gradient(batch, estimates.at, estimates.w)
+        relative = np.sqrt(with_dynamics(estimates.covariance, gradient))
+        feedthrough = _feedthrough(batch, estimates)
     columns = (*np.moveaxis(parameters, -1, 0), *dynamics)
     value = {name: column.T for name, column in zip((*PARAMETERS, "f_n", "zeta"), columns, strict=True)}
     shape = value["f_n"].shape
@@ -124,20 +125,44 @@ def _track(batch: Batch, estimates: Estimates) -> Track:
         time=(estimates.at * batch.period).astype(np.float64),
         value=value,
         sigma={name: column * relative[..., i].T for i, (name, column) in enumerate(value.items())},
-        correlation=np.stack(correlation, axis=-1).swapaxes(0, 1),
-        trim=batch.trim[:, estimates.at].T,
         faults=np.zeros(shape, dtype=np.uint32),
         mode=np.full(shape, lib.LEVER_MODE_RUN, dtype=np.uint32),
+        feedthrough=feedthrough,
     )
 
 
+def _feedthrough(batch: Batch, estimates: Estimates) -> Feedthrough:
+    """theta/z_ddot about the trim at every RESPONSE_STRIDE-th time; its sigma to first order, by differences of w."""
+    assert estimates.covariance is not None
+    lever = KINDS["lever"].make({row.name: row.default for row in settings_table()}, "trim")
+    assert isinstance(lever, Lever)
+    w, trim = estimates.w[:, ::RESPONSE_STRIDE], batch.trim[:, estimates.at[::RESPONSE_STRIDE]]
+    s = 2j * np.pi * FREQUENCIES
+
+    def response(w: Array) -> Any:
+        m_p, c_p, k_p = np.moveaxis(batch.knowledge.physical(w), -1, 0)
+        stiffness = lever.rotational_stiffness(trim, m_p, k_p, trim)[..., np.newaxis]
+        damping = lever.rotational_damping(trim, c_p)[..., np.newaxis]
+        force = (lever.unbalance(m_p) * np.cos(trim))[..., np.newaxis]
+        return -force / (lever.total_inertia(m_p)[..., np.newaxis] * s**2 + damping * s + stiffness)
+
+    steps = _STEP * np.eye(len(PARAMETERS))
+    gradient = np.stack([np.log(response(w + step) / response(w - step)) / (2.0 * _STEP) for step in steps], axis=-1)
+    covariance = estimates.covariance[:, ::RESPONSE_STRIDE]
+    gain, phase = (
+        np.sqrt(np.einsum("btfi,btij,btfj->tbf", part, covariance, part)) for part in (gradient.real, gradient.imag)
+    )
+    return Feedthrough(response(w).swapaxes(0, 1), gain, phase)
+
+
 def _part(track: Track, runs: slice) -> Track:
+    whole = track.feedthrough
+    assert whole is not None
     return Track(
         time=track.time,
         value={name: column[:, runs] for name, column in track.value.items()},
         sigma={name: column[:, runs] for name, column in track.sigma.items()},
-        correlation=track.correlation[:, runs],
-        trim=track.trim[:, runs],
         faults=track.faults[:, runs],
         mode=track.mode[:, runs],
+        feedthrough=Feedthrough(whole.response[:, runs], whole.gain_sigma[:, runs], whole.phase_sigma[:, runs]),
     )

@@ -58,7 +58,9 @@ def logs(chunk: Sequence[Condition], seeds: int) -> Iterator[Log]:
         else:
             recording = recordings[_key(condition)]
             signals = measured(recording, condition.sensors, own)
-            yield Log(condition, recording, signals, trim, _firmware(condition, signals))
+            yield Log(
+                condition, recording, signals, trim, _firmware(condition, signals, recording.response is not None)
+            )
 
 
 class _Key(NamedTuple):
@@ -88,9 +90,9 @@ def _recordings(keys: Iterable[_Key], seeds: int) -> dict[_Key, Recording]:
     return found
 
 
-def _firmware(condition: Condition, signals: Mapping[str, Array]) -> firmware.Track | None:
+def _firmware(condition: Condition, signals: Mapping[str, Array], response: bool) -> firmware.Track | None:
     try:
-        return firmware.estimates(Config(settings=condition.settings), signals)
+        return firmware.estimates(Config(settings=condition.settings), signals, response)
     except SettingsError:
         return None
 
@@ -98,7 +100,7 @@ def _firmware(condition: Condition, signals: Mapping[str, Array]) -> firmware.Tr
 def _closed_loop(condition: Condition, loop: ClosedLoop, seeds: Sequence[int], trim: Array) -> Log:
     """The firmware dithers by itself, so that its log is part of its run; what was lost is drawn as there."""
     config = Config(settings=condition.settings)
-    recording, track = firmware.closed_loop(config, condition.motion, seeds, loop.dither, loop.lost, loop.whole)
+    recording, track = firmware.closed_loop(config, condition.motion, seeds, loop, lambda: None)
     signals = measured(recording, Sensors(), seeds)
     lost = np.stack([stream("lost", seed).random(len(recording.time)) < loop.lost for seed in seeds], axis=1)
     for name in signals if loop.whole else ("theta", "theta_dot", "tau_m"):

@@ -13,8 +13,10 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.sil.envelope import conditions
 from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition
 from lever_cdkf.sil.envelope.measure import FIGURES, Outcome
-from lever_cdkf.sil.envelope.motions import PERIOD, Motion
+from lever_cdkf.sil.envelope.motions import FREQUENCIES, PERIOD, Motion
 from lever_cdkf.sil.envelope.sensors import Fault, Sensors
+from lever_cdkf.sil.study.baselines.joint_ekf import Joint
+from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.peers import filters, logs, words
 from lever_cdkf.sil.study.peers.campaign import ESTIMATORS, Result
 from numpy.typing import NDArray
@@ -103,6 +105,36 @@ def test_steady_flight_does_not_and_missing_samples_are_skipped() -> None:
         rms, covered = measured(log, name)
         assert rms < 4.0, name
         assert covered > 60.0, name
+
+
+def test_feedthrough_is_as_uncertain_as_a_cloud_of_parameters() -> None:
+    """The lever's transfer function written out, at a trim of 20 degrees."""
+    (log,) = logs.logs([Condition("still", "", Motion(duration=0.2))], 1)
+    log = dataclasses.replace(log, trim=np.radians([20.0]))
+    peer = filters.Peer("", Fixed, False)
+    found = filters.tracks([log], peer)[0].feedthrough
+    assert found is not None
+    m_p, c_p, k_p = np.array([2.5, 42.0, 1500.0])[:, None, None] * np.exp(
+        0.01 * np.random.default_rng(1).standard_normal((3, 50_000, 1))
+    )
+    s, rise, mu = 2j * np.pi * FREQUENCIES, 0.45 * np.cos(np.radians(20.0)), 0.6 + m_p
+    inertia = 0.45**2 * (0.3 + m_p) + 0.020
+    cloud = -rise * mu / (inertia * s**2 + (rise**2 * c_p + 0.5) * s + rise**2 * k_p + 5.0)
+    np.testing.assert_allclose(found.response[0, 0], cloud.mean(axis=0), rtol=2e-3)
+    ratio = cloud / found.response[0, 0]
+    np.testing.assert_allclose(found.gain_sigma[0, 0], np.abs(ratio).std(axis=0), rtol=0.03)
+    np.testing.assert_allclose(found.phase_sigma[0, 0], np.angle(ratio).std(axis=0), rtol=0.03)
+
+
+class Fixed(Joint):
+    """Stays at the first guess, 1 % uncertain."""
+
+    def __init__(self, batch: Batch) -> None:
+        super().__init__(batch)
+        self.covariance = 1e-4 * np.broadcast_to(np.eye(5), (batch.runs, 5, 5))
+
+    def step(self, k: int) -> None:
+        pass
 
 
 # --- how it is said --------------------------------------------------------------------------------------------------
