@@ -9,7 +9,7 @@
 #define RESTARTS_TOLERATED 5.0f   /* not yet forgotten */
 #define INNOVATION_TOLERATED 3.0f /* mean of nis / nis_size; expected 1 */
 #define INNOVATION_MOST 1.0e6f    /* a single value is not averaged beyond this, so that the mean recovers */
-#define MOTION_TIME 0.2f          /* [s] */
+#define MOTION_TIME 0.1f          /* [s] */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
 #define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
 #define HALF_TURN_OF_TIME 0x80000000u
@@ -150,7 +150,7 @@ static bool restart_if_invalid(estimator_t *estimator, const checked_t *sample, 
 static bool is_excited(const estimator_t *estimator)
 {
     const float least = squared(estimator->setup.settings->excitation_least);
-    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= least);
+    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= (0.25f * least));
 }
 
 static void average(estimator_t *estimator, float elapsed)

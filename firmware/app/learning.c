@@ -39,7 +39,6 @@ void learning_take_back(learning_t *learning, cdkf_t *cdkf)
     learning->kept[0] = learning->kept[1];
     learning->kept_ago = 0.0f;
     noise_estimation_begin(&learning->noise);
-    whiteness_start(&learning->whiteness);
 }
 
 static void keep(learning_t *learning, const cdkf_t *cdkf, float period)
@@ -109,6 +108,7 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     }
     const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong;
     if (fails || (held && learning->hands.off)) {
+        whiteness_start(&learning->whiteness);
         learning_take_back(learning, cdkf);
     } else if (!held && !learning->hands.off) { /* another grip */
         cdkf_open(cdkf);
@@ -152,6 +152,8 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     const bool taught = learning_is_taught(learning, lesson);
     if (taught && lesson->excited) {
         estimate_noise(learning, setup, cdkf, period);
+    } else {
+        noise_estimation_begin(&learning->noise);
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
     learning->bounded = correction.bounded;

@@ -28,7 +28,12 @@ static void watch(stillness_t *of, bool noisy, bool surprised)
 {
     const bool changed = (of->now < of->before) || (of->now > of->before);
     of->before = of->now;
-    if (changed) {
+    const bool seen = of->seen;
+    of->seen = false;
+    if (!seen) { /* not sent, or not valid: nothing to say */
+        of->same = 0u;
+        of->stuck = false;
+    } else if (changed) {
         of->same = 0u;
         of->stuck = false;
         if (of->changes < ALIVE) {

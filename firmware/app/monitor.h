@@ -21,6 +21,7 @@ typedef struct stillness {
     float before;    /* and of the last one of the block before */
     uint8_t same;    /* blocks for which it has been that */
     uint8_t changes; /* blocks since then in which it has changed, up to ALIVE */
+    bool seen;       /* in this block */
     bool stuck;
 } stillness_t;
 
@@ -39,6 +40,7 @@ static inline bool monitor_is_alive(monitor_t *monitor, enum monitor_signal sign
 {
     stillness_t *of = &monitor->stillness[signal];
     of->now = value;
+    of->seen = true;
     return !of->stuck;
 }
 

@@ -79,11 +79,8 @@ static void add_to_state(cdkf_t *cdkf, const float deviations[MODEL_STATES * MOD
     factor_tria_two(theta, theta_dot, N + L, cdkf->s_xx);
 }
 
-void cdkf_open(cdkf_t *cdkf)
+static void open_parameters(cdkf_t *cdkf)
 {
-    considered_of_w_t unused; /* what the prior says of w is not of these errors */
-    considered_lift(cdkf, unused);
-    considered_start_w(cdkf->considered);
     add_to_state(cdkf, &cdkf->s[L * L]);
     (void)memset(cdkf->s, 0, sizeof cdkf->s);
     for (uint32_t i = 0u; i < L; i++) {
@@ -91,6 +88,14 @@ void cdkf_open(cdkf_t *cdkf)
     }
     cdkf_drop_pending(cdkf);
     cdkf->trust = 0.0f;
+}
+
+void cdkf_open(cdkf_t *cdkf)
+{
+    considered_of_w_t unused; /* what the prior says of w is not of these errors */
+    considered_lift(cdkf, unused);
+    open_parameters(cdkf);
+    considered_start_w(cdkf->considered);
 }
 
 void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
@@ -102,10 +107,17 @@ void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
 
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
 {
-    cdkf_open(cdkf);
+    considered_of_w_t of_w;
+    considered_lift(cdkf, of_w);
+    open_parameters(cdkf);
     (void)memcpy(cdkf->w, snapshot->w, sizeof snapshot->w);
     (void)memcpy(cdkf->s, snapshot->s_ww, sizeof snapshot->s_ww);
     cdkf->trust = snapshot->trust;
+    if (snapshot->trust >= 1.0f) { /* what the considered errors made of w then was nearly the same */
+        considered_lower(cdkf, of_w);
+    } else {
+        considered_start_w(cdkf->considered);
+    }
 }
 
 void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
