@@ -136,19 +136,27 @@ static void add_to_state(cdkf_t *cdkf, const float deviations[MODEL_STATES * MOD
     factor_tria_two(theta, theta_dot, N + L, cdkf->s_xx);
 }
 
+/* Opens the covariance of w to `s_ww`. What w explained of the state's uncertainty stays with the state. */
+static void open_to(cdkf_t *cdkf, const float s_ww[MODEL_PARAMETERS * MODEL_PARAMETERS])
+{
+    add_to_state(cdkf, &cdkf->s[L * L]);
+    (void)memset(&cdkf->s[L * L], 0, (N * L) * sizeof cdkf->s[0]);
+    (void)memcpy(cdkf->s, s_ww, (L * L) * sizeof cdkf->s[0]);
+    cdkf_drop_pending(cdkf);
+}
+
 void cdkf_open(cdkf_t *cdkf)
 {
     float of_w[CONSIDERED][L];
+    float s_ww[L * L] = {0.0f};
     lift_considered(cdkf, of_w);
     for (uint32_t c = 0u; c < CONSIDERED; c++) { /* what the prior says of w is not of these errors */
         (void)memset(cdkf->considered[c].w, 0, sizeof cdkf->considered[c].w);
     }
-    add_to_state(cdkf, &cdkf->s[L * L]);
-    (void)memset(cdkf->s, 0, sizeof cdkf->s);
     for (uint32_t i = 0u; i < L; i++) {
-        cdkf->s[(i * L) + i] = scaling_prior_sigma(&cdkf->scaling, i);
+        s_ww[(i * L) + i] = scaling_prior_sigma(&cdkf->scaling, i);
     }
-    cdkf_drop_pending(cdkf);
+    open_to(cdkf, s_ww);
     cdkf->trust = 0.0f;
 }
 
@@ -161,9 +169,15 @@ void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
 
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
 {
-    cdkf_open(cdkf);
+    if (snapshot->trust > 0.0f) {
+        float of_w[CONSIDERED][L];
+        lift_considered(cdkf, of_w);
+        open_to(cdkf, snapshot->s_ww);
+        lower_considered(cdkf, of_w); /* hardly others than then */
+    } else {
+        cdkf_open(cdkf);
+    }
     (void)memcpy(cdkf->w, snapshot->w, sizeof snapshot->w);
-    (void)memcpy(cdkf->s, snapshot->s_ww, sizeof snapshot->s_ww);
     cdkf->trust = snapshot->trust;
 }
 
