@@ -11,7 +11,7 @@
 #define MOTION_TIME 0.2f          /* [s] */
 #define OUTAGE 0.0205f            /* a base acceleration missing for longer is out [s] */
 #define UNKNOWN 3.0f              /* process noise for an unknown base acceleration, in those that are set */
-#define STOP_RATE 0.002f          /* friction is at 71 % of its limit [rad/s] */
+#define STOP_RATE 0.002f          /* friction is at half of its limit [rad/s] */
 #define SUBSTEPS_MOST 12u         /* predictions through a gap: bounds the time of one call */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
 #define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
@@ -44,7 +44,7 @@ static void start_filter(estimator_t *estimator)
     cdkf->output_noise[0] = s->theta_noise;
     cdkf->output_noise[1] = s->theta_dot_noise;
     cdkf->considered_sigma[CDKF_BASE_GAIN] = s->z_ddot_gain_sigma;
-    cdkf->considered_sigma[CDKF_BASE_DELAY] = s->z_ddot_delay_sigma;
+    cdkf->considered_sigma[CDKF_BASE_DELAY] = s->z_ddot_delay_sigma / s->sample_period;
     cdkf->considered_sigma[CDKF_TORQUE_GAIN] = s->tau_m_gain_sigma;
     cdkf->considered_sigma[CDKF_FRICTION] = s->lever_friction_sigma;
     cdkf_start_state(cdkf, origin, cdkf->output_noise);
@@ -93,12 +93,6 @@ static bool is_usable(estimator_t *estimator, float value, bool valid, float mos
     return usable;
 }
 
-/* A plausible value that has not stuck. */
-static bool is_alive(estimator_t *estimator, enum monitor_signal signal, float value, bool usable, float elapsed)
-{
-    return usable && !monitor_is_stuck(&estimator->learning.monitor, signal, value, elapsed);
-}
-
 /* The true base acceleration of a sensor with gain and delay, the delay by extrapolation. */
 static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 {
@@ -113,13 +107,14 @@ static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 static checked_t check(estimator_t *estimator, const lever_sample_t *sample, float own_torque, float elapsed)
 {
     checked_t checked = {.y = {sample->theta, sample->theta_dot}};
+    monitor_t *monitor = &estimator->learning.monitor;
     const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
     const bool torque = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);
-    checked.valid[0] = is_alive(estimator, MONITOR_THETA, sample->theta, theta, elapsed);
-    checked.valid[1] = is_alive(estimator, MONITOR_THETA_DOT, sample->theta_dot, theta_dot, elapsed);
-    checked.base = is_alive(estimator, MONITOR_Z_DDOT, sample->z_ddot, base, elapsed);
+    checked.valid[0] = theta && monitor_is_alive(monitor, MONITOR_THETA, sample->theta);
+    checked.valid[1] = theta_dot && monitor_is_alive(monitor, MONITOR_THETA_DOT, sample->theta_dot);
+    checked.base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked.tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
     checked.z_ddot = checked.base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked.z_ddot;
@@ -131,7 +126,7 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample, flo
     note(estimator, !checked.valid[0], LEVER_FAULT_THETA);
     note(estimator, !checked.valid[1], LEVER_FAULT_THETA_DOT);
     note(estimator, !torque, LEVER_FAULT_TORQUE);
-    note(estimator, !checked.base || estimator->learning.monitor.base_wrong, LEVER_FAULT_BASE);
+    note(estimator, !checked.base || monitor->base_wrong, LEVER_FAULT_BASE);
     note(estimator, estimator->communication_fault, LEVER_FAULT_COMMUNICATION);
     estimator->communication_fault = false;
     return checked;
@@ -142,16 +137,15 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample, flo
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. */
 static float friction(float rate)
 {
-    return rate / sqrtf((rate * rate) + (STOP_RATE * STOP_RATE));
+    return rate / (fabsf(rate) + STOP_RATE);
 }
 
 /* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
  * measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
-static void considered_errors(
-    const estimator_t *estimator, float z_ddot, float stop, float period, float error[CDKF_CONSIDERED])
+static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
 {
     error[CDKF_BASE_GAIN] = -z_ddot;
-    error[CDKF_BASE_DELAY] = (z_ddot - estimator->z_ddot) / period;
+    error[CDKF_BASE_DELAY] = z_ddot - estimator->z_ddot; /* in sample periods */
     error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
     error[CDKF_FRICTION] = -stop;
 }
@@ -183,7 +177,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
         step.z_ddot = 0.0f;
         cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
     }
-    considered_errors(estimator, next_z_ddot, stop, period, error);
+    considered_errors(estimator, next_z_ddot, stop, error);
     cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
     estimator->z_ddot = next_z_ddot;
     estimator->tau_m = next_tau_m;
@@ -291,7 +285,7 @@ static void average(estimator_t *estimator, float elapsed)
     averages_t *averages = &estimator->averages;
     const float share = (elapsed < time) ? (elapsed / time) : 1.0f;
     averages->excitation_square += share * (squared(estimator->cdkf.x[1]) - averages->excitation_square);
-    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed / MOTION_TIME) : 1.0f) *
+    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed * (1.0f / MOTION_TIME)) : 1.0f) *
                                (squared(estimator->cdkf.x[1]) - averages->motion_square);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);

@@ -39,7 +39,6 @@ void learning_take_back(learning_t *learning, cdkf_t *cdkf)
     learning->kept[0] = learning->kept[1];
     learning->kept_ago = 0.0f;
     noise_estimation_begin(&learning->noise);
-    whiteness_start(&learning->whiteness);
 }
 
 static void keep(learning_t *learning, const cdkf_t *cdkf, float period)
@@ -107,10 +106,9 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     } else {
         monitor_trust_base(&learning->monitor);
     }
-    const bool stuck = monitor_has_stuck(&learning->monitor);
-    const bool fails = base_wrong || (stuck && !learning->monitor.had_stuck);
-    learning->monitor.had_stuck = stuck;
+    const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong;
     if (fails || (held && learning->hands.off)) {
+        whiteness_start(&learning->whiteness);
         learning_take_back(learning, cdkf);
     } else if (!held && !learning->hands.off) { /* another grip */
         cdkf_open(cdkf);

@@ -81,7 +81,7 @@ typedef struct cdkf {
     float response[MODEL_STATES];            /* of the state to past corrections (noise_estimation.h) */
     information_t pending;                   /* not learnt yet */
     considered_t considered[CDKF_CONSIDERED];
-    float considered_sigma[CDKF_CONSIDERED];   /* [1], [s], [1], [N m] */
+    float considered_sigma[CDKF_CONSIDERED];   /* [1], [sample periods], [1], [N m] */
     float trust;                               /* the part of the information that counts: see cdkf_learn */
     float p[MODEL_PARAMETERS];                 /* the parameters at w, in the units of the model */
     model_coefficients_t points[MODEL_POINTS]; /* at the sigma points of S_ww */
