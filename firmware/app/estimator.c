@@ -8,7 +8,7 @@
 #define RESTARTS_TOLERATED 5.0f   /* not yet forgotten */
 #define INNOVATION_TOLERATED 3.0f /* mean of nis / nis_size; expected 1 */
 #define INNOVATION_MOST 1.0e6f    /* a single value is not averaged beyond this, so that the mean recovers */
-#define MOTION_TIME 0.2f          /* [s] */
+#define MOTION_TIME 0.1f          /* [s] */
 #define OUTAGE 0.0205f            /* a base acceleration missing for longer is out [s] */
 #define UNKNOWN 3.0f              /* process noise for an unknown base acceleration, in those that are set */
 #define STOP_RATE 0.002f          /* friction is at half of its limit [rad/s] */
@@ -276,7 +276,7 @@ static bool restart_if_invalid(estimator_t *estimator, const checked_t *sample, 
 static bool is_excited(const estimator_t *estimator)
 {
     const float least = squared(estimator->setup.settings->excitation_least);
-    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= least);
+    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= (0.25f * least));
 }
 
 static void average(estimator_t *estimator, float elapsed)

@@ -152,6 +152,8 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     const bool taught = learning_is_taught(learning, lesson);
     if (taught && lesson->excited) {
         estimate_noise(learning, setup, cdkf, period);
+    } else {
+        noise_estimation_begin(&learning->noise);
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
     learning->bounded = correction.bounded;
