@@ -24,11 +24,11 @@ ESTIMATORS = ("dual", "joint", "augmented")
 OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 12  # predictions through a gap
 SETTLING = 0.9  # [1] time that levels need, in periods of the corner
-MOTION_TIME = 0.2  # [s] of the shorter average of motion
+MOTION_TIME = 0.1  # [s] of the shorter average of motion
 UNKNOWN = 3.0  # process noise for an unknown base acceleration, in those that are set
 SPIKE = 6.0  # standard deviations
 SPIKE_TIME = 0.02  # [s] longer than this it is no spike
-STOP_RATE = 0.002  # [rad/s] friction is at 71 % of its limit
+STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
 CONSIDERED = ("z_ddot_gain", "z_ddot_delay", "tau_m_gain", "lever_friction")
 UNBOUNDED = np.array([[-math.inf, math.inf]] * 3)
 
@@ -136,7 +136,7 @@ class Estimator:
         """Measurement update, and learning when it is due."""
         settled = bool(self.unsettled < 0.5 * self.settings["sample_period"])
         least = self.settings["excitation_least"] ** 2
-        excited = self.excitation_square >= least and self.motion_square >= least
+        excited = self.excitation_square >= least and self.motion_square >= 0.25 * least
         lesson = Lesson(settled and bool(valid.any()) and bool(self.base_missing <= 0.0), excited)
         self.nis = 0.0
         if valid.any():
@@ -177,7 +177,7 @@ class Estimator:
     def _advance(self, raw: tuple[float, float], dt: float) -> None:
         """One prediction, with the mean of the inputs at both ends. A base that is not known is noise."""
         rate = float(self.origin[1] + self.belief.x[1])
-        stop = self._deviation(self.inputs[2], rate / math.hypot(rate, STOP_RATE), dt)
+        stop = self._deviation(self.inputs[2], rate / (abs(rate) + STOP_RATE), dt)
         base, torque = (self._deviation(detrend, value, dt) for detrend, value in zip(self.inputs, raw, strict=False))
         u, last = (base, torque - self.settings["lever_friction"] * stop), self.last_input
         if self.detrended:

@@ -103,6 +103,7 @@ class Learning:
         taught = lesson.measured and self.wait <= 0.0
         if not (taught and lesson.excited):
             self.belief.drop_pending()
+            self.noise.begin()
         elif self.adapted:
             self._estimate_noise(period)
         correction, variance = self._learn(period)
@@ -150,7 +151,7 @@ class Learning:
         started = self.kept[1].trust < 1.0
         if self.noise.end_block(period) and (started or self.changed <= 0.0):
             kept = self.kept[1]
-            self.belief.restore(kept.w, kept.w_factor, errors=bool(kept.trust > 0.0))
+            self.belief.restore(kept.w, kept.w_factor, errors=bool(kept.trust >= 1.0))
             self.trust = kept.trust
             self.noise.begin()
             self.kept, self.kept_ago = (kept, kept), seconds(0.0)

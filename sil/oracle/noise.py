@@ -5,6 +5,7 @@ of Geodesy 73, 1999); process noise from what is left of past corrections in the
 identification of variances and adaptive Kalman filtering", IEEE TAC 15, 1970).
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -14,9 +15,10 @@ from .belief import Innovation
 from .cdkf import Array
 
 SAMPLES_LEAST = 20  # of an output
-FAR = 0.5  # a factor further than this from 1 is done at once, up to STEP_MOST; of a nearer one SHARE
-STEP_MOST = 10.0
+NEAR = (0.67, 1.5)  # of a factor within, SHARE is done; of one outside, all of it,
+STEP = (0.33, 10.0)  # within these
 SHARE = 0.2
+PROCESS_LEAST = 0.6  # factor of the process noise
 STARVED = 1.15  # times the gain, from which on it is the process noise that is too small
 OUTLIERS = 3.0  # innovations so many times too large are never those of process noise
 
@@ -58,32 +60,27 @@ class NoiseEstimation:
             return False
         gain = 1.0 + (self.product / self.response_square if self.response_square > 0.0 else 0.0)
         starved = gain > STARVED
-        factors = np.array([self._factor(i) for i in range(2)])
-        far_too_small = False
-        for i in range(2):
-            now = self.output_noise[i]
-            if starved and self.squares[i] < OUTLIERS**2 * (self.samples[i] + 1.0):
-                factors[i] = 1.0
-                self.output_noise[i] = np.sqrt(now * min(now, self.output_set[i]))
-            elif self.samples[i] >= SAMPLES_LEAST:
-                self.output_noise[i] = self._scaled(now, factors[i], self.output_set[i])
-                far_too_small |= bool(factors[i] > 1.0 + FAR)
-            else:
-                factors[i] = 1.0
-        if self.response_square > 0.0:
-            before = self.process_noise
-            factor = gain**2 if starved else gain * float(np.sqrt(factors.prod()))
-            self.process_noise = self._scaled(before, factor, self.process_set)
-            far_too_small |= self.process_noise > (1.0 + FAR) * before
+        factors = [self._correct_output(i, starved) for i in range(2) if self.samples[i] >= SAMPLES_LEAST]
+        factor = max(gain**2 if starved else gain * math.sqrt(math.prod(factors)), PROCESS_LEAST)
+        before = self.process_noise
+        self.process_noise = self._scaled(before, factor, self.process_set)
+        far_too_small = max(*factors, self.process_noise / before, 0.0) > NEAR[1]
         self.begin()
         return far_too_small
 
-    def _factor(self, i: int) -> float:
-        """By which the noise of output i is wrong. As far as the innovation is noise; outliers always count."""
-        factor = float(np.sqrt(self.squares[i] / max(self.samples[i], 1.0)))
-        return factor if factor > OUTLIERS else 1.0 + float(self.share[i]) * (factor - 1.0)
+    def _correct_output(self, i: int, starved: bool) -> float:
+        """Sets the noise of output i; returns the factor by which it was wrong. It counts as far as the innovation is
+        noise; outliers always count. With too little gain innovations are too large although the noise is right."""
+        excess = math.sqrt(self.squares[i] / self.samples[i])
+        factor = excess if excess > OUTLIERS else 1.0 + self.share[i] * (excess - 1.0)
+        now, setting = float(self.output_noise[i]), float(self.output_set[i])
+        if starved and 1.0 <= excess <= OUTLIERS:
+            self.output_noise[i] = math.sqrt(now * min(now, setting))
+            return 1.0
+        self.output_noise[i] = self._scaled(now, factor, setting)
+        return float(factor)
 
     def _scaled(self, now: float, factor: float, setting: float) -> float:
-        bounded = min(max(factor, 1.0 / STEP_MOST), STEP_MOST)
-        step = bounded if abs(bounded - 1.0) > FAR else 1.0 + SHARE * (bounded - 1.0)
+        bounded = min(max(factor, STEP[0]), STEP[1])
+        step = 1.0 + SHARE * (bounded - 1.0) if NEAR[0] <= bounded <= NEAR[1] else bounded
         return min(max(now * step, setting / self.range), setting * self.range)
