@@ -2,10 +2,11 @@
 
 #include <math.h>
 
-#define OUTAGE 0.0205f    /* a base acceleration missing for longer is out [s] */
-#define UNKNOWN 3.0f      /* process noise for an unknown base acceleration, in those that are set */
-#define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
-#define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
+#define OUTAGE 0.0205f      /* a base acceleration missing for longer is out [s] */
+#define UNKNOWN 3.0f        /* process noise for an unknown base acceleration, in those that are set */
+#define Z_DOT_KEPT 0.99998f /* in a step: what rounding adds to the base velocity is forgotten */
+#define STOP_RATE 0.002f    /* friction is at half of its limit [rad/s] */
+#define SUBSTEPS_MOST 12u   /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. */
 static float friction(float rate)
@@ -36,10 +37,13 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     const float stop = trim_input(trim, 2u, friction(trim->origin[1] + cdkf->x[1]), period);
     const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
     const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
+    const float z_dot = estimator->z_dot;
     float error[CDKF_CONSIDERED];
+    estimator->z_dot = (Z_DOT_KEPT * z_dot) + (period * next_z_ddot);
     trim_set_origin(trim);
     model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
+        .z_dot = z_dot,
         .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
         .origin = trim->origin[0],
         .trim = trim_angle(trim),
@@ -48,6 +52,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
     if (unknown) {
         step.z_ddot = 0.0f;
+        step.z_dot = 0.0f;
         cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);
