@@ -15,7 +15,7 @@ from . import cdkf
 from .belief import Augmented, Belief, TwoStage
 from .cdkf import Array
 from .detrend import Detrend
-from .learning import ADAPTATIONS, Learning, Lesson, seconds
+from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
 from .lever import Lever
 from .linear import LinearBlackBox, LinearPhysical
 from .scale import Scale
@@ -112,10 +112,10 @@ class Estimator:
     ) -> None:
         """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) as
         the sensors show them."""
-        duration = seconds(1e-6) * seconds(round(1e6 * (time - self.time)))
-        substeps = min(max(1, round(float(duration) / self.settings["sample_period"])), MOST_SUBSTEPS)
-        dt, none_valid = float(duration) / substeps, np.zeros(2, np.bool_)
-        inputs = (self._true_base(u[0], float(duration), base_valid), u[1] / self.settings["tau_m_gain"])
+        duration = time - self.time
+        substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
+        dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
+        inputs = (self._true_base(u[0], duration, base_valid), u[1] / self.settings["tau_m_gain"])
         for i in range(1, substeps + 1):
             if i == substeps:
                 self._follow_base(base_valid, duration)
@@ -130,9 +130,9 @@ class Estimator:
         if back:
             self._end_outage(y, valid)
         self._correct(y, valid, duration)
-        self._average_motion(float(duration))
+        self._average_motion(duration)
 
-    def _correct(self, y: Array, valid: NDArray[np.bool_], duration: np.float32) -> None:
+    def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Measurement update, and learning when it is due."""
         settled = bool(self.unsettled < 0.5 * self.settings["sample_period"])
         least = self.settings["excitation_least"] ** 2
@@ -143,20 +143,20 @@ class Estimator:
             noise = np.diag(self.learning.noise.output_noise)
             innovation = self.belief.update(y, valid, noise, learn=lesson.measured and excited)
             self.nis = innovation.normalised_square
-            share = min(float(duration) / self.settings["excitation_time"], 1.0)
+            share = min(duration / self.settings["excitation_time"], 1.0)
             self.average_nis += share * (self.nis / int(valid.sum()) - self.average_nis)
             self.learning.add(innovation, valid, excited)
         self.learning.step(duration, lesson)
-        self.unsettled -= duration
+        self.unsettled -= counted(duration)
 
-    def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: np.float32) -> NDArray[np.bool_]:
+    def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
         """Outputs far from what is expected, until they have been for SPIKE_TIME."""
         noise = self.learning.noise.output_noise
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
         expected = np.maximum(max(self.average_nis, 1.0) * (state**2 + noise**2), noise**2)
         far = valid & ((y - self.origin - self.belief.x) ** 2 > SPIKE**2 * expected)
         for i in np.flatnonzero(valid):
-            self.refused[i] = self.refused[i] + duration if far[i] else seconds(0.0)
+            self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
         return spikes
 
@@ -168,11 +168,11 @@ class Estimator:
         self.last_measured_base = measured
         return (measured + self.settings["z_ddot_delay"] * slope) / self.settings["z_ddot_gain"]
 
-    def _follow_base(self, valid: bool, duration: np.float32) -> None:
+    def _follow_base(self, valid: bool, duration: float) -> None:
         """Its level has to settle again after an outage."""
         if valid and self.base_missing > OUTAGE:
             self._wait_for_levels()
-        self.base_missing = seconds(0.0) if valid else self.base_missing + duration
+        self.base_missing = seconds(0.0) if valid else self.base_missing + counted(duration)
 
     def _advance(self, raw: tuple[float, float], dt: float) -> None:
         """One prediction, with the mean of the inputs at both ends. A base that is not known is noise."""
@@ -237,7 +237,9 @@ class Estimator:
             return moved_by(x, w, *u)
 
         x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
-        push = moved_by(x, w, u[0] + errors[0], u[1] + errors[1]) - motion(x, w)
+        with_errors = u + np.concatenate((np.zeros((1, 2)), errors.T))  # none, then a unit of each
+        moved = moved_by(x, w, *with_errors.T)
+        push = moved[:, 1:] - moved[:, :1]
         self.belief.predict(motion, self._process_noise(dt), push)
 
     def _process_noise(self, dt: float) -> Array:
