@@ -1,5 +1,6 @@
 #include "app/estimator.h"
 #include "app/alignment.h"
+#include "app/prediction.h"
 
 #include <math.h>
 #include <string.h>
@@ -9,10 +10,6 @@
 #define INNOVATION_TOLERATED 3.0f /* mean of nis / nis_size; expected 1 */
 #define INNOVATION_MOST 1.0e6f    /* a single value is not averaged beyond this, so that the mean recovers */
 #define MOTION_TIME 0.1f          /* [s] */
-#define OUTAGE 0.0205f            /* a base acceleration missing for longer is out [s] */
-#define UNKNOWN 3.0f              /* process noise for an unknown base acceleration, in those that are set */
-#define STOP_RATE 0.002f          /* friction is at half of its limit [rad/s] */
-#define SUBSTEPS_MOST 12u         /* predictions through a gap: bounds the time of one call */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
 #define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
 #define HALF_TURN_OF_TIME 0x80000000u
@@ -132,129 +129,6 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample, flo
     return checked;
 }
 
-/* --- time update ------------------------------------------------------------------------------------------------- */
-
-/* Torque of one newton metre of Coulomb friction, smooth about standstill. */
-static float friction(float rate)
-{
-    return rate / (fabsf(rate) + STOP_RATE);
-}
-
-/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
- * measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
-static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
-{
-    error[CDKF_BASE_GAIN] = -z_ddot;
-    error[CDKF_BASE_DELAY] = z_ddot - estimator->z_ddot; /* in sample periods */
-    error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
-    error[CDKF_FRICTION] = -stop;
-}
-
-/* One step of the model, with the mean of the inputs at both ends. A base that cannot be used is unknown: then the
- * state has the process noise for it. */
-static void predict(estimator_t *estimator, float z_ddot, float tau_m, float period)
-{
-    trim_t *trim = &estimator->trim;
-    cdkf_t *cdkf = &estimator->cdkf;
-    learning_t *learning = &estimator->learning;
-    const setup_t *setup = &estimator->setup;
-    const lever_settings_t *s = setup->settings;
-    const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
-    const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
-    const float stop = trim_input(trim, 2u, friction(trim->origin[1] + cdkf->x[1]), period);
-    const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
-    float error[CDKF_CONSIDERED];
-    trim_set_origin(trim);
-    model_step_t step = {.period = period,
-        .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
-        .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
-        .origin = trim->origin[0],
-        .trim = trim_angle(trim),
-        .trim_sine = estimator->trim_angle.sine,
-        .trim_cosine = estimator->trim_angle.cosine};
-    hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
-    if (unknown) {
-        step.z_ddot = 0.0f;
-        cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
-    }
-    considered_errors(estimator, next_z_ddot, stop, error);
-    cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
-    estimator->z_ddot = next_z_ddot;
-    estimator->tau_m = next_tau_m;
-}
-
-/* Subtracts the slow level from the outputs, and renews the trim angle. Returns true at the end of an outage. */
-static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], float period)
-{
-    const bool back = trim_outputs(&estimator->trim, estimator->cdkf.x, y, valid, period);
-    estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
-    return back;
-}
-
-/* The inputs of the last sample, as they came. */
-typedef struct inputs {
-    float z_ddot;
-    float tau_m;
-} inputs_t;
-
-/* Predicts through a gap in `substeps`, inputs in between on a straight line from the last ones, up to the last
- * step. */
-static void cross_gap(
-    estimator_t *estimator, const checked_t *sample, const inputs_t *last, float period, uint32_t substeps)
-{
-    static const bool missing[CDKF_OUTPUTS] = {false, false};
-    const float part = 1.0f / (float)substeps;
-    float unused[CDKF_OUTPUTS] = {0.0f, 0.0f};
-    for (uint32_t i = 1u; i < substeps; i++) {
-        const float share = part * (float)i;
-        predict(estimator, last->z_ddot + (share * (sample->z_ddot - last->z_ddot)),
-            last->tau_m + (share * (sample->tau_m - last->tau_m)), period);
-        (void)subtract_trim(estimator, unused, missing, period);
-    }
-}
-
-/* After an outage of the base its level has to settle again. */
-static void follow_base(estimator_t *estimator, bool valid, float elapsed)
-{
-    if (valid && (estimator->base_missing > OUTAGE)) {
-        trim_unsettle(&estimator->trim);
-    }
-    estimator->base_missing = valid ? 0.0f : (estimator->base_missing + elapsed);
-}
-
-/* An output far from what is expected is not valid. */
-static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elapsed)
-{
-    const float average = estimator->averages.innovation;
-    const float level = (average > 1.0f) ? average : 1.0f;
-    monitor_t *monitor = &estimator->learning.monitor;
-    for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
-        const float y = sample->y[i] - estimator->trim.origin[i];
-        if (sample->valid[i] && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
-            sample->valid[i] = false;
-            estimator->corrupt++;
-            note(estimator, true, (i == 0u) ? LEVER_FAULT_THETA : LEVER_FAULT_THETA_DOT);
-        }
-    }
-}
-
-/* Predicts to the sample, `periods` sample periods after the last one. */
-static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed, uint32_t periods)
-{
-    float period = elapsed;
-    if (periods > 1u) {
-        const uint32_t substeps = (periods < SUBSTEPS_MOST) ? periods : SUBSTEPS_MOST;
-        period = elapsed / (float)substeps;
-        cross_gap(estimator, sample, last, period, substeps);
-    }
-    follow_base(estimator, sample->base, elapsed);
-    predict(estimator, sample->z_ddot, sample->tau_m, period);
-    refuse_spikes(estimator, sample, elapsed);
-    if (subtract_trim(estimator, sample->y, sample->valid, period)) {
-        alignment_end_outage(estimator, sample);
-    }
-}
-
 /* --- measurement update ------------------------------------------------------------------------------------------ */
 
 /* Refuses an estimate that breaks an invariant: the filter starts again from the measurement and the first guess. */
@@ -321,7 +195,7 @@ static lesson_t update_filter(estimator_t *estimator, const checked_t *sample)
     innovation_t innovation[CDKF_OUTPUTS];
     cdkf_measurement_update(
         &estimator->cdkf, sample->y, sample->valid, lesson.walks && lesson.measured && lesson.excited, innovation);
-    if (lesson.excited) {
+    if (lesson.excited && lesson.measured) {
         noise_estimation_add(&estimator->learning.noise, innovation, sample->valid);
         whiteness_add(&estimator->learning.whiteness, innovation[sample->valid[1] ? 1u : 0u].value);
     }
@@ -382,7 +256,7 @@ static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last
     } else if (estimator->mode == LEVER_MODE_ALIGN) {
         alignment_step(estimator, sample, elapsed);
     } else {
-        advance(estimator, sample, last, elapsed, periods);
+        prediction_advance(estimator, sample, last, elapsed, periods);
         correct(estimator, sample, elapsed);
     }
 }
