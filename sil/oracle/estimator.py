@@ -145,7 +145,7 @@ class Estimator:
             self.nis = innovation.normalised_square
             share = min(duration / self.settings["excitation_time"], 1.0)
             self.average_nis += share * (self.nis / int(valid.sum()) - self.average_nis)
-            self.learning.add(innovation, valid, excited)
+            self.learning.add(innovation, valid, lesson)
         self.learning.step(duration, lesson)
         self.unsettled -= counted(duration)
 

@@ -86,9 +86,9 @@ class Learning:
 
     # --- one sample ------------------------------------------------------------------------------------------------
 
-    def add(self, innovation: Innovation, valid: NDArray[np.bool_], excited: bool) -> None:
+    def add(self, innovation: Innovation, valid: NDArray[np.bool_], lesson: Lesson) -> None:
         """What a sample says of the noise."""
-        if self.adapted and excited:
+        if self.adapted and lesson.measured and lesson.excited:
             self.noise.add(innovation, valid)
 
     def step(self, duration: float, lesson: Lesson) -> None:

@@ -130,12 +130,12 @@ def test_agrees_with_the_unscented_filter_of_filterpy() -> None:
 
 def test_finds_another_pilot_within_its_own_uncertainty() -> None:
     pilot = PILOT * [1.2, 0.7, 0.85]
-    samples = recorded(6500, pilot)
+    samples = recorded(5000, pilot)
     estimator = Estimator(SETTINGS, start_of(samples), "fixed")
-    feed(estimator, samples, 1, 6500)
+    feed(estimator, samples, 1, 5000)
     found, sigma = estimator.parameters()
     assert (np.abs(found - pilot) < 3.0 * sigma).all()
-    assert (sigma < 0.1 * pilot).all()
+    assert (sigma < 0.12 * pilot).all()
 
 
 def test_coasting_moves_with_the_model_and_grows_uncertain() -> None:
@@ -238,14 +238,14 @@ def test_a_level_follows_a_ramp_without_lag() -> None:
 
 def test_the_parameters_do_not_follow_a_new_trim() -> None:
     """The whole recording moved by an angle that rises slowly: the parameters hardly notice."""
-    samples = recorded(8000, PILOT * [1.2, 0.8, 1.1])
+    samples = recorded(7000, PILOT * [1.2, 0.8, 1.1])
     moved = samples | {"y": samples["y"].copy()}
     still, carried = (Estimator(SETTINGS, start_of(samples)) for _ in range(2))
-    angle = 0.05 * np.clip((samples["time"] - 2.0) / 4.0, 0.0, 1.0)
+    angle = 0.05 * np.clip((samples["time"] - 2.0) / 3.0, 0.0, 1.0)
     moved["y"][:, 0] += angle
     moved["y"][:, 1] += np.gradient(angle, 1e-3)
-    feed(still, samples, 1, 8000)
-    feed(carried, moved, 1, 8000)
+    feed(still, samples, 1, 7000)
+    feed(carried, moved, 1, 7000)
     assert (np.abs(still.belief.w - carried.belief.w) < 2.0 * cdkf.deviations(still.belief.w_factor)).all()
     assert carried.trim - still.trim == pytest.approx(0.05, abs=1e-3)
 
