@@ -17,7 +17,7 @@ from .cdkf import Array
 from .detrend import Detrend
 from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
 from .lever import Lever
-from .linear import LinearBlackBox, LinearPhysical
+from .linear import Hand, LinearBlackBox, LinearPhysical
 from .scale import Scale
 
 ESTIMATORS = ("dual", "joint", "augmented")
@@ -25,6 +25,7 @@ OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 12  # predictions through a gap
 SETTLING = 0.9  # [1] time that levels need, in periods of the corner
 MOTION_TIME = 0.1  # [s] of the shorter average of motion
+VELOCITY_KEPT = 0.99998  # of the base's, in a step
 UNKNOWN = 3.0  # process noise for an unknown base acceleration, in those that are set
 SPIKE = 6.0  # standard deviations
 SPIKE_TIME = 0.02  # [s] longer than this it is no spike
@@ -32,13 +33,15 @@ STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
 CONSIDERED = ("z_ddot_gain", "z_ddot_delay", "tau_m_gain", "lever_friction")
 UNBOUNDED = np.array([[-math.inf, math.inf]] * 3)
 
-Model = Lever | LinearPhysical | LinearBlackBox
+Model = Lever | LinearPhysical | LinearBlackBox | Hand
 
 
 def model_of(settings: Mapping[str, float], name: str, preload: str) -> Model:
     """The model of that name in firmware/lever_settings.def."""
     if name == "lever":
         return Lever.from_settings(settings, preload)
+    if name == "hand":
+        return Hand.from_settings(settings, preload)
     rest = settings["lever_preload_angle"]
     return LinearPhysical(rest, preload) if name == "linear_physical" else LinearBlackBox(rest, preload)
 
@@ -102,6 +105,7 @@ class Estimator:
         self._wait_for_levels()
         self.last_raw = start.input
         self.last_input = start.input  # the same, as deviations in preload trim
+        self.velocity = 0.0  # of the base, from the end of a step to the middle of the next one [m/s]
         self.last_measured_base = start.measured_base
         self.time = start.time
 
@@ -182,13 +186,14 @@ class Estimator:
         u, last = (base, torque - self.settings["lever_friction"] * stop), self.last_input
         if self.detrended:
             self.origin = np.array([detrend.level for detrend in self.outputs])
-        z_ddot = 0.5 * (base + last[0])
+        z_ddot, z_dot = 0.5 * (base + last[0]), self.velocity
+        self.velocity = VELOCITY_KEPT * self.velocity + dt * base
         if self.base_missing > 0.0:
-            z_ddot = 0.0
+            z_ddot, z_dot = 0.0, 0.0
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
         errors = np.array(((-base, (base - last[0]) / dt, 0.0, 0.0), (0.0, 0.0, -last[1], -stop)))
-        self._predict((z_ddot, 0.5 * (u[1] + last[1])), errors, dt)
+        self._predict((z_ddot, 0.5 * (u[1] + last[1]), z_dot), errors, dt)
         self.last_input = u
 
     def _deviation(self, detrend: Detrend, value: float, dt: float) -> float:
@@ -224,21 +229,21 @@ class Estimator:
     def _wait_for_levels(self) -> None:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
-    def _predict(self, u: tuple[float, float], errors: Array, dt: float) -> None:
+    def _predict(self, u: tuple[float, ...], errors: Array, dt: float) -> None:
         """The trim is where it was at the last sample. `errors` (2, 4): of the inputs, per unit of each considered."""
         trim = self.outputs[0].level
         angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
 
-        def moved_by(x: Array, w: Array, z_ddot: float | Array, tau_m: float | Array) -> Array:
-            moved: Array = self.model.step(x + angle, self.scale.physical(w), (z_ddot, tau_m), trim, dt) - angle
+        def moved_by(x: Array, w: Array, u: tuple[float | Array, ...]) -> Array:
+            moved: Array = self.model.step(x + angle, self.scale.physical(w), u, trim, dt) - angle
             return moved
 
         def motion(x: Array, w: Array) -> Array:
-            return moved_by(x, w, *u)
+            return moved_by(x, w, u)
 
         x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
-        with_errors = u + np.concatenate((np.zeros((1, 2)), errors.T))  # none, then a unit of each
-        moved = moved_by(x, w, *with_errors.T)
+        with_errors = np.concatenate((np.zeros((2, 1)), errors), axis=1)  # none, then a unit of each
+        moved = moved_by(x, w, (u[0] + with_errors[0], u[1] + with_errors[1], *u[2:]))
         push = moved[:, 1:] - moved[:, :1]
         self.belief.predict(motion, self._process_noise(dt), push)
 

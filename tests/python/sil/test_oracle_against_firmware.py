@@ -21,13 +21,15 @@ BOUNDS = {  # of firmware/model
     "lever": np.array(((0.3, 10.0), (2.0, 400.0), (50.0, 6500.0))),
     "linear_physical": np.array(((0.05, 60.0), (0.1, 600.0), (1.0, 6500.0))),
     "linear_black_box": np.array(((-3200.0, 3200.0), (-320.0, 320.0), (-32.0, 32.0))),
+    "hand": np.array(((20.0, 3200.0), (0.5, 320.0), (0.1, 320.0))),
 }
 PILOTS = {  # none the first guess
     "lever": np.array(((3.2,), (60.0,), (2100.0,))),
     "linear_physical": np.array(((3.2,), (60.0,), (2100.0,))),
     "linear_black_box": np.array(((-620.0,), (-19.0,), (-2.8,))),
+    "hand": np.array(((420.0,), (17.0,), (7.0,))),
 }
-TORQUE = {"lever": 0.3, "linear_physical": 1.6, "linear_black_box": 0.0}  # rms; [N m], [N]
+TORQUE = {"lever": 0.3, "linear_physical": 1.6, "linear_black_box": 0.0, "hand": 0.3}  # rms; [N m], [N]
 UNADAPTED = {"change_threshold": 0.0, "noise_window": 0.0, "caution_time": 0.0}  # as the augmented filter is
 CALIBRATED = (("z_ddot_gain", 1.05), ("z_ddot_delay", 2e-3), ("tau_m_gain", 0.9), ("lever_friction", 0.1))
 QUIET = (("theta_noise", 2e-4), ("theta_dot_noise", 2e-3))  # a fifth of what it is
@@ -66,12 +68,12 @@ def recorded(model: str, preload: str, seconds: float) -> dict[str, Array]:
     count = round(seconds * 1e3)
     z_ddot, tau_m = band_limited(rng, count, 0.98), band_limited(rng, count, TORQUE[model])
     plant = model_of(Config().settings | PRELOADED, model, preload)
-    x, trim = np.array([[0.35], [0.0]]), 0.35
+    x, trim, z_dot = np.array([[0.35], [0.0]]), 0.35, 1e-3 * np.cumsum(z_ddot)
     truth = np.empty((count, 2))
     disturbance = 0.05 * np.sqrt(1e-3) * rng.standard_normal(count)
     for k in range(count):
         p = PILOTS[model] * (1.0 if k < 0.9 * count else 1.6)
-        x = plant.step(x, p, (z_ddot[k], tau_m[k]), trim, 1e-3)
+        x = plant.step(x, p, (z_ddot[k], tau_m[k], z_dot[k]), trim, 1e-3)
         x[1] += disturbance[k]
         truth[k] = x[:, 0]
     truth[round(0.36 * count), 0] += 0.3
