@@ -9,7 +9,7 @@
 
 float estimator_state(const estimator_t *estimator, uint32_t i)
 {
-    return estimator->trim.origin[i] + estimator->cdkf.x[i];
+    return estimator->trim.origin[i] + estimator->trim.ahead[i] + estimator->cdkf.x[i];
 }
 
 void estimator_parameters(const estimator_t *estimator, float parameter[LEVER_PARAMETERS])

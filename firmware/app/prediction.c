@@ -97,7 +97,7 @@ static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elaps
     const float level = (average > 1.0f) ? average : 1.0f;
     monitor_t *monitor = &estimator->learning.monitor;
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
-        const float y = sample->y[i] - estimator->trim.origin[i];
+        const float y = sample->y[i] - (estimator->trim.origin[i] + estimator->trim.ahead[i]);
         if (sample->valid[i] && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
             sample->valid[i] = false;
             estimator->corrupt++;
