@@ -98,7 +98,8 @@ static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elaps
     monitor_t *monitor = &estimator->learning.monitor;
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
         const float y = sample->y[i] - (estimator->trim.origin[i] + estimator->trim.ahead[i]);
-        if (sample->valid[i] && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
+        const bool expected = sample->valid[i] && !trim_is_waiting(&estimator->trim, i);
+        if (expected && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
             sample->valid[i] = false;
             estimator->corrupt++;
             estimator->faults |= (i == 0u) ? (uint32_t)LEVER_FAULT_THETA : (uint32_t)LEVER_FAULT_THETA_DOT;
