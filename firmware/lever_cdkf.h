@@ -50,6 +50,7 @@ enum lever_model {
     LEVER_MODEL_LEVER = 0,            /* nonlinear lever and arm: m_p [kg], c_p [N s/m], k_p [N/m] */
     LEVER_MODEL_LINEAR_PHYSICAL = 1,  /* mass, spring, damper on a base: m [kg], c [N s/m], k [N/m] */
     LEVER_MODEL_LINEAR_BLACK_BOX = 2, /* second-order system: a21 [1/s^2], a22 [1/s], b21, of any sign */
+    LEVER_MODEL_HAND = 3,             /* hand damped in space, too: k_hand [1/s^2], c_hand [1/s], c_space [1/s] */
     LEVER_MODEL_COUNT
 };
 

@@ -1,4 +1,4 @@
-"""A truth that no model of the firmware is: pilots as Mayo (1989) has measured them, by their transfer functions.
+"""Pilots as Mayo (1989) has measured them, by their transfer functions: the truth of the firmware's model "hand".
 
 R. Mayo, "The involuntary participation of a human pilot in a helicopter collective control loop", 15th European
 Rotorcraft Forum, Amsterdam 1989, paper 81: absolute acceleration of the hand on the collective over that of the cabin,
@@ -59,7 +59,7 @@ HANDS: Mapping[str, Hand] = {
 class Mayo(LinearTruth):
     """A pilot of one somatotype on a lever of `length` [m]; `trim` [rad] at every sample."""
 
-    model = "mayo"
+    model = "hand"
     takes_torque = False
     hand: Hand
     length: float
@@ -67,7 +67,8 @@ class Mayo(LinearTruth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
-        return {}
+        hand, ones = self.hand, np.ones_like(self.trim)
+        return {"k_hand": hand.stiffness * ones, "c_hand": hand.damping * ones, "c_space": hand.outside * ones}
 
     @property
     def system(self) -> System:

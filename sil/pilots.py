@@ -192,7 +192,7 @@ class ReflexPilot(ArmPilot):
 class MayoPilot(Pilot):
     """A hand as Mayo has measured it."""
 
-    model = "mayo"
+    model = "hand"
     signs: ClassVar[Mapping[str, int]] = {}
     preload: plant.Preload = choice("trim", default="trim")
     somatotype: str = choice(*mayo_plant.HANDS)

@@ -21,6 +21,9 @@ _WORDS = {
     "a21": "minus stiffness",
     "a22": "minus damping",
     "b21": "answer to the floor",
+    "k_hand": "stiffness per mass",
+    "c_hand": "damping per mass",
+    "c_space": "of it, in space",
 }
 
 

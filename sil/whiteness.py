@@ -26,7 +26,7 @@ LAGS = 25
 """Lags looked at, in averages: 20 ms to 0.5 s, a period of 2 Hz."""
 COLOURED = 0.2
 """A correlation that is not put down to chance or tuning. Seen: models that are right leave 0.05 to 0.11 in 40 s, those
-that are asked for the pilots of two_dof and mayo 0.5."""
+that are asked for the pilots of two_dof and hand 0.5."""
 CANNOT_SEE = "That test does not see friction in the lever, nor gain and delay of a sensor: these bias the parameters."
 """For every verdict that says that residuals are white."""
 

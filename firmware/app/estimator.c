@@ -195,7 +195,7 @@ static lesson_t update_filter(estimator_t *estimator, const checked_t *sample)
     innovation_t innovation[CDKF_OUTPUTS];
     cdkf_measurement_update(
         &estimator->cdkf, sample->y, sample->valid, lesson.walks && lesson.measured && lesson.excited, innovation);
-    if (lesson.excited) {
+    if (lesson.excited && lesson.measured) {
         noise_estimation_add(&estimator->learning.noise, innovation, sample->valid);
         whiteness_add(&estimator->learning.whiteness, innovation[sample->valid[1] ? 1u : 0u].value);
     }

@@ -47,7 +47,8 @@ typedef struct estimator {
     float last_tau_m;
     float z_ddot; /* the same as the model takes them: deviations in preload trim */
     float tau_m;
-    float nis; /* of the last sample */
+    float z_dot; /* the integral of z_ddot, to the middle of the next step [m/s] */
+    float nis;   /* of the last sample */
     uint8_t nis_size;
     bool frozen;
     bool communication_fault; /* reported by the CAN side for the next sample */

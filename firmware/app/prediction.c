@@ -2,10 +2,11 @@
 
 #include <math.h>
 
-#define OUTAGE 0.0205f    /* a base acceleration missing for longer is out [s] */
-#define UNKNOWN 3.0f      /* process noise for an unknown base acceleration, in those that are set */
-#define STOP_RATE 0.002f  /* friction is at 71 % of its limit [rad/s] */
-#define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
+#define OUTAGE 0.0205f      /* a base acceleration missing for longer is out [s] */
+#define UNKNOWN 3.0f        /* process noise for an unknown base acceleration, in those that are set */
+#define Z_DOT_KEPT 0.99998f /* in a step: what rounding adds to the base velocity is forgotten */
+#define STOP_RATE 0.002f    /* friction is at half of its limit [rad/s] */
+#define SUBSTEPS_MOST 12u   /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. */
 static float friction(float rate)
@@ -14,13 +15,13 @@ static float friction(float rate)
 }
 
 /* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
- * measured later by the delay. */
-static void considered_errors(const estimator_t *estimator, float z_ddot, float error[CDKF_CONSIDERED])
+ * measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
+static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
 {
     error[CDKF_BASE_GAIN] = -z_ddot;
     error[CDKF_BASE_DELAY] = z_ddot - estimator->z_ddot; /* in sample periods */
     error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
-    error[CDKF_FRICTION] = -friction(estimator->cdkf.x[1]);
+    error[CDKF_FRICTION] = -stop;
 }
 
 /* One step of the model, with the mean of the inputs at both ends. A base that cannot be used is unknown: then the
@@ -33,14 +34,16 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     const setup_t *setup = &estimator->setup;
     const lever_settings_t *s = setup->settings;
     const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
-    const bool rubs = (s->lever_friction > 0.0f);
-    const float stop = rubs ? (s->lever_friction * friction(trim->origin[1] + cdkf->x[1])) : 0.0f;
+    const float stop = trim_input(trim, 2u, friction(trim->origin[1] + cdkf->x[1]), period);
     const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
-    const float next_tau_m = trim_input(trim, 1u, tau_m - stop, period);
+    const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
+    const float z_dot = estimator->z_dot;
     float error[CDKF_CONSIDERED];
+    estimator->z_dot = (Z_DOT_KEPT * z_dot) + (period * next_z_ddot);
     trim_set_origin(trim);
     model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
+        .z_dot = z_dot,
         .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
         .origin = trim->origin[0],
         .trim = trim_angle(trim),
@@ -49,9 +52,10 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
     if (unknown) {
         step.z_ddot = 0.0f;
+        step.z_dot = 0.0f;
         cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
     }
-    considered_errors(estimator, next_z_ddot, error);
+    considered_errors(estimator, next_z_ddot, stop, error);
     cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
     estimator->z_ddot = next_z_ddot;
     estimator->tau_m = next_tau_m;

@@ -7,7 +7,7 @@
 const model_t *setup_model(uint8_t model)
 {
     static const model_t *const models[LEVER_MODEL_COUNT] = {
-        &model_lever, &model_linear_physical, &model_linear_black_box};
+        &model_lever, &model_linear_physical, &model_linear_black_box, &model_hand};
     return (model < (uint8_t)LEVER_MODEL_COUNT) ? models[model] : NULL;
 }
 
@@ -24,6 +24,7 @@ void setup_choose(setup_t *setup)
     constants->stiffness = s->lever_stiffness;
     constants->arm_preload_sine = sine_cosine(s->arm_preload_angle).sine;
     constants->lever_preload_angle = s->lever_preload_angle;
+    constants->hand_inertia = constants->inertia + (constants->length_squared * s->m_p);
     constants->trim = (setup->preload == (uint8_t)LEVER_PRELOAD_TRIM);
     setup->base_scale = 1.0f / s->z_ddot_gain;
     setup->torque_scale = 1.0f / s->tau_m_gain;
@@ -45,6 +46,9 @@ static rows_t rows_of(const setup_t *setup)
     } else if (setup->model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX) {
         rows = (rows_t){{{s->a21, s->a22, s->b21}, {s->a21_sigma, s->a22_sigma, s->b21_sigma}},
             {s->a21_walk, s->a22_walk, s->b21_walk}};
+    } else if (setup->model == (uint8_t)LEVER_MODEL_HAND) {
+        rows = (rows_t){{{s->k_hand, s->c_hand, s->c_space}, {s->k_hand_sigma, s->c_hand_sigma, s->c_space_sigma}},
+            {s->k_hand_walk, s->c_hand_walk, s->c_space_walk}};
     } else {
         rows = (rows_t){{{s->m_p, s->c_p, s->k_p}, {s->m_p_sigma, s->c_p_sigma, s->k_p_sigma}},
             {s->m_p_walk, s->c_p_walk, s->k_p_walk}};

@@ -53,11 +53,13 @@ static const quantity_t parameter_quantity[LEVER_MODEL_COUNT][LEVER_PARAMETERS] 
     PHYSICAL_PARAMETERS,
     PHYSICAL_PARAMETERS,
     {SIGNED(16u, 65535u, 10.0f), SIGNED(32u, 65535u, 100.0f), SIGNED(48u, 65535u, 1000.0f)},
+    {UNSIGNED(16u, 65535u, 10.0f), UNSIGNED(32u, 65535u, 100.0f), UNSIGNED(48u, 65535u, 100.0f)},
 };
 static const quantity_t sigma_quantity[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
     PHYSICAL_SIGMA,
     PHYSICAL_SIGMA,
     {UNSIGNED(16u, 65535u, 50.0f), UNSIGNED(32u, 65535u, 500.0f), UNSIGNED(48u, 65535u, 5000.0f)},
+    {UNSIGNED(16u, 65535u, 20.0f), UNSIGNED(32u, 65535u, 500.0f), UNSIGNED(48u, 65535u, 500.0f)},
 };
 
 static const place_t model_code[] = {MODEL, VALID};
@@ -65,11 +67,13 @@ static const layout_t pilot_parameters[LEVER_MODEL_COUNT] = {
     LAYOUT(MESSAGE_PILOT_PARAMETERS_ID, model_code, parameter_quantity[0]),
     LAYOUT(MESSAGE_PILOT_PARAMETERS_ID, model_code, parameter_quantity[1]),
     LAYOUT(MESSAGE_PILOT_PARAMETERS_ID, model_code, parameter_quantity[2]),
+    LAYOUT(MESSAGE_PILOT_PARAMETERS_ID, model_code, parameter_quantity[3]),
 };
 static const layout_t pilot_sigma[LEVER_MODEL_COUNT] = {
     LAYOUT(MESSAGE_PILOT_SIGMA_ID, model_code, sigma_quantity[0]),
     LAYOUT(MESSAGE_PILOT_SIGMA_ID, model_code, sigma_quantity[1]),
     LAYOUT(MESSAGE_PILOT_SIGMA_ID, model_code, sigma_quantity[2]),
+    LAYOUT(MESSAGE_PILOT_SIGMA_ID, model_code, sigma_quantity[3]),
 };
 
 static bool encode_by_model(lever_frame_t *frame, const layout_t layout[LEVER_MODEL_COUNT], uint8_t model, bool valid,

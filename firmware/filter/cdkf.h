@@ -155,7 +155,7 @@ typedef struct snapshot {
 void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot);
 
 /* Takes back what was learnt since, and drops pending information. What w explained of the state's uncertainty stays
- * with the state. */
+ * with the state. What the considered errors make of w is taken to be what it is now: they change slowly. */
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot);
 
 /* Forgetting for `period` seconds: P_w / lambda, 1 / lambda = 1 + growth period. The covariance of x and w stays. */

@@ -68,13 +68,14 @@ static couple_t oscillation(const model_dynamics_t *dynamics)
     return result;
 }
 
-/* Real and imaginary part of forcing / (stiffness - omega^2 + i omega damping). */
+/* Real and imaginary part of forcing (1 + space / (i omega)) / (stiffness - omega^2 + i omega damping). */
 static couple_t response_at(const model_dynamics_t *dynamics, float omega)
 {
     const float in_phase = dynamics->stiffness - (omega * omega);
     const float quadrature = omega * dynamics->damping;
     const float scale = dynamics->forcing / ((in_phase * in_phase) + (quadrature * quadrature));
-    const couple_t result = {scale * in_phase, -(scale * quadrature)};
+    const float lag = (dynamics->space > 0.0f) ? (dynamics->space / omega) : 0.0f;
+    const couple_t result = {scale * (in_phase - (lag * quadrature)), -(scale * (quadrature + (lag * in_phase)))};
     return result;
 }
 

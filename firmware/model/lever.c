@@ -149,7 +149,8 @@ static model_dynamics_t dynamics(
     const float inverse = 1.0f / c[INERTIA];
     const model_dynamics_t result = {.stiffness = stiffness * inverse,
         .damping = damping * inverse,
-        .forcing = -((c[FORCING] * step->trim_cosine) * inverse)};
+        .forcing = -((c[FORCING] * step->trim_cosine) * inverse),
+        .space = 0.0f};
     return result;
 }
 

@@ -57,6 +57,7 @@ model_dynamics_t linear_dynamics(
     (void)step;
     const model_dynamics_t result = {.stiffness = coefficients->c[LINEAR_STIFFNESS],
         .damping = coefficients->c[LINEAR_DAMPING],
-        .forcing = coefficients->c[LINEAR_BASE]};
+        .forcing = coefficients->c[LINEAR_BASE],
+        .space = 0.0f};
     return result;
 }

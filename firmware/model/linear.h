@@ -1,4 +1,4 @@
-/* The step of a linear second-order system, shared by the linear models.
+/* The step of a linear second-order system, shared by the linear models and the hand.
  *
  *   x_ddot = base z_ddot + torque tau_m - stiffness x - damping x_dot      (all per unit of mass)
  *

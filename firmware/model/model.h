@@ -2,7 +2,7 @@
  * bounds.
  *
  * All models have the state x = [theta, theta_dot] (in preload trim: deviations from the trim), three parameters p,
- * the inputs u = [z_ddot, tau_m] and the outputs y = x. Over a step of T seconds theta_dot changes by what the model
+ * the inputs u = [z_ddot, tau_m] and the integral of the first, and the outputs y = x. Over a step of T seconds theta_dot changes by what the model
  * says, and theta by T (theta_dot + change / 2): the midpoint rule, the same for all models. Models return changes,
  * not new values, and points are given by their offsets from the mean. So differences are those of small numbers,
  * which single precision needs when the measurement noise is near its resolution.
@@ -55,6 +55,7 @@ typedef struct model_constants {
     float stiffness;           /* k_l [N m/rad] */
     float arm_preload_sine;    /* sine of the arm's preload angle (preload fixed) */
     float lever_preload_angle; /* the lever's preload angle [rad] (preload fixed) */
+    float hand_inertia;        /* of lever and hand where the model does not know the mass [kg m^2] */
     bool trim;                 /* preload trim instead of fixed */
 } model_constants_t;
 
@@ -62,6 +63,7 @@ typedef struct model_constants {
 typedef struct model_step {
     float period;    /* [s] */
     float z_ddot;    /* base acceleration, mean over the step [m/s^2] */
+    float z_dot;     /* base velocity, likewise, without its slow part in preload trim [m/s] */
     float tau_m;     /* motor torque, mean over the step [N m] */
     float origin;    /* angle that the state's theta counts from [rad]; 0 unless preload trim */
     float trim;      /* trim angle [rad] */
@@ -76,11 +78,12 @@ typedef struct model_parameter {
     float greatest;
 } model_parameter_t;
 
-/* theta_ddot + damping theta_dot + stiffness theta = forcing z_ddot */
+/* theta_ddot + damping theta_dot + stiffness theta = forcing (z_ddot + space z_dot) */
 typedef struct model_dynamics {
     float stiffness; /* [1/s^2] */
     float damping;   /* [1/s] */
     float forcing;   /* [unit of theta / m] */
+    float space;     /* [1/s] */
 } model_dynamics_t;
 
 typedef struct model {
@@ -114,5 +117,6 @@ static inline void model_response_pair(model_response_t *response, uint32_t pair
 extern const model_t model_lever;            /* nonlinear lever: m_p, c_p, k_p */
 extern const model_t model_linear_physical;  /* mass, spring and damper: m, c, k */
 extern const model_t model_linear_black_box; /* second-order system: a21, a22, b21 */
+extern const model_t model_hand;             /* Mayo's hand: k_hand, c_hand, c_space */
 
 #endif

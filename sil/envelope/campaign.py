@@ -108,7 +108,7 @@ def _result(
 ) -> Result:
     """Runs a condition; its outcome becomes one of `outcomes`, which later ones may be measured against."""
     try:
-        config = Config(settings=row.settings)
+        config = Config(model=row.model, settings=row.settings)
     except SettingsError as error:
         return Result(row, {}, problem=str(error).partition(";")[0])
     if recording is None:

@@ -60,6 +60,8 @@ class Condition:
     sensors: Sensors = field(default_factory=Sensors)
     settings: Mapping[str, float] = field(default_factory=dict)
     """Of the firmware, besides its defaults."""
+    model: str | None = None
+    """Of the firmware; None: its default."""
     start: float = 20.0
     """Judged from here on [s]."""
     end: float | None = None

@@ -235,9 +235,14 @@ _CALIBRATION = (
 
 
 def _pilot(name: str, title: str, dither: float) -> Condition:
-    """A pilot whose arm is none that the firmware models."""
+    """A pilot whose arm is not the lever model's."""
     limits = (_most("θ/z̈ rms", 10.0), _least("θ/z̈ covered", 85.0))
     return Condition(name, title, Motion(pilot=name, dither=dither), limits, (_least("mismatch", 90.0),))
+
+
+def _hand(name: str, title: str) -> Condition:
+    """A hand as Mayo measured it, and the firmware's model of such hands: no flag excuses it."""
+    return replace(_pilot(name, f"{title}, model hand", 0.0), name=f"{name}_hand", unless=(), model="hand")
 
 
 def _reported(condition: Condition) -> Condition:
@@ -249,6 +254,9 @@ _PILOTS = (
     _pilot("two_dof", "arm on a trunk on a seat", 0.3),
     _pilot("mayo_ectomorphic", "Mayo's ectomorphic pilot", 0.0),
     _pilot("mayo_mesomorphic", "Mayo's mesomorphic pilot", 0.0),
+    _hand("mayo_ectomorphic", "Mayo's ectomorphic pilot"),
+    _hand("mayo_mesomorphic", "Mayo's mesomorphic pilot"),
+    _hand("mayo_random", "hands about Mayo's two pilots"),
     _reported(_pilot("hysteretic", "arm with hysteretic damping", 0.3)),
     _reported(_pilot("reflex", "arm with a stretch reflex after 35 ms", 0.3)),
 )

@@ -95,8 +95,13 @@ def _of_sil(motion: Motion, seeds: Sequence[int], tick: Callable[[], None]) -> R
 
 
 def _pilot_of_sil(name: str, trim: FloatArray, rng: np.random.Generator) -> Truth:
-    """mayo_* as measured; two_dof with an arm that differs from that of its scenario by 10 % (standard deviation)."""
+    """mayo_* as measured, mayo_random about both; two_dof with an arm that differs from that of its scenario by 10 %
+    (standard deviation)."""
     lever = plant.Lever.from_settings({row.name: row.default for row in settings_table()})
+    if name == "mayo_random":
+        normal = np.clip(rng.standard_normal(3), -1.8, 1.8)
+        w, a, outside = np.array((500.0, 13.5, 9.0)) * np.exp(np.array((0.3, 0.35, 0.45)) * normal)
+        return mayo_plant.Mayo(mayo_plant.Hand(a, a - outside, w), lever.lever_length, trim)
     if name.startswith("mayo_"):
         return mayo_plant.Mayo(mayo_plant.HANDS[name.removeprefix("mayo_")], lever.lever_length, trim)
     ones = np.ones_like(trim)

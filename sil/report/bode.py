@@ -37,10 +37,21 @@ def _of_linear_black_box(_: Lever, parameters: Array, __: Array) -> Transfer:
     return Transfer(b21[:, np.newaxis], np.column_stack((np.ones_like(a21), -a22, -a21)))
 
 
+def _of_hand(lever: Lever, parameters: Array, trim: Array) -> Transfer:
+    """θ̈ + c_hand θ̇ + k_hand θ = -(z̈ + c_space ż) / (l cos(trim))."""
+    k_hand, c_hand, c_space = parameters
+    ones, forcing = np.ones_like(k_hand), -1.0 / (lever.length * np.cos(trim))
+    return Transfer(
+        forcing[:, np.newaxis] * np.column_stack((ones, c_space)),
+        np.column_stack((ones, c_hand, k_hand, 0.0 * ones)),
+    )
+
+
 _TRANSFERS: Mapping[str, Callable[[Lever, Array, Array], Transfer]] = {
     "lever": _of_lever,
     "linear_physical": _of_linear_physical,
     "linear_black_box": _of_linear_black_box,
+    "hand": _of_hand,
 }
 
 

@@ -11,18 +11,23 @@ ABOUT_MODEL = {
     "linear_black_box": "In this run the estimator asks for no mass, damping or stiffness, but for the three numbers "
     "of any second-order system, θ̈ = a<sub>21</sub> θ + a<sub>22</sub> θ̇ + b<sub>21</sub> z̈. Natural frequency and "
     "damping ratio follow from the first two.",
+    "hand": "In this run the estimator takes the pilot for a hand as Mayo (1989) measured it on people: on a spring "
+    "and a damper in the cabin, and damped in space as well, so that the lever leans while the cabin climbs. Its "
+    "vertical motion d in the cabin is d̈ = −k<sub>hand</sub> d − c<sub>hand</sub> ḋ − z̈ − c<sub>space</sub> ż, all "
+    "per unit of its mass, and θ is the trim + d/(ℓ cos θ<sub>0</sub>).",
 }
 PARAMETERS = {
     "lever": "Mass, damping and stiffness of the pilot's arm",
     "linear_physical": "Mass, damping and stiffness that the linear model needs to move as the lever does",
     "linear_black_box": "The three coefficients of a second-order system that moves as the lever does",
+    "hand": "Stiffness and damping of the pilot's hand, and the part of the damping that is against space",
 }
 ABOUT_TRUTH = {
     "lever": "a rigid lever with the arm as mass, damper and spring at its end",
     "linear_physical": "a mass on a spring and a damper",
     "linear_black_box": "a linear second-order system",
     "two_dof": "the arm hangs on a trunk that gives way on its seat, so that two masses swing",
-    "mayo": "a hand that follows the cabin as Mayo (1989) measured it on people, by a transfer function",
+    "hand": "a hand that follows the cabin as Mayo (1989) measured it on people, by a transfer function",
     "hysteretic": "an arm whose tissue loses the same share of the energy of a cycle at every frequency, where a "
     "damper loses more the faster it moves",
     "reflex": "an arm with a stretch reflex, which pulls against the motion a few hundredths of a second late",
@@ -30,7 +35,7 @@ ABOUT_TRUTH = {
 """Every model of [pilot]."""
 DYNAMICS = {
     "two_dof": "The truth is the one of its two modes that answers more between 2 and 8 Hz.",
-    "mayo": "The truth is that of the poles of the hand's transfer function.",
+    "hand": "The truth is that of the poles of the hand's transfer function.",
     "hysteretic": "The truth is the mode that answers most between 2 and 8 Hz.",
     "reflex": "The truth is the mode that answers most between 2 and 8 Hz.",
 }
@@ -104,7 +109,7 @@ def excitation_caption(run: Run) -> str:
 
 def _has_scale(run: Run) -> bool:
     """Whether the parameters have a common scale that base motion alone does not tell."""
-    return run.model != "linear_black_box"
+    return run.model in ("lever", "linear_physical")
 
 
 def whiteness_caption(run: Run) -> str:

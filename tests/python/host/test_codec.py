@@ -31,7 +31,7 @@ def crc(data: bytes) -> int:
     return register ^ 0xFF
 
 
-MODELS = {0: ("m_p", "c_p", "k_p"), 1: ("m", "c", "k"), 2: ("a21", "a22", "b21")}
+MODELS = {0: ("m_p", "c_p", "k_p"), 1: ("m", "c", "k"), 2: ("a21", "a22", "b21"), 3: ("k_hand", "c_hand", "c_space")}
 
 
 def code(signal: Signal) -> float | None:
@@ -345,8 +345,9 @@ def test_columns_of_other_layouts() -> None:
 @pytest.mark.parametrize("name", MESSAGES)
 def test_raw_fields_against_cantools(name: str) -> None:
     message = MESSAGES[name]
+    choices = 1 + max(max(signal.multiplexer_ids or [0]) for signal in message.signals)
     for row, frame in enumerate(np.random.default_rng(4).integers(0, 256, (21, 8), dtype=np.uint8)):
-        frame[1] = frame[1] & 0x0F | row % len(MODELS) << 4
+        frame[1] = frame[1] & 0x0F | row % choices << 4
         raw = message.decode_simple(frame.tobytes(), decode_choices=False, scaling=False)
         for signal in filter(lambda signal: signal.name in raw, message.signals):
             value = codec.raw_field(name, signal.name)(frame.tobytes())

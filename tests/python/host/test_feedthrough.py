@@ -21,6 +21,8 @@ def responses(model: str, p: NDArray[np.float64], trim: float, frequency: float)
         return np.asarray(first / (first * s**2 + second * s + third))
     if model == "linear_black_box":
         return np.asarray(third / (s**2 - second * s - first))
+    if model == "hand":
+        return np.asarray(-(1.0 + third / s) / (0.45 * math.cos(trim)) / (s**2 + second * s + first))
     length, mass, place, inertia, c_l, k_l = 0.45, 1.2, 0.5, 0.020, 0.5, 5.0
     square = (length * math.cos(trim)) ** 2
     total = length**2 * (place**2 * mass + first) + inertia
@@ -30,7 +32,7 @@ def responses(model: str, p: NDArray[np.float64], trim: float, frequency: float)
 
 LEVER = (0.5873, 8.01, 273.2, -1.311)
 """Inertia, damping, stiffness and forcing of 2.5 kg, 42 N s/m, 1500 N/m on the lever."""
-PLANTS = {"lever": LEVER, "linear_black_box": LEVER, "linear_physical": (2.5, 42.0, 1500.0, 2.5)}
+PLANTS = {"lever": LEVER, "linear_black_box": LEVER, "linear_physical": (2.5, 42.0, 1500.0, 2.5), "hand": LEVER}
 
 
 def swing(estimator: Estimator, plant: tuple[float, float, float, float], seconds: float) -> None:
@@ -46,7 +48,7 @@ def swing(estimator: Estimator, plant: tuple[float, float, float, float], second
         estimator.update(1000 * k, 0.349 + theta + 3e-4 * rng.standard_normal(), rate, torque, z_ddot)
 
 
-@pytest.mark.parametrize("model", ["lever", "linear_physical", "linear_black_box"])
+@pytest.mark.parametrize("model", ["lever", "linear_physical", "linear_black_box", "hand"])
 def test_value_and_band_are_those_of_the_parameters_and_their_covariance(model: str) -> None:
     estimator = Estimator(Config(model=model))
     swing(estimator, PLANTS[model], 6.0)

@@ -43,7 +43,7 @@ MAYO = """
 title = "t"
 duration = "1 s"
 [pilot]
-model = "mayo"
+model = "hand"
 somatotype = "ectomorphic"
 trim = '20 deg'
 """
@@ -175,9 +175,9 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
         (LEAST.replace("20 deg", "-95 deg"), "pilot.trim: moves by 95 deg; it must stay below 90 deg"),
         (BLACK_BOX.replace("-9 1/s", "1 1/s"), "pilot.a22: rises to 1; it must stay below 0"),
         (BLACK_BOX + SINE_TORQUE, "torque: no torque acts on a pilot of model linear_black_box; remove it"),
-        (MAYO + SINE_TORQUE, "torque: no torque acts on a pilot of model mayo; remove it"),
-        (MAYO + FIRMWARE_TORQUE, "torque: no torque acts on a pilot of model mayo"),
-        (MAYO + SINE_TORQUE.replace("torque", "disturbance"), "disturbance: no torque acts on a pilot of model mayo"),
+        (MAYO + SINE_TORQUE, "torque: no torque acts on a pilot of model hand; remove it"),
+        (MAYO + FIRMWARE_TORQUE, "torque: no torque acts on a pilot of model hand"),
+        (MAYO + SINE_TORQUE.replace("torque", "disturbance"), "disturbance: no torque acts on a pilot of model hand"),
         (
             MAYO.replace("ecto", "endo"),
             "pilot.somatotype: 'endomorphic' is not known; allowed: ectomorphic, mesomorphic",

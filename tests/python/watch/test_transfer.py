@@ -39,11 +39,19 @@ def black_box_response(frequency: float, a21: float, a22: float, b21: float) -> 
     return b21 / (s**2 - a22 * s - a21)
 
 
+def hand_response(frequency: float, k_hand: float, c_hand: float, c_space: float, trim: float) -> complex:
+    """Mayo's H - 1, over s² for acceleration and l cos(trim) for the angle."""
+    s = 2j * math.pi * frequency
+    hand = ((c_hand - c_space) * s + k_hand) / (s**2 + c_hand * s + k_hand)
+    return (hand - 1.0) / s**2 / (0.45 * math.cos(trim))
+
+
 CASES = [
     ("lever", (2.5, 42.0, 1500.0), [lever_response(f, 2.5, 42.0, 1500.0, 0.35) for f in FREQUENCIES]),
     ("linear_physical", (2.7, 42.0, 1500.0), [physical_response(f, 2.7, 42.0, 1500.0) for f in FREQUENCIES]),
     ("linear_black_box", (-500.0, -14.0, -2.0), [black_box_response(f, -500.0, -14.0, -2.0) for f in FREQUENCIES]),
     ("linear_black_box", (-500.0, -14.0, 2.0), [black_box_response(f, -500.0, -14.0, 2.0) for f in FREQUENCIES]),
+    ("hand", (452.3, 13.7, 8.51), [hand_response(f, 452.3, 13.7, 8.51, 0.35) for f in FREQUENCIES]),
 ]
 
 

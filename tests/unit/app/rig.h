@@ -30,7 +30,7 @@ static inline lever_config_t rig_config(uint32_t combination)
 
 static inline const char *rig_test_name(const char *test, uint32_t combination)
 {
-    static const char *const models[LEVER_MODEL_COUNT] = {"lever", "linear_physical", "linear_black_box"};
+    static const char *const models[LEVER_MODEL_COUNT] = {"lever", "linear_physical", "linear_black_box", "hand"};
     static const char *const estimators[LEVER_ESTIMATOR_COUNT] = {"dual", "joint"};
     static char name[160];
     const lever_config_t config = rig_config(combination);
@@ -92,7 +92,8 @@ static inline rig_t rig_of(uint8_t model, double truth[LEVER_PARAMETERS])
 {
     static const double parameters[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {[LEVER_MODEL_LEVER] = {3.2, 60.0, 2100.0},
         [LEVER_MODEL_LINEAR_PHYSICAL] = {3.2, 60.0, 2100.0},
-        [LEVER_MODEL_LINEAR_BLACK_BOX] = {-620.0, -19.0, -2.8}};
+        [LEVER_MODEL_LINEAR_BLACK_BOX] = {-620.0, -19.0, -2.8},
+        [LEVER_MODEL_HAND] = {620.0, 19.0, 12.0}};
     const double *p = parameters[model];
     rig_t rig = rig_typical();
     if (model == (uint8_t)LEVER_MODEL_LINEAR_PHYSICAL) {
@@ -101,6 +102,8 @@ static inline rig_t rig_of(uint8_t model, double truth[LEVER_PARAMETERS])
     } else if (model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX) {
         rig.simulation.plant = plant_black_box(p[0], p[1], p[2]);
         rig.simulation.torque_rms = 0.0;
+    } else if (model == (uint8_t)LEVER_MODEL_HAND) {
+        rig.simulation.plant = plant_hand(p[0], p[1], p[2]);
     } else {
         /* a lever it is */
     }

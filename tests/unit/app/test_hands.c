@@ -84,7 +84,7 @@ static void test_a_lever_that_is_let_go_is_off_within_a_second_and_held_again_wi
         (void)run(500u, true);
         let_go();
         TEST_ASSERT_TRUE(run(50u, true) > 0u);
-        TEST_ASSERT_TRUE(run(500u, true) >= 400u); /* the lever alone swings out of what is linear */
+        TEST_ASSERT_TRUE(run(500u, true) >= 380u); /* the lever alone swings out of what is linear */
         hold(2.5, 42.0, 1500.0);
         (void)run(50u, true);
         TEST_ASSERT_EQUAL_UINT32(0u, run(500u, true));

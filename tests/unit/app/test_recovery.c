@@ -182,7 +182,7 @@ static void test_frozen_survives_a_restart(void)
 
 static void test_an_estimate_beyond_a_bound_is_held_there_and_said(void)
 {
-    const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box};
+    const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box, &model_hand};
     const float greatest = models[config.model]->parameter[0].greatest;
     estimator.cdkf.w[0] = estimator.cdkf.scaling.greatest[0] + 1.0f;
     for (uint32_t samples = 0u; !has_fault(LEVER_FAULT_BOUND); samples++) {

@@ -206,7 +206,7 @@ static void test_the_crc_of_the_settings_tells_every_one_of_them(void)
 
 static void test_first_guesses_are_accepted_within_the_bounds_of_the_model_and_nowhere_else(void)
 {
-    const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box};
+    const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box, &model_hand};
     for (uint32_t k = 0u; k < ((uint32_t)LEVER_MODEL_COUNT * (uint32_t)LEVER_PARAMETERS); k++) {
         const model_parameter_t *parameter =
             &models[k / (uint32_t)LEVER_PARAMETERS]->parameter[k % (uint32_t)LEVER_PARAMETERS];
@@ -259,9 +259,9 @@ static void test_init_refuses_null(void)
 static void test_parameters_have_names_and_units_and_nothing_beyond(void)
 {
     static const char *const names[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
-        {"m_p", "c_p", "k_p"}, {"m", "c", "k"}, {"a21", "a22", "b21"}};
+        {"m_p", "c_p", "k_p"}, {"m", "c", "k"}, {"a21", "a22", "b21"}, {"k_hand", "c_hand", "c_space"}};
     static const char *const units[LEVER_MODEL_COUNT][LEVER_PARAMETERS] = {
-        {"kg", "N s/m", "N/m"}, {"kg", "N s/m", "N/m"}, {"1/s^2", "1/s", "1"}};
+        {"kg", "N s/m", "N/m"}, {"kg", "N s/m", "N/m"}, {"1/s^2", "1/s", "1"}, {"1/s^2", "1/s", "1/s"}};
     for (uint8_t model = 0u; model < (uint8_t)LEVER_MODEL_COUNT; model++) {
         for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
             TEST_ASSERT_EQUAL_STRING(names[model][i], lever_parameter_name(model, i));

@@ -16,6 +16,8 @@ static inline model_constants_t constants_of(const plant_t *plant)
         .stiffness = (float)plant->stiffness,
         .arm_preload_sine = (float)sin(plant->arm_preload_angle),
         .lever_preload_angle = (float)plant->lever_preload_angle,
+        .hand_inertia =
+            (float)((centre * centre * plant->mass) + plant->inertia + (plant->length * plant->length * 2.5)),
         .trim = plant->follows_trim};
     return constants;
 }

@@ -10,12 +10,13 @@
 
 #define PLANT_GRAVITY 9.80665
 
-/* theta_ddot = -stiffness (theta - trim) - damping theta_dot + base z_ddot + torque tau_m */
+/* theta_ddot = -stiffness (theta - trim) - damping theta_dot + base (z_ddot + space z_dot) + torque tau_m */
 typedef struct plant_linear {
     double stiffness; /* [1/s^2] */
     double damping;   /* [1/s] */
     double base;
     double torque;
+    double space; /* [1/s] */
 } plant_linear_t;
 
 typedef struct plant {
@@ -36,6 +37,7 @@ typedef struct plant {
     double k_p;                 /* [N/m] */
     double theta;               /* [rad] */
     double theta_dot;           /* [rad/s] */
+    double z_dot;               /* of the base [m/s] */
 } plant_t;
 
 /* The working values of DESIGN section 3, at rest at 20 degrees. */
@@ -63,7 +65,7 @@ static inline plant_t plant_physical(double m, double c, double k)
 {
     plant_t plant = plant_typical();
     plant.is_linear = true;
-    plant.linear = (plant_linear_t){k / m, c / m, 1.0, 1.0 / m};
+    plant.linear = (plant_linear_t){k / m, c / m, 1.0, 1.0 / m, 0.0};
     return plant;
 }
 
@@ -71,7 +73,17 @@ static inline plant_t plant_black_box(double a21, double a22, double b21)
 {
     plant_t plant = plant_typical();
     plant.is_linear = true;
-    plant.linear = (plant_linear_t){-a21, -a22, b21, 0.0};
+    plant.linear = (plant_linear_t){-a21, -a22, b21, 0.0, 0.0};
+    return plant;
+}
+
+/* Mayo's hand on the typical lever, at 20 degrees; the motor moves the pilot's mass of the first guess. */
+static inline plant_t plant_hand(double k, double c, double space)
+{
+    plant_t plant = plant_typical();
+    const double rise = plant.length * cos(plant.trim);
+    plant.is_linear = true;
+    plant.linear = (plant_linear_t){k, c, -1.0 / rise, 1.0 / 0.587, space};
     return plant;
 }
 
@@ -108,8 +120,9 @@ static inline double plant_acceleration(
 {
     const plant_linear_t *linear = &plant->linear;
     const double own = -(linear->stiffness * (theta - plant->trim)) - (linear->damping * theta_dot);
-    return plant->is_linear ? (own + (linear->base * z_ddot) + (linear->torque * tau_m))
-                            : plant_lever_acceleration(plant, theta, theta_dot, z_ddot, tau_m);
+    return plant->is_linear
+               ? (own + (linear->base * (z_ddot + (linear->space * plant->z_dot))) + (linear->torque * tau_m))
+               : plant_lever_acceleration(plant, theta, theta_dot, z_ddot, tau_m);
 }
 
 /* One Runge-Kutta step of `h` seconds with constant inputs. */

@@ -53,16 +53,18 @@ static inline double simulation_multisine(double time, const double frequency[5]
 /* On to the sample `period` seconds later; between samples, inputs are straight lines. */
 static inline void simulation_advance(simulation_t *simulation, double period)
 {
-    static const double base[5] = {1.3, 2.1, 3.4, 4.7, 6.1};
+    static const double shaking[5] = {1.3, 2.1, 3.4, 4.7, 6.1};
     static const double torque[5] = {1.7, 2.9, 3.9, 5.3, 8.2};
     const double h = period / (double)SIMULATION_SUBSTEPS;
     simulation->time += period;
-    const double z_ddot = simulation->base_rms * simulation_multisine(simulation->time, base);
+    const double z_ddot = simulation->base_rms * simulation_multisine(simulation->time, shaking);
     const double tau_m = simulation->torque_rms * simulation_multisine(simulation->time, torque);
     for (uint32_t k = 0u; k < (uint32_t)SIMULATION_SUBSTEPS; k++) {
         const double along = ((double)k + 0.5) / (double)SIMULATION_SUBSTEPS;
-        plant_runge_kutta(&simulation->plant, h, simulation->z_ddot + (along * (z_ddot - simulation->z_ddot)),
-            simulation->tau_m + (along * (tau_m - simulation->tau_m)));
+        const double base = simulation->z_ddot + (along * (z_ddot - simulation->z_ddot));
+        simulation->plant.z_dot += 0.5 * h * base;
+        plant_runge_kutta(&simulation->plant, h, base, simulation->tau_m + (along * (tau_m - simulation->tau_m)));
+        simulation->plant.z_dot += 0.5 * h * base;
         simulation->plant.theta_dot += simulation->process_noise * sqrt(h) * random_normal(&simulation->source);
     }
     simulation->z_ddot = z_ddot;

@@ -5,7 +5,9 @@
 #include "constants.h"
 #include "unity.h"
 
-enum { KINDS = 6, REPEATS = 300, FINE = 200, L = MODEL_PARAMETERS };
+enum { MODELS = 4, KINDS = 2 * MODELS, REPEATS = 300, FINE = 200, L = MODEL_PARAMETERS };
+
+#define TRIM 0.37
 
 typedef struct subject {
     const model_t *model;
@@ -15,7 +17,8 @@ typedef struct subject {
     double p[L];
 } subject_t;
 
-static const model_t *const models[3] = {&model_lever, &model_linear_physical, &model_linear_black_box};
+static const model_t *const models[MODELS] = {
+    &model_lever, &model_linear_physical, &model_linear_black_box, &model_hand};
 static random_source_t source;
 
 void setUp(void)
@@ -37,6 +40,9 @@ static plant_t plant_with(const subject_t *subject, const double p[L])
         plant.linear = plant_physical(p[0], p[1], p[2]).linear;
     } else if (subject->model == &model_linear_black_box) {
         plant.linear = plant_black_box(p[0], p[1], p[2]).linear;
+    } else if (subject->model == &model_hand) {
+        const double inertia = (0.25 * 0.45 * 0.45 * 1.2) + 0.020 + (0.45 * 0.45 * 2.5);
+        plant.linear = (plant_linear_t){p[0], p[1], -1.0 / (0.45 * cos(TRIM)), 1.0 / inertia, p[2]};
     } else {
         plant.m_p = p[0];
         plant.c_p = p[1];
@@ -55,12 +61,14 @@ static subject_t subject_of(uint32_t kind, const double p[L], double period, dou
     plant->follows_trim = ((kind % 2u) == 0u);
     plant->arm_preload_angle = 0.44;
     plant->lever_preload_angle = -0.17;
-    plant->trim = 0.37;
+    plant->trim = TRIM;
+    plant->z_dot = 0.3;
     plant->stiffness = 9.0;
     *plant = plant_with(&subject, p);
     subject.constants = constants_of(plant);
     subject.step = (model_step_t){.period = (float)period,
         .z_ddot = (float)z_ddot,
+        .z_dot = (float)plant->z_dot,
         .tau_m = (float)tau_m,
         .origin = 0.31f,
         .trim = (float)plant->trim,
@@ -75,8 +83,9 @@ static subject_t subject_of(uint32_t kind, const double p[L], double period, dou
 
 static subject_t random_subject(uint32_t kind, double period)
 {
-    const double least[3][L] = {{1.0, 10.0, 200.0}, {1.0, 10.0, 200.0}, {-1500.0, -80.0, -5.0}};
-    const double greatest[3][L] = {{5.0, 150.0, 4000.0}, {5.0, 150.0, 4000.0}, {500.0, 30.0, 5.0}};
+    const double least[MODELS][L] = {{1.0, 10.0, 200.0}, {1.0, 10.0, 200.0}, {-1500.0, -80.0, -5.0}, {200.0, 3.0, 1.0}};
+    const double greatest[MODELS][L] = {
+        {5.0, 150.0, 4000.0}, {5.0, 150.0, 4000.0}, {500.0, 30.0, 5.0}, {1500.0, 40.0, 30.0}};
     double p[L];
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
         p[i] = random_between(&source, least[kind / 2u][i], greatest[kind / 2u][i]);
@@ -85,6 +94,8 @@ static subject_t random_subject(uint32_t kind, double period)
     subject_t subject = subject_of(kind, p, period, z_ddot, random_between(&source, -3.0, 3.0));
     subject.plant.theta += random_between(&source, -0.1, 0.1);
     subject.plant.theta_dot = random_between(&source, -1.5, 1.5);
+    subject.plant.z_dot = random_between(&source, -0.5, 0.5);
+    subject.step.z_dot = (float)subject.plant.z_dot;
     return subject;
 }
 
@@ -223,7 +234,7 @@ static void test_a_step_follows_the_equation_of_motion(void)
 
 static void test_halving_the_step_makes_its_error_eight_times_smaller(void)
 {
-    const double p[3][L] = {{2.5, 42.0, 1500.0}, {2.5, 42.0, 1500.0}, {300.0, 20.0, 2.0}};
+    const double p[MODELS][L] = {{2.5, 42.0, 1500.0}, {2.5, 42.0, 1500.0}, {300.0, 20.0, 2.0}, {500.0, 13.5, 9.0}};
     for (uint32_t kind = 0u; kind < (uint32_t)KINDS; kind++) {
         double error[2][2];
         for (uint32_t k = 0u; k < 2u; k++) {
@@ -240,9 +251,10 @@ static void test_halving_the_step_makes_its_error_eight_times_smaller(void)
 /* In preload fixed the lever's arm rests where its spring bears its weight. */
 static void test_at_rest_it_stays_at_rest(void)
 {
-    const double p[3][L] = {{2.5, 42.0, 1500.0}, {2.5, 42.0, 1500.0}, {-465.0, -13.7, -2.2}};
+    const double p[MODELS][L] = {{2.5, 42.0, 1500.0}, {2.5, 42.0, 1500.0}, {-465.0, -13.7, -2.2}, {500.0, 13.5, 9.0}};
     for (uint32_t kind = 0u; kind < (uint32_t)KINDS; kind++) {
         subject_t subject = subject_of(kind, p[kind / 2u], 1.0e-3, 0.0, 0.0);
+        subject.step.z_dot = 0.0f;
         if (kind == 1u) {
             const double mu = (subject.plant.mass_position * subject.plant.mass) + subject.plant.m_p;
             const double bears = PLANT_GRAVITY * mu / (subject.plant.k_p * subject.plant.length);
@@ -255,9 +267,10 @@ static void test_at_rest_it_stays_at_rest(void)
 
 static void test_heavy_damping_and_a_long_step_still_decay(void)
 {
-    const double p[3][L] = {{0.3, 400.0, 200.0}, {0.05, 600.0, 1.0}, {-1.0, -320.0, 0.0}};
-    for (uint32_t model = 0u; model < 3u; model++) {
+    const double p[MODELS][L] = {{0.3, 400.0, 200.0}, {0.05, 600.0, 1.0}, {-1.0, -320.0, 0.0}, {20.0, 320.0, 0.1}};
+    for (uint32_t model = 0u; model < (uint32_t)MODELS; model++) {
         subject_t subject = subject_of(2u * model, p[model], 2.0e-2, 0.0, 0.0);
+        subject.step.z_dot = 0.0f;
         for (double rate = 1.0; fabs(rate) > 1.0e-6;) {
             subject.plant.theta_dot = rate;
             const double next = rate + mean_change(&subject);
@@ -299,6 +312,7 @@ static void test_dynamics_are_those_of_the_equation_linearised_at_the_trim(void)
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-5 * (fabs(stiffness) + 1.0), stiffness, (double)found.stiffness);
         TEST_ASSERT_DOUBLE_WITHIN(5.0e-6 * fabs(damping), damping, (double)found.damping);
         TEST_ASSERT_DOUBLE_WITHIN(5.0e-6 * fabs(forcing), forcing, (double)found.forcing);
+        TEST_ASSERT_EQUAL_FLOAT((float)subject.plant.linear.space, found.space);
     }
 }
 
@@ -317,16 +331,21 @@ static void test_a_lever_that_falls_has_a_negative_stiffness(void)
 /* Bounds fit into the CAN signals (lever.dbc) and hold every pilot of the design with room. */
 static void test_descriptors_have_names_units_and_bounds(void)
 {
-    static const model_t expected[3] = {{.name = "lever",
-                                            .parameter = {{"m_p", "kg", 0.001f, 65.535f},
-                                                {"c_p", "N s/m", 0.01f, 655.35f}, {"k_p", "N/m", 0.1f, 6553.5f}}},
+    static const model_t expected[MODELS] = {{.name = "lever",
+                                                 .parameter = {{"m_p", "kg", 0.001f, 65.535f},
+                                                     {"c_p", "N s/m", 0.01f, 655.35f}, {"k_p", "N/m", 0.1f, 6553.5f}}},
         {.name = "linear_physical",
             .parameter = {{"m", "kg", 0.001f, 65.535f}, {"c", "N s/m", 0.01f, 655.35f}, {"k", "N/m", 0.1f, 6553.5f}}},
         {.name = "linear_black_box",
             .parameter = {{"a21", "1/s^2", -3276.8f, 3276.7f}, {"a22", "1/s", -327.68f, 327.67f},
-                {"b21", "1", -32.768f, 32.767f}}}};
-    const float pilot[2][L] = {{1.0f, 10.0f, 200.0f}, {5.0f, 150.0f, 4000.0f}};
-    for (uint32_t model = 0u; model < 3u; model++) {
+                {"b21", "1", -32.768f, 32.767f}}},
+        {.name = "hand",
+            .parameter = {{"k_hand", "1/s^2", 0.1f, 6553.4f}, {"c_hand", "1/s", 0.01f, 655.34f},
+                {"c_space", "1/s", 0.01f, 655.34f}}}};
+    const float arm[2][L] = {{1.0f, 10.0f, 200.0f}, {5.0f, 150.0f, 4000.0f}};
+    const float hand[2][L] = {{100.0f, 4.0f, 2.0f}, {2000.0f, 60.0f, 40.0f}};
+    for (uint32_t model = 0u; model < (uint32_t)MODELS; model++) {
+        const float (*pilot)[L] = (model == 3u) ? hand : arm;
         TEST_ASSERT_EQUAL_STRING(expected[model].name, models[model]->name);
         TEST_ASSERT_EQUAL(model != 2u, models[model]->positive);
         for (uint32_t i = 0u; i < (uint32_t)L; i++) {
