@@ -6,12 +6,14 @@
 #define UNKNOWN 3.0f        /* process noise for an unknown base acceleration, in those that are set */
 #define Z_DOT_KEPT 0.99998f /* in a step: what rounding adds to the base velocity is forgotten */
 #define STOP_RATE 0.002f    /* friction is at half of its limit [rad/s] */
+#define RATE_MOST 1.0e4f    /* [rad/s] */
 #define SUBSTEPS_MOST 12u   /* predictions through a gap: bounds the time of one call */
 
-/* Torque of one newton metre of Coulomb friction, smooth about standstill. */
+/* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is
+ * not a number would stay in the trim. */
 static float friction(float rate)
 {
-    return rate / (fabsf(rate) + STOP_RATE);
+    return (fabsf(rate) <= RATE_MOST) ? (rate / (fabsf(rate) + STOP_RATE)) : 0.0f;
 }
 
 /* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
