@@ -49,8 +49,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
         .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
         .origin = trim->origin[0],
         .trim = trim_angle(trim),
-        .trim_sine = estimator->trim_angle.sine,
-        .trim_cosine = estimator->trim_angle.cosine};
+        .trim_sine = estimator->trim_sine_cosine.sine,
+        .trim_cosine = estimator->trim_sine_cosine.cosine};
     hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
     if (unknown) {
         step.z_ddot = 0.0f;
@@ -67,7 +67,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
 static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], float period)
 {
     const bool back = trim_outputs(&estimator->trim, estimator->cdkf.x, y, valid, period);
-    estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
+    estimator->trim_sine_cosine = sine_cosine(trim_angle(&estimator->trim));
     return back;
 }
 
