@@ -16,8 +16,8 @@ static float friction(float rate)
     return (fabsf(rate) <= RATE_MOST) ? (rate / (fabsf(rate) + STOP_RATE)) : 0.0f;
 }
 
-/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
- * measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
+/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true
+ * = measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
 static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
 {
     error[CDKF_BASE_GAIN] = -z_ddot;

@@ -99,7 +99,8 @@ static void test_outputs_that_stand_still_as_expected_are_not_stuck(void)
     }
 }
 
-/* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never stands still. */
+/* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never
+ * stands still. */
 static void test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations(void)
 {
     for (uint32_t changes = 19u; changes <= 20u; changes++) {
