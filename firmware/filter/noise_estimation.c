@@ -12,7 +12,7 @@
 #define SHARE 0.2f          /* this part, which averages over about five windows */
 #define Q_LEAST 0.6f        /* of a window for Q: there may have been rest in it */
 #define STARVED 1.15f       /* more gain than this is missing: it is Q that is too small, not R */
-#define CHANCE 3.0f         /* by so many standard deviations of the regression, whose variance is noise_estimation_t's */
+#define CHANCE 3.0f         /* by so many standard deviations of the regression: 1 / sqrt(variance) */
 #define CERTAIN 3.0f        /* a factor of R that is put down to R whatever its share */
 
 void noise_estimation_begin(noise_estimation_t *noise)
