@@ -164,8 +164,10 @@ class TwoStage(Belief):
 
     @property
     def joint_factor(self) -> Array:
-        n, m = len(self._x), len(self._w)
-        return np.block([[self._w_factor, np.zeros((m, n))], [self.v @ self._w_factor, self.x_factor]])
+        m = len(self._w)
+        factor = np.zeros((m + len(self._x), m + len(self._x)))
+        factor[:m, :m], factor[m:, :m], factor[m:, m:] = self._w_factor, self.v @ self._w_factor, self.x_factor
+        return factor
 
     @property
     def errors(self) -> Array:

@@ -15,9 +15,9 @@ from . import cdkf
 from .belief import Augmented, Belief, TwoStage
 from .cdkf import Array
 from .detrend import Detrend
-from .learning import ADAPTATIONS, Learning, Lesson, seconds
+from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
 from .lever import Lever
-from .linear import LinearBlackBox, LinearPhysical
+from .linear import Hand, LinearBlackBox, LinearPhysical
 from .scale import Scale
 
 ESTIMATORS = ("dual", "joint", "augmented")
@@ -25,6 +25,7 @@ OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 12  # predictions through a gap
 SETTLING = 0.9  # [1] time that levels need, in periods of the corner
 MOTION_TIME = 0.1  # [s] of the shorter average of motion
+VELOCITY_KEPT = 0.99998  # of the base's, in a step
 UNKNOWN = 3.0  # process noise for an unknown base acceleration, in those that are set
 SPIKE = 6.0  # standard deviations
 SPIKE_TIME = 0.02  # [s] longer than this it is no spike
@@ -32,13 +33,15 @@ STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
 CONSIDERED = ("z_ddot_gain", "z_ddot_delay", "tau_m_gain", "lever_friction")
 UNBOUNDED = np.array([[-math.inf, math.inf]] * 3)
 
-Model = Lever | LinearPhysical | LinearBlackBox
+Model = Lever | LinearPhysical | LinearBlackBox | Hand
 
 
 def model_of(settings: Mapping[str, float], name: str, preload: str) -> Model:
     """The model of that name in firmware/lever_settings.def."""
     if name == "lever":
         return Lever.from_settings(settings, preload)
+    if name == "hand":
+        return Hand.from_settings(settings, preload)
     rest = settings["lever_preload_angle"]
     return LinearPhysical(rest, preload) if name == "linear_physical" else LinearBlackBox(rest, preload)
 
@@ -102,6 +105,7 @@ class Estimator:
         self._wait_for_levels()
         self.last_raw = start.input
         self.last_input = start.input  # the same, as deviations in preload trim
+        self.velocity = 0.0  # of the base, from the end of a step to the middle of the next one [m/s]
         self.last_measured_base = start.measured_base
         self.time = start.time
 
@@ -112,10 +116,10 @@ class Estimator:
     ) -> None:
         """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) as
         the sensors show them."""
-        duration = seconds(1e-6) * seconds(round(1e6 * (time - self.time)))
-        substeps = min(max(1, round(float(duration) / self.settings["sample_period"])), MOST_SUBSTEPS)
-        dt, none_valid = float(duration) / substeps, np.zeros(2, np.bool_)
-        inputs = (self._true_base(u[0], float(duration), base_valid), u[1] / self.settings["tau_m_gain"])
+        duration = time - self.time
+        substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
+        dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
+        inputs = (self._true_base(u[0], duration, base_valid), u[1] / self.settings["tau_m_gain"])
         for i in range(1, substeps + 1):
             if i == substeps:
                 self._follow_base(base_valid, duration)
@@ -130,9 +134,9 @@ class Estimator:
         if back:
             self._end_outage(y, valid)
         self._correct(y, valid, duration)
-        self._average_motion(float(duration))
+        self._average_motion(duration)
 
-    def _correct(self, y: Array, valid: NDArray[np.bool_], duration: np.float32) -> None:
+    def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Measurement update, and learning when it is due."""
         settled = bool(self.unsettled < 0.5 * self.settings["sample_period"])
         least = self.settings["excitation_least"] ** 2
@@ -143,20 +147,20 @@ class Estimator:
             noise = np.diag(self.learning.noise.output_noise)
             innovation = self.belief.update(y, valid, noise, learn=lesson.measured and excited)
             self.nis = innovation.normalised_square
-            share = min(float(duration) / self.settings["excitation_time"], 1.0)
+            share = min(duration / self.settings["excitation_time"], 1.0)
             self.average_nis += share * (self.nis / int(valid.sum()) - self.average_nis)
-            self.learning.add(innovation, valid, excited)
+            self.learning.add(innovation, valid, lesson)
         self.learning.step(duration, lesson)
-        self.unsettled -= duration
+        self.unsettled -= counted(duration)
 
-    def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: np.float32) -> NDArray[np.bool_]:
+    def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
         """Outputs far from what is expected, until they have been for SPIKE_TIME."""
         noise = self.learning.noise.output_noise
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
         expected = np.maximum(max(self.average_nis, 1.0) * (state**2 + noise**2), noise**2)
         far = valid & ((y - self.origin - self.belief.x) ** 2 > SPIKE**2 * expected)
         for i in np.flatnonzero(valid):
-            self.refused[i] = self.refused[i] + duration if far[i] else seconds(0.0)
+            self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
         return spikes
 
@@ -168,11 +172,11 @@ class Estimator:
         self.last_measured_base = measured
         return (measured + self.settings["z_ddot_delay"] * slope) / self.settings["z_ddot_gain"]
 
-    def _follow_base(self, valid: bool, duration: np.float32) -> None:
+    def _follow_base(self, valid: bool, duration: float) -> None:
         """Its level has to settle again after an outage."""
         if valid and self.base_missing > OUTAGE:
             self._wait_for_levels()
-        self.base_missing = seconds(0.0) if valid else self.base_missing + duration
+        self.base_missing = seconds(0.0) if valid else self.base_missing + counted(duration)
 
     def _advance(self, raw: tuple[float, float], dt: float) -> None:
         """One prediction, with the mean of the inputs at both ends. A base that is not known is noise."""
@@ -182,13 +186,14 @@ class Estimator:
         u, last = (base, torque - self.settings["lever_friction"] * stop), self.last_input
         if self.detrended:
             self.origin = np.array([detrend.level for detrend in self.outputs])
-        z_ddot = 0.5 * (base + last[0])
+        z_ddot, z_dot = 0.5 * (base + last[0]), self.velocity
+        self.velocity = VELOCITY_KEPT * self.velocity + dt * base
         if self.base_missing > 0.0:
-            z_ddot = 0.0
+            z_ddot, z_dot = 0.0, 0.0
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
         errors = np.array(((-base, (base - last[0]) / dt, 0.0, 0.0), (0.0, 0.0, -last[1], -stop)))
-        self._predict((z_ddot, 0.5 * (u[1] + last[1])), errors, dt)
+        self._predict((z_ddot, 0.5 * (u[1] + last[1]), z_dot), errors, dt)
         self.last_input = u
 
     def _deviation(self, detrend: Detrend, value: float, dt: float) -> float:
@@ -224,20 +229,22 @@ class Estimator:
     def _wait_for_levels(self) -> None:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
-    def _predict(self, u: tuple[float, float], errors: Array, dt: float) -> None:
+    def _predict(self, u: tuple[float, ...], errors: Array, dt: float) -> None:
         """The trim is where it was at the last sample. `errors` (2, 4): of the inputs, per unit of each considered."""
         trim = self.outputs[0].level
         angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
 
-        def moved_by(x: Array, w: Array, z_ddot: float | Array, tau_m: float | Array) -> Array:
-            moved: Array = self.model.step(x + angle, self.scale.physical(w), (z_ddot, tau_m), trim, dt) - angle
+        def moved_by(x: Array, w: Array, u: tuple[float | Array, ...]) -> Array:
+            moved: Array = self.model.step(x + angle, self.scale.physical(w), u, trim, dt) - angle
             return moved
 
         def motion(x: Array, w: Array) -> Array:
-            return moved_by(x, w, *u)
+            return moved_by(x, w, u)
 
         x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
-        push = moved_by(x, w, u[0] + errors[0], u[1] + errors[1]) - motion(x, w)
+        with_errors = np.concatenate((np.zeros((2, 1)), errors), axis=1)  # none, then a unit of each
+        moved = moved_by(x, w, (u[0] + with_errors[0], u[1] + with_errors[1], *u[2:]))
+        push = moved[:, 1:] - moved[:, :1]
         self.belief.predict(motion, self._process_noise(dt), push)
 
     def _process_noise(self, dt: float) -> Array:

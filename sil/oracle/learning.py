@@ -27,8 +27,13 @@ DISTURBANCE_TIME = 0.4  # [s] in which it dies away
 
 
 def seconds(value: float) -> np.float32:
-    """As the firmware counts time."""
+    """A time as the firmware has it."""
     return np.float32(value)
+
+
+def counted(duration: float) -> np.float32:
+    """Between two samples, whose times are whole microseconds."""
+    return seconds(1e-6) * seconds(round(1e6 * duration))
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,8 @@ class Learning:
         self.trust = seconds(0.0)  # part of the information that counts [1], counted like time
         self.noise = NoiseEstimation(settings)
         self.change = ChangeDetection(settings["change_memory"], settings["change_threshold"])
-        self.elapsed = seconds(0.0)  # since the parameters learnt last
+        self.elapsed = 0.0  # since the parameters learnt last [s]
+        self.counted = seconds(0.0)  # the same
         self.changed = seconds(0.0)  # time left of a change
         self.wait = seconds(0.0)  # until anything is taught
         self.kept_ago = seconds(0.0)
@@ -80,41 +86,42 @@ class Learning:
 
     # --- one sample ------------------------------------------------------------------------------------------------
 
-    def add(self, innovation: Innovation, valid: NDArray[np.bool_], excited: bool) -> None:
+    def add(self, innovation: Innovation, valid: NDArray[np.bool_], lesson: Lesson) -> None:
         """What a sample says of the noise."""
-        if self.adapted and excited:
+        if self.adapted and lesson.measured and lesson.excited:
             self.noise.add(innovation, valid)
 
-    def step(self, duration: np.float32, lesson: Lesson) -> None:
+    def step(self, duration: float, lesson: Lesson) -> None:
         """The parameters learn once every learn_period; a sample that is half a sample_period early is on time."""
         self.elapsed += duration
-        if self.elapsed > seconds(self.settings["learn_period"]) - seconds(0.5 * self.settings["sample_period"]):
-            period, self.elapsed = self.elapsed, seconds(0.0)
-            self._end_block(period, lesson)
+        self.counted += counted(duration)
+        if self.counted > seconds(self.settings["learn_period"]) - seconds(0.5 * self.settings["sample_period"]):
+            self._end_block(self.elapsed, self.counted, lesson)
+            self.elapsed, self.counted = 0.0, seconds(0.0)
 
     # --- a block -----------------------------------------------------------------------------------------------------
 
-    def _end_block(self, period: np.float32, lesson: Lesson) -> None:
-        self.wait = max(self.wait - period, seconds(0.0))
+    def _end_block(self, period: float, counted: np.float32, lesson: Lesson) -> None:
+        self.wait = max(self.wait - counted, seconds(0.0))
         if not lesson.excited:
             self.wait = max(self.wait, seconds(AWAKE))
-        self.changed = max(self.changed - period, seconds(0.0))
-        self.disturbance *= 1.0 - min(float(period) / DISTURBANCE_TIME, 1.0)
+        self.changed = max(self.changed - counted, seconds(0.0))
+        self.disturbance *= 1.0 - min(period / DISTURBANCE_TIME, 1.0)
         taught = lesson.measured and self.wait <= 0.0
         if not (taught and lesson.excited):
             self.belief.drop_pending()
             self.noise.begin()
         elif self.adapted:
-            self._estimate_noise(period)
-        correction, variance = self._learn(period)
+            self._estimate_noise(counted)
+        correction, variance = self._learn(counted)
         suddenly = 0.0  # seconds of the walk at once
         if taught and lesson.excited and self.adapted:
-            suddenly = self._detect_change(correction, variance, float(period))
-        self.belief.forget(self.growth * float(period))
-        self.belief.walk(self.walk * float(period) + self.floor * suddenly)
+            suddenly = self._detect_change(correction, variance, period)
+        self.belief.forget(self.growth * period)
+        self.belief.walk(self.walk * period + self.floor * suddenly)
         self.belief.limit(self.greatest_sigma)
         if taught:
-            self._adapt_walk(correction, float(period), lesson.excited)
+            self._adapt_walk(correction, period, lesson.excited)
         else:
             self.growth = 0.0  # what cannot be learnt again is not forgotten
 
