@@ -61,7 +61,8 @@ def test_single_precision_goes_where_double_goes(
 
 @pytest.mark.requires("cc|gcc|clang")
 def test_the_two_scenes_are_what_they_claim(programs: Path) -> None:
-    """Drift: followed, with a small sigma, most of it what is stated of the sensors. Calm: little is learnt, and uncertainty does not wind up."""
+    """Drift: followed, with a small sigma, most of it what is stated of the sensors. Calm: little is learnt, and
+    uncertainty does not wind up."""
     drift, calm = (flown(programs / "single", scene, 0, "default") for scene in ("drift", "calm"))
     drift_sigma, calm_sigma = (np.median(run[:, 6] / run[:, 5]) for run in (drift, calm))
     assert drift[600:, 5].max() / drift[600:, 5].min() > 1.8
