@@ -9,7 +9,7 @@
 
 float estimator_state(const estimator_t *estimator, uint32_t i)
 {
-    return estimator->trim.origin[i] + estimator->cdkf.x[i];
+    return estimator->trim.origin[i] + estimator->trim.ahead[i] + estimator->cdkf.x[i];
 }
 
 void estimator_parameters(const estimator_t *estimator, float parameter[LEVER_PARAMETERS])
@@ -46,14 +46,19 @@ derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float 
     return derived_feedthrough(&estimator->cdkf, setup->model_in_use, &setup->constants, &step, frequency);
 }
 
-/* Standard deviation of state i. While its level waits for samples, what moves slower than trim_corner is not
- * predicted: a quarter of the rms rate, in the state's unit by `scale`. */
+#define LEVEL_NOISE 22.2f /* noise bandwidth of the level, 2 x integral of |1 - H|^2, in corners */
+
+/* Standard deviation of state i. The level, to which the deviation is added, has the noise of the samples too; while it
+ * waits for samples, what it makes up of the motion is not predicted: the rms rate, in the state's unit by `scale`. */
 static float state_sigma(const estimator_t *estimator, uint32_t i, float scale)
 {
-    const bool waiting = estimator->setup.constants.trim && trim_is_waiting(&estimator->trim, i);
-    const float slow = waiting ? (0.25f * scale) : 0.0f;
+    const lever_settings_t *s = estimator->setup.settings;
+    const bool trimmed = estimator->setup.constants.trim;
+    const float slow = (trimmed && trim_is_waiting(&estimator->trim, i)) ? scale : 0.0f;
+    const float noise = trimmed ? estimator->cdkf.output_noise[i] : 0.0f;
     const float sigma = cdkf_state_sigma(&estimator->cdkf, i);
-    return sqrtf((sigma * sigma) + ((slow * slow) * estimator->averages.excitation_square));
+    return sqrtf((sigma * sigma) + ((noise * noise) * (LEVEL_NOISE * (s->trim_corner * s->sample_period))) +
+                 ((slow * slow) * estimator->averages.excitation_square));
 }
 
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate)

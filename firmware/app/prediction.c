@@ -7,12 +7,14 @@
 #define WRONG 3.0f          /* and for a wrong one, so that it is noticed when it is right again */
 #define Z_DOT_KEPT 0.99998f /* in a step: what rounding adds to the base velocity is forgotten */
 #define STOP_RATE 0.002f    /* friction is at half of its limit [rad/s] */
+#define RATE_MOST 1.0e4f    /* [rad/s] */
 #define SUBSTEPS_MOST 12u   /* predictions through a gap: bounds the time of one call */
 
-/* Torque of one newton metre of Coulomb friction, smooth about standstill. */
+/* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is
+ * not a number would stay in the trim. */
 static float friction(float rate)
 {
-    return rate / (fabsf(rate) + STOP_RATE);
+    return (fabsf(rate) <= RATE_MOST) ? (rate / (fabsf(rate) + STOP_RATE)) : 0.0f;
 }
 
 /* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true
@@ -102,8 +104,9 @@ static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elaps
     const float level = (average > 1.0f) ? average : 1.0f;
     monitor_t *monitor = &estimator->learning.monitor;
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
-        const float y = sample->y[i] - estimator->trim.origin[i];
-        if (sample->valid[i] && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
+        const float y = sample->y[i] - (estimator->trim.origin[i] + estimator->trim.ahead[i]);
+        const bool expected = sample->valid[i] && !trim_is_waiting(&estimator->trim, i);
+        if (expected && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
             sample->valid[i] = false;
             estimator->corrupt++;
             estimator->faults |= (i == 0u) ? (uint32_t)LEVER_FAULT_THETA : (uint32_t)LEVER_FAULT_THETA_DOT;

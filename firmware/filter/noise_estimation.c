@@ -12,6 +12,7 @@
 #define SHARE 0.2f          /* this part, which averages over about five windows */
 #define Q_LEAST 0.6f        /* of a window for Q: there may have been rest in it */
 #define STARVED 1.15f       /* more gain than this is missing: it is Q that is too small, not R */
+#define CHANCE 3.0f         /* by so many standard deviations of the regression: 1 / sqrt(variance) */
 #define CERTAIN 3.0f        /* a factor of R that is put down to R whatever its share */
 
 void noise_estimation_begin(noise_estimation_t *noise)
@@ -91,7 +92,7 @@ bool noise_estimation_step(noise_estimation_t *noise, cdkf_t *cdkf, const noise_
     if ((setting->window > 0.0f) && (noise->elapsed >= setting->window)) {
         float level = 1.0f; /* geometric mean of both outputs' factors: the gain stays when everything scales alike */
         const float gain = (noise->variance > 0.0f) ? (1.0f + (noise->covariance / noise->variance)) : 1.0f;
-        const bool starved = (gain > STARVED);
+        const bool starved = (gain > STARVED) && (noise->covariance > (CHANCE * sqrtf(noise->variance)));
         for (uint32_t i = 0u; i < OUTPUTS; i++) {
             if (noise->samples[i] >= SAMPLES_LEAST) {
                 const float factor = correct_output(noise, cdkf, setting, i, starved);

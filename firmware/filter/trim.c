@@ -4,7 +4,8 @@
 #include <string.h>
 
 #define TURN 6.28318531f
-#define OUTAGE 0.0205f /* an output missing for longer is out [s]; not a whole number of periods */
+#define STEPS_MOST 24.0f /* of that line */
+#define OUTAGE 0.0205f   /* an output missing for longer is out [s]; not a whole number of periods */
 
 high_pass_corner_t high_pass_corner(float frequency, float damping)
 {
@@ -77,26 +78,56 @@ bool trim_is_waiting(const trim_t *trim, uint32_t i)
     return trim->missing[i] > OUTAGE;
 }
 
+/* The deviation of output i, which is back at `value`: its level takes the straight line from the last one. */
+static float pass_line(trim_t *trim, uint32_t i, float value, float period)
+{
+    const float elapsed = trim->missing[i] + period;
+    const float whole = (elapsed < (STEPS_MOST * period)) ? ((elapsed / period) + 0.5f) : STEPS_MOST;
+    const uint32_t steps = (uint32_t)whole;
+    const float part = 1.0f / (float)steps;
+    float deviation = 0.0f;
+    for (uint32_t k = 1u; k <= steps; k++) {
+        const float between = trim->last[i] + ((part * (float)k) * (value - trim->last[i]));
+        deviation = pass(trim, &trim->output[i], between, part * elapsed);
+    }
+    return deviation;
+}
+
+/* Where the level of a missing output has gone: at its rate for the deviation x, which its last section sees. The level
+ * itself stays: its sections would integrate their own sum. */
+static void follow(trim_t *trim, uint32_t i, float x, float period)
+{
+    const bool waiting = trim_is_waiting(trim, i);
+    float deviation = (fabsf(x) <= MODEL_THETA_MOST) ? x : 0.0f;
+    float rate = 0.0f;
+    for (uint32_t left = (uint32_t)TRIM_SECTIONS; left > 0u; left--) {
+        high_pass_t *section = &trim->output[i].section[left - 1u];
+        section->slope = waiting ? 0.0f : section->slope;
+        rate += section->slope + (trim->corner[left - 1u].damping * deviation);
+        deviation += section->level;
+    }
+    if (trim->deviations && !waiting) {
+        trim->ahead[i] += period * rate;
+    }
+    trim->missing[i] += period;
+}
+
 bool trim_outputs(
     trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period)
 {
     bool back = false;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
+        const float value = y[i];
         const bool waiting = trim_is_waiting(trim, i);
-        if (valid[i]) {
-            back = back || waiting;
-            trim->missing[i] = 0.0f;
-            y[i] = pass(trim, &trim->output[i], y[i], period);
+        if (!valid[i]) {
+            follow(trim, i, x[i], period);
         } else {
-            trim->missing[i] += period;
-            if (waiting) {
-                for (uint32_t k = 0u; k < (uint32_t)TRIM_SECTIONS; k++) {
-                    trim->output[i].section[k].slope = 0.0f;
-                }
-            } else {
-                const float predicted = trim->origin[i] + ((fabsf(x[i]) <= MODEL_THETA_MOST) ? x[i] : 0.0f);
-                (void)pass(trim, &trim->output[i], predicted, period);
-            }
+            const bool line = (trim->missing[i] > 0.0f) && !waiting;
+            back = back || waiting;
+            y[i] = line ? pass_line(trim, i, value, period) : pass(trim, &trim->output[i], value, period);
+            trim->last[i] = value;
+            trim->ahead[i] = 0.0f;
+            trim->missing[i] = 0.0f;
         }
     }
     return back;

@@ -52,6 +52,8 @@ typedef struct trim {
     level_t input[TRIM_INPUTS];   /* z_ddot, tau_m, friction of a newton metre */
     float origin[MODEL_STATES];   /* of the state: the levels in preload trim, otherwise 0 */
     float missing[MODEL_STATES];  /* time since the last sample of each output [s] */
+    float last[MODEL_STATES];     /* value of that sample */
+    float ahead[MODEL_STATES];    /* by which the level of a missing output has moved since */
     float unsettled;              /* time until the levels have settled: nothing can be learnt before [s] */
     high_pass_corner_t corner[TRIM_SECTIONS];
     float settling_time; /* [s] */
@@ -71,8 +73,9 @@ float trim_input(trim_t *trim, uint32_t i, float value, float period);
 void trim_set_origin(trim_t *trim);
 
 /* Replaces valid outputs y by deviations from the levels, in preload trim, `period` seconds after the last sample.
- * The level of an output that is not valid follows the prediction x for 20 ms, then waits: to follow itself for long
- * would be to integrate twice. Returns true when an output is back after that. */
+ * While an output is not valid its level waits, and when it is back takes the straight line between both samples: to
+ * follow its own prediction x would be to integrate six times (seen: one sample in three, and the state exploded).
+ * `ahead` follows x, for 20 ms. Returns true when an output is back after that. */
 bool trim_outputs(
     trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period);
 

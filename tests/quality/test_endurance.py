@@ -68,4 +68,5 @@ def test_the_two_scenes_are_what_they_claim(programs: Path) -> None:
     assert drift[600:, 5].max() / drift[600:, 5].min() > 1.8
     assert drift_sigma < 0.09
     assert calm_sigma > 2.0 * drift_sigma
-    assert (calm[:, 2] / calm[:, 1]).max() <= setting("m_p_sigma").default * (1.0 + 1e-5)
+    own = setting("m_p_sigma").default  # what is stated of the sensors comes on top
+    assert (calm[:, 2] / calm[:, 1]).max() <= 1.25 * own
