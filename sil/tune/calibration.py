@@ -210,7 +210,7 @@ class _Fit:
         known = [name for name in noise if self._settings[name] > 0.0]
         self._unknowns = [_Unknown(name, name in known, self._settings[name]) for name in (*names, *known)]
         self._least, self._greatest = np.array([each.ends for each in self._unknowns]).T
-        self._expected = likelihood.runs + _ROUNDS // 2 * (len(self._unknowns) + 1)
+        self._expected = likelihood.runs + _ROUNDS // 2 * (2 * len(self._unknowns) + 1)
 
     def run(self) -> tuple[Calibrated, ...]:
         at = np.array([each.number(each.before) for each in self._unknowns])
@@ -251,12 +251,20 @@ class _Fit:
         return found
 
     def _scores(self, at: Array, now: Array) -> tuple[Array, Array]:
-        """Derivatives of `now` by differences, a column for each unknown, and their sum, at `at` itself: differences
-        are halfway to their other end, where the sum is less by the information."""
-        ahead = np.array([each.step for each in self._unknowns])
-        step = np.where(at + ahead <= self._greatest, ahead, -ahead)
-        scores = np.stack([(self._each(at + own) - now) / own.sum() for own in np.diag(step)], axis=1)
-        return scores, scores.sum(axis=0) + 0.5 * step * np.square(scores).sum(axis=0)
+        """Derivatives of `now`, a column for each unknown, and their sum, by differences to both sides.
+
+        Of the two the smaller counts: a change of the pilot that is detected on one side alone would look like
+        information. A difference is halfway to its other end, where the sum is less by half a step of information.
+        """
+        columns, gradient = [], []
+        for i, each in enumerate(self._unknowns):
+            sides = [h for h in (each.step, -each.step) if self._least[i] <= at[i] + h <= self._greatest[i]]
+            found = [(self._each(at + h * np.eye(len(at))[i]) - now) / h for h in sides]
+            sizes = [float(column @ column) for column in found]
+            best = int(np.argmin(sizes))
+            columns.append(found[best])
+            gradient.append(found[best].sum() + 0.5 * sides[best] * sizes[best])
+        return np.stack(columns, axis=1), np.array(gradient)
 
     def _information(self, scores: Array) -> Array:
         """With that of the ranges, next to nothing, so that it has an inverse."""
