@@ -169,7 +169,7 @@ def _of_independent_plant(task: CalibrationTask) -> recording.Recording:
     samples["time_us"] = np.arange(len(samples)) * round(motions.PERIOD * 1e6)
     for name, columns in sensors.measured(moved, fitted, seeds).items():
         samples[name], samples[f"{name}_valid"] = columns[:, 0], True
-    return recording.Recording(samples, motions.PERIOD, "none", {}, Estimator(Config()).health)
+    return recording.Recording(samples, motions.PERIOD, "none", {}, Estimator(Config()).health())
 
 
 def calibration_text(tasks: Sequence[CalibrationTask], logs: Sequence[tuple[Calibrated, ...]]) -> str:
