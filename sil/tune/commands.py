@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 if TYPE_CHECKING:
     from lever_cdkf.host_tools.settings_file import Assignments
 
+    from .calibration import Calibrated, Calibration
     from .judgement import Fit
     from .likelihood import Likelihood
     from .recording import Recording
@@ -24,11 +26,16 @@ Finds settings of the estimator from a recorded log: measurement noise (theta_no
 (theta_dot_process_noise), the walk of the parameters and how it adapts. They are those under which the log is most
 likely: the firmware's own filter runs through it some hundred times, and the density of its innovations is maximised.
 
-A setting is changed only where the log contradicts it (95 % likelihood interval). The last part of the log is held out:
-the search never sees it, and before and after are compared on it. Noise that the firmware estimates while running
-(noise_window) is off during the search, and on again when it is judged.
+With dither in the log (a motor torque of 0.05 N m rms or more) it first finds the calibration: gain and delay of the
+accelerometer (z_ddot_gain, z_ddot_delay) and Coulomb friction of the lever (lever_friction), each with its standard
+deviation (_sigma). Two minutes with 0.3 N m of dither and 0.1 g of vibration give them within 1 %, 0.3 ms and 0.03 N m.
+Without dither they cannot be known. tau_m_gain never can: measure it.
 
-What is printed: the settings with units, and for both parts, before and after,
+Noise, walks and adaptation are changed only where the log contradicts them (95 % likelihood interval). The last part of
+the log is held out: the search never sees it, and before and after are compared on it. Noise that the firmware
+estimates while running (noise_window) is off during the search, and on again when it is judged.
+
+What is printed: the settings with units (sigma: standard deviation), and for both parts, before and after,
   lnL     log-likelihood per sample of angle [rad] and rate [rad/s], given all before [nat]; more is better
   NIS     normalised innovation squared per output [1]: 1 where the filter is as certain as it may be, more: too certain
   corr.   largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
@@ -79,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from lever_cdkf.host_tools.progress import Progress
 
     from . import judgement
+    from .calibration import calibrate
     from .likelihood import Likelihood
     from .recording import read
     from .search import Search, groups
@@ -88,13 +96,15 @@ def run(args: argparse.Namespace) -> int:
         recording = read(args.log, args.channel, args.start, args.length, progress.show)
         before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
-        search = Search(likelihood, before, progress.show)
+        calibration = calibrate(likelihood, before, args.keep, progress.show)
+        calibrated = {**before, **calibration.assignments}
+        search = Search(likelihood, calibrated, progress.show)
         if not search.can_learn:
             _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
-        found = search.run(groups(before, args.keep))
-        after = {**before, **{entry.name: entry.after for entry in found if entry.after != entry.before}}
+        found = search.run(groups(calibrated, args.keep))
+        after = {**calibrated, **{entry.name: entry.after for entry in found if entry.after != entry.before}}
         fits = judgement.fits(likelihood, before, after)
-    return _conclude(args, likelihood, before, after, found, fits)
+    return _conclude(args, likelihood, before, after, calibration, found, fits)
 
 
 def _settings(args: argparse.Namespace) -> Assignments:
@@ -152,6 +162,7 @@ def _conclude(
     likelihood: Likelihood,
     before: Assignments,
     after: Assignments,
+    calibration: Calibration,
     found: Sequence[Found],
     fits: Sequence[Fit],
 ) -> int:
@@ -162,18 +173,21 @@ def _conclude(
     from . import judgement
 
     tables: Tables = {"settings": [_setting_row(entry) for entry in found], "before and after": _fit_rows(fits)}
-    told = judgement.verdict(fits, sum(entry.after != entry.before for entry in found))
+    if calibration.found:
+        tables = {"calibration": [_calibration_row(entry) for entry in calibration.found], **tables}
+    changed = sum(entry.after != entry.before for entry in found) + len(calibration.assignments)
+    told = judgement.verdict(fits, changed)
     print_tables(tables, args.json)
-    print(f"{_subtitle(args, likelihood)} {told}")
+    print(f"{_subtitle(args, likelihood)} {told} {calibration.words}".rstrip())
     if args.page is not None:
         from .page import build
 
-        write_text(args.page, build(_subtitle(args, likelihood), told, tables, found, fits))
+        write_text(args.page, build(_subtitle(args, likelihood), told, tables, calibration.words, found, fits))
     if judgement.is_worse(fits):
         _note("the new settings do worse on the part held out, so the log changes on the way: no settings are written")
         return 1
     if args.output is not None:
-        write_text(args.output, _file(args, told, before, after))
+        write_text(args.output, _file(args, f"{told} {calibration.words}", before, after))
     written = [str(path) for path in (args.output, args.page) if path is not None]
     if written:
         print(f"Written: {', '.join(written)}")
@@ -206,6 +220,22 @@ def _setting_row(entry: Found) -> Row:
     }
 
 
+def _calibration_row(entry: Calibrated) -> Row:
+    from lever_cdkf.host_tools.config import setting
+
+    return {
+        "name": entry.name,
+        "unit": setting(entry.name).unit,
+        "before": entry.before,
+        "sigma before": entry.sigma_before,
+        "after": entry.after,
+        "sigma after": entry.sigma_after,
+        "most likely": entry.best,
+        "its sigma": entry.sigma,
+        "verdict": entry.verdict,
+    }
+
+
 def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
     """A row for each part of the log and way to have the noise."""
     from . import judgement
@@ -234,5 +264,5 @@ def _file(args: argparse.Namespace, told: str, before: Assignments, after: Assig
 
     was = make_config(before).settings
     notes = {name: f"was {was[name]:g}" for name in after if name in was and after[name] != was[name]}
-    head = f"# lever tune {' '.join(args.log)}\n# {told}\n"
-    return head + format_assignments(after, notes)
+    lines = (line for part in (f"lever tune {' '.join(args.log)}", told) for line in textwrap.wrap(part, 110))
+    return "".join(f"# {line}\n" for line in lines) + format_assignments(after, notes)

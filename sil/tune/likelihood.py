@@ -46,10 +46,13 @@ class Likelihood:
         self.judged_by: Array = time >= split
         """True at those that are held out."""
 
-    def run(self, assignments: Assignments) -> Array:
-        """What the estimator with these settings and choices makes of the samples: innovations.INNOVATION for each."""
+    def run(self, assignments: Assignments, delay: float = 0.0) -> Array:
+        """What the estimator with these settings and choices makes of the samples: innovations.INNOVATION for each.
+
+        A `delay` of the base acceleration [s] is undone before.
+        """
         self.runs += 1
-        return innovations(make_config(assignments), self.recording.samples)
+        return innovations(make_config(assignments), self.recording.without_delay(delay))
 
     def of(self, assignments: Assignments) -> float:
         """Logarithm of the likelihood of the part that is tuned on; -inf where the filter breaks down."""

@@ -24,17 +24,26 @@ _OPEN = 10.0  # an interval without an end is drawn beyond the last value by thi
 
 
 def build(
-    subtitle: str, verdict: str, tables: Mapping[str, Sequence[Row]], found: Sequence[Found], fits: Sequence[Fit]
+    subtitle: str,
+    verdict: str,
+    tables: Mapping[str, Sequence[Row]],
+    calibration: str,
+    found: Sequence[Found],
+    fits: Sequence[Fit],
 ) -> str:
-    """The whole page. `tables` are settings and fits, as they are printed."""
+    """The whole page. `tables` are as they are printed; `calibration` says in words what is known of that."""
     page = Page()
-    settings, numbers = (_table(title, rows) for title, rows in tables.items())
+    calibrated, settings, numbers = (
+        _table(title, tables.get(title, ())) for title in ("calibration", "settings", "before and after")
+    )
     told = page.figure(
         "intervals",
         _intervals(found),
         "Bar: what the log does not contradict (95 % likelihood interval, the other settings as found); one that runs "
         "out of the figure has no end. Hollow: before. Full: after.",
     )
+    words = f"<p>{html.escape(calibration)}</p>" if calibration else ""
+    page.section("calibration", "Calibration", "Accelerometer and friction", words, calibrated)
     page.section("settings", "Settings", "What the log says of the settings", told, settings)
     page.section("fits", "Before and after", "Before and after", numbers, *_innovations(page, fits))
     links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)

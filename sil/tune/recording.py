@@ -41,6 +41,15 @@ class Recording:
         steps = _steps(self.samples) * 1e-6
         return np.concatenate(([0.0], np.cumsum(np.where(steps > 0.0, steps, self.period))))
 
+    def without_delay(self, delay: float) -> Array:
+        """The samples with the base acceleration as it is measured `delay` later [s]."""
+        measured = self.samples["z_ddot_valid"]
+        if delay == 0.0 or not measured.any():
+            return self.samples
+        samples, time = self.samples.copy(), self.time
+        samples["z_ddot"] = np.interp(time + delay, time[measured], samples["z_ddot"][measured])
+        return samples
+
 
 def read(
     paths: Sequence[str | os.PathLike[str]],

@@ -66,6 +66,23 @@ def test_what_tune_finds_is_what_the_table_says(root: Path) -> None:
         assert re.fullmatch(rf"\d+ of {tables.SEEDS}", row[3])
 
 
+def test_the_calibration_is_found_as_the_table_says(root: Path) -> None:
+    """Within 1 %, 0.3 ms and 0.03 N m at worst, ±2σ true of 90 %, and one log is no worse than the worst."""
+    header, _, *rows = written(root, tuning.CALIBRATION_PLACE)
+    assert header == [f"{tables.SEEDS} seeds", *tuning.CALIBRATION_COLUMNS]
+    assert [row[0] for row in rows] == [f"`{name}`" for name in tuning.UNKNOWNS for _ in range(2)]
+    task = tuning.CalibrationTask("`lever sim`", seed=3)
+    found = {f"`{entry.name}`": entry for entry in tuning.calibrated(task)}
+    for (name, of, _, error, _, held), limit in zip(rows, (1.0, 1.0, 0.3, 0.3, 0.03, 0.03), strict=True):
+        median, worst = pair(error)
+        count, total = map(int, held.split(" of "))
+        assert median <= worst <= limit, (name, of)
+        assert (count >= 0.9 * total, total) == (True, tables.SEEDS), (name, of)
+        if of == task.plant:
+            scale, truth = tuning.UNKNOWNS[name.strip("`")].scale, task.truth[name.strip("`")]
+            assert scale * abs(found[name].best - truth) <= 1.05 * worst, name
+
+
 OLD = "| 20 seeds | f_n |\n| --- | --- |\n| `steady` | 0.8 / 1.2 % |\n"
 
 

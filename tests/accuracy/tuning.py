@@ -1,4 +1,4 @@
-"""What `lever tune` finds in simulated logs whose noise and walks are known."""
+"""What `lever tune` finds in simulated logs whose noise, walks and calibration are known."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ from pathlib import Path
 import numpy as np
 from accuracy.tables import Place, markdown
 from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.estimator import Estimator
+from lever_cdkf.host_tools.innovations import SAMPLE
 from lever_cdkf.sil import buslog, runner, scenario
+from lever_cdkf.sil.envelope import motions, plant, sensors
 from lever_cdkf.sil.tune import recording
+from lever_cdkf.sil.tune.calibration import Calibrated, calibrate
 from lever_cdkf.sil.tune.likelihood import Likelihood
 from lever_cdkf.sil.tune.search import Found, Search, groups
 
@@ -60,16 +65,21 @@ def tasks(count: int) -> list[Task]:
 def search(task: Task) -> list[Found]:
     """What is found in the log of `task`. The search starts at the defaults: half to twice the truth."""
     overrides = [f"duration={80 if task.changing else 40} s", "limits={}", f"seed={task.seed}", *_SENSORS]
-    loaded = scenario.load("steady", [*overrides, *(_CHANGING if task.changing else ())])
-    with LeverBus("lever", config=loaded.config) as bus, tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "bus.log"
-        log.write_bytes(b"".join(buslog.lines(runner.simulate(loaded, bus).frames, "vcan0")))
-        samples = recording.read([log])
+    samples = _recorded([*overrides, *(_CHANGING if task.changing else ())])
     if task.changing:
         known: dict[str, float | str] = {"adaptation": "fixed", **_NOISE}
         return Search(Likelihood(samples, held_out=0.0), known).run(groups(known, [*_NOISE, "m_p_walk"]))
     walks = ("m_p_walk", "c_p_walk", "k_p_walk", "walk_ceiling", "robbins_monro_time")
     return Search(Likelihood(samples), {}).run(groups({}, walks))
+
+
+def _recorded(overrides: Sequence[str]) -> recording.Recording:
+    """The log of the scenario "steady" with these."""
+    loaded = scenario.load("steady", overrides)
+    with LeverBus("lever", config=loaded.config) as bus, tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "bus.log"
+        log.write_bytes(b"".join(buslog.lines(runner.simulate(loaded, bus).frames, "vcan0")))
+        return recording.read([log])
 
 
 def text(logs: Sequence[Sequence[Found]]) -> str:
@@ -83,3 +93,104 @@ def text(logs: Sequence[Sequence[Found]]) -> str:
         rows.append((f"`{name}`", f"{scale * truth:g} {unit}", values, f"{held} of {len(found)}"))
         count = len(found)
     return markdown((f"{count} seeds", *COLUMNS), rows)
+
+
+# --- calibration -----------------------------------------------------------------------------------------------------
+
+CALIBRATION_PLACE = Place("sil/README.md", "calibration")
+CALIBRATION_COLUMNS = ("plant", "truth", "error", "stated σ", "±2σ holds the truth")
+_DURATION = 120.0  # [s]
+_PLANTS = ("`lever sim`", "independent")
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A setting of the calibration: truths are drawn between `least` and `greatest`; shown by a factor and a unit."""
+
+    least: float
+    greatest: float
+    scale: float
+    unit: str
+
+
+UNKNOWNS: Mapping[str, Unknown] = {
+    "z_ddot_gain": Unknown(0.97, 1.03, 100.0, "%"),
+    "z_ddot_delay": Unknown(0.0, 3e-3, 1e3, "ms"),
+    "lever_friction": Unknown(0.0, 0.2, 1.0, "N m"),
+}
+
+
+@dataclass(frozen=True)
+class CalibrationTask:
+    """One log of a plant."""
+
+    plant: str
+    seed: int
+
+    def __str__(self) -> str:
+        return f"calibration, {self.plant} plant, seed {self.seed}"
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """By setting."""
+        rng = np.random.default_rng(self.seed)
+        return {name: rng.uniform(row.least, row.greatest) for name, row in UNKNOWNS.items()}
+
+
+def calibration_tasks(count: int) -> list[CalibrationTask]:
+    """Logs of both plants with seeds from 1 on."""
+    return [CalibrationTask(plant, seed) for plant in _PLANTS for seed in range(1, count + 1)]
+
+
+def calibrated(task: CalibrationTask) -> tuple[Calibrated, ...]:
+    """What `lever tune` finds in the log of `task`, starting at the defaults."""
+    samples = _of_lever_sim(task) if task.plant == _PLANTS[0] else _of_independent_plant(task)
+    return calibrate(Likelihood(samples), {}).found
+
+
+def _of_lever_sim(task: CalibrationTask) -> recording.Recording:
+    """Through CAN frames and a log."""
+    truth = task.truth
+    accelerometer = f'gain_error = "{truth["z_ddot_gain"] - 1.0} 1", delay = "{truth["z_ddot_delay"]} s"'
+    overrides = [f"duration={_DURATION} s", "limits={}", f"seed={task.seed}"]
+    overrides += [f'sensors.z_ddot={{ noise = "0.01 m/s^2", {accelerometer} }}']
+    return _recorded([*overrides, f"lever.lever_friction={truth['lever_friction']} N m"])
+
+
+def _of_independent_plant(task: CalibrationTask) -> recording.Recording:
+    """Samples straight from sil/envelope."""
+    truth, seeds = task.truth, [task.seed]
+    motion = motions.Motion(duration=_DURATION, friction=truth["lever_friction"])
+    given = motions.lanes(motion, seeds)
+    theta, theta_dot = plant.run(given)
+    moved = motions.Recording(motion.time, theta, theta_dot, given.tau_m, given.z_ddot, {})
+    fitted = sensors.Sensors(z_ddot_gain=truth["z_ddot_gain"], z_ddot_delay=truth["z_ddot_delay"])
+    samples = np.zeros(len(motion.time), SAMPLE)
+    samples["time_us"] = np.arange(len(samples)) * round(motions.PERIOD * 1e6)
+    for name, columns in sensors.measured(moved, fitted, seeds).items():
+        samples[name], samples[f"{name}_valid"] = columns[:, 0], True
+    return recording.Recording(samples, motions.PERIOD, "none", {}, Estimator(Config()).health())
+
+
+def calibration_text(tasks: Sequence[CalibrationTask], logs: Sequence[tuple[Calibrated, ...]]) -> str:
+    """The table as Markdown, from what was found in the log of each task."""
+    rows = []
+    for name, row in UNKNOWNS.items():
+        for of in _PLANTS:
+            pairs = [
+                (entry, task.truth[name])
+                for task, log in zip(tasks, logs, strict=True)
+                for entry in log
+                if task.plant == of and entry.name == name
+            ]
+            errors = row.scale * np.abs([entry.best - truth for entry, truth in pairs])
+            sigma = row.scale * np.median([entry.sigma for entry, _ in pairs])
+            held = sum(abs(entry.best - truth) <= 2.0 * entry.sigma for entry, truth in pairs)
+            cells = (
+                f"{row.scale * row.least:g} to {row.scale * row.greatest:g} {row.unit}",
+                f"{np.median(errors):.2g} / {np.max(errors):.2g} {row.unit}",
+                f"{sigma:.2g} {row.unit}",
+                f"{held} of {len(pairs)}",
+            )
+            rows.append((f"`{name}`", of, *cells))
+    return markdown((f"{len(tasks) // len(_PLANTS)} seeds", *CALIBRATION_COLUMNS), rows)

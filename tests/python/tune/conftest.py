@@ -13,6 +13,10 @@ Simulate = Callable[..., Path]
 
 NOISE = {"theta_noise": 0.5e-3, "theta_dot_noise": 20e-3, "theta_dot_process_noise": 0.03}
 """Of these runs: half, twice and three fifths of the firmware's defaults."""
+CALIBRATION = {"gain_error": 0.0, "delay": 0.0, "friction": 0.0}
+"""Of the accelerometer [1, s] and the lever [N m]."""
+LOADS = {"base": 0.1, "torque": 0.3, "tremor": 0.0}
+"""rms of base [g], dither [N m] and a torque that nobody measures [N m]."""
 WALK = {"c_p_walk": 0.04, "k_p_walk": 0.06}
 """Of those whose pilot changes [1/sqrt(s)]."""
 PILOT = {"c_p": "48 N s/m", "k_p": "1700 N/m"}
@@ -40,6 +44,14 @@ high = "10 Hz"
 [sensors]
 theta = {{ noise = "{theta_noise} rad" }}
 theta_dot = {{ noise = "{theta_dot_noise} rad/s" }}
+z_ddot = {{ noise = "0.01 m/s^2", gain_error = "{gain_error} 1", delay = "{delay} s" }}
+[lever]
+lever_friction = "{friction} N m"
+[[disturbance]]
+kind = "noise"
+rms = "{tremor} N m"
+low = "3 Hz"
+high = "5 Hz"
 [[torque]]
 kind = "firmware"
 rms = "{torque} N m"
@@ -48,13 +60,17 @@ rms = "{torque} N m"
 
 @pytest.fixture(scope="session")
 def simulate(tmp_path_factory: pytest.TempPathFactory) -> Simulate:
-    """simulate(duration, changing=False, rest=False, **noise): the bus.log of a run of so many seconds."""
+    """simulate(duration, changing=False, rest=False, **others): the bus.log of a run of so many seconds.
 
-    def run(duration: float, *, changing: bool = False, rest: bool = False, **noise: float) -> Path:
+    `others` are of NOISE, CALIBRATION and LOADS.
+    """
+
+    def run(duration: float, *, changing: bool = False, rest: bool = False, **others: float) -> Path:
         folder = tmp_path_factory.mktemp("log")
         pilot = CHANGING if changing else {name: f'"{value}"' for name, value in PILOT.items()}
-        shaken = {"base": 0.0001, "torque": 0.0001} if rest else {"base": 0.1, "torque": 0.3}
-        (folder / "known.toml").write_text(_SCENARIO.format(duration=duration, **{**pilot, **shaken, **NOISE, **noise}))
+        shaken = {"base": 0.0001, "torque": 0.0001} if rest else {}
+        values = {**LOADS, **NOISE, **CALIBRATION, **pilot, **shaken, **others}
+        (folder / "known.toml").write_text(_SCENARIO.format(duration=duration, **values))
         loaded = scenario.load(str(folder / "known.toml"))
         with LeverBus("lever", config=loaded.config) as bus:
             frames = runner.simulate(loaded, bus).frames

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli, codec
 from lever_cdkf.host_tools.settings_file import make_config, read_assignments
+from lever_cdkf.sil.tune import calibration
 from python.tune.conftest import NOISE, Simulate
 
 Run = Callable[..., tuple[int, str, str]]
@@ -58,12 +59,33 @@ def test_what_it_prints_says_before_and_after_with_units(tuned: Path) -> None:
     held = rows["held out", "as set"]
     assert held["gain [nat]"] > 0.5
     assert held["lnL after [nat]"] - held["lnL before [nat]"] == pytest.approx(held["gain [nat]"], abs=2e-4)
-    assert abs(held["NIS after"] - 1.0) < 0.02 < abs(held["NIS before"] - 1.0)
+    assert abs(held["NIS after"] - 1.0) < 0.03 < abs(held["NIS before"] - 1.0)
+
+
+def test_calibration_goes_into_the_settings_file(tuned: Path) -> None:
+    """Its log has dither, and neither gain error nor delay nor friction."""
+    text = (tuned / "my.settings").read_text()
+    found = read_assignments(tuned / "my.settings")
+    rows = {row["name"]: row for row in json.loads((tuned / "tune.json").read_text())["calibration"]}
+    assert set(rows) == set(calibration.NAMES)
+    for name, true in zip(calibration.NAMES, (1.0, 0.0, 0.0), strict=True):
+        sigma = found[f"{name}_sigma"]
+        assert (rows[name]["after"], rows[name]["sigma after"]) == (found[name], sigma)
+        assert abs(float(found[name]) - true) < 3.0 * float(sigma), name
+    assert "[1] accelerometer: measured over true; was 1" in text
+    assert "tau_m_gain cannot be found" in " ".join(line.removeprefix("# ") for line in text.splitlines())
 
 
 def test_the_page_holds_the_same(tuned: Path) -> None:
     page = (tuned / "tune.html").read_text()
-    for text in ("Lever CDKF: settings from a log", "theta_dot_process_noise", "What the log says", "held out"):
+    for text in (
+        "Lever CDKF: settings from a log",
+        "theta_dot_process_noise",
+        "What the log says",
+        "held out",
+        "From the dither (± one standard deviation): z_ddot_gain",
+        "<td>lever_friction</td>",
+    ):
         assert text in page
     for figure in ("intervals", "sizes", "correlation"):
         assert f'id="{figure}"' in page
@@ -94,11 +116,13 @@ def test_replay_takes_the_file(tuned: Path, steady_log: Path, lever: Run, tmp_pa
 def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
     log = tmp_path / "slow.log"
     write_log(log, count=3000, period_us=10_000)
-    status, _, err = lever("tune", log, *QUICK, "-o", tmp_path / "slow.settings", "--held-out", "0")
+    status, out, err = lever("tune", log, *QUICK, "-o", tmp_path / "slow.settings", "--held-out", "0")
     assert (status, err.splitlines()[0]) == (
         0,
         "lever: tune: the log has a sample each 10 ms: sample_period becomes that (was 1 ms)",
     )
+    assert "lever_friction stay as they are: without dither they cannot be known." in out
+    assert not set(calibration.NAMES) & set(read_assignments(tmp_path / "slow.settings"))
     assert read_assignments(tmp_path / "slow.settings")["sample_period"] == 0.01
 
 

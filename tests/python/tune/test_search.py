@@ -61,7 +61,7 @@ def test_part_that_is_not_tuned_on_shows_the_improvement(steady_log: Path) -> No
     assert gained.is_clear
     assert gained.mean > 0.5
     assert not judgement.is_worse(fits)
-    assert after.nis == pytest.approx(1.0, abs=0.03)  # of 8000 samples: 0.011 of them is chance
+    assert after.nis == pytest.approx(1.02, abs=0.03)  # 0.02: the trim filter's; of 8000 samples 0.011 is chance
     assert before.nis > 1.5
     assert "better with noise as set" in judgement.verdict(fits, 3)
 

@@ -1,0 +1,101 @@
+"""Gain, delay and friction that a log is known to have, and what is said where they cannot be known."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from lever_cdkf.sil.tune import recording
+from lever_cdkf.sil.tune.calibration import NAMES, Calibrated, calibrate
+from lever_cdkf.sil.tune.likelihood import Likelihood
+from lever_cdkf.sil.tune.recording import Recording
+from python.tune.conftest import NOISE, Simulate
+
+WITHIN = (0.01, 0.3e-3, 0.03)
+"""What the error of each of NAMES may be."""
+TRUTH = (1.025, 2.2e-3, 0.12)
+
+
+@pytest.fixture(scope="module")
+def wrong(simulate: Simulate) -> Recording:
+    """A minute with the calibration TRUTH."""
+    gain, delay, friction = TRUTH
+    return recording.read([simulate(60.0, gain_error=gain - 1.0, delay=delay, friction=friction)])
+
+
+@pytest.mark.parametrize("start", [{}, {name: 2.0 * value for name, value in NOISE.items()} | {"z_ddot_delay": 5e-3}])
+def test_it_is_found_wherever_the_search_starts(wrong: Recording, start: dict[str, float]) -> None:
+    """Noise that is set wrong, by a factor of two both ways, must not look like a gain."""
+    found = calibrate(Likelihood(wrong, held_out=0.0), start).found
+    assert [entry.name for entry in found] == list(NAMES)
+    for entry, true, within in zip(found, TRUTH, WITHIN, strict=True):
+        assert abs(entry.best - true) < min(within, 3.0 * entry.sigma), entry
+        assert entry.verdict == "found"
+
+
+def test_a_torque_gain_that_is_not_known_makes_the_gain_less_certain(wrong: Recording) -> None:
+    """By 0.06 times its own standard deviation (DESIGN section 3: d ln b / d ln m_p)."""
+    exact, stated = (
+        calibrate(Likelihood(wrong), {**NOISE, "tau_m_gain_sigma": sigma}, ("z_ddot_delay", *NOISE)).found[0].sigma
+        for sigma in (0.0, 0.2)
+    )
+    assert math.sqrt(stated**2 - exact**2) == pytest.approx(0.06 * 0.2, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("loads", "settings", "words"),
+    [
+        ({"torque": 0.0}, {}, "without dither they cannot be known"),
+        ({}, {"model": "linear_physical"}, "with model linear_physical they cannot be known"),
+        ({"base": 0.0001, "torque": 0.06}, {"excitation_least": 0.1}, "the lever hardly moves"),
+    ],
+)
+def test_what_cannot_be_known_stays(
+    loads: dict[str, float], settings: dict[str, float | str], words: str, simulate: Simulate
+) -> None:
+    calibration = calibrate(Likelihood(recording.read([simulate(21.0, **loads)])), settings)
+    assert (calibration.found, calibration.assignments) == ((), {})
+    assert f"lever_friction stay as they are: {words}" in calibration.words
+
+
+def test_torque_that_nobody_knows_is_not_taken_for_it(simulate: Simulate) -> None:
+    calibration = calibrate(Likelihood(recording.read([simulate(30.0, tremor=0.3)]), held_out=0.0), {})
+    assert calibration.assignments == {}
+    assert {entry.verdict for entry in calibration.found} == {"kept: innovations not white"}
+    assert calibration.words.startswith("The calibration stays as it is: the innovations are not white")
+
+
+def test_all_that_is_kept_is_not_looked_for(wrong: Recording) -> None:
+    likelihood = Likelihood(wrong)
+    calibration = calibrate(likelihood, {}, NAMES)
+    assert (calibration.found, calibration.words, likelihood.runs) == ((), "", 0)
+
+
+@pytest.mark.parametrize(
+    ("best", "sigma", "white", "after", "sigma_after"),
+    [
+        (1.03, 0.005, True, 1.03, 0.005),
+        (1.03, 0.03, True, 1.0, 0.02),  # known better before
+        (1.20, 0.03, True, 1.20, 0.03),  # but contradicted
+        (1.03, 0.005, False, 1.0, 0.02),
+    ],
+)
+def test_decision(best: float, sigma: float, white: bool, after: float, sigma_after: float) -> None:
+    entry = Calibrated("z_ddot_gain", before=1.0, sigma_before=0.02, best=best, sigma=sigma, white=white)
+    assert (entry.after, entry.sigma_after) == (after, sigma_after)
+    assert entry.assignments == ({"z_ddot_gain": after, "z_ddot_gain_sigma": sigma_after} if after != 1.0 else {})
+
+
+def test_a_delay_is_undone_across_what_is_missing(wrong: Recording) -> None:
+    """A sine of 5 Hz, a tenth of it not valid."""
+    samples = wrong.samples[:2000].copy()
+    recorded = dataclasses.replace(wrong, samples=samples)
+    omega, delay = 10.0 * math.pi, 2.4e-3
+    samples["z_ddot"] = np.sin(omega * (recorded.time - delay))
+    samples["z_ddot_valid"] = np.arange(len(samples)) % 10 != 3
+    samples["z_ddot"][~samples["z_ddot_valid"]] = np.nan
+    undone = recorded.without_delay(delay)
+    assert (undone["z_ddot_valid"] == samples["z_ddot_valid"]).all()
+    assert np.abs(undone["z_ddot"] - np.sin(omega * recorded.time))[:-5].max() < 1e-3
