@@ -192,7 +192,8 @@ class Estimator:
             z_ddot, z_dot = 0.0, 0.0
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
-        errors = np.array(((-base, (base - last[0]) / dt, 0.0, 0.0), (0.0, 0.0, -last[1], -stop)))
+        slope = (base - last[0]) / dt
+        errors = np.array(((-base, slope, 0.0, 0.0), (0.0, 0.0, -last[1], -stop), (-self.velocity, base, 0.0, 0.0)))
         self._predict((z_ddot, 0.5 * (u[1] + last[1]), z_dot), errors, dt)
         self.last_input = u
 
@@ -230,7 +231,7 @@ class Estimator:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
     def _predict(self, u: tuple[float, ...], errors: Array, dt: float) -> None:
-        """The trim is where it was at the last sample. `errors` (2, 4): of the inputs, per unit of each considered."""
+        """The trim is where it was at the last sample. `errors` (3, 4): of the inputs, per unit of each considered."""
         trim = self.outputs[0].level
         angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
 
@@ -242,8 +243,8 @@ class Estimator:
             return moved_by(x, w, u)
 
         x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
-        with_errors = np.concatenate((np.zeros((2, 1)), errors), axis=1)  # none, then a unit of each
-        moved = moved_by(x, w, (u[0] + with_errors[0], u[1] + with_errors[1], *u[2:]))
+        with_errors = np.concatenate((np.zeros((3, 1)), errors), axis=1)  # none, then a unit of each
+        moved = moved_by(x, w, tuple(np.array(u)[:, np.newaxis] + with_errors))
         push = moved[:, 1:] - moved[:, :1]
         self.belief.predict(motion, self._process_noise(dt), push)
 
