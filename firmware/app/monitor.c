@@ -8,7 +8,7 @@
 #define SURPRISE 1.3f        /* of `surprise`; its standard deviation in flight is 0.07 */
 #define SURPRISE_TIME 0.1f   /* [s] */
 #define SURPRISE_MOST 100.0f /* of a single sample */
-#define SPIKE 6.0f           /* standard deviations */
+#define SPIKE 8.0f           /* standard deviations */
 #define SPIKE_TIME 0.02f     /* longer than this it is no spike [s] */
 #define BASE_MEMORY 0.5f     /* [s] */
 #define BASE_MEMORY_AGAIN 0.3f

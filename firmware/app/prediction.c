@@ -3,7 +3,8 @@
 #include <math.h>
 
 #define OUTAGE 0.0205f      /* a base acceleration missing for longer is out [s] */
-#define UNKNOWN 3.0f        /* process noise for an unknown base acceleration, in those that are set */
+#define MISSING 10.0f       /* process noise for a base acceleration that is missing, in those that are set, */
+#define WRONG 3.0f          /* and for a wrong one, so that it is noticed when it is right again */
 #define Z_DOT_KEPT 0.99998f /* in a step: what rounding adds to the base velocity is forgotten */
 #define STOP_RATE 0.002f    /* friction is at half of its limit [rad/s] */
 #define SUBSTEPS_MOST 12u   /* predictions through a gap: bounds the time of one call */
@@ -56,7 +57,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     if (unknown) {
         step.z_ddot = 0.0f;
         step.z_dot = 0.0f;
-        cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
+        cdkf->disturbance = (learning->monitor.base_wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);
     cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);

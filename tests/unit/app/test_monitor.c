@@ -69,6 +69,21 @@ static void test_a_signal_that_stands_still_against_the_innovations_is_stuck(voi
     }
 }
 
+/* Its sender says so itself: then it is missing, not stuck, however long, and counts anew when it is back. */
+static void test_a_signal_that_is_not_sent_or_not_valid_is_not_stuck(void)
+{
+    (void)block((uint32_t)MONITOR_THETA, 0.5f);
+    surprise(4.0, 300u);
+    for (uint32_t k = 0u; k < 50u; k++) {
+        TEST_ASSERT_FALSE(monitor_has_just_stuck(&monitor));
+    }
+    for (uint32_t k = 0u; k < 4u; k++) {
+        TEST_ASSERT_FALSE(block((uint32_t)MONITOR_THETA, 0.5f));
+    }
+    TEST_ASSERT_TRUE(block((uint32_t)MONITOR_THETA, 0.5f));
+    TEST_ASSERT_FALSE(monitor_has_just_stuck(&monitor) || monitor_has_stuck(&monitor));
+}
+
 /* At rest a sensor of coarse resolution stands still, and is right. */
 static void test_outputs_that_stand_still_as_expected_are_not_stuck(void)
 {
@@ -111,7 +126,7 @@ static void test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second(void)
     surprise(3.0, 100u);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 + (2.0 * (1.0 - exp(-1.0))), (double)monitor.surprise);
     monitor_start(&monitor);
-    surprise(1.0e30, 1u);
+    surprise(1.0e3, 1u);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 1.0f + (0.01f * 99.0f), monitor.surprise);
     monitor_add(&monitor, 2.0f, 10.0f);
     TEST_ASSERT_TRUE(monitor.surprise == 2.0f);
@@ -238,6 +253,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_a_signal_that_stands_still_against_the_innovations_is_stuck);
+    RUN_TEST(test_a_signal_that_is_not_sent_or_not_valid_is_not_stuck);
     RUN_TEST(test_outputs_that_stand_still_as_expected_are_not_stuck);
     RUN_TEST(test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations);
     RUN_TEST(test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second);

@@ -151,7 +151,7 @@ static void test_inputs_between_two_samples_are_the_mean_of_both(void)
     const double pushed = plant_acceleration(plant, plant->theta, 0.0, 2.0, 2.0);
     const double wanted = 1.0e-3 * (pushed - plant_acceleration(plant, plant->theta, 0.0, 0.0, 0.0));
     const double found = (double)rig_estimate(other).theta_dot - (double)rig_estimate(lever).theta_dot;
-    TEST_ASSERT_DOUBLE_WITHIN(0.05 * fabs(wanted), wanted, found);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * fabs(wanted), wanted, found); /* the arm is known to some per cent */
 }
 
 /* --- what is wrong ------------------------------------------------------------------------------------------------ */

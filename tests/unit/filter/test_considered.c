@@ -307,6 +307,27 @@ static void test_what_was_learnt_since_is_taken_back_and_the_state_stays(void)
     }
 }
 
+/* What the errors have made of parameters that were known is nearly what they make of them now; of those of the first
+ * guess they have made nothing yet. */
+static void test_what_an_error_makes_of_parameters_that_are_taken_back(void)
+{
+    for (uint32_t known = 0u; known < 2u; known++) {
+        snapshot_t snapshot;
+        double nis[2];
+        correction_t correction;
+        setUp();
+        random_considered();
+        cdkf->trust = (known == 1u) ? 1.0f : 0.5f;
+        cdkf_keep(cdkf, &snapshot);
+        pair_update(&pair, true, true, true, nis);
+        cdkf_learn(cdkf, 0.01f, 0.1f, &correction);
+        const cdkf_t before = *cdkf;
+        cdkf_return(cdkf, &snapshot);
+        assert_same_effect(&before, (known == 1u) ? 0u : (uint32_t)L, (uint32_t)PAIR_Z);
+        TEST_ASSERT_EQUAL(known == 0u, effect(cdkf, 0u, 0u) == 0.0);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -317,5 +338,6 @@ int main(void)
     RUN_TEST(test_an_opened_covariance_and_a_new_state_forget_the_errors_that_were_theirs);
     RUN_TEST(test_reported_covariance_is_the_filters_own_and_that_of_the_errors);
     RUN_TEST(test_what_was_learnt_since_is_taken_back_and_the_state_stays);
+    RUN_TEST(test_what_an_error_makes_of_parameters_that_are_taken_back);
     return UNITY_END();
 }
