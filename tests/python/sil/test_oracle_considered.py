@@ -71,7 +71,8 @@ def moved(model: str, preload: str, torque: float) -> Array:
         x = arm.step(x, PILOTS[model], middle, TRIM, 1e-3)
         x[1] += kick[k]
         states[k] = x
-    return states + rng.standard_normal((COUNT, 2, 1)) * np.array(((1e-3,), (1e-2,)))
+    noisy: Array = states + rng.standard_normal((COUNT, 2, 1)) * np.array(((1e-3,), (1e-2,)))
+    return noisy
 
 
 def measured(case: Case, wrong: str = "", by: float = 0.0) -> dict[str, Array]:
