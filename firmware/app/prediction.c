@@ -18,11 +18,14 @@ static float friction(float rate)
 }
 
 /* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true
- * = measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
+ * = measured later by the delay, in sample periods. `stop`: friction of a newton metre, high-passed like any torque. The
+ * hand is driven by z_ddot + c_space z_dot, both wrong alike. */
 static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
 {
-    error[CDKF_BASE_GAIN] = -z_ddot;
-    error[CDKF_BASE_DELAY] = z_ddot - estimator->z_ddot; /* in sample periods */
+    const setup_t *setup = &estimator->setup;
+    const float space = (setup->model_in_use == &model_hand) ? estimator->cdkf.p[2] : 0.0f;
+    error[CDKF_BASE_GAIN] = -(z_ddot + (space * estimator->z_dot));
+    error[CDKF_BASE_DELAY] = (z_ddot - estimator->z_ddot) + (space * (setup->settings->sample_period * z_ddot));
     error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
     error[CDKF_FRICTION] = -stop;
 }

@@ -26,8 +26,10 @@ MOST_SUBSTEPS = 12  # predictions through a gap
 SETTLING = 0.9  # [1] time that levels need, in periods of the corner
 MOTION_TIME = 0.1  # [s] of the shorter average of motion
 VELOCITY_KEPT = 0.99998  # of the base's, in a step
-UNKNOWN = 3.0  # process noise for an unknown base acceleration, in those that are set
-SPIKE = 6.0  # standard deviations
+UNKNOWN = 10.0  # process noise for an unknown base acceleration, in those that are set
+SPIKE = 8.0  # standard deviations
+SURPRISE_TIME = 0.1  # [s] of the shorter average of normalised innovations
+SURPRISE_MOST = 100.0  # of a single sample
 SPIKE_TIME = 0.02  # [s] longer than this it is no spike
 STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
 CONSIDERED = ("z_ddot_gain", "z_ddot_delay", "tau_m_gain", "lever_friction")
@@ -98,7 +100,7 @@ class Estimator:
         presumed = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], until measured
         self.excitation_square, self.motion_square = presumed, presumed
         self.nis = 0.0
-        self.average_nis = 1.0  # per output
+        self.average_nis, self.surprise = 1.0, 1.0  # per output, over a long time and a short one
         self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
         self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
         self.base_missing = seconds(0.0)
@@ -141,14 +143,14 @@ class Estimator:
         settled = bool(self.unsettled < 0.5 * self.settings["sample_period"])
         least = self.settings["excitation_least"] ** 2
         excited = self.excitation_square >= least and self.motion_square >= 0.25 * least
-        lesson = Lesson(settled and bool(valid.any()) and bool(self.base_missing <= 0.0), excited)
+        measured = settled and bool(valid.any()) and bool(self.base_missing <= 0.0)
+        lesson = Lesson(measured, excited, self.surprise)
         self.nis = 0.0
         if valid.any():
             noise = np.diag(self.learning.noise.output_noise)
             innovation = self.belief.update(y, valid, noise, learn=lesson.measured and excited)
             self.nis = innovation.normalised_square
-            share = min(duration / self.settings["excitation_time"], 1.0)
-            self.average_nis += share * (self.nis / int(valid.sum()) - self.average_nis)
+            self._average_innovation(self.nis / int(valid.sum()), duration)
             self.learning.add(innovation, valid, lesson)
         self.learning.step(duration, lesson)
         self.unsettled -= counted(duration)
@@ -192,7 +194,8 @@ class Estimator:
             z_ddot, z_dot = 0.0, 0.0
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
-        errors = np.array(((-base, (base - last[0]) / dt, 0.0, 0.0), (0.0, 0.0, -last[1], -stop)))
+        slope = (base - last[0]) / dt
+        errors = np.array(((-base, slope, 0.0, 0.0), (0.0, 0.0, -last[1], -stop), (-self.velocity, base, 0.0, 0.0)))
         self._predict((z_ddot, 0.5 * (u[1] + last[1]), z_dot), errors, dt)
         self.last_input = u
 
@@ -230,7 +233,7 @@ class Estimator:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
     def _predict(self, u: tuple[float, ...], errors: Array, dt: float) -> None:
-        """The trim is where it was at the last sample. `errors` (2, 4): of the inputs, per unit of each considered."""
+        """The trim is where it was at the last sample. `errors` (3, 4): of the inputs, per unit of each considered."""
         trim = self.outputs[0].level
         angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
 
@@ -242,8 +245,8 @@ class Estimator:
             return moved_by(x, w, u)
 
         x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
-        with_errors = np.concatenate((np.zeros((2, 1)), errors), axis=1)  # none, then a unit of each
-        moved = moved_by(x, w, (u[0] + with_errors[0], u[1] + with_errors[1], *u[2:]))
+        with_errors = np.concatenate((np.zeros((3, 1)), errors), axis=1)  # none, then a unit of each
+        moved = moved_by(x, w, tuple(np.array(u)[:, np.newaxis] + with_errors))
         push = moved[:, 1:] - moved[:, :1]
         self.belief.predict(motion, self._process_noise(dt), push)
 
@@ -252,6 +255,11 @@ class Estimator:
         own = self.settings["theta_process_noise"]
         rate = self.learning.noise.process_noise + self.learning.disturbance
         return math.sqrt(dt) * np.array([[own, rate * dt / 2.0, rate * dt / math.sqrt(12.0)], [0.0, rate, 0.0]])
+
+    def _average_innovation(self, square: float, duration: float) -> None:
+        share = min(duration / self.settings["excitation_time"], 1.0)
+        self.average_nis += share * (square - self.average_nis)
+        self.surprise += min(duration / SURPRISE_TIME, 1.0) * (min(square, SURPRISE_MOST) - self.surprise)
 
     def _average_motion(self, duration: float) -> None:
         """The mean square of the rate, over a long time and a short one."""

@@ -24,6 +24,7 @@ KEEP_PERIOD = 1.0  # [s]
 AWAKE = 0.3  # [s] after a rest
 DISTURBANCE = 2.0  # process noise after a change, in noise_range times the one that is set
 DISTURBANCE_TIME = 0.4  # [s] in which it dies away
+SURPRISES = (1.2, 2.0)  # at a change: from which on there is any of it, and at which it is as large as can be
 
 
 def seconds(value: float) -> np.float32:
@@ -42,6 +43,7 @@ class Lesson:
 
     measured: bool  # an output and the base are valid, and levels have settled
     excited: bool  # there was motion enough
+    surprise: float  # average of the latest normalised innovations; expected 1
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ class Learning:
         correction, variance = self._learn(counted)
         suddenly = 0.0  # seconds of the walk at once
         if taught and lesson.excited and self.adapted:
-            suddenly = self._detect_change(correction, variance, period)
+            suddenly = self._detect_change(correction, variance, period, lesson.surprise)
         self.belief.forget(self.growth * period)
         self.belief.walk(self.walk * period + self.floor * suddenly)
         self.belief.limit(self.greatest_sigma)
@@ -139,13 +141,17 @@ class Learning:
             correction = self.belief.w - w
         return correction, np.sum(factor**2 - self.belief.w_factor**2, axis=1)
 
-    def _detect_change(self, correction: Array, variance: Array, period: float) -> float:
-        """A sudden change counts as change_walk seconds of the walk. With his grip the pilot moves the lever: the
-        state's process noise is large for a while."""
+    def _detect_change(self, correction: Array, variance: Array, period: float, surprise: float) -> float:
+        """A sudden change counts as change_walk seconds of the walk. With his grip the pilot moves the lever: when
+        innovations are large, so is the state's process noise for a while."""
         if not self.change.step(correction, variance, period) or self.changed > 0.0:
             return 0.0
         self.changed = seconds(REPORTED)
-        self.disturbance = DISTURBANCE * self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
+        part = float(np.interp(surprise, SURPRISES, (0.0, 1.0)))
+        if part > 0.0:
+            self.disturbance = (
+                part * DISTURBANCE * self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
+            )
         return self.settings["change_walk"]
 
     # --- noise, and what was learnt with a wrong one -----------------------------------------------------------------

@@ -12,6 +12,7 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from lever_cdkf.host_tools.native import settings_table
 from lever_cdkf.sil.oracle import Lever, cdkf
+from lever_cdkf.sil.oracle.linear import Hand
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -206,6 +207,26 @@ def test_dynamics_are_those_of_the_linearised_equation(preload: str, trim: float
     frequency, ratio = lever.dynamics(PILOT[:, None], trim)[:, 0]
     assert frequency == pytest.approx(np.sqrt(stiffness) / (2 * np.pi), rel=1e-6)
     assert ratio == pytest.approx((still - moving) / (2 * np.sqrt(stiffness)), rel=1e-6)
+
+
+@pytest.mark.parametrize(("a", "b", "w"), [(13.70, 5.19, 452.3), (13.31, 4.02, 555.4)])
+@pytest.mark.parametrize("frequency", [2.0, 3.5, 7.0])
+def test_hand_is_what_mayo_has_measured(a: float, b: float, w: float, frequency: float) -> None:
+    """Absolute acceleration of his hands over that of the cabin: H = (b s + w) / (s² + a s + w); θ is that of H - 1."""
+    hand = Hand.from_settings(SETTINGS, "trim")
+    s, trim, dt = 2j * np.pi * frequency, 0.35, 1e-3
+    time = np.arange(5000) * dt
+    z_ddot, z_dot = np.cos(abs(s) * time), np.sin(abs(s) * time) / abs(s)
+    x, theta = np.array([[trim], [0.0]]), np.empty(len(time))
+    for k in range(len(time)):
+        theta[k] = x[0, 0] - trim
+        x = hand.step(
+            x, np.array([[w], [a], [a - b]]), (z_ddot[k : k + 2].mean(), 0.0, z_dot[k : k + 2].mean()), trim, dt
+        )
+    late = time >= 3.0
+    measured = 2.0 * (theta * np.exp(-s * time))[late].mean()
+    expected = ((b * s + w) / (s**2 + a * s + w) - 1.0) / (s**2 * SETTINGS["lever_length"] * np.cos(trim))
+    assert abs(measured - expected) < 0.01 * abs(expected)
 
 
 def test_lever_refuses_an_unknown_preload() -> None:

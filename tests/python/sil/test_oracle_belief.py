@@ -36,9 +36,9 @@ def covariance(of: Belief) -> Array:
     return np.asarray(of.joint_factor @ of.joint_factor.T)
 
 
-def pushed(b: Array, offset: Array) -> Motion:
-    """x_next = A x + B (w + offset)."""
-    return lambda x, w: np.asarray(A @ x + b @ (w + offset))
+def pushed(b: Array, offset: Array, push: Array | float = 0.0) -> Motion:
+    """x_next = A x + B (w + offset) + push."""
+    return lambda x, w: np.asarray(A @ x + b @ (w + offset) + push)
 
 
 class Linear:
@@ -137,7 +137,7 @@ def test_considered_errors_are_what_an_unknown_push_makes(form: str) -> None:
     for index in range(300):
         b, push, y = 0.03 * rng.standard_normal((2, 3)), 0.01 * rng.standard_normal((2, 4)), rng.standard_normal(2)
         valid, moved = rng.random(2) > 0.2, (push @ size)[:, np.newaxis]
-        knows.predict(lambda x, w, b=b, moved=moved: A @ x + b @ w + moved, PROCESS)  # type: ignore[misc]
+        knows.predict(pushed(b, np.zeros((3, 1)), moved), PROCESS)
         considers.predict(pushed(b, np.zeros((3, 1))), PROCESS, push)
         for one in (knows, considers):
             if index == 150:

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.native import Config, run_samples
-from lever_cdkf.sil.oracle.lever import Lever
+from lever_cdkf.sil.oracle.estimator import model_of
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
 COUNT = 12000  # samples, 1 kHz
 AT = np.array((8000, COUNT - 1))
-PILOT = np.array(((2.5,), (42.0,), (1500.0,)))
+PILOTS = {"lever": np.array(((2.5,), (42.0,), (1500.0,))), "hand": np.array(((500.0,), (13.5,), (9.0,)))}
 TRIM = 0.35
 STOP_RATE = 0.002  # of the friction in firmware/app/estimator.c [rad/s]
 FRICTION = 0.005  # [N m]
@@ -38,10 +38,11 @@ class Case:
     preload: str = "trim"
     estimator: str = "dual"
     torque: float = 0.3  # rms [N m]
+    model: str = "lever"
     dead: bool = False  # the accelerometer shows 0 for a second
 
     def __str__(self) -> str:
-        return f"{self.preload}-{self.estimator}-{self.torque:g}" + "-dead" * self.dead
+        return f"{self.model}-{self.preload}-{self.estimator}-{self.torque:g}" + "-dead" * self.dead
 
 
 def band_limited(seed: int, rms: float, delay: float = 0.0) -> Array:
@@ -55,27 +56,29 @@ def band_limited(seed: int, rms: float, delay: float = 0.0) -> Array:
 
 
 @functools.cache
-def moved(preload: str, torque: float) -> Array:
+def moved(model: str, preload: str, torque: float) -> Array:
     """θ and θ̇ of a lever with less friction than known, with as much, with more: (COUNT, 2, 3)."""
     rng = np.random.default_rng(1)
-    lever = Lever.from_settings(Config().settings | ALIKE, preload)
+    arm = model_of(Config().settings | ALIKE, model, preload)
     base, motor = band_limited(2, 1.0), band_limited(3, torque)
+    velocity = 1e-3 * np.cumsum(base)
     kick = 0.05 * np.sqrt(1e-3) * rng.standard_normal(COUNT)
     x = np.repeat(((TRIM,), (0.0,)), 3, axis=1)
     states = np.empty((COUNT, 2, 3))
     for k in range(COUNT):
         stop = np.array((-FRICTION, 0.0, FRICTION)) * x[1] / (np.abs(x[1]) + STOP_RATE)
-        middle = (0.5 * (base[k] + base[k - 1]), 0.5 * (motor[k] + motor[k - 1]) - stop)
-        x = lever.step(x, PILOT, middle, TRIM, 1e-3)
+        middle = (0.5 * (base[k] + base[k - 1]), 0.5 * (motor[k] + motor[k - 1]) - stop, velocity[k - 1])
+        x = arm.step(x, PILOTS[model], middle, TRIM, 1e-3)
         x[1] += kick[k]
         states[k] = x
-    return states + rng.standard_normal((COUNT, 2, 1)) * np.array(((1e-3,), (1e-2,)))
+    noisy: Array = states + rng.standard_normal((COUNT, 2, 1)) * np.array(((1e-3,), (1e-2,)))
+    return noisy
 
 
 def measured(case: Case, wrong: str = "", by: float = 0.0) -> dict[str, Array]:
     """What sensors show of which one, or the lever's friction, is wrong."""
     error = dict.fromkeys(STEPS, 0.0) | ({wrong: by} if wrong else {})
-    y = moved(case.preload, case.torque)[:, :, 1 + int(np.sign(error["lever_friction"]))]
+    y = moved(case.model, case.preload, case.torque)[:, :, 1 + int(np.sign(error["lever_friction"]))]
     base = (1.0 + error["z_ddot_gain"]) * band_limited(2, 1.0, error["z_ddot_delay"])
     if case.dead:
         base[5000:6000] = 0.0
@@ -85,7 +88,7 @@ def measured(case: Case, wrong: str = "", by: float = 0.0) -> dict[str, Array]:
 
 def estimates(case: Case, samples: dict[str, Array], **sigma: float) -> dict[str, Array]:
     settings = ALIKE | CERTAIN | {f"{name}_sigma": value for name, value in sigma.items()}
-    found = run_samples(Config("lever", case.preload, case.estimator, "fixed", settings), samples, AT)
+    found = run_samples(Config(case.model, case.preload, case.estimator, "fixed", settings), samples, AT)
     return {name: np.asarray(values, float) for name, values in found.items()}
 
 
@@ -101,6 +104,7 @@ def logarithmic_covariance(found: dict[str, Array]) -> Array:
 CASES = (
     *(Case(preload, estimator) for preload, estimator in (("trim", "dual"), ("trim", "joint"), ("fixed", "dual"))),
     Case(torque=0.0),
+    Case(model="hand"),
     Case(torque=0.0, dead=True),
 )
 
@@ -128,7 +132,7 @@ def test_stated_is_what_a_small_error_does(case: Case, name: str) -> None:
         for of in ("natural_frequency", "damping_ratio"):
             change = abs(more[of][k] - less[of][k]) / (2.0 * step)
             alone = np.sqrt(considered[f"{of}_sigma"][k] ** 2 - own[f"{of}_sigma"][k] ** 2) / large
-            assert alone == pytest.approx(change, rel=0.15, abs=0.01 * size[k] * own[of][k])
+            assert alone == pytest.approx(change, rel=0.15, abs=0.02 * size[k] * own[of][k])
 
 
 def test_an_error_that_is_known_is_made_up_for() -> None:

@@ -10,6 +10,7 @@ import pytest
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from lever_cdkf.host_tools.native import settings_table
 from lever_cdkf.sil.oracle import Estimator, Lever, Start, cdkf
+from lever_cdkf.sil.oracle.change import ChangeDetection
 from lever_cdkf.sil.oracle.detrend import Detrend
 from numpy.typing import NDArray
 from scipy.signal import butter, freqs
@@ -212,6 +213,28 @@ def test_parameters_stay_in_their_bounds() -> None:
     assert (np.min(seen, axis=0) >= bounds[:, 0] * (1 - 1e-12)).all()
     assert (np.max(seen, axis=0) <= bounds[:, 1] * (1 + 1e-12)).all()
     assert np.max(seen, axis=0)[2] == pytest.approx(1600.0)
+
+
+# --- noise, and sudden changes ---------------------------------------------------------------------------------------
+
+
+def test_noise_that_is_set_too_small_is_found() -> None:
+    samples = recorded(4000)
+    settings = SETTINGS | {"noise_window": 0.5, "theta_noise": SETTINGS["theta_noise"] / 3.0}
+    estimator = Estimator(settings, start_of(samples), "fixed")
+    feed(estimator, samples, 1, 4000)
+    np.testing.assert_allclose(estimator.learning.noise.output_noise, OUTPUT_NOISE.diagonal(), rtol=0.1)
+
+
+def test_white_corrections_are_no_change_and_a_drift_is() -> None:
+    """The statistic is chi-square with three degrees of freedom: 30 has a probability of 1e-6."""
+    rng, variance = np.random.default_rng(3), np.array([1.0, 4.0, 0.25])
+    change = ChangeDetection(memory=0.3, threshold=30.0)
+    white = rng.standard_normal((20000, 3)) * np.sqrt(variance)
+    assert not any(change.step(correction, variance, 0.02) for correction in white)
+    assert change.average == pytest.approx(1.0, abs=0.3)
+    drift = np.sqrt(variance) * [2.0, 0.0, 0.0]
+    assert any(change.step(correction + drift, variance, 0.02) for correction in white[:30])
 
 
 # --- trim ------------------------------------------------------------------------------------------------------------
