@@ -12,7 +12,6 @@
 #define OUTAGE 0.0205f            /* a base acceleration missing for longer is out [s] */
 #define UNKNOWN 3.0f              /* process noise for an unknown base acceleration, in those that are set */
 #define STOP_RATE 0.002f          /* friction is at 71 % of its limit [rad/s] */
-#define Z_DOT_KEPT 0.99998f       /* in a step: what rounding adds to the base velocity is forgotten */
 #define SUBSTEPS_MOST 12u         /* predictions through a gap: bounds the time of one call */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
 #define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
@@ -171,17 +170,17 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
     const float next_tau_m = trim_input(trim, 1u, tau_m - stop, period);
     float error[CDKF_CONSIDERED];
-    const float z_dot = estimator->z_dot;
-    estimator->z_dot = (Z_DOT_KEPT * z_dot) + (period * next_z_ddot);
     trim_set_origin(trim);
     model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
-        .z_dot = z_dot,
         .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
         .origin = trim->origin[0],
         .trim = trim_angle(trim),
         .trim_sine = estimator->trim_angle.sine,
         .trim_cosine = estimator->trim_angle.cosine};
+    if (setup->uses_base_motion) {
+        base_motion_step(&estimator->base_motion, &setup->constants, &step);
+    }
     hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
     if (unknown) {
         step.z_ddot = 0.0f;
