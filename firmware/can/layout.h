@@ -107,16 +107,16 @@ static inline uint64_t layout_read(const lever_frame_t *frame)
 /* --- any message, by a table: smaller than code for each ---------------------------------------------------------- */
 
 typedef struct layout {
-    uint32_t id;
     const place_t *code;
     const quantity_t *quantity;
+    uint32_t id;
     uint8_t codes; /* how many */
     uint8_t quantities;
 } layout_t;
 
 #define COUNT(array) ((uint8_t)(sizeof(array) / sizeof((array)[0])))
-#define LAYOUT(id, code, quantity) {(uint32_t)(id), (code), (quantity), COUNT(code), COUNT(quantity)}
-#define CODES_ONLY(id, code) {(uint32_t)(id), (code), NULL, COUNT(code), 0u}
+#define LAYOUT(id, code, quantity) {(code), (quantity), (uint32_t)(id), COUNT(code), COUNT(quantity)}
+#define CODES_ONLY(id, code) {(code), NULL, (uint32_t)(id), COUNT(code), 0u}
 
 /* Writes identifier, length and all payload bits. Returns false, leaving the frame alone, when a code does not fit. */
 bool layout_encode(lever_frame_t *frame, const layout_t *layout, const uint32_t code[], const float value[]);

@@ -140,7 +140,7 @@ static void respond(const model_constants_t *constants, const model_step_t *step
 static void respond_on_seat(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
     model_response_t *response)
 {
-    model_points_t from_seat = *points;
+    model_points_t from_seat = *points; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
     from_seat.x[0] -= step->seat - ((0.5f * step->period) * step->seat_dot);
     from_seat.x[1] -= step->seat_dot;
     respond(constants, step, &from_seat, response);
