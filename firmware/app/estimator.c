@@ -1,5 +1,6 @@
 #include "app/estimator.h"
 #include "app/alignment.h"
+#include "app/prediction.h"
 
 #include <math.h>
 #include <string.h>
@@ -8,11 +9,7 @@
 #define RESTARTS_TOLERATED 5.0f   /* not yet forgotten */
 #define INNOVATION_TOLERATED 3.0f /* mean of nis / nis_size; expected 1 */
 #define INNOVATION_MOST 1.0e6f    /* a single value is not averaged beyond this, so that the mean recovers */
-#define MOTION_TIME 0.2f          /* [s] */
-#define OUTAGE 0.0205f            /* a base acceleration missing for longer is out [s] */
-#define UNKNOWN 3.0f              /* process noise for an unknown base acceleration, in those that are set */
-#define STOP_RATE 0.002f          /* friction is at 71 % of its limit [rad/s] */
-#define SUBSTEPS_MOST 12u         /* predictions through a gap: bounds the time of one call */
+#define MOTION_TIME 0.1f          /* [s] */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
 #define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
 #define HALF_TURN_OF_TIME 0x80000000u
@@ -44,7 +41,7 @@ static void start_filter(estimator_t *estimator)
     cdkf->output_noise[0] = s->theta_noise;
     cdkf->output_noise[1] = s->theta_dot_noise;
     cdkf->considered_sigma[CDKF_BASE_GAIN] = s->z_ddot_gain_sigma;
-    cdkf->considered_sigma[CDKF_BASE_DELAY] = s->z_ddot_delay_sigma;
+    cdkf->considered_sigma[CDKF_BASE_DELAY] = s->z_ddot_delay_sigma / s->sample_period;
     cdkf->considered_sigma[CDKF_TORQUE_GAIN] = s->tau_m_gain_sigma;
     cdkf->considered_sigma[CDKF_FRICTION] = s->lever_friction_sigma;
     cdkf_start_state(cdkf, origin, cdkf->output_noise);
@@ -93,12 +90,6 @@ static bool is_usable(estimator_t *estimator, float value, bool valid, float mos
     return usable;
 }
 
-/* A plausible value that has not stuck. */
-static bool is_alive(estimator_t *estimator, enum monitor_signal signal, float value, bool usable, float elapsed)
-{
-    return usable && !monitor_is_stuck(&estimator->learning.monitor, signal, value, elapsed);
-}
-
 /* The true base acceleration of a sensor with gain and delay, the delay by extrapolation. */
 static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 {
@@ -113,13 +104,14 @@ static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 static checked_t check(estimator_t *estimator, const lever_sample_t *sample, float own_torque, float elapsed)
 {
     checked_t checked = {.y = {sample->theta, sample->theta_dot}};
+    monitor_t *monitor = &estimator->learning.monitor;
     const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
     const bool torque = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);
-    checked.valid[0] = is_alive(estimator, MONITOR_THETA, sample->theta, theta, elapsed);
-    checked.valid[1] = is_alive(estimator, MONITOR_THETA_DOT, sample->theta_dot, theta_dot, elapsed);
-    checked.base = is_alive(estimator, MONITOR_Z_DDOT, sample->z_ddot, base, elapsed);
+    checked.valid[0] = theta && monitor_is_alive(monitor, MONITOR_THETA, sample->theta);
+    checked.valid[1] = theta_dot && monitor_is_alive(monitor, MONITOR_THETA_DOT, sample->theta_dot);
+    checked.base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked.tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
     checked.z_ddot = checked.base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked.z_ddot;
@@ -131,138 +123,10 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample, flo
     note(estimator, !checked.valid[0], LEVER_FAULT_THETA);
     note(estimator, !checked.valid[1], LEVER_FAULT_THETA_DOT);
     note(estimator, !torque, LEVER_FAULT_TORQUE);
-    note(estimator, !checked.base || estimator->learning.monitor.base_wrong, LEVER_FAULT_BASE);
+    note(estimator, !checked.base || monitor->base_wrong, LEVER_FAULT_BASE);
     note(estimator, estimator->communication_fault, LEVER_FAULT_COMMUNICATION);
     estimator->communication_fault = false;
     return checked;
-}
-
-/* --- time update ------------------------------------------------------------------------------------------------- */
-
-/* Torque of one newton metre of Coulomb friction, smooth about standstill. */
-static float friction(float rate)
-{
-    return rate / sqrtf((rate * rate) + (STOP_RATE * STOP_RATE));
-}
-
-/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
- * measured later by the delay. */
-static void considered_errors(const estimator_t *estimator, float z_ddot, float period, float error[CDKF_CONSIDERED])
-{
-    error[CDKF_BASE_GAIN] = -z_ddot;
-    error[CDKF_BASE_DELAY] = (z_ddot - estimator->z_ddot) / period;
-    error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
-    error[CDKF_FRICTION] = -friction(estimator->cdkf.x[1]);
-}
-
-/* One step of the model, with the mean of the inputs at both ends. A base that cannot be used is unknown: then the
- * state has the process noise for it. */
-static void predict(estimator_t *estimator, float z_ddot, float tau_m, float period)
-{
-    trim_t *trim = &estimator->trim;
-    cdkf_t *cdkf = &estimator->cdkf;
-    learning_t *learning = &estimator->learning;
-    const setup_t *setup = &estimator->setup;
-    const lever_settings_t *s = setup->settings;
-    const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
-    const bool rubs = (s->lever_friction > 0.0f);
-    const float stop = rubs ? (s->lever_friction * friction(trim->origin[1] + cdkf->x[1])) : 0.0f;
-    const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
-    const float next_tau_m = trim_input(trim, 1u, tau_m - stop, period);
-    float error[CDKF_CONSIDERED];
-    trim_set_origin(trim);
-    model_step_t step = {.period = period,
-        .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
-        .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
-        .origin = trim->origin[0],
-        .trim = trim_angle(trim),
-        .trim_sine = estimator->trim_angle.sine,
-        .trim_cosine = estimator->trim_angle.cosine};
-    if (setup->uses_base_motion) {
-        base_motion_step(&estimator->base_motion, &setup->constants, &step);
-    }
-    hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
-    if (unknown) {
-        step.z_ddot = 0.0f;
-        step.z_dot = 0.0f;
-        cdkf->disturbance = UNKNOWN * s->theta_dot_process_noise;
-    }
-    considered_errors(estimator, next_z_ddot, period, error);
-    cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
-    estimator->z_ddot = next_z_ddot;
-    estimator->tau_m = next_tau_m;
-}
-
-/* Subtracts the slow level from the outputs, and renews the trim angle. Returns true at the end of an outage. */
-static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], float period)
-{
-    const bool back = trim_outputs(&estimator->trim, estimator->cdkf.x, y, valid, period);
-    estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
-    return back;
-}
-
-/* The inputs of the last sample, as they came. */
-typedef struct inputs {
-    float z_ddot;
-    float tau_m;
-} inputs_t;
-
-/* Predicts through a gap in `substeps`, inputs in between on a straight line from the last ones, up to the last
- * step. */
-static void cross_gap(
-    estimator_t *estimator, const checked_t *sample, const inputs_t *last, float period, uint32_t substeps)
-{
-    static const bool missing[CDKF_OUTPUTS] = {false, false};
-    const float part = 1.0f / (float)substeps;
-    float unused[CDKF_OUTPUTS] = {0.0f, 0.0f};
-    for (uint32_t i = 1u; i < substeps; i++) {
-        const float share = part * (float)i;
-        predict(estimator, last->z_ddot + (share * (sample->z_ddot - last->z_ddot)),
-            last->tau_m + (share * (sample->tau_m - last->tau_m)), period);
-        (void)subtract_trim(estimator, unused, missing, period);
-    }
-}
-
-/* After an outage of the base its level has to settle again. */
-static void follow_base(estimator_t *estimator, bool valid, float elapsed)
-{
-    if (valid && (estimator->base_missing > OUTAGE)) {
-        trim_unsettle(&estimator->trim);
-    }
-    estimator->base_missing = valid ? 0.0f : (estimator->base_missing + elapsed);
-}
-
-/* An output far from what is expected is not valid. */
-static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elapsed)
-{
-    const float average = estimator->averages.innovation;
-    const float level = (average > 1.0f) ? average : 1.0f;
-    monitor_t *monitor = &estimator->learning.monitor;
-    for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
-        const float y = sample->y[i] - estimator->trim.origin[i];
-        if (sample->valid[i] && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
-            sample->valid[i] = false;
-            estimator->corrupt++;
-            note(estimator, true, (i == 0u) ? LEVER_FAULT_THETA : LEVER_FAULT_THETA_DOT);
-        }
-    }
-}
-
-/* Predicts to the sample, `periods` sample periods after the last one. */
-static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed, uint32_t periods)
-{
-    float period = elapsed;
-    if (periods > 1u) {
-        const uint32_t substeps = (periods < SUBSTEPS_MOST) ? periods : SUBSTEPS_MOST;
-        period = elapsed / (float)substeps;
-        cross_gap(estimator, sample, last, period, substeps);
-    }
-    follow_base(estimator, sample->base, elapsed);
-    predict(estimator, sample->z_ddot, sample->tau_m, period);
-    refuse_spikes(estimator, sample, elapsed);
-    if (subtract_trim(estimator, sample->y, sample->valid, period)) {
-        alignment_end_outage(estimator, sample);
-    }
 }
 
 /* --- measurement update ------------------------------------------------------------------------------------------ */
@@ -286,7 +150,7 @@ static bool restart_if_invalid(estimator_t *estimator, const checked_t *sample, 
 static bool is_excited(const estimator_t *estimator)
 {
     const float least = squared(estimator->setup.settings->excitation_least);
-    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= least);
+    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= (0.25f * least));
 }
 
 static void average(estimator_t *estimator, float elapsed)
@@ -295,7 +159,7 @@ static void average(estimator_t *estimator, float elapsed)
     averages_t *averages = &estimator->averages;
     const float share = (elapsed < time) ? (elapsed / time) : 1.0f;
     averages->excitation_square += share * (squared(estimator->cdkf.x[1]) - averages->excitation_square);
-    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed / MOTION_TIME) : 1.0f) *
+    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed * (1.0f / MOTION_TIME)) : 1.0f) *
                                (squared(estimator->cdkf.x[1]) - averages->motion_square);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);
@@ -331,7 +195,7 @@ static lesson_t update_filter(estimator_t *estimator, const checked_t *sample)
     innovation_t innovation[CDKF_OUTPUTS];
     cdkf_measurement_update(
         &estimator->cdkf, sample->y, sample->valid, lesson.walks && lesson.measured && lesson.excited, innovation);
-    if (lesson.excited) {
+    if (lesson.excited && lesson.measured) {
         noise_estimation_add(&estimator->learning.noise, innovation, sample->valid);
         whiteness_add(&estimator->learning.whiteness, innovation[sample->valid[1] ? 1u : 0u].value);
     }
@@ -392,7 +256,7 @@ static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last
     } else if (estimator->mode == LEVER_MODE_ALIGN) {
         alignment_step(estimator, sample, elapsed);
     } else {
-        advance(estimator, sample, last, elapsed, periods);
+        prediction_advance(estimator, sample, last, elapsed, periods);
         correct(estimator, sample, elapsed);
     }
 }

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define MEMORY 0.15f /* [s] */
+#define MEMORY 0.12f /* [s] */
 #define OFF 0.04f    /* residual over change, in squares; a hand leaves several times 1 */
 #define ON 0.12f
 

@@ -3,6 +3,8 @@
 #define REPORTED 3.0f         /* time for which a change is reported, and not followed by another [s] */
 #define TRANSIENT 2.0f        /* left of it when innovations are noise again, and not of the change [s] */
 #define KEEP_PERIOD 1.0f      /* [s] */
+#define UNSURPRISED 1.2f      /* monitor_t.surprise at a change from which on torque is thought to have changed, too, */
+#define SURPRISED 2.0f        /* and is as large as can be */
 #define REGRIP 0.6f           /* after the lever is held again [s] */
 #define AWAKE 0.3f            /* after a rest [s] */
 #define DISTURBANCE 2.0f      /* process noise after a change, in noise_range times the one that is set */
@@ -39,7 +41,6 @@ void learning_take_back(learning_t *learning, cdkf_t *cdkf)
     learning->kept[0] = learning->kept[1];
     learning->kept_ago = 0.0f;
     noise_estimation_begin(&learning->noise);
-    whiteness_start(&learning->whiteness);
 }
 
 static void keep(learning_t *learning, const cdkf_t *cdkf, float period)
@@ -53,9 +54,9 @@ static void keep(learning_t *learning, const cdkf_t *cdkf, float period)
 }
 
 /* For a while the state is moved by torque that nobody knows. */
-static void disturb(const lever_settings_t *s, cdkf_t *cdkf)
+static void disturb(const lever_settings_t *s, cdkf_t *cdkf, float part)
 {
-    cdkf->disturbance = DISTURBANCE * (s->noise_range * s->theta_dot_process_noise);
+    cdkf->disturbance = (part * DISTURBANCE) * (s->noise_range * s->theta_dot_process_noise);
 }
 
 /* A sudden change of the pilot counts as change_walk seconds of the walk, once: a disturbance that only looks like
@@ -68,8 +69,11 @@ static float detect_change(
         change_detection_step(&learning->change, correction, period, s->change_memory, s->change_threshold);
     const bool changed = detected && (learning->changed <= 0.0f);
     if (changed) {
+        const float surprise = (learning->monitor.surprise - UNSURPRISED) / (SURPRISED - UNSURPRISED);
         learning->changed = REPORTED;
-        disturb(s, cdkf);
+        if (surprise > 0.0f) {
+            disturb(s, cdkf, (surprise < 1.0f) ? surprise : 1.0f);
+        }
     }
     return changed ? s->change_walk : 0.0f;
 }
@@ -107,16 +111,15 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     } else {
         monitor_trust_base(&learning->monitor);
     }
-    const bool stuck = monitor_has_stuck(&learning->monitor);
-    const bool fails = base_wrong || (stuck && !learning->monitor.had_stuck);
-    learning->monitor.had_stuck = stuck;
+    const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong;
     if (fails || (held && learning->hands.off)) {
+        whiteness_start(&learning->whiteness);
         learning_take_back(learning, cdkf);
     } else if (!held && !learning->hands.off) { /* another grip */
         cdkf_open(cdkf);
         cdkf_keep(cdkf, &learning->kept[1]);
         learning_take_back(learning, cdkf);
-        disturb(setup->settings, cdkf);
+        disturb(setup->settings, cdkf, 1.0f);
         learning->wait = REGRIP;
     } else {
         /* as before */
@@ -147,13 +150,15 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     }
     learning->changed = (learning->changed > period) ? (learning->changed - period) : 0.0f;
     if (learning->hands.off) {
-        disturb(s, cdkf);
+        disturb(s, cdkf, 1.0f);
     }
     cdkf->disturbance -= cdkf->disturbance * ((period < DISTURBANCE_TIME) ? (period / DISTURBANCE_TIME) : 1.0f);
     judge(learning, setup, cdkf, lesson, period);
     const bool taught = learning_is_taught(learning, lesson);
     if (taught && lesson->excited) {
         estimate_noise(learning, setup, cdkf, period);
+    } else {
+        noise_estimation_begin(&learning->noise);
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
     learning->bounded = correction.bounded;

@@ -93,6 +93,7 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
         torque_gate_keep_alive(&lever->gate);
         if (resets) {
             dither_reset(&lever->dither);
+            lever->link.frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;
         }
         if (command->dither_rms < (float)LEVER_KEEP) {
             dither_set(&lever->dither, command->dither_rms, resets || !lever->gate.open); /* a reset closes it */

@@ -3,12 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-#define STUCK_TIME 0.1f      /* [s] */
-#define ALIVE 200u           /* changes without a pause of STUCK_TIME */
+#define STILL 4u             /* blocks without a change before it is stuck */
+#define ALIVE 20u            /* blocks with a change before it is taken for granted */
 #define SURPRISE 1.3f        /* of `surprise`; its standard deviation in flight is 0.07 */
 #define SURPRISE_TIME 0.1f   /* [s] */
 #define SURPRISE_MOST 100.0f /* of a single sample */
-#define SPIKE 6.0f           /* standard deviations */
+#define SPIKE 8.0f           /* standard deviations */
 #define SPIKE_TIME 0.02f     /* longer than this it is no spike [s] */
 #define BASE_MEMORY 0.5f     /* [s] */
 #define BASE_MEMORY_AGAIN 0.3f
@@ -23,25 +23,28 @@ void monitor_start(monitor_t *monitor)
     monitor->surprise = 1.0f;
 }
 
-bool monitor_is_stuck(monitor_t *monitor, enum monitor_signal signal, float value, float elapsed)
+/* At the end of a block. */
+static void watch(stillness_t *of, bool noisy, bool surprised)
 {
-    stillness_t *of = &monitor->stillness[signal];
-    if ((value < of->last) || (value > of->last)) {
-        of->unchanged = 0.0f;
+    const bool changed = (of->now < of->before) || (of->now > of->before);
+    of->before = of->now;
+    const bool seen = of->seen;
+    of->seen = false;
+    if (!seen) { /* not sent, or not valid: nothing to say */
+        of->same = 0u;
+        of->stuck = false;
+    } else if (changed) {
+        of->same = 0u;
         of->stuck = false;
         if (of->changes < ALIVE) {
             of->changes++;
         }
+    } else if (of->same < STILL) {
+        of->same++;
     } else {
-        of->unchanged += elapsed;
-        if (of->unchanged > STUCK_TIME) {
-            const bool noisy = (signal == MONITOR_Z_DDOT) && (of->changes == ALIVE);
-            of->stuck = of->stuck || noisy || (monitor->surprise > SURPRISE);
-            of->changes = 0u;
-        }
+        of->stuck = of->stuck || surprised || (noisy && (of->changes == ALIVE));
+        of->changes = 0u;
     }
-    of->last = value;
-    return of->stuck;
 }
 
 bool monitor_has_stuck(const monitor_t *monitor)
@@ -62,8 +65,18 @@ bool monitor_is_spike(monitor_t *monitor, const cdkf_t *cdkf, uint32_t i, float 
 
 void monitor_add(monitor_t *monitor, float ratio, float elapsed)
 {
-    const float share = (elapsed < SURPRISE_TIME) ? (elapsed / SURPRISE_TIME) : 1.0f;
+    const float share = (elapsed < SURPRISE_TIME) ? (elapsed * (1.0f / SURPRISE_TIME)) : 1.0f;
     monitor->surprise += share * (((ratio < SURPRISE_MOST) ? ratio : SURPRISE_MOST) - monitor->surprise);
+}
+
+bool monitor_has_just_stuck(monitor_t *monitor)
+{
+    const bool before = monitor_has_stuck(monitor);
+    const bool surprised = (monitor->surprise > SURPRISE);
+    for (uint32_t i = 0u; i < (uint32_t)MONITOR_SIGNALS; i++) {
+        watch(&monitor->stillness[i], i == (uint32_t)MONITOR_Z_DDOT, surprised);
+    }
+    return monitor_has_stuck(monitor) && !before;
 }
 
 bool monitor_step(monitor_t *monitor, const score_t *sudden, float period)

@@ -12,13 +12,16 @@
 #include "filter/cdkf.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 
 enum monitor_signal { MONITOR_THETA, MONITOR_THETA_DOT, MONITOR_Z_DDOT, MONITOR_SIGNALS };
 
 typedef struct stillness {
-    float last;      /* value */
-    float unchanged; /* time for which it has been that [s] */
-    uint8_t changes; /* since it was unchanged for long, up to what makes it alive */
+    float now;       /* value of the last sample, */
+    float before;    /* and of the last one of the block before */
+    uint8_t same;    /* blocks for which it has been that */
+    uint8_t changes; /* blocks since then in which it has changed, up to ALIVE */
+    bool seen;       /* in this block */
     bool stuck;
 } stillness_t;
 
@@ -28,13 +31,21 @@ typedef struct monitor {
     float surprise;              /* mean of nis / nis_size over 50 ms; expected 1 */
     score_t base;                /* of CDKF_BASE_GAIN, with exponential forgetting */
     bool base_wrong;             /* the base acceleration is not used */
-    bool had_stuck;              /* a signal was, at the end of the last block */
 } monitor_t;
 
 void monitor_start(monitor_t *monitor);
 
-/* A value after `elapsed` seconds; true when it is stuck. */
-bool monitor_is_stuck(monitor_t *monitor, enum monitor_signal signal, float value, float elapsed);
+/* A value that its sender calls valid; true when it is not stuck. */
+static inline bool monitor_is_alive(monitor_t *monitor, enum monitor_signal signal, float value)
+{
+    stillness_t *of = &monitor->stillness[signal];
+    of->now = value;
+    of->seen = true;
+    return !of->stuck;
+}
+
+/* At the end of a block: true when a signal has just been found stuck. */
+bool monitor_has_just_stuck(monitor_t *monitor);
 
 /* Output i of the coming measurement update, `elapsed` seconds after the last; true when it is a spike. Innovations are
  * now `level` times as large as expected, in squares. */

@@ -35,7 +35,6 @@ void setup_choose(setup_t *setup)
     constants->seat_stiffness = seat * seat;
     constants->seat_damping = 2.0f * (s->seat_damping_ratio * seat);
     setup->model_in_use = seated ? &model_lever_on_seat : setup_model(setup->model);
-    setup->uses_base_motion = seated || (setup->model == (uint8_t)LEVER_MODEL_HAND);
 }
 
 /* The rows of lever_settings.def that a model uses. */

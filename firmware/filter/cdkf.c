@@ -1,5 +1,6 @@
 #include "filter/cdkf.h"
 
+#include "filter/considered.h"
 #include "math/factor.h"
 
 #include <string.h>
@@ -7,7 +8,6 @@
 #define N ((uint32_t)MODEL_STATES)
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define ROWS ((uint32_t)CDKF_ROWS)
-#define CONSIDERED ((uint32_t)CDKF_CONSIDERED)
 
 /* --- start ------------------------------------------------------------------------------------------------------ */
 
@@ -17,9 +17,7 @@ void cdkf_start_state(cdkf_t *cdkf, const float x[MODEL_STATES], const float sig
         cdkf->s[k] = 0.0f;
     }
     cdkf_drop_pending(cdkf);
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        (void)memset(cdkf->considered[c].x, 0, sizeof cdkf->considered[c].x);
-    }
+    considered_start_state(cdkf->considered);
     for (uint32_t i = 0u; i < N; i++) {
         cdkf->x[i] = x[i];
         cdkf->response[i] = 0.0f;
@@ -49,15 +47,6 @@ static void predict_mean_and_parameter_columns(cdkf_t *cdkf, const model_respons
     cdkf->x[1] += mean;
 }
 
-/* A deviation of the state, moved by the slope of the step. Sigma points of S_xx would give the same to 5e-5
- * standard deviations: the model is nearly linear over the state's own uncertainty. */
-static inline void move(const model_response_t *response, float period, float *theta, float *theta_dot)
-{
-    const float change = (response->slope[0] * *theta) + (response->slope[1] * *theta_dot);
-    *theta += period * (*theta_dot + (0.5f * change));
-    *theta_dot += change;
-}
-
 /* S_xx: its own columns; the walk q of theta_dot, integrated by theta, q^2 [T^3/3, T^2/2; T^2/2, T] (van Loan 1978);
  * second differences along the parameters, in the same direction [T/2; 1]; and a walk of theta itself. */
 static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period)
@@ -73,23 +62,9 @@ static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response
     const float angle = sqrtf((variance * (period * period * 0.0833333333f)) + own);
     float theta[4] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, angle};
     float theta_dot[4] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f};
-    move(response, period, &theta[0], &theta_dot[0]);
-    move(response, period, &theta[1], &theta_dot[1]);
+    response_move(response, period, &theta[0], &theta_dot[0]);
+    response_move(response, period, &theta[1], &theta_dot[1]);
     factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
-}
-
-/* The considered errors act through the inputs. */
-static void predict_considered(
-    cdkf_t *cdkf, const model_response_t *response, float period, const float error[CDKF_CONSIDERED])
-{
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        const float input = (c <= (uint32_t)CDKF_BASE_DELAY) ? response->base : response->torque;
-        const float change = input * error[c];
-        float *x = cdkf->considered[c].x;
-        move(response, period, &x[0], &x[1]);
-        x[0] += 0.5f * (period * change);
-        x[1] += change;
-    }
 }
 
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
@@ -107,17 +82,11 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
     model->respond(constants, step, &points, &response);
     predict_mean_and_parameter_columns(cdkf, &response, step->period);
     predict_state_columns(cdkf, &response, step->period);
-    predict_considered(cdkf, &response, step->period, error);
-    move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
+    considered_predict(cdkf->considered, &response, step->period, error);
+    response_move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
 }
 
 /* --- measurement update ------------------------------------------------------------------------------------------ */
-
-/* Gain of one output on the state for given w, and the innovation's standard deviation. */
-typedef struct gain {
-    float k[MODEL_STATES];
-    float inverse; /* 1 / S_y */
-} gain_t;
 
 /* Conditions S_xx on output i of standard deviation `noise`, by Carlson's triangular form (1973) for
  * lower-triangular factors: column by column from the output's own to the first. There is no downdate; the diagonal
@@ -146,47 +115,34 @@ static inline gain_t condition_on(float *s, uint32_t i, float noise)
     return gain;
 }
 
-/* Takes from a deviation of the state what the correction by output i takes, I - K H; returns what the output saw of
- * it, divided by S_y. */
-static inline float correct(const gain_t *gain, float seen, float *theta, float *theta_dot)
-{
-    *theta -= gain->k[0] * seen;
-    *theta_dot -= gain->k[1] * seen;
-    return gain->inverse * seen;
-}
-
 /* Takes output i, or nothing when it is not valid: row = H S_xw / S_y is what the output sees of each column of S_ww.
- * `step` adds up the correction of the state. */
-static inline void take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, float row[MODEL_PARAMETERS],
-    float considered[CDKF_CONSIDERED], innovation_t *innovation, float step[MODEL_STATES])
+ * `step` adds up the correction of the state. Returns the gain. */
+static inline gain_t take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, float row[MODEL_PARAMETERS],
+    innovation_t *innovation, float step[MODEL_STATES])
 {
+    gain_t gain = {{0.0f, 0.0f}, 0.0f};
     if (valid) {
-        /* cppcheck-suppress misra-c2012-9.3 ; D3 */
-        const gain_t gain = condition_on(cdkf->s_xx, i, cdkf->output_noise[i]);
+        gain = condition_on(cdkf->s_xx, i, cdkf->output_noise[i]);
         float *theta = &cdkf->s[L * L];
         float *theta_dot = &cdkf->s[(L + 1u) * L];
         const float *seen = (i == 0u) ? theta : theta_dot;
         for (uint32_t j = 0u; j < L; j++) {
-            row[j] = correct(&gain, seen[j], &theta[j], &theta_dot[j]);
-        }
-        for (uint32_t c = 0u; c < CONSIDERED; c++) {
-            float *x = cdkf->considered[c].x;
-            considered[c] = correct(&gain, x[i], &x[0], &x[1]);
+            row[j] = gain_correct(&gain, seen[j], &theta[j], &theta_dot[j]);
         }
         const float nu = y - cdkf->x[i];
         const float share = cdkf->output_noise[i] * gain.inverse;
         innovation->value = gain.inverse * nu;
         innovation->noise_variance = share * share;
-        innovation->response = correct(&gain, cdkf->response[i], &cdkf->response[0], &cdkf->response[1]);
+        innovation->response = gain_correct(&gain, cdkf->response[i], &cdkf->response[0], &cdkf->response[1]);
         for (uint32_t k = 0u; k < N; k++) {
             cdkf->x[k] += gain.k[k] * nu;
             step[k] += gain.k[k] * nu;
         }
     } else {
         (void)memset(row, 0, L * sizeof row[0]);
-        (void)memset(considered, 0, CONSIDERED * sizeof considered[0]);
         (void)memset(innovation, 0, sizeof *innovation);
     }
+    return gain;
 }
 
 static inline void add_information(information_t *pending, const float row[MODEL_PARAMETERS], float nu)
@@ -199,34 +155,21 @@ static inline void add_information(information_t *pending, const float row[MODEL
     }
 }
 
-/* The same of a considered error, both outputs at once. */
-static inline void add_considered(considered_t *considered, float row[2][MODEL_PARAMETERS],
-    const innovation_t innovation[CDKF_OUTPUTS], float first, float second)
-{
-    for (uint32_t i = 0u; i < L; i++) {
-        considered->cross[i] += (row[0][i] * first) + (row[1][i] * second);
-    }
-    considered->vector += (innovation[0].value * first) + (innovation[1].value * second);
-    considered->information += (first * first) + (second * second);
-}
-
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS])
 {
     float row[2][L];
-    float seen[2][CONSIDERED];
     float step[N] = {0.0f, 0.0f};
-    take_output(cdkf, 0u, y[0], valid[0], row[0], seen[0], &innovation[0], step);
-    take_output(cdkf, 1u, y[1], valid[1], row[1], seen[1], &innovation[1], step);
+    gain_t gain[2];
+    gain[0] = take_output(cdkf, 0u, y[0], valid[0], row[0], &innovation[0], step);
+    gain[1] = take_output(cdkf, 1u, y[1], valid[1], row[1], &innovation[1], step);
     cdkf->response[0] += step[0]; /* from now on it includes the response to this correction */
     cdkf->response[1] += step[1];
     if (learn) {
         add_information(&cdkf->pending, row[0], innovation[0].value);
         add_information(&cdkf->pending, row[1], innovation[1].value);
-        for (uint32_t c = 0u; c < CONSIDERED; c++) {
-            add_considered(&cdkf->considered[c], row, innovation, seen[0][c], seen[1][c]);
-        }
     }
+    considered_correct(cdkf->considered, gain, row, innovation, learn);
     /* w makes both uncertain together: I + R R^T = L D L^T, and the second innovation is then given the first */
     const float covariance = factor_dot_three(row[0], row[1]);
     innovation[0].inverse_variance = 1.0f / (1.0f + factor_dot_three(row[0], row[0]));

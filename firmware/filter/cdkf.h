@@ -81,7 +81,7 @@ typedef struct cdkf {
     float response[MODEL_STATES];            /* of the state to past corrections (noise_estimation.h) */
     information_t pending;                   /* not learnt yet */
     considered_t considered[CDKF_CONSIDERED];
-    float considered_sigma[CDKF_CONSIDERED];   /* [1], [s], [1], [N m] */
+    float considered_sigma[CDKF_CONSIDERED];   /* [1], [sample periods], [1], [N m] */
     float trust;                               /* the part of the information that counts: see cdkf_learn */
     float p[MODEL_PARAMETERS];                 /* the parameters at w, in the units of the model */
     model_coefficients_t points[MODEL_POINTS]; /* at the sigma points of S_ww */
@@ -155,7 +155,7 @@ typedef struct snapshot {
 void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot);
 
 /* Takes back what was learnt since, and drops pending information. What w explained of the state's uncertainty stays
- * with the state. */
+ * with the state. What the considered errors make of w is taken to be what it is now: they change slowly. */
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot);
 
 /* Forgetting for `period` seconds: P_w / lambda, 1 / lambda = 1 + growth period. The covariance of x and w stays. */

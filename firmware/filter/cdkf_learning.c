@@ -1,5 +1,6 @@
 /* Learning of the parameters, once a block: see cdkf.h. */
 #include "filter/cdkf.h"
+#include "filter/considered.h"
 #include "math/factor.h"
 
 #include <string.h>
@@ -7,7 +8,6 @@
 #define N ((uint32_t)MODEL_STATES)
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define ROWS ((uint32_t)CDKF_ROWS)
-#define CONSIDERED ((uint32_t)CDKF_CONSIDERED)
 #define FINITE_MOST 1.0e17f /* squares stay inside the range of float */
 
 void cdkf_init(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const prior_t *prior)
@@ -21,53 +21,7 @@ void cdkf_init(cdkf_t *cdkf, const model_t *model, const model_constants_t *cons
 void cdkf_drop_pending(cdkf_t *cdkf)
 {
     (void)memset(&cdkf->pending, 0, sizeof cdkf->pending);
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        considered_t *considered = &cdkf->considered[c];
-        (void)memset(considered->cross, 0, sizeof considered->cross);
-        considered->vector = 0.0f;
-        considered->information = 0.0f;
-    }
-}
-
-/* The score of a considered error as the parameters that have learnt with it show it: the outputs see x + S_xw w. */
-static score_t score_of(const information_t *pending, const considered_t *considered)
-{
-    const float *w = considered->w;
-    const float *m = pending->matrix; /* its upper triangle */
-    const float square = (w[0] * w[0] * m[0]) + (w[1] * w[1] * m[4]) + (w[2] * w[2] * m[8]);
-    const float mixed = (w[0] * w[1] * m[1]) + (w[0] * w[2] * m[2]) + (w[1] * w[2] * m[5]);
-    const score_t score = {considered->vector + factor_dot_three(w, pending->vector),
-        considered->information + (2.0f * (factor_dot_three(w, considered->cross) + mixed)) + square};
-    return score;
-}
-
-/* What the considered errors make of w, before and after the columns of S have changed: S_ww w and S_xw w + x stay. */
-static void lift_considered(cdkf_t *cdkf, float of_w[CDKF_CONSIDERED][MODEL_PARAMETERS])
-{
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        considered_t *considered = &cdkf->considered[c];
-        for (uint32_t i = 0u; i < L; i++) {
-            of_w[c][i] = factor_dot_three(&cdkf->s[i * L], considered->w);
-        }
-        for (uint32_t i = 0u; i < N; i++) {
-            considered->x[i] += factor_dot_three(&cdkf->s[(L + i) * L], considered->w);
-        }
-    }
-}
-
-static void lower_considered(cdkf_t *cdkf, float of_w[CDKF_CONSIDERED][MODEL_PARAMETERS])
-{
-    const float *s = cdkf->s;
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        considered_t *considered = &cdkf->considered[c];
-        float *w = considered->w; /* forward substitution */
-        w[0] = of_w[c][0] / s[0];
-        w[1] = (of_w[c][1] - (s[L] * w[0])) / s[L + 1u];
-        w[2] = (of_w[c][2] - (s[2u * L] * w[0]) - (s[(2u * L) + 1u] * w[1])) / s[(2u * L) + 2u];
-        for (uint32_t i = 0u; i < N; i++) {
-            considered->x[i] -= factor_dot_three(&s[(L + i) * L], w);
-        }
-    }
+    considered_drop_pending(cdkf->considered);
 }
 
 score_t cdkf_sudden_score(const cdkf_t *cdkf)
@@ -79,19 +33,8 @@ score_t cdkf_sudden_score(const cdkf_t *cdkf)
 
 void cdkf_constant_scores(const cdkf_t *cdkf, score_t score[CDKF_CONSIDERED])
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        score[c] = score_of(&cdkf->pending, &cdkf->considered[c]);
-    }
-}
-
-static void learn_considered(cdkf_t *cdkf, const float *u)
-{
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        considered_t *considered = &cdkf->considered[c];
-        for (uint32_t i = 0u; i < L; i++) {
-            considered->w[i] -= cdkf->trust * considered->cross[i];
-        }
-        factor_reverse_solve(u, L, considered->w, L);
+    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+        score[c] = considered_score(&cdkf->considered[c], &cdkf->pending);
     }
 }
 
@@ -119,7 +62,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
         float *mean = (r < L) ? &cdkf->w[r] : &cdkf->x[r - L];
         *mean += factor_dot_three(row, step);
     }
-    learn_considered(cdkf, u);
+    considered_learn(cdkf->considered, cdkf->trust, u);
     cdkf_drop_pending(cdkf);
     correction->bounded = scaling_bound(&cdkf->scaling, cdkf->w);
     for (uint32_t i = 0u; i < L; i++) {
@@ -136,13 +79,8 @@ static void add_to_state(cdkf_t *cdkf, const float deviations[MODEL_STATES * MOD
     factor_tria_two(theta, theta_dot, N + L, cdkf->s_xx);
 }
 
-void cdkf_open(cdkf_t *cdkf)
+static void open_parameters(cdkf_t *cdkf)
 {
-    float of_w[CONSIDERED][L];
-    lift_considered(cdkf, of_w);
-    for (uint32_t c = 0u; c < CONSIDERED; c++) { /* what the prior says of w is not of these errors */
-        (void)memset(cdkf->considered[c].w, 0, sizeof cdkf->considered[c].w);
-    }
     add_to_state(cdkf, &cdkf->s[L * L]);
     (void)memset(cdkf->s, 0, sizeof cdkf->s);
     for (uint32_t i = 0u; i < L; i++) {
@@ -150,6 +88,14 @@ void cdkf_open(cdkf_t *cdkf)
     }
     cdkf_drop_pending(cdkf);
     cdkf->trust = 0.0f;
+}
+
+void cdkf_open(cdkf_t *cdkf)
+{
+    considered_of_w_t unused; /* what the prior says of w is not of these errors */
+    considered_lift(cdkf, unused);
+    open_parameters(cdkf);
+    considered_start_w(cdkf->considered);
 }
 
 void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
@@ -161,18 +107,25 @@ void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
 
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
 {
-    cdkf_open(cdkf);
+    considered_of_w_t of_w;
+    considered_lift(cdkf, of_w);
+    open_parameters(cdkf);
     (void)memcpy(cdkf->w, snapshot->w, sizeof snapshot->w);
     (void)memcpy(cdkf->s, snapshot->s_ww, sizeof snapshot->s_ww);
     cdkf->trust = snapshot->trust;
+    if (snapshot->trust >= 1.0f) { /* what the considered errors made of w then was nearly the same */
+        considered_lower(cdkf, of_w);
+    } else {
+        considered_start_w(cdkf->considered);
+    }
 }
 
 void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 {
     const float growth = cdkf->growth * period;
     if (growth != 0.0f) { /* a NaN is to show */
-        float of_w[CONSIDERED][L];
-        lift_considered(cdkf, of_w);
+        considered_of_w_t of_w;
+        considered_lift(cdkf, of_w);
         const float stretch = sqrtf(1.0f + growth);
         const float shrink = 1.0f / stretch;
         const float rest = sqrtf(growth) * shrink;
@@ -184,7 +137,7 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
         for (uint32_t k = 0u; k < (L * L); k++) {
             cdkf->s[k] *= stretch;
         }
-        lower_considered(cdkf, of_w);
+        considered_lower(cdkf, of_w);
         if (joint) {
             add_to_state(cdkf, unexplained);
         }
@@ -194,15 +147,15 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 void cdkf_walk(cdkf_t *cdkf, float period, const float variance[MODEL_PARAMETERS], bool joint)
 {
     float unexplained[N * L];
-    float of_w[CONSIDERED][L];
-    lift_considered(cdkf, of_w);
+    considered_of_w_t of_w;
+    considered_lift(cdkf, of_w);
     for (uint32_t i = 0u; i < L; i++) {
         float rest[N];
         factor_add_noise(cdkf->s, ROWS, L, i, sqrtf((cdkf->walk[i] * period) + variance[i]), rest);
         unexplained[i] = rest[0];
         unexplained[L + i] = rest[1];
     }
-    lower_considered(cdkf, of_w);
+    considered_lower(cdkf, of_w);
     if (joint) {
         add_to_state(cdkf, unexplained);
     }
@@ -237,40 +190,24 @@ void cdkf_draw(cdkf_t *cdkf, const model_t *model, const model_constants_t *cons
     }
 }
 
-/* Covariance of rows i and j of S, with what the considered errors make of both. */
-static float covariance_of(const cdkf_t *cdkf, uint32_t i, uint32_t j)
-{
-    const float *a = &cdkf->s[i * L];
-    const float *b = &cdkf->s[j * L];
-    float covariance = factor_dot_three(a, b);
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        const considered_t *considered = &cdkf->considered[c];
-        const float sigma = cdkf->considered_sigma[c];
-        const float of_a = factor_dot_three(a, considered->w) + ((i < L) ? 0.0f : considered->x[i - L]);
-        const float of_b = factor_dot_three(b, considered->w) + ((j < L) ? 0.0f : considered->x[j - L]);
-        covariance += (sigma * of_a) * (sigma * of_b);
-    }
-    return covariance;
-}
-
 float cdkf_state_sigma(const cdkf_t *cdkf, uint32_t i)
 {
     const float *own = &cdkf->s_xx[i * N];
-    return sqrtf(covariance_of(cdkf, L + i, L + i) + (own[0] * own[0]) + (own[1] * own[1]));
+    return sqrtf(considered_covariance(cdkf, L + i, L + i) + (own[0] * own[0]) + (own[1] * own[1]));
 }
 
 float cdkf_parameter_sigma(const cdkf_t *cdkf, uint32_t i)
 {
-    return scaling_slope(&cdkf->scaling, cdkf->p, i) * sqrtf(covariance_of(cdkf, i, i));
+    return scaling_slope(&cdkf->scaling, cdkf->p, i) * sqrtf(considered_covariance(cdkf, i, i));
 }
 
 void cdkf_correlation(const cdkf_t *cdkf, float correlation[MODEL_PARAMETERS])
 {
-    const float sigma[L] = {
-        sqrtf(covariance_of(cdkf, 0u, 0u)), sqrtf(covariance_of(cdkf, 1u, 1u)), sqrtf(covariance_of(cdkf, 2u, 2u))};
-    correlation[0] = covariance_of(cdkf, 0u, 1u) / (sigma[0] * sigma[1]);
-    correlation[1] = covariance_of(cdkf, 0u, 2u) / (sigma[0] * sigma[2]);
-    correlation[2] = covariance_of(cdkf, 1u, 2u) / (sigma[1] * sigma[2]);
+    const float sigma[L] = {sqrtf(considered_covariance(cdkf, 0u, 0u)), sqrtf(considered_covariance(cdkf, 1u, 1u)),
+        sqrtf(considered_covariance(cdkf, 2u, 2u))};
+    correlation[0] = considered_covariance(cdkf, 0u, 1u) / (sigma[0] * sigma[1]);
+    correlation[1] = considered_covariance(cdkf, 0u, 2u) / (sigma[0] * sigma[2]);
+    correlation[2] = considered_covariance(cdkf, 1u, 2u) / (sigma[1] * sigma[2]);
 }
 
 bool cdkf_is_valid(const cdkf_t *cdkf)

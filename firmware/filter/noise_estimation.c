@@ -5,9 +5,14 @@
 
 #define OUTPUTS ((uint32_t)CDKF_OUTPUTS)
 #define SAMPLES_LEAST 20.0f /* of an output, for a variance to mean anything */
-#define FAR 0.5f            /* a factor further than this from 1 is done at once, */
-#define STEP_MOST 10.0f     /* up to this one; of a nearer one only */
+#define FAR 1.5f            /* a greater factor is done at once, */
+#define FAR_BELOW 0.67f     /* and a smaller one, */
+#define STEP_LEAST 0.33f    /* within */
+#define STEP_MOST 10.0f     /* these; of a nearer one only */
 #define SHARE 0.2f          /* this part, which averages over about five windows */
+#define Q_LEAST 0.6f        /* of a window for Q: there may have been rest in it */
+#define STARVED 1.15f       /* more gain than this is missing: it is Q that is too small, not R */
+#define CERTAIN 3.0f        /* a factor of R that is put down to R whatever its share */
 
 void noise_estimation_begin(noise_estimation_t *noise)
 {
@@ -39,16 +44,44 @@ static float clamped(float value, float least, float greatest)
 /* A standard deviation times `factor`, within `range` of what is set. */
 static float scaled(float now, float factor, float set, float range)
 {
-    const float bounded = clamped(factor, 1.0f / STEP_MOST, STEP_MOST);
-    const float step = (fabsf(bounded - 1.0f) > FAR) ? bounded : (1.0f + (SHARE * (bounded - 1.0f)));
+    const float bounded = clamped(factor, STEP_LEAST, STEP_MOST);
+    const bool far = (bounded > FAR) || (bounded < FAR_BELOW);
+    const float step = far ? bounded : (1.0f + (SHARE * (bounded - 1.0f)));
     return clamped(now * step, set / range, set * range);
 }
 
-/* The factor by which the noise of output i is wrong, by this window. */
-static float factor_of(const noise_estimation_t *noise, uint32_t i)
+/* The factor by which the noise of output i is wrong, by this window, and how far its innovations are too large. */
+typedef struct error {
+    float factor;
+    float excess;
+} error_t;
+
+static error_t error_of(const noise_estimation_t *noise, uint32_t i)
 {
-    const float factor = sqrtf(noise->ratio[i] / noise->samples[i]);
-    return (factor > 3.0f) ? factor : (1.0f + (noise->share[i] * (factor - 1.0f)));
+    error_t error;
+    error.excess = sqrtf(noise->ratio[i] / noise->samples[i]);
+    error.factor = (error.excess > CERTAIN) ? error.excess : (1.0f + (noise->share[i] * (error.excess - 1.0f)));
+    return error;
+}
+
+/* Sets the noise of output i. With too little gain innovations are large although R is right: then it stays, and what
+ * it was raised by before is halved. Returns the factor. */
+static float correct_output(
+    const noise_estimation_t *noise, cdkf_t *cdkf, const noise_setting_t *setting, uint32_t i, bool starved)
+{
+    float *now = &cdkf->output_noise[i];
+    const float set = setting->output_noise[i];
+    const error_t error = error_of(noise, i);
+    float factor = 1.0f;
+    if (!starved || (error.excess > CERTAIN) || (error.excess < 1.0f)) {
+        factor = error.factor;
+        *now = scaled(*now, factor, set, setting->range);
+    } else if (*now > set) {
+        *now = sqrtf(*now * set);
+    } else {
+        /* it stays */
+    }
+    return factor;
 }
 
 bool noise_estimation_step(noise_estimation_t *noise, cdkf_t *cdkf, const noise_setting_t *setting, float period)
@@ -58,26 +91,19 @@ bool noise_estimation_step(noise_estimation_t *noise, cdkf_t *cdkf, const noise_
     if ((setting->window > 0.0f) && (noise->elapsed >= setting->window)) {
         float level = 1.0f; /* geometric mean of both outputs' factors: the gain stays when everything scales alike */
         const float gain = (noise->variance > 0.0f) ? (1.0f + (noise->covariance / noise->variance)) : 1.0f;
-        const bool starved = (gain > 1.15f); /* far too little gain: it is Q that is too small, not R */
+        const bool starved = (gain > STARVED);
         for (uint32_t i = 0u; i < OUTPUTS; i++) {
-            const float raw = sqrtf(noise->ratio[i] / (noise->samples[i] + 1.0f));
-            if (starved && (raw < 3.0f)) {
-                if (cdkf->output_noise[i] > setting->output_noise[i]) {
-                    cdkf->output_noise[i] = sqrtf(cdkf->output_noise[i] * setting->output_noise[i]);
-                }
-            } else if (noise->samples[i] >= SAMPLES_LEAST) {
-                const float factor = factor_of(noise, i);
-                cdkf->output_noise[i] = scaled(cdkf->output_noise[i], factor, setting->output_noise[i], setting->range);
+            if (noise->samples[i] >= SAMPLES_LEAST) {
+                const float factor = correct_output(noise, cdkf, setting, i, starved);
                 level *= sqrtf(factor);
-                far_too_small = far_too_small || (factor > (1.0f + FAR));
+                far_too_small = far_too_small || (factor > FAR);
             }
         }
-        if (noise->variance > 0.0f) {
-            const float factor = starved ? (gain * gain) : (level * gain);
-            const float before = cdkf->process_noise[1];
-            cdkf->process_noise[1] = scaled(before, factor, setting->process_noise, setting->range);
-            far_too_small = far_too_small || (cdkf->process_noise[1] > ((1.0f + FAR) * before));
-        }
+        const float asked = starved ? (gain * gain) : (level * gain);
+        const float factor = (asked > Q_LEAST) ? asked : Q_LEAST;
+        const float before = cdkf->process_noise[1];
+        cdkf->process_noise[1] = scaled(before, factor, setting->process_noise, setting->range);
+        far_too_small = far_too_small || (cdkf->process_noise[1] > (FAR * before));
         noise_estimation_begin(noise);
     }
     return far_too_small;

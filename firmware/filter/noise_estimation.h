@@ -9,7 +9,8 @@
  * and that rule confirms any Q. The colour of the innovations does depend on Q: too little gain leaves a part of the
  * last innovations in the next ones (Mehra 1970). The response r of the state to past corrections obeys r- = F r,
  * then r = (I - K H) r- + K nu. The coefficient of the regression of the innovations on H r- says how much more gain
- * they ask for, and Q goes with its square.
+ * they ask for, and the variance Q goes with its square. When much more is asked for, the coefficient is less than it
+ * should be, so that Q goes with its fourth power.
  *
  * Both stay within a factor about what is set.
  */

@@ -39,7 +39,7 @@ high_pass_corner_t high_pass_corner(float frequency, float damping);
 /* One value after `period` seconds. Returns its deviation from the level before it. */
 float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period);
 
-enum { TRIM_INPUTS = 2, TRIM_SECTIONS = 3 };
+enum { TRIM_INPUTS = 3, TRIM_SECTIONS = 3 };
 
 /* A signal's slow part. */
 typedef struct level {
@@ -48,7 +48,7 @@ typedef struct level {
 
 typedef struct trim {
     level_t output[MODEL_STATES]; /* theta, whose level is the trim angle [rad], and theta_dot */
-    level_t input[TRIM_INPUTS];   /* z_ddot, tau_m */
+    level_t input[TRIM_INPUTS];   /* z_ddot, tau_m, friction of a newton metre */
     float origin[MODEL_STATES];   /* of the state: the levels in preload trim, otherwise 0 */
     float missing[MODEL_STATES];  /* time since the last sample of each output [s] */
     float unsettled;              /* time until the levels have settled: nothing can be learnt before [s] */
@@ -63,7 +63,7 @@ void trim_start(trim_t *trim, float angle, float corner, bool deviations);
 /* The trim angle [rad]. */
 float trim_angle(const trim_t *trim);
 
-/* Input i (0 z_ddot, 1 tau_m) after `period` seconds: its deviation in preload trim. */
+/* Input i (0 z_ddot, 1 tau_m, 2 friction) after `period` seconds: its deviation in preload trim. */
 float trim_input(trim_t *trim, uint32_t i, float value, float period);
 
 /* Sets the origin of the state to the levels: before a prediction. */

@@ -6,7 +6,7 @@
 
 #define LAGS ((uint32_t)WHITENESS_LAGS)
 #define MEMORY 5.0f /* of the means [s]: 250 blocks of 20 ms, white correlations are then 0.05 */
-#define LEAST 1.0f  /* before a verdict [s] */
+#define LEAST 2.0f  /* before a verdict [s] */
 #define COLOURED 0.35f
 #define WHITE 0.25f
 

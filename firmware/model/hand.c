@@ -33,7 +33,7 @@ static void respond(const model_constants_t *constants, const model_step_t *step
     const float torque = 1.0f / constants->hand_inertia;
     model_step_t drive = *step;
     drive.z_ddot = (base * step->z_ddot) + (torque * step->tau_m);
-    drive.tau_m = base * step->z_dot;
+    drive.tau_m = step->seat_dot; /* -z_dot, as an angle */
     linear_respond(constants, &drive, points, response);
     response->torque = torque * response->base;
     response->base *= base;
@@ -55,6 +55,7 @@ const model_t model_hand = {
     .name = "hand",
     .parameter = {{"k_hand", "1/s^2", 20.0f, 3200.0f}, {"c_hand", "1/s", 0.5f, 320.0f},
         {"c_space", "1/s", 0.1f, 320.0f}},
+    .uses_base_motion = true,
     .positive = true,
     .prepare = prepare,
     .respond = respond,

@@ -172,6 +172,7 @@ static model_dynamics_t dynamics(
 const model_t model_lever = {
     .name = "lever",
     .parameter = PARAMETER,
+    .uses_base_motion = false,
     .positive = true,
     .prepare = prepare,
     .respond = respond,
@@ -181,6 +182,7 @@ const model_t model_lever = {
 const model_t model_lever_on_seat = {
     .name = "lever",
     .parameter = PARAMETER,
+    .uses_base_motion = true,
     .positive = true,
     .prepare = prepare,
     .respond = respond_on_seat,

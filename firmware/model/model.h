@@ -63,11 +63,10 @@ typedef struct model_constants {
 
 /* What is the same for every sigma point of a step. */
 typedef struct model_step {
-    float period; /* [s] */
-    float z_ddot; /* base acceleration, mean over the step [m/s^2] */
-    float z_dot;  /* what follows from z_ddot, for a model that uses it: model/base_motion.h */
-    float seat;
-    float seat_dot;
+    float period;    /* [s] */
+    float z_ddot;    /* base acceleration, mean over the step [m/s^2] */
+    float seat;      /* base_motion.h, for the models that use it [rad] */
+    float seat_dot;  /* [rad/s] */
     float tau_m;     /* motor torque, mean over the step [N m] */
     float origin;    /* angle that the state's theta counts from [rad]; 0 unless preload trim */
     float trim;      /* trim angle [rad] */
@@ -96,6 +95,7 @@ typedef struct model_dynamics {
 typedef struct model {
     const char *name;
     model_parameter_t parameter[MODEL_PARAMETERS];
+    bool uses_base_motion;
     bool positive; /* all parameters are, and are estimated on a logarithmic scale; else on a linear one */
 
     void (*prepare)(

@@ -164,8 +164,8 @@ _FAULTS = (
     _fault("base_stuck", "z̈ stuck but “valid” for 10 s", "z_ddot", "stuck", quick=True),
     _fault("base_zero", "z̈ zero but “valid” for 10 s", "z_ddot", "zero"),
     _fault("base_sign", "z̈ of the wrong sign for 10 s", "z_ddot", "sign", 2.0),
-    _fault("theta_stuck", "θ stuck for 10 s", "theta", "stuck"),
-    _fault("theta_dot_stuck", "θ̇ stuck for 10 s", "theta_dot", "stuck", quick=True),
+    _fault("theta_stuck", "θ stuck for 10 s", "theta", "stuck", quick=True),
+    _fault("theta_dot_stuck", "θ̇ stuck for 10 s", "theta_dot", "stuck"),
     Condition(
         "spikes",
         "1 % of the θ samples off by 0.3 rad",

@@ -7,8 +7,12 @@ probably right. It is also the readable version of the estimator:
 - `cdkf`             the square-root Central Difference Kalman Filter for any model: draw, predict, measure, update;
 - `lever` `linear`   the models: the step of the motion, natural frequency and damping ratio;
 - `scale`            how a model's parameters are scaled, and their prior;
-- `belief`           the belief about state and parameters, and how samples change it: dual, joint, augmented;
-- `estimator`        the whole estimator: when it learns, adaptation of the parameter noise, trim, gaps, alignment.
+- `belief`           the belief about state and parameters, and how samples change it: dual, joint, augmented; what
+                     calibration errors make of it;
+- `learning`         when the parameters learn, adaptation of their walk; `noise` and `change`: what innovations and
+                     corrections say of the noise and of a sudden change;
+- `detrend`          the high-pass of all signals;
+- `estimator`        the whole estimator: inputs, trim, gaps, alignment.
 """
 
 from .estimator import Estimator, Start, align, run

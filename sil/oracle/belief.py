@@ -18,10 +18,19 @@ joint filter adds to S, and the dual filter drops.
 
 `Augmented` is the textbook's joint filter: one square-root CDKF on [w; x], which learns from every sample at once (R.
 van der Merwe, "Sigma-point Kalman filters for probabilistic inference", PhD thesis, OGI 2004).
+
+Calibration errors b are considered, not estimated (S. F. Schmidt, "Application of state-space methods to navigation
+problems", 1966): the errors e = [e_w; e_x] of the estimates per unit of each b, shape (5, k), go the way that a small
+change of the samples takes through the filter, with the filter's gain as it is.
+
+    predict   e⁻ = F e + G, F the transition of [w; x] by first differences, G the push of a unit of b
+    update    e = (I - K H) e⁻;  pending: the score's, s_e += (H V⁻)ᵀ (S_y S_yᵀ)⁻¹ H e_x⁻
+    learn     e_w -= c P_w s_e;  e_x -= c V P_w s_e
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +41,23 @@ from .cdkf import Array
 Flags = NDArray[np.bool_]
 Motion = Callable[[Array, Array], Array]
 """f: the states (2, N) or (2, 1) and parameters w (3, N) or (3, 1) one step on, states (2, N)."""
+
+CONSIDERED = 4
+"""Calibration errors: of the gain and the delay of z̈, the gain of τ_m, friction."""
+UNMOVED = np.zeros((2, CONSIDERED))
+
+
+@dataclass(frozen=True)
+class Innovation:
+    """Of m outputs, with the uncertainty of state and parameters in its covariance."""
+
+    value: Array  # (m,)
+    factor: Array  # (m, m) lower triangular
+    response: Array  # (m,) what past corrections of the state, predicted and corrected like it, make of the outputs
+
+    @property
+    def normalised_square(self) -> float:
+        return cdkf.normalised_square(self.factor, self.value)
 
 
 class Belief(ABC):
@@ -57,20 +83,25 @@ class Belief(ABC):
     def joint_factor(self) -> Array:
         """Factor (5, 5) of the covariance of [w; x], lower triangular."""
 
+    @property
+    @abstractmethod
+    def errors(self) -> Array:
+        """What a unit of each considered error makes of [w; x]: truth less estimate, (5, CONSIDERED)."""
+
     @abstractmethod
     def start_state(self, x: Array, factor: Array) -> None:
         """The state starts anew, independent of the parameters; pending information is dropped."""
 
     @abstractmethod
-    def predict(self, motion: Motion, noise: Array) -> None:
-        """Time update; process noise of the state with the factor (2, k)."""
+    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED) -> None:
+        """Time update; process noise of the state with the factor (2, k); a unit of each considered error moves the
+        true state by a column of `push` besides."""
 
     @abstractmethod
-    def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> float:
+    def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> Innovation:
         """Measurement update with the valid ones of two outputs, whose noise has the factor (2, 2).
 
-        With `learn`, what the outputs say of the parameters becomes pending. Returns the normalised innovation squared,
-        with the uncertainty of the parameters in the innovation covariance.
+        With `learn`, what the outputs say of the parameters becomes pending.
         """
 
     @property
@@ -79,8 +110,17 @@ class Belief(ABC):
         """Whether there is information that is not learnt yet."""
 
     @abstractmethod
+    def drop_pending(self) -> None:
+        """It is not to be learnt."""
+
+    @abstractmethod
     def learn(self, trust: float = 1.0) -> Array:
         """The parameters learn what is pending, which counts by `trust`; returns the change of w (3,)."""
+
+    @abstractmethod
+    def restore(self, w: Array, w_factor: Array, errors: bool) -> None:
+        """The parameters become these, independent of the state, whose covariance stays; what considered errors make
+        of w stays or is 0. Pending information is dropped."""
 
     @abstractmethod
     def forget(self, growth: float) -> None:
@@ -92,7 +132,8 @@ class Belief(ABC):
 
     @abstractmethod
     def limit(self, most: Array) -> None:
-        """No standard deviation of a parameter exceeds `most` (3,)."""
+        """No standard deviation of a parameter exceeds `most` (3,); what considered errors make of it shrinks with
+        it, for then it is the prior that is believed."""
 
     @abstractmethod
     def bound(self, least: Array, greatest: Array) -> None:
@@ -106,6 +147,7 @@ class TwoStage(Belief):
         self.joint = joint
         self._w = np.zeros(len(w_factor))
         self._w_factor = w_factor
+        self.w_errors: Array = np.zeros((len(w_factor), CONSIDERED))
         self.start_state(x, x_factor)
 
     @property
@@ -122,42 +164,58 @@ class TwoStage(Belief):
 
     @property
     def joint_factor(self) -> Array:
-        n, m = len(self._x), len(self._w)
-        return np.block([[self._w_factor, np.zeros((m, n))], [self.v @ self._w_factor, self.x_factor]])
+        m = len(self._w)
+        factor = np.zeros((m + len(self._x), m + len(self._x)))
+        factor[:m, :m], factor[m:, :m], factor[m:, m:] = self._w_factor, self.v @ self._w_factor, self.x_factor
+        return factor
+
+    @property
+    def errors(self) -> Array:
+        return np.concatenate((self.w_errors, self.x_errors))
 
     def start_state(self, x: Array, factor: Array) -> None:
         self._x, self.x_factor = x, factor.copy()
         self.v: Array = np.zeros((len(x), len(self._w)))  # dx/dw
-        self._drop_pending()
+        self.x_errors: Array = np.zeros((len(x), CONSIDERED))
+        self.response: Array = np.zeros(len(x))  # of the state to past corrections
+        self.drop_pending()
 
-    def _drop_pending(self) -> None:
+    def drop_pending(self) -> None:
         self.information: Array = np.zeros_like(self._w_factor)
         self.score: Array = np.zeros_like(self._w)
+        self.score_errors: Array = np.zeros_like(self.w_errors)
 
-    def predict(self, motion: Motion, noise: Array) -> None:
+    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED) -> None:
         n = len(self._x)
         states = motion(cdkf.draw(self._x, self.x_factor), self._w[:, np.newaxis])
         pairs = cdkf.draw(np.concatenate((self._x, self._w)), np.concatenate((self.v @ self._w_factor, self._w_factor)))
         mean, first, second = cdkf.differences(states)
         mean_of_pairs, t, second_of_pairs = cdkf.differences(motion(pairs[:n], pairs[n:]))
+        transition = np.linalg.solve(self.x_factor.T, first.T).T  # of the state, w given
+        own_errors = self.x_errors - self.v @ self.w_errors
         self._x = mean + mean_of_pairs - states[:, 0]
         self.x_factor = cdkf.tria(np.concatenate((first, second, second_of_pairs, noise), axis=1))
         self.v = np.linalg.solve(self._w_factor.T, t.T).T
+        self.x_errors = self.v @ self.w_errors + transition @ own_errors + push
+        self.response = transition @ self.response
 
-    def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> float:
+    def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> Innovation:
         state = cdkf.measure(self._x, self.x_factor, lambda x: x[valid], noise[np.ix_(valid, valid)])
         innovation = y[valid] - state.mean
-        output = self.v[valid]
+        output, errors, response = self.v[valid], self.x_errors[valid], self.response[valid]
         gain = cdkf.gain(self.x_factor, state)
         self._x, self.x_factor = cdkf.update(self._x, self.x_factor, state, gain, innovation)
         self.v = self.v - gain @ output
+        self.x_errors = self.x_errors - gain @ errors
+        self.response = self.response - gain @ response + gain @ innovation  # this correction is a past one from now on
         given = state.factor @ state.factor.T
         if learn:
             weighted = np.linalg.solve(given, output).T
             self.information = self.information + weighted @ output
             self.score = self.score + weighted @ innovation
+            self.score_errors = self.score_errors + weighted @ errors
         by_parameters = output @ self._w_factor
-        return float(innovation @ np.linalg.solve(given + by_parameters @ by_parameters.T, innovation))
+        return Innovation(innovation, np.linalg.cholesky(given + by_parameters @ by_parameters.T), response)
 
     @property
     def pending(self) -> bool:
@@ -167,11 +225,22 @@ class TwoStage(Belief):
         prior = np.linalg.inv(self._w_factor @ self._w_factor.T)
         covariance = np.linalg.inv(prior + trust * self.information)
         correction: Array = trust * covariance @ self.score
+        of_errors = trust * covariance @ self.score_errors
         self._w_factor = np.linalg.cholesky(covariance)
         self._w = self._w + correction
         self._x = self._x + self.v @ correction
-        self._drop_pending()
+        self.w_errors = self.w_errors - of_errors
+        self.x_errors = self.x_errors - self.v @ of_errors
+        self.drop_pending()
         return correction
+
+    def restore(self, w: Array, w_factor: Array, errors: bool) -> None:
+        explained = self.v @ self._w_factor
+        self.x_factor = np.linalg.cholesky(self.x_factor @ self.x_factor.T + explained @ explained.T)
+        self.v = np.zeros_like(self.v)
+        self._w, self._w_factor = w, w_factor
+        self.w_errors = self.w_errors if errors else np.zeros_like(self.w_errors)
+        self.drop_pending()
 
     def forget(self, growth: float) -> None:
         self._widen((1.0 + growth) * self._w_factor @ self._w_factor.T)
@@ -191,7 +260,8 @@ class TwoStage(Belief):
     def limit(self, most: Array) -> None:
         shrink = np.minimum(most / cdkf.deviations(self._w_factor), 1.0)
         self._w_factor = self._w_factor * shrink[:, np.newaxis]
-        self.v = self.v / shrink  # T = V S_w stays
+        self.w_errors = self.w_errors * shrink[:, np.newaxis]
+        self.v = self.v / shrink  # T = V S_w stays, and so does V e_w
 
     def bound(self, least: Array, greatest: Array) -> None:
         self._w = np.clip(self._w, least, greatest)
@@ -207,6 +277,7 @@ class Augmented(Belief):
         self.factor[: self.parameters, : self.parameters] = w_factor
         self.factor[self.parameters :, self.parameters :] = x_factor
         self.correction: Array = np.zeros(self.parameters)
+        self._errors: Array = np.zeros((len(self.z), CONSIDERED))
 
     @property
     def w(self) -> Array:
@@ -224,22 +295,33 @@ class Augmented(Belief):
     def joint_factor(self) -> Array:
         return self.factor
 
+    @property
+    def errors(self) -> Array:
+        return self._errors
+
     def start_state(self, x: Array, factor: Array) -> None:
-        self.z = np.concatenate((self.w, x))
-        self.factor = self.factor.copy()
-        self.factor[self.parameters :] = 0.0
-        self.factor[self.parameters :, self.parameters :] = factor
-
-    def predict(self, motion: Motion, noise: Array) -> None:
         n = self.parameters
+        self.z = np.concatenate((self.w, x))
+        self._split(self.w_factor, factor)
+        self._errors = np.concatenate((self._errors[:n], np.zeros((len(x), CONSIDERED))))
 
-        def step(z: Array) -> Array:
-            return np.concatenate((z[:n], motion(z[n:], z[:n])))
+    def _split(self, w_factor: Array, x_factor: Array) -> None:
+        """Parameters and state become independent."""
+        n = self.parameters
+        self.factor = np.zeros_like(self.factor)
+        self.factor[:n, :n], self.factor[n:, n:] = w_factor, x_factor
 
+    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED) -> None:
+        n = self.parameters
+        points = cdkf.draw(self.z, self.factor)
+        stepped = np.concatenate((points[:n], motion(points[n:], points[:n])))
+        self.z, first, second = cdkf.differences(stepped)
+        pushed = np.concatenate((np.zeros((n, CONSIDERED)), push))
+        self._errors = first @ np.linalg.solve(self.factor, self._errors) + pushed
         padded = np.concatenate((np.zeros((n, noise.shape[1])), noise))
-        self.z, self.factor = cdkf.predict(self.z, self.factor, step, padded)
+        self.factor = cdkf.tria(np.concatenate((first, second, padded), axis=1))
 
-    def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> float:
+    def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> Innovation:
         n = self.parameters
         noise = noise[np.ix_(valid, valid)]
         expected = cdkf.measure(self.z, self.factor, lambda z: z[n:][valid], noise)
@@ -251,16 +333,27 @@ class Augmented(Belief):
             given = cdkf.measure(self.x, self.factor[n:, n:], lambda x: x[valid], noise)
             gain = np.concatenate((np.zeros((n, len(innovation))), cdkf.gain(self.factor[n:, n:], given)))
         self.z, self.factor = cdkf.update(self.z, self.factor, expected, gain, innovation)
-        return cdkf.normalised_square(expected.factor, innovation)
+        self._errors = self._errors - gain @ self._errors[n:][valid]
+        return Innovation(innovation, expected.factor, np.zeros_like(innovation))
 
     @property
     def pending(self) -> bool:
         return False
 
+    def drop_pending(self) -> None:
+        """Nothing is."""
+
     def learn(self, trust: float = 1.0) -> Array:
         """Everything is learnt sample by sample, and in full, whatever `trust` is."""
         correction, self.correction = self.correction, np.zeros(self.parameters)
         return correction
+
+    def restore(self, w: Array, w_factor: Array, errors: bool) -> None:
+        n = self.parameters
+        self._split(w_factor, cdkf.tria(self.factor[n:]))
+        self.z = np.concatenate((w, self.x))
+        self._errors = self._errors.copy()
+        self._errors[:n] *= float(errors)
 
     def forget(self, growth: float) -> None:
         self._widen(np.sqrt(growth) * self.w_factor)
@@ -274,8 +367,10 @@ class Augmented(Belief):
 
     def limit(self, most: Array) -> None:
         n = self.parameters
-        self.factor = self.factor.copy()
-        self.factor[:n] *= np.minimum(most / cdkf.deviations(self.factor[:n]), 1.0)[:, np.newaxis]
+        shrink = np.minimum(most / cdkf.deviations(self.factor[:n]), 1.0)[:, np.newaxis]
+        self.factor, self._errors = self.factor.copy(), self._errors.copy()
+        self.factor[:n] *= shrink
+        self._errors[:n] *= shrink
 
     def bound(self, least: Array, greatest: Array) -> None:
         self.z = np.concatenate((np.clip(self.w, least, greatest), self.x))

@@ -1,9 +1,7 @@
-"""The estimator as the firmware runs it: a belief (belief.py), when it learns and walks, trim, gaps, alignment.
+"""The estimator as the firmware runs it: inputs, trim, gaps, alignment, around a belief (belief.py) and its learning.
 
 In preload trim all signals are deviations from their levels (detrend), so x is, too; in preload fixed they are as they
-come. Once every learn_period the parameters learn what is pending, forget, and walk; how they walk next is set by the
-adaptation. Change detection and noise estimation are not repeated here: compare with the settings change_threshold and
-noise_window at 0.
+come. What finds sensors stuck or wrong, and hands off, is not repeated here: compare runs in which it finds nothing.
 """
 
 import math
@@ -17,23 +15,33 @@ from . import cdkf
 from .belief import Augmented, Belief, TwoStage
 from .cdkf import Array
 from .detrend import Detrend
+from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
 from .lever import Lever
-from .linear import LinearBlackBox, LinearPhysical
+from .linear import Hand, LinearBlackBox, LinearPhysical
 from .scale import Scale
 
-ADAPTATIONS = ("fixed", "annealing", "robbins_monro", "forgetting")
 ESTIMATORS = ("dual", "joint", "augmented")
 OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 12  # predictions through a gap
+SETTLING = 0.9  # [1] time that levels need, in periods of the corner
+MOTION_TIME = 0.1  # [s] of the shorter average of motion
+VELOCITY_KEPT = 0.99998  # of the base's, in a step
+UNKNOWN = 3.0  # process noise for an unknown base acceleration, in those that are set
+SPIKE = 6.0  # standard deviations
+SPIKE_TIME = 0.02  # [s] longer than this it is no spike
+STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
+CONSIDERED = ("z_ddot_gain", "z_ddot_delay", "tau_m_gain", "lever_friction")
 UNBOUNDED = np.array([[-math.inf, math.inf]] * 3)
 
-Model = Lever | LinearPhysical | LinearBlackBox
+Model = Lever | LinearPhysical | LinearBlackBox | Hand
 
 
 def model_of(settings: Mapping[str, float], name: str, preload: str) -> Model:
     """The model of that name in firmware/lever_settings.def."""
     if name == "lever":
         return Lever.from_settings(settings, preload)
+    if name == "hand":
+        return Hand.from_settings(settings, preload)
     rest = settings["lever_preload_angle"]
     return LinearPhysical(rest, preload) if name == "linear_physical" else LinearBlackBox(rest, preload)
 
@@ -45,7 +53,8 @@ class Start:
     state: Array  # (2,) [rad, rad/s]
     state_factor: Array  # (2, 2)
     trim: float  # [rad]
-    input: tuple[float, float] = (0.0, 0.0)  # z̈ [m/s²], τ_m [N m] at that sample
+    input: tuple[float, float] = (0.0, 0.0)  # z̈ [m/s²], τ_m [N m] at that sample, compensated
+    measured_base: float = 0.0  # z̈ as the sensor shows it
     time: float = 0.0  # [s]
 
 
@@ -53,8 +62,8 @@ class Estimator:
     """The square-root CDKF for state and parameters. `settings` are those of firmware/lever_settings.def, by name.
 
     `estimator`: "dual" or "joint", as in the firmware; "augmented", the textbook's joint filter, which learns from
-    every sample at once, and without caution. `bounds` (3, 2) are the model's least and greatest parameters in physical
-    units.
+    every sample at once, without caution, and has no change detection and noise estimation. `bounds` (3, 2) are the
+    model's least and greatest parameters in physical units.
     """
 
     def __init__(
@@ -71,70 +80,120 @@ class Estimator:
             if name not in choices:
                 raise ValueError(f'{what}: "{name}" is none of {", ".join(choices)}')
         self.settings = settings
-        self.adaptation = adaptation
         self.scale = Scale.from_settings(settings, model)
         self.model = model_of(settings, model, preload)
         self.detrended = preload == "trim"
-        self.floor = self.scale.walk
-        self.ceiling = self.floor * settings["walk_ceiling"] ** 2
-        self.greatest_sigma = self.scale.sigma
-        self.process_noise = (settings["theta_process_noise"], settings["theta_dot_process_noise"])
-        self.output_noise = np.diag([settings["theta_noise"], settings["theta_dot_noise"]])
-        self.bounds = self.scale.scaled(bounds)
 
         self.outputs = (Detrend(start.trim), Detrend())  # θ, whose level is the trim angle, and θ̇
-        self.inputs = (Detrend(), Detrend())  # z̈, τ_m
+        self.inputs = (Detrend(), Detrend(), Detrend())  # z̈, τ_m, friction of 1 N m
         self.origin = np.array((start.trim, 0.0)) if self.detrended else np.zeros(2)  # what x counts from
         x = start.state.astype(np.float64) - self.origin
         x_factor, w_factor = start.state_factor.astype(np.float64), np.diag(self.scale.sigma)
+        whole = estimator == "augmented"
         self.belief: Belief = (
-            Augmented(w_factor, x, x_factor)
-            if estimator == "augmented"
-            else TwoStage(w_factor, x, x_factor, joint=estimator == "joint")
+            Augmented(w_factor, x, x_factor) if whole else TwoStage(w_factor, x, x_factor, joint=estimator == "joint")
         )
-        self.walk = (self.ceiling if adaptation == "annealing" else self.floor).copy()  # q [1/s]
-        self.growth = self._growth(excited=True)  # [1/s]
-        self.elapsed = 0.0  # since the parameters learnt last [s]
-        self.trust = 0.0  # part of the information that counts
-        self.excitation_square = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], presumed until measured
+        self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, adapted=not whole)
+        self.considered_sigma = np.array([settings[f"{name}_sigma"] for name in CONSIDERED])
+        presumed = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], until measured
+        self.excitation_square, self.motion_square = presumed, presumed
         self.nis = 0.0
-        self.missing = [0.0, 0.0]  # time since the last sample of θ, of θ̇ [s]
+        self.average_nis = 1.0  # per output
+        self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
+        self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
+        self.base_missing = seconds(0.0)
         self._wait_for_levels()
         self.last_raw = start.input
         self.last_input = start.input  # the same, as deviations in preload trim
+        self.velocity = 0.0  # of the base, from the end of a step to the middle of the next one [m/s]
+        self.last_measured_base = start.measured_base
         self.time = start.time
 
     # --- one sample ------------------------------------------------------------------------------------------------
 
-    def step(self, time: float, y: Array, valid: NDArray[np.bool_], u: tuple[float, float]) -> None:
-        """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m)."""
+    def step(
+        self, time: float, y: Array, valid: NDArray[np.bool_], u: tuple[float, float], base_valid: bool = True
+    ) -> None:
+        """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) as
+        the sensors show them."""
         duration = time - self.time
         substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
         dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
+        inputs = (self._true_base(u[0], duration, base_valid), u[1] / self.settings["tau_m_gain"])
         for i in range(1, substeps + 1):
+            if i == substeps:
+                self._follow_base(base_valid, duration)
             share = i / substeps
-            self._advance(tuple(old + share * (new - old) for old, new in zip(self.last_raw, u, strict=True)), dt)
+            last = self.last_raw
+            self._advance((last[0] + share * (inputs[0] - last[0]), last[1] + share * (inputs[1] - last[1])), dt)
             if i < substeps:
                 self._subtract_trim(y, none_valid, dt)
-        self.time, self.last_raw = time, u
+        self.time, self.last_raw = time, inputs
+        valid = valid & ~self._are_spikes(y, valid, duration)
         y, back = self._subtract_trim(y, valid, dt)
         if back:
             self._end_outage(y, valid)
-        settled = self.unsettled < 0.5 * self.settings["sample_period"]
-        excited = math.sqrt(self.excitation_square) >= self.settings["excitation_least"]
+        self._correct(y, valid, duration)
+        self._average_motion(duration)
+
+    def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
+        """Measurement update, and learning when it is due."""
+        settled = bool(self.unsettled < 0.5 * self.settings["sample_period"])
+        least = self.settings["excitation_least"] ** 2
+        excited = self.excitation_square >= least and self.motion_square >= 0.25 * least
+        lesson = Lesson(settled and bool(valid.any()) and bool(self.base_missing <= 0.0), excited)
         self.nis = 0.0
         if valid.any():
-            self.nis = self.belief.update(y, valid, self.output_noise, learn=settled and excited)
-        self._learn_when_due(duration, teaches=settled and bool(valid.any()), excited=excited)
-        self.unsettled -= duration
-        self._average_excitation(duration)
+            noise = np.diag(self.learning.noise.output_noise)
+            innovation = self.belief.update(y, valid, noise, learn=lesson.measured and excited)
+            self.nis = innovation.normalised_square
+            share = min(duration / self.settings["excitation_time"], 1.0)
+            self.average_nis += share * (self.nis / int(valid.sum()) - self.average_nis)
+            self.learning.add(innovation, valid, lesson)
+        self.learning.step(duration, lesson)
+        self.unsettled -= counted(duration)
 
-    def _advance(self, raw: tuple[float, ...], dt: float) -> None:
-        """One prediction, with the mean of the inputs at both ends."""
-        u = (self._deviation(self.inputs[0], raw[0], dt), self._deviation(self.inputs[1], raw[1], dt))
+    def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
+        """Outputs far from what is expected, until they have been for SPIKE_TIME."""
+        noise = self.learning.noise.output_noise
+        state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
+        expected = np.maximum(max(self.average_nis, 1.0) * (state**2 + noise**2), noise**2)
+        far = valid & ((y - self.origin - self.belief.x) ** 2 > SPIKE**2 * expected)
+        for i in np.flatnonzero(valid):
+            self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
+        spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
+        return spikes
+
+    def _true_base(self, measured: float, duration: float, valid: bool) -> float:
+        """By a sensor that shows gain times the base acceleration, late by a delay; the last one when not valid."""
+        if not valid:
+            return self.last_raw[0]
+        slope = (measured - self.last_measured_base) / duration
+        self.last_measured_base = measured
+        return (measured + self.settings["z_ddot_delay"] * slope) / self.settings["z_ddot_gain"]
+
+    def _follow_base(self, valid: bool, duration: float) -> None:
+        """Its level has to settle again after an outage."""
+        if valid and self.base_missing > OUTAGE:
+            self._wait_for_levels()
+        self.base_missing = seconds(0.0) if valid else self.base_missing + counted(duration)
+
+    def _advance(self, raw: tuple[float, float], dt: float) -> None:
+        """One prediction, with the mean of the inputs at both ends. A base that is not known is noise."""
+        rate = float(self.origin[1] + self.belief.x[1])
+        stop = self._deviation(self.inputs[2], rate / (abs(rate) + STOP_RATE), dt)
+        base, torque = (self._deviation(detrend, value, dt) for detrend, value in zip(self.inputs, raw, strict=False))
+        u, last = (base, torque - self.settings["lever_friction"] * stop), self.last_input
         if self.detrended:
             self.origin = np.array([detrend.level for detrend in self.outputs])
-        self._predict((0.5 * (u[0] + self.last_input[0]), 0.5 * (u[1] + self.last_input[1])), dt)
+        z_ddot, z_dot = 0.5 * (base + last[0]), self.velocity
+        self.velocity = VELOCITY_KEPT * self.velocity + dt * base
+        if self.base_missing > 0.0:
+            z_ddot, z_dot = 0.0, 0.0
+            self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
+        # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
+        errors = np.array(((-base, (base - last[0]) / dt, 0.0, 0.0), (0.0, 0.0, -last[1], -stop)))
+        self._predict((z_ddot, 0.5 * (u[1] + last[1]), z_dot), errors, dt)
         self.last_input = u
 
     def _deviation(self, detrend: Detrend, value: float, dt: float) -> float:
@@ -148,15 +207,15 @@ class Estimator:
         """
         deviation, back = np.zeros(2), False
         for i, detrend in enumerate(self.outputs):
-            waiting = self.missing[i] > OUTAGE
+            waiting = bool(self.missing[i] > OUTAGE)
             if valid[i]:
                 deviation[i] = self._deviation(detrend, float(y[i]), dt)
                 back = back or waiting
-                self.missing[i] = 0.0
+                self.missing[i] = seconds(0.0)
                 continue
-            self.missing[i] += dt
+            self.missing[i] += seconds(dt)
             if waiting:
-                detrend.slope = 0.0
+                detrend.hold()
             else:
                 self._deviation(detrend, float(self.origin[i] + self.belief.x[i]), dt)
         return deviation, back
@@ -164,71 +223,42 @@ class Estimator:
     def _end_outage(self, y: Array, valid: NDArray[np.bool_]) -> None:
         """The state starts again where it is measured; levels must settle before anything can be learnt."""
         if valid.all():
-            self.belief.start_state(y, self.output_noise)
+            self.belief.start_state(y, np.diag(self.learning.noise.output_noise))
         self._wait_for_levels()
 
     def _wait_for_levels(self) -> None:
-        self.unsettled = 1.0 / self.settings["trim_corner"] if self.detrended else 0.0  # [s]
+        self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
-    def _predict(self, u: tuple[float, float], dt: float) -> None:
-        """The trim is where it was at the last sample."""
+    def _predict(self, u: tuple[float, ...], errors: Array, dt: float) -> None:
+        """The trim is where it was at the last sample. `errors` (2, 4): of the inputs, per unit of each considered."""
         trim = self.outputs[0].level
         angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
 
-        def motion(x: Array, w: Array) -> Array:
+        def moved_by(x: Array, w: Array, u: tuple[float | Array, ...]) -> Array:
             moved: Array = self.model.step(x + angle, self.scale.physical(w), u, trim, dt) - angle
             return moved
 
-        self.belief.predict(motion, self._process_noise(dt))
+        def motion(x: Array, w: Array) -> Array:
+            return moved_by(x, w, u)
+
+        x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
+        with_errors = np.concatenate((np.zeros((2, 1)), errors), axis=1)  # none, then a unit of each
+        moved = moved_by(x, w, (u[0] + with_errors[0], u[1] + with_errors[1], *u[2:]))
+        push = moved[:, 1:] - moved[:, :1]
+        self.belief.predict(motion, self._process_noise(dt), push)
 
     def _process_noise(self, dt: float) -> Array:
         """Factor (2, 3) of an integrated random walk of θ̇ (its covariance: van Loan 1978) plus a random walk of θ."""
-        own, rate = self.process_noise
+        own = self.settings["theta_process_noise"]
+        rate = self.learning.noise.process_noise + self.learning.disturbance
         return math.sqrt(dt) * np.array([[own, rate * dt / 2.0, rate * dt / math.sqrt(12.0)], [0.0, rate, 0.0]])
 
-    # --- when the parameters learn, and how they walk ----------------------------------------------------------------
-
-    def _learn_when_due(self, duration: float, teaches: bool, excited: bool) -> None:
-        """Once every learn_period; a sample that is half a sample_period early is on time."""
-        self.elapsed += duration
-        if self.elapsed > self.settings["learn_period"] - 0.5 * self.settings["sample_period"]:
-            self._learn(self.elapsed, teaches, excited)
-            self.elapsed = 0.0
-
-    def _learn(self, period: float, teaches: bool, excited: bool) -> None:
-        """At first information counts in part: far from the truth the sensitivities are wrong."""
-        if self.belief.pending:
-            caution = self.settings["caution_time"]
-            self.trust = min(self.trust + (period / caution if caution > period else 1.0), 1.0)
-        correction = self.belief.learn(self.trust)
-        self.belief.bound(self.bounds[:, 0], self.bounds[:, 1])
-        self.belief.forget(self.growth * period)
-        self.belief.walk(self.walk * period)
-        self.belief.limit(self.greatest_sigma)
-        if teaches:
-            self._adapt_walk(correction, period, excited)
-        else:
-            self.growth = 0.0  # what cannot be learnt again is not forgotten
-
-    def _growth(self, excited: bool) -> float:
-        """Forgetting: the covariance grows by 1/λ = 1 + growth dt."""
-        return 1.0 / self.settings["forgetting_time"] if excited and self.adaptation == "forgetting" else 0.0
-
-    def _adapt_walk(self, correction: Array, period: float, excited: bool) -> None:
-        """Sets q and growth for the next time from the last correction of w, `period` [s] after the one before."""
-        self.growth = self._growth(excited)
-        if not excited:
-            self.walk = self.floor.copy()  # nothing to learn from: no more uncertainty than the pilot's own changes
-        elif self.adaptation == "annealing":
-            self.walk = np.maximum(self.walk * math.exp(-period / self.settings["annealing_time"]), self.floor)
-        elif self.adaptation == "robbins_monro":  # 1951: a running average of what the corrections say the walk is
-            nu = min(period / self.settings["robbins_monro_time"], 1.0)
-            self.walk = np.clip((1.0 - nu) * self.walk + nu * correction**2 / period, self.floor, self.ceiling)
-
-    def _average_excitation(self, duration: float) -> None:
-        """The mean square of the rate."""
+    def _average_motion(self, duration: float) -> None:
+        """The mean square of the rate, over a long time and a short one."""
+        square = float(self.belief.x[1]) ** 2
         share = min(duration / self.settings["excitation_time"], 1.0)
-        self.excitation_square += share * (float(self.belief.x[1]) ** 2 - self.excitation_square)
+        self.excitation_square += share * (square - self.excitation_square)
+        self.motion_square += min(duration / MOTION_TIME, 1.0) * (square - self.motion_square)
 
     # --- estimates -------------------------------------------------------------------------------------------------
 
@@ -238,20 +268,33 @@ class Estimator:
         return self.outputs[0].level
 
     def state_deviations(self) -> Array:
-        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of the parameters included."""
-        return cdkf.deviations(self.belief.joint_factor[len(self.scale.names) :])
+        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration included. While
+        a level waits, what moves slower than the corner is not predicted: taken to be a quarter of the motion."""
+        sigma = self._with_considered(self.belief.joint_factor, self.belief.errors)[len(self.scale.names) :]
+        if not self.detrended:
+            return sigma
+        slow = 0.25 * math.sqrt(self.excitation_square) * (np.array(self.missing) > OUTAGE)
+        total: Array = np.hypot(sigma, slow / np.array((2.0 * math.pi * self.settings["trim_corner"], 1.0)))
+        return total
+
+    def _with_considered(self, factor: Array, errors: Array) -> Array:
+        """Standard deviations of what has the factor `factor`, and `errors` by a unit of each considered error."""
+        return cdkf.deviations(np.concatenate((factor, errors * self.considered_sigma), axis=1))
 
     def parameters(self) -> tuple[Array, Array]:
         """The model's parameters in its units, and their standard deviations to first order."""
-        w = self.belief.w
-        return self.scale.physical(w), self.scale.slope(w) * cdkf.deviations(self.belief.w_factor)
+        w, n = self.belief.w, len(self.scale.names)
+        sigma = self._with_considered(self.belief.w_factor, self.belief.errors[:n])
+        return self.scale.physical(w), self.scale.slope(w) * sigma
 
     def dynamics(self) -> tuple[Array, Array]:
         """Natural frequency [Hz] and damping ratio [1] of the estimate; standard deviations by sigma points."""
         points = self.scale.physical(cdkf.draw(self.belief.w, self.belief.w_factor))
         values = self.model.dynamics(points, self.trim)
         _, first, second = cdkf.differences(values)
-        return values[:, 0], cdkf.deviations(np.concatenate((first, second), axis=1))
+        slope = np.linalg.solve(self.belief.w_factor.T, first.T).T
+        errors = slope @ self.belief.errors[: len(self.scale.names)]
+        return values[:, 0], self._with_considered(np.concatenate((first, second), axis=1), errors)
 
 
 # --- a whole run -----------------------------------------------------------------------------------------------------
@@ -270,8 +313,10 @@ def align(samples: Mapping[str, Array], settings: Mapping[str, float]) -> tuple[
     theta = samples["theta"][: last + 1][samples["theta_valid"][: last + 1].astype(bool)]
     state = np.array((samples["theta"][last], samples["theta_dot"][last]))
     factor = np.diag((settings["theta_noise"], settings["theta_dot_noise"]))
-    inputs = (float(samples["z_ddot"][last]), float(samples["tau_m"][last]))
-    return Start(state, factor, float(theta.mean()), inputs, float(time[last])), last + 1
+    base, before = (float(samples["z_ddot"][k]) for k in (last, max(last - 1, 0)))
+    late = settings["z_ddot_delay"] * (base - before) / (float(time[last] - time[last - 1]) if last else 1.0)
+    inputs = ((base + late) / settings["z_ddot_gain"], float(samples["tau_m"][last]) / settings["tau_m_gain"])
+    return Start(state, factor, float(theta.mean()), inputs, base, float(time[last])), last + 1
 
 
 def columns(estimator: Estimator) -> tuple[str, ...]:
@@ -288,15 +333,16 @@ def columns(estimator: Estimator) -> tuple[str, ...]:
 def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, every: int = 1) -> dict[str, Array]:
     """Steps through the samples from index `first` on; estimates after every `every`th of them, an array a column.
 
-    `samples`: time_s, theta, theta_dot, z_ddot, tau_m and theta_valid, theta_dot_valid, each of shape (N,); an invalid
-    tau_m must already be 0 and an invalid z_ddot the last valid one.
+    `samples`: time_s, theta, theta_dot, z_ddot, tau_m and theta_valid, theta_dot_valid, z_ddot_valid, each of shape
+    (N,); an invalid tau_m must already be 0.
     """
     rows = []
     y = np.column_stack((samples["theta"], samples["theta_dot"]))
     valid = np.column_stack((samples["theta_valid"], samples["theta_dot_valid"])).astype(bool)
+    base_valid = samples["z_ddot_valid"].astype(bool).tolist()
     time, base, torque = (samples[name].tolist() for name in ("time_s", "z_ddot", "tau_m"))
     for index in range(first, len(time)):
-        estimator.step(time[index], y[index], valid[index], (base[index], torque[index]))
+        estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index])
         if (index - first) % every == 0:
             x = (estimator.origin + estimator.belief.x, estimator.state_deviations())
             others = (*estimator.parameters(), *estimator.dynamics(), (estimator.trim, estimator.nis))

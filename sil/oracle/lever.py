@@ -84,7 +84,7 @@ class Lever:
         arm = cosine**2 - sine * (sine - np.sin(self.arm_preload_angle))
         return self.length**2 * k_p * arm + self.stiffness - GRAVITY * self.unbalance(m_p) * sine
 
-    def step(self, x: Array, p: Array, u: tuple[float | Array, float | Array], trim: float | Array, dt: float) -> Array:
+    def step(self, x: Array, p: Array, u: tuple[float | Array, ...], trim: float | Array, dt: float) -> Array:
         """The states dt [s] later under constant inputs, by the linearly implicit midpoint rule.
 
         `x` (2, …), `p` (3, …), inputs and trim broadcast against each other. Second order in dt; the damping is taken

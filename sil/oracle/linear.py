@@ -1,11 +1,15 @@
-"""The two linear models, in float64: a mass with spring and damper on a base, and a black box.
+"""The linear models, in float64: a mass with spring and damper on a base, a black box, and a hand.
 
     physical    x_ddot = -(k/m) x - (c/m) x_dot + z_ddot + f/m      p = [m kg, c N s/m, k N/m], all positive
     black box   x_ddot = a21 x + a22 x_dot + b21 z_ddot             p = [a21 1/s², a22 1/s, b21], of any sign
 
 x is what the samples carry as theta, counted from the trim (preload trim) or from where the lever's spring rests
-(preload fixed); f is what they carry as motor torque, which the black box does not take. Both have the interface of
-`lever.Lever`: `step` and `dynamics`.
+(preload fixed); f is what they carry as motor torque, which the black box does not take.
+
+    hand        d_ddot = -k d - c d_dot - z_ddot - c_space z_dot + f_d     p = [k 1/s², c 1/s, c_space 1/s], positive
+
+d is the motion of the hand in the cabin per unit of its mass, and x = d / (l cos(trim)) that of the lever. All have the
+interface of `lever.Lever`: `step` and `dynamics`.
 """
 
 from abc import ABC, abstractmethod
@@ -15,9 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .cdkf import Array
+from .lever import Lever
 
-Inputs = tuple[float | Array, float | Array]
-"""z̈ and f, between the samples."""
+Inputs = tuple[float | Array, ...]
+"""z̈ and f, between the samples; for the hand also ż."""
+
+COSINE_LEAST = 0.2  # of the trim
 
 
 @dataclass(frozen=True)
@@ -75,3 +82,26 @@ class LinearBlackBox(Linear):
     def coefficients(self, p: Array, u: Inputs) -> tuple[Array, Array, Array]:
         a21, a22, b21 = p
         return -a21, -a22, b21 * u[0]
+
+
+@dataclass(frozen=True)
+class Hand(Linear):
+    """A hand that is damped against the cabin and against space, on a lever of known length and inertia with it."""
+
+    length: float = 1.0  # l [m]
+    inertia: float = 1.0  # of lever and hand [kg m²]
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[str, float], preload: str) -> "Hand":
+        """The mass of the hand is the first guess of m_p."""
+        lever = Lever.from_settings(settings, preload)
+        inertia = float(lever.total_inertia(np.array(settings["m_p"])))
+        return cls(settings["lever_preload_angle"], preload, lever.length, inertia)
+
+    def step(self, x: Array, p: Array, u: Inputs, trim: float | Array, dt: float) -> Array:
+        of_d = -1.0 / (self.length * np.maximum(np.cos(trim), COSINE_LEAST))
+        return super().step(x, p, (of_d * u[0] + u[1] / self.inertia, of_d * u[2]), trim, dt)
+
+    def coefficients(self, p: Array, u: Inputs) -> tuple[Array, Array, Array]:
+        k, c, c_space = p
+        return k, c, u[0] + c_space * u[1]

@@ -15,6 +15,7 @@ PARAMETERS = {
     "lever": ("m_p", "c_p", "k_p"),
     "linear_physical": ("m", "c", "k"),
     "linear_black_box": ("a21", "a22", "b21"),
+    "hand": ("k_hand", "c_hand", "c_space"),
 }
 SIGNED = frozenset(("linear_black_box",))
 

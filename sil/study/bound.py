@@ -1,146 +1,78 @@
-"""How good an estimator can be at best: the posterior Cramér–Rao bound of a batch, run by run.
+"""The least mean square error that any estimator can have over a whole ensemble of runs: posterior Cramér–Rao bound.
 
 P. Tichavský, C. Muravchik, A. Nehorai, "Posterior Cramér–Rao bounds for discrete-time nonlinear filtering", IEEE Trans.
-Signal Processing 46 (1998). For z = [w; x] of a run with additive Gaussian noise its recursion of information matrices
-is, by the matrix inversion lemma, that of the covariance of a Kalman filter linearised at the true trajectory:
+Signal Processing 46 (1998), eq. 21, for z = [w; x] with additive Gaussian noise; E is over trajectories:
 
-    P⁻ = F P Fᵀ + Q,   F = df/dz at the truth
-    K = P⁻ Hᵀ (H P⁻ Hᵀ + R)⁻¹,   P = (I - K H) P⁻ (I - K H)ᵀ + K R Kᵀ
+    J⁺ = Q⁻¹ + Hᵀ R⁻¹ H - Q⁻¹ E[F] (J + E[Fᵀ Q⁻¹ F])⁻¹ E[F]ᵀ Q⁻¹,   F = df/dz at the truth
 
-*Why covariances.* The paper's own form needs Q⁻¹. Our Q is singular wherever a parameter has no walk, or the model no
-process noise, and next to singular always: the noise of theta is that of theta_dot integrated over one sample. The
-form above asks for nothing but R > 0.
+*How it is computed.* Let C = E[(F - E[F])ᵀ Q⁻¹ (F - E[F])]. By the matrix inversion lemma, with P = J⁻¹:
 
-*What averaging means.* The paper takes the expectation over trajectories inside the recursion, of the matrices made of
-F and Q⁻¹, so that one bound holds for the mean over all runs. Here each run has a bound of its own, given its inputs
-and its truth, and mean squares of errors are held against the mean of these bounds over runs. A Schur complement is
-concave in the matrix it is taken of, and an inverse convex: so that mean is never less than the paper's bound. It is
-the stricter measure, and nearer to what can be reached, since an estimator sees the inputs and nearly sees the truth.
-Where F does not depend on the truth both are the same, and the Kalman filter reaches them. Elsewhere it is strictly no
-limit: while the prior still counts an estimator may get below it.
+    P⁻ = E[F] (P⁻¹ + C)⁻¹ E[F]ᵀ + Q,   then the measurement update of a Kalman filter with H and R
 
-*Where it starts.* As an estimator does: at the first sample, knowing theta and theta_dot as well as they are measured
-and w as well as it is guessed. That the lever rests there is not used.
+so that Q⁻¹, which does not exist where a parameter has no walk, is needed of the states alone: F varies in their rows
+only. E is the mean over the runs of a batch, C with the divisor B - 1. Inputs differ from run to run and every
+estimator knows them; they are part of what E is over.
+
+*How tight it is.* An estimator rarely reaches it. C counts what is learnt of w as if theta and theta_dot were known
+without error. And it is information that is averaged over runs, where runs with much of it count most; in the mean of
+squared errors it is runs with little of it. An error of twice the bound is no sign of a bad estimator.
+
+*What it is a bound of.* The prior is N(guess, sigma²) of w and N(y_0, R) of the first state. In a matched run the lever
+is at rest first, and runs that leave the model's bounds are drawn again (matched.py): that is not counted here.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..oracle.cdkf import Array
-from .data import PARAMETERS, STATES, Batch, Knowledge
-
-_DIFFERENCE = 1e-4  # of w, theta [rad] and theta_dot [rad/s], for derivatives: right to 1e-8 of their size
-_BLOCK = 500  # samples linearised at a time, so that the arrays stay in the cache
-_SIZE = PARAMETERS + STATES
-
-
-@dataclass(frozen=True)
-class Bound:
-    """The bounds of a batch's runs."""
-
-    at: NDArray[np.int64]
-    """(T,) indices of samples, rising; what is known there includes the sample itself."""
-    covariance: Array
-    """(B, T, 5, 5) of [w; theta, theta_dot]."""
+from .data import PARAMETERS, Batch
+from .transitions import (
+    SIZE,
+    dynamics_gradient,
+    initial_covariance,
+    measured,
+    process_covariance,
+    transitions,
+    true_parameters,
+    with_dynamics,
+)
 
 
-def posterior_bound(batch: Batch, at: NDArray[np.int64]) -> Bound:
-    """The bound at the samples `at` of every run. Raises ValueError where the truth is no member of the model."""
-    z = _truth(batch)
-    process = _process_covariance(batch.knowledge, batch.period)
-    noise = np.diag(batch.knowledge.output_noise**2)
-    p = np.tile(np.diag((*batch.knowledge.sigma_w**2, *batch.knowledge.output_noise**2)), (batch.runs, 1, 1))
-    last = int(at[-1])
-    kept, wanted = {0: p}, set(at.tolist())
-    for begin in range(0, last, _BLOCK):
-        for k, transition in enumerate(_transitions(batch, z, begin, min(begin + _BLOCK, last)), begin + 1):
-            p = _update(transition @ p @ transition.transpose(0, 2, 1) + process, noise)
+def posterior_cramer_rao(batch: Batch, at: NDArray[np.int64]) -> Array:
+    """(T, 5, 5) bound of the covariance of errors of [w; theta, theta_dot] after the samples `at`, which rise.
+
+    Raises ValueError where the truth is no member of the model, or where the states have no process noise.
+    """
+    if batch.knowledge.process_noise <= 0.0:
+        raise ValueError("the posterior Cramér-Rao bound needs process noise: without it, it is 0")
+    process, noise = process_covariance(batch), np.diag(batch.knowledge.output_noise**2)
+    weight = np.linalg.inv(process[PARAMETERS:, PARAMETERS:])
+    p = initial_covariance(batch)
+    kept, wanted, k = {0: p}, set(at.tolist()), 0
+    for block in transitions(batch, int(at[-1])):
+        for mean, c in zip(*_moments(block, weight), strict=True):
+            k += 1
+            sharpened = p @ np.linalg.inv(np.eye(SIZE) + c @ p)
+            p = measured((mean @ sharpened @ mean.T + process)[np.newaxis], noise)[0]
             if k in wanted:
                 kept[k] = p
-    return Bound(at, np.stack([kept[k] for k in at.tolist()], axis=1))
+    return np.stack([kept[k] for k in at.tolist()])
 
 
-def variances(batch: Batch, bound: Bound) -> Array:
-    """(B, T, 5) least variances of w and of natural frequency and damping ratio, relative to the truth.
+def _moments(block: Array, weight: Array) -> tuple[Array, Array]:
+    """E[F] and C (n, 5, 5) of F (n, B, 5, 5); `weight` (2, 2) is the states' Q⁻¹."""
+    mean = block.mean(axis=1)
+    varying = (block - mean[:, np.newaxis])[:, :, PARAMETERS:]
+    c = np.einsum("nbai,nbaj->nij", varying, weight @ varying, optimize=True)
+    return mean, c / max(block.shape[1] - 1, 1)
 
-    The latter two by the delta method. These are what the squares of `scores.errors` are to be held against.
+
+def variances(batch: Batch, at: NDArray[np.int64], covariance: Array) -> Array:
+    """(T, 5) of w, natural frequency and damping ratio, the latter two relative, of posterior_cramer_rao().
+
+    The bound of a function is that of z through the mean of its gradient over trajectories.
     """
-    w = batch.knowledge.scaled(_parameters(batch)[:, bound.at])
-    covariance = bound.covariance[..., :PARAMETERS, :PARAMETERS]
-    own = np.diagonal(covariance, axis1=-2, axis2=-1)
-    return np.concatenate((own, dynamics_variances(batch, bound.at, w, covariance)), axis=-1)
-
-
-def rms(batch: Batch, bound: Bound) -> Array:
-    """(T, 5) least rms errors over the runs, of the quantities of `variances`."""
-    root: Array = np.sqrt(variances(batch, bound).mean(axis=0))
-    return root
-
-
-def dynamics_variances(batch: Batch, at: NDArray[np.int64], w: Array, covariance: Array) -> Array:
-    """(B, T, 2) of the logarithms of natural frequency and damping ratio, for w (B, T, 3) as uncertain as `covariance`.
-
-    First order, by differences of the logarithm; `covariance` is (B, T, 3, 3).
-    """
-    angle = batch.rest(at)
-
-    def logarithms(index: int, sign: float) -> Array:
-        moved = w + sign * _DIFFERENCE * np.eye(PARAMETERS)[index]
-        dynamics = batch.model.dynamics(np.moveaxis(batch.knowledge.physical(moved), -1, 0), angle)
-        return np.moveaxis(np.log(dynamics), 0, -1)
-
-    columns = [(logarithms(i, 1.0) - logarithms(i, -1.0)) / (2.0 * _DIFFERENCE) for i in range(PARAMETERS)]
-    gradient = np.stack(columns, axis=-1)
-    spread: Array = np.einsum("btqi,btij,btqj->btq", gradient, covariance, gradient)
-    return spread
-
-
-def _parameters(batch: Batch) -> Array:
-    if batch.truth.p is None:
-        raise ValueError("no bound: the truth is no member of the model")
-    return batch.truth.p
-
-
-def _truth(batch: Batch) -> Array:
-    """(5, B, K) z along the true trajectories."""
-    w = batch.knowledge.scaled(_parameters(batch))
-    return np.ascontiguousarray(np.moveaxis(np.concatenate((w, batch.truth.x), axis=-1), -1, 0))
-
-
-def _process_covariance(knowledge: Knowledge, period: float) -> Array:
-    covariance = np.zeros((_SIZE, _SIZE))
-    covariance[:PARAMETERS, :PARAMETERS] = np.diag(knowledge.walk_w**2 * period)
-    covariance[PARAMETERS:, PARAMETERS:] = knowledge.process_covariance(period)
-    return covariance
-
-
-def _transitions(batch: Batch, z: Array, begin: int, end: int) -> Array:
-    """(n, B, 5, 5) F of the steps from the samples begin to end - 1, by central differences."""
-    mean = 0.5 * (batch.u[:, begin:end] + batch.u[:, begin + 1 : end + 1])
-    u, trim, start = (mean[..., 0], mean[..., 1]), batch.trim[:, begin:end], z[:, :, begin:end]
-
-    def moved(index: int, difference: float) -> Array:
-        shifted = start.copy()
-        shifted[index] += difference
-        p = np.moveaxis(batch.knowledge.physical(np.moveaxis(shifted[:PARAMETERS], 0, -1)), -1, 0)
-        return batch.model.step(shifted[PARAMETERS:], p, u, trim, batch.period)
-
-    transitions = np.zeros((end - begin, batch.runs, _SIZE, _SIZE))
-    transitions[..., :PARAMETERS, :PARAMETERS] = np.eye(PARAMETERS)
-    for index in range(_SIZE):
-        slope = (moved(index, _DIFFERENCE) - moved(index, -_DIFFERENCE)) / (2.0 * _DIFFERENCE)
-        transitions[..., PARAMETERS:, index] = slope.transpose(2, 1, 0)
-    return transitions
-
-
-def _update(p: Array, noise: Array) -> Array:
-    """(B, 5, 5) covariance after a sample of both states with the covariance `noise` (2, 2), of that before it."""
-    gain = p[:, :, PARAMETERS:] @ np.linalg.inv(p[:, PARAMETERS:, PARAMETERS:] + noise)
-    remains = np.tile(np.eye(_SIZE), (len(p), 1, 1))
-    remains[:, :, PARAMETERS:] -= gain
-    updated: Array = remains @ p @ remains.transpose(0, 2, 1) + gain @ noise @ gain.transpose(0, 2, 1)
-    return updated
+    w = batch.knowledge.scaled(true_parameters(batch)[:, at])
+    return with_dynamics(covariance[:, :PARAMETERS, :PARAMETERS], dynamics_gradient(batch, at, w).mean(axis=0))

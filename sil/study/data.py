@@ -126,7 +126,7 @@ class Batch:
     period: float
     """[s]"""
     y: Array
-    """(B, K, 2) measured theta [rad], theta_dot [rad/s]; no sample is missing."""
+    """(B, K, 2) measured theta [rad], theta_dot [rad/s]."""
     u: Array
     """(B, K, 2) known inputs at the samples: z_ddot [m/s²], tau_m [N m]."""
     trim: Array
@@ -137,6 +137,8 @@ class Batch:
     """(B, K, 2) y before detrending: what the firmware, which detrends by itself, is fed with."""
     raw_u: Array
     """(B, K, 2) u before detrending."""
+    missing: NDArray[np.bool_] | None = None
+    """(B, K, 2) which of y are missing, for the joint filters alone; None: none."""
 
     @property
     def runs(self) -> int:

@@ -15,6 +15,10 @@ from .data import PARAMETERS, Batch, Estimates
 _PAIRS = ((0, 1), (0, 2), (1, 2))  # of parameter_correlation
 
 
+EXACT = dict.fromkeys(("z_ddot_gain_sigma", "z_ddot_delay_sigma", "tau_m_gain_sigma", "lever_friction_sigma"), 0.0)
+"""Settings for data whose inputs are measured without errors, of a lever without friction."""
+
+
 @dataclass(frozen=True)
 class Firmware:
     """The firmware as a `data.Estimator`: choices and settings by name, defaults for what is not given.
@@ -30,7 +34,7 @@ class Firmware:
     settings: Mapping[str, float] = field(default_factory=dict)
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
-        config = Config(self.model, self.preload, self.estimator, self.adaptation, settings=self.settings)
+        config = Config(self.model, self.preload, self.estimator, self.adaptation, settings=EXACT | dict(self.settings))
         time_us = np.arange(batch.samples, dtype=np.int64) * round(batch.period * 1e6)
         runs = [
             run_samples(

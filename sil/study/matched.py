@@ -1,4 +1,4 @@
-"""Runs whose truth is exactly what a filter assumes: what the bound is for, and consistency can be tested on.
+"""Runs whose truth is exactly what a filter assumes: for linearised.py, bound.py and tests of consistency.
 
     w_0 ~ N(0, sigma²)            w_k+1 = w_k + walk √dt N(0, 1)
     x_0 at rest                   x_k+1 = f(x_k, p(w_k), mean of u_k and u_k+1) + N(0, Q)         y_k = x_k + N(0, R)

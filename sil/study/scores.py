@@ -1,4 +1,4 @@
-"""How good estimates are: errors against the bound, honesty of the stated covariances, time to converge.
+"""How good estimates are: errors against references, honesty of the stated covariances, time to converge.
 
 All functions are pure and take arrays with runs first and times second, so that a window of time is a slice. The tests
 on normalised squares of errors (NEES) and of innovations (NIS) are those of Y. Bar-Shalom, X. R. Li, T. Kirubarajan,
@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
+from scipy.stats import bootstrap, chi2
 
 from ..oracle.cdkf import Array
 from .data import Batch, Estimates
-
-_BISECTIONS = 100  # halvings of an interval: to the last bit
-
 
 # --- errors ----------------------------------------------------------------------------------------------------------
 
@@ -42,27 +39,36 @@ def rms(deviations: Array) -> Array:
     return mean
 
 
-# --- against the bound -----------------------------------------------------------------------------------------------
+# --- against references ----------------------------------------------------------------------------------------------
 
 
 def ratio(deviations: Array, variances: Array) -> Array:
-    """(n,) rms of errors (B, T, n) ÷ root of the mean of their least variances (bound.variances).
+    """(n,) rms of errors (B, T, n) ÷ root of the mean of variances (B, T, n) or (T, n) (linearised.py, bound.py).
 
     With the squares of another estimator's errors for `variances`: how the two compare. On the same data that ratio has
     the smaller spread, as most of what chance does, it does to both.
     """
-    quotient: Array = rms(deviations) / np.sqrt(np.mean(variances, axis=(0, 1)))
+    quotient: Array = rms(deviations) / np.sqrt(np.mean(np.broadcast_to(variances, deviations.shape), axis=(0, 1)))
     return quotient
 
 
 def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 2000) -> Array:
     """(n,) standard error of `ratio`, by drawing runs with replacement (B. Efron, Annals of Statistics 7, 1979).
 
-    Times of one run depend on each other, so it is runs that are drawn.
+    Times of one run depend on each other, so it is runs that are drawn. NaN for a single run.
     """
-    square, least = (np.mean(part, axis=1) for part in (np.square(deviations), variances))
-    drawn = np.random.default_rng(seed).integers(len(square), size=(draws, len(square)))
-    spread: Array = np.std(np.sqrt(square[drawn].mean(axis=1) / least[drawn].mean(axis=1)), axis=0, ddof=1)
+    square, least = (
+        np.mean(np.broadcast_to(part, deviations.shape), axis=1) for part in (np.square(deviations), variances)
+    )
+    if len(square) < 2:
+        return np.full(square.shape[1], np.nan)
+
+    def quotient(square: Array, least: Array, axis: int) -> Array:
+        root: Array = np.sqrt(square.mean(axis=axis) / least.mean(axis=axis))
+        return root
+
+    drawn = bootstrap((square, least), quotient, paired=True, axis=0, n_resamples=draws, method="percentile", rng=seed)
+    spread: Array = drawn.standard_error
     return spread
 
 
@@ -89,7 +95,7 @@ class Consistency:
     mean: float
     """Over runs and times."""
     mean_band: tuple[float, float]
-    """Where the mean would lie in 95 % of batches."""
+    """Where the mean would lie in 95 % of batches, or more: times of one run depend on each other (consistency())."""
     inside: float
     """Share of times at which the mean over runs lies in its chi-square's 95 % band; 0.95 on average."""
 
@@ -100,57 +106,22 @@ class Consistency:
 
 
 def consistency(squares: Array, freedom: int) -> Consistency:
-    """Of NEES or NIS (B, T), at least two runs, each expected to be chi-square with `freedom` degrees of freedom.
+    """Of NEES or NIS (B, T), each expected to be chi-square with `freedom` degrees of freedom.
 
-    Times of one run depend on each other, runs do not: so the mean's band is `freedom` ± Student's t for the means of
-    the runs, with the spread that those have.
+    The mean over B runs at one time lies in the band of chi-square with B `freedom` degrees of freedom, ÷ B. That is
+    taken for the band of the mean over all times as well: right where a run's squares hardly change in time, and wider
+    than need be where they do.
     """
-    runs = len(squares)
-    low, high = chi_square_band(freedom * runs)
-    over_runs, over_times = squares.mean(axis=0), squares.mean(axis=1)
-    half = student_95(runs - 1) * float(over_times.std(ddof=1)) / math.sqrt(runs)
-    inside = np.mean((over_runs >= low / runs) & (over_runs <= high / runs))
-    return Consistency(float(freedom), float(squares.mean()), (freedom - half, freedom + half), float(inside))
+    low, high = (edge / len(squares) for edge in chi_square_band(freedom * len(squares)))
+    over_runs = squares.mean(axis=0)
+    inside = np.mean((over_runs >= low) & (over_runs <= high))
+    return Consistency(float(freedom), float(squares.mean()), (low, high), float(inside))
 
 
 def chi_square_band(freedom: int) -> tuple[float, float]:
     """The middle 95 % of chi-square."""
-    return _chi_square_quantile(0.025, freedom), _chi_square_quantile(0.975, freedom)
-
-
-def _chi_square_quantile(probability: float, freedom: int) -> float:
-    low, high = 0.0, freedom + 20.0 * math.sqrt(2.0 * freedom) + 20.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _chi_square_tail(middle, freedom) > 1.0 - probability else (low, middle)
-    return 0.5 * (low + high)
-
-
-def _chi_square_tail(value: float, freedom: int) -> float:
-    """Probability of more than `value`: Poisson's sum if `freedom` is even, with half powers and erfc if it is odd
-    (Abramowitz and Stegun 1964, 26.4.4 and 26.4.5)."""
-    half, start = 0.5 * value, 0.5 * (freedom % 2)
-    if half == 0.0:
-        return 1.0
-    powers = (start + index for index in range(freedom // 2))
-    terms = (math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers)
-    return math.fsum(terms) + (math.erfc(math.sqrt(half)) if start else 0.0)
-
-
-def student_95(freedom: int) -> float:
-    """What the magnitude of Student's t exceeds in 5 %, right to 0.2 % from 3 degrees of freedom on.
-
-    Fisher's expansion about the normal value (Abramowitz and Stegun 1964, 26.7.5).
-    """
-    x = NormalDist().inv_cdf(0.975)
-    terms: tuple[float, ...] = (
-        x,
-        (x**3 + x) / 4.0,
-        (5.0 * x**5 + 16.0 * x**3 + 3.0 * x) / 96.0,
-        (3.0 * x**7 + 19.0 * x**5 + 17.0 * x**3 - 15.0 * x) / 384.0,
-        (79.0 * x**9 + 776.0 * x**7 + 1482.0 * x**5 - 1920.0 * x**3 - 945.0 * x) / 92160.0,
-    )
-    return math.fsum(term / float(freedom**power) for power, term in enumerate(terms))
+    low, high = chi2.ppf((0.025, 0.975), freedom)
+    return float(low), float(high)
 
 
 # --- convergence -----------------------------------------------------------------------------------------------------

@@ -12,8 +12,8 @@ from ..data import Estimator, Model
 from .algorithm1 import Algorithm1
 from .balance import MODELS as LINEAR_IN_COEFFICIENTS
 from .dual_ekf import dual_ekf
-from .filterpy_ukf import FilterPyUkf
 from .joint_ekf import joint_ekf
+from .joint_ukf import joint_ukf
 from .lms import Nlms
 from .rls import Rls
 
@@ -58,6 +58,7 @@ BASELINES = {
             dual_ekf,
         ),
         Baseline("joint_ekf", "joint extended Kalman filter", "Kopp and Orford 1963, Jazwinski 1970", joint_ekf),
+        Baseline("joint_ukf", "joint unscented Kalman filter", "Wan and van der Merwe 2000", joint_ukf),
         Baseline(
             "rls",
             "recursive least squares with exponential forgetting",
@@ -66,6 +67,5 @@ BASELINES = {
             LINEAR_IN_COEFFICIENTS,
         ),
         Baseline("lms", "normalised least mean squares", "Elliott 2001", Nlms(), LINEAR_IN_COEFFICIENTS),
-        Baseline("filterpy_ukf", "joint unscented Kalman filter, off the shelf", "FilterPy (Labbe)", FilterPyUkf()),
     )
 }

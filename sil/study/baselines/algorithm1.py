@@ -24,7 +24,17 @@ from numpy.typing import NDArray
 
 from ...oracle.cdkf import C1, C2, H_SQUARED, Array, H
 from ..data import PARAMETERS, STATES, Batch, Estimates
-from .recursion import apply, follow, gain, no_innovation, output_covariance, repeated, transposed, walk_covariance
+from .recursion import (
+    apply,
+    factor,
+    follow,
+    gain,
+    no_innovation,
+    output_covariance,
+    repeated,
+    transposed,
+    walk_covariance,
+)
 
 
 @dataclass(frozen=True)
@@ -83,18 +93,3 @@ def differences(values: Array) -> tuple[Array, Array, Array]:
     both = plus + minus
     mean = ((H_SQUARED - n) * centre[:, 0] + 0.5 * both.sum(axis=1)) / H_SQUARED
     return mean, C1 * (plus - minus), C2 * (both - 2.0 * centre)
-
-
-def factor(covariance: Array) -> Array:
-    """Cholesky factors (B, n, n); NaN for a run whose covariance is no longer positive definite."""
-    try:
-        return np.linalg.cholesky(covariance)
-    except np.linalg.LinAlgError:
-        return np.stack([_factor_or_nan(run) for run in covariance])
-
-
-def _factor_or_nan(covariance: Array) -> Array:
-    try:
-        return np.linalg.cholesky(covariance)
-    except np.linalg.LinAlgError:
-        return np.full_like(covariance, np.nan)

@@ -73,6 +73,21 @@ def normalised_square(innovation: Array, covariance: Array) -> Array:
     return square
 
 
+def factor(covariance: Array) -> Array:
+    """Cholesky factors (B, n, n); NaN for a run whose covariance is no longer positive definite."""
+    try:
+        return np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        return np.stack([_factor_or_nan(run) for run in covariance])
+
+
+def _factor_or_nan(covariance: Array) -> Array:
+    try:
+        return np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        return np.full_like(covariance, np.nan)
+
+
 class Slopes:
     """The step of a batch's model with its first derivatives, by central differences in one call of the model."""
 

@@ -1,7 +1,7 @@
 """Runs entrants on cases, in processes, and brings back their errors. Nothing is kept on disk.
 
-A task is a case with an entrant, or with nobody: that is the bound. Tasks go case by case, so each process makes the
-batch of a case once and keeps it until the next.
+A task is a case with an entrant, or with nobody: those are the references. Tasks go case by case, so each process makes
+the batch of a case once and keeps it until the next.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...oracle.cdkf import Array
-from ..bound import dynamics_variances
 from ..data import PARAMETERS, Batch, Estimates
 from ..scores import errors, normalised_squares
-from .cases import Case, Matched, Plan, cases
+from ..transitions import dynamics_gradient, with_dynamics
+from .cases import Case, Matched, Plan, References, cases
 from .entrants import entrants
 
 Progress = Callable[[int, int, str], None]
@@ -56,8 +56,8 @@ class Results:
     plan: Plan
     outcomes: dict[tuple[str, str], Outcome]
     """By names of case and entrant."""
-    least: dict[str, Array]
-    """Bounds by name of case, (B, T, 5), where there is one."""
+    references: dict[str, References]
+    """By name of case, where there are any."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,11 @@ class Task:
 
     case: str
     entrant: str | None
-    """None: the bound."""
+    """None: the references."""
     plan: Plan
 
     def __str__(self) -> str:
-        return f"{self.case}: {self.entrant or 'bound'}"
+        return f"{self.case}: {self.entrant or 'references'}"
 
 
 def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> list[Task]:
@@ -80,8 +80,8 @@ def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> lis
     for name in chosen:
         case = cases()[name]
         taking = [entrant for entrant in entrants(case) if wanted is None or entrant in wanted]
-        bound = [None] if taking and isinstance(case, Matched) else []
-        found += [Task(name, entrant, plan) for entrant in (*bound, *taking)]
+        nobody = [None] if taking and isinstance(case, Matched) else []
+        found += [Task(name, entrant, plan) for entrant in (*nobody, *taking)]
     return found
 
 
@@ -92,13 +92,13 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Result
         if isinstance(result, Outcome):
             results.outcomes[task.case, task.entrant or ""] = result
         elif result is not None:
-            results.least[task.case] = result
+            results.references[task.case] = result
         if progress is not None:
             progress(done, len(todo), str(task))
     return results
 
 
-def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, Outcome | Array | None]]:
+def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, Outcome | References | None]]:
     if jobs == 1 or len(todo) == 1:
         yield from map(do, todo)
         return
@@ -107,18 +107,18 @@ def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, Outcome | Arra
         yield from pool.imap_unordered(do, todo)
 
 
-def do(task: Task) -> tuple[Task, Outcome | Array | None]:
+def do(task: Task) -> tuple[Task, Outcome | References | None]:
     """One task."""
     case = cases()[task.case]
     batch = _batch(task.case, task.plan)
     at = samples(case, batch)
     if task.entrant is None:
-        return task, case.least(batch, at, task.plan)
+        return task, case.references(batch, at, task.plan)
     entrant = entrants(case)[task.entrant]
-    share, estimator = entrant.share(batch), entrant.make(case)
+    estimator = entrant.make(case)
     start = clock.process_time()
-    estimates = estimator(share, at)
-    return task, outcome(share, estimates, clock.process_time() - start)
+    estimates = estimator(batch, at)
+    return task, outcome(batch, estimates, clock.process_time() - start)
 
 
 @lru_cache(maxsize=1)
@@ -150,8 +150,7 @@ def _stated(batch: Batch, estimates: Estimates, deviations: Array) -> tuple[Arra
     if estimates.covariance is None or batch.truth.p is None:
         return None, None
     own = np.diagonal(estimates.covariance, axis1=-2, axis2=-1)
-    dynamics = dynamics_variances(batch, estimates.at, estimates.w, estimates.covariance)
-    stated = np.concatenate((own, dynamics), axis=-1)
+    stated = with_dynamics(estimates.covariance, dynamics_gradient(batch, estimates.at, estimates.w))
     intact = np.isfinite(own).all(axis=-1) & (own > 0.0).all(axis=-1)
     covariance = np.where(intact[..., None, None], estimates.covariance, np.eye(PARAMETERS))
     squares = normalised_squares(deviations[..., :PARAMETERS], covariance)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ... import scenario as scenarios
 from ...oracle.cdkf import Array
-from ..bound import posterior_bound, variances
+from .. import bound, linearised
 from ..data import Batch
 from ..detrended import detrended
 from ..matched import Condition, matched
@@ -34,6 +34,16 @@ QUIET, ROUGH = 0.01, 0.1
 _MOST_RECORDED = 20  # runs
 DITHER = 0.3
 """[N m] rms"""
+
+
+@dataclass(frozen=True)
+class References:
+    """Variances of w and of natural frequency and damping ratio relative to the truth, for the errors of all."""
+
+    linearised: Array
+    """(B, T, 5) of the Kalman filter linearised at the truth (linearised.py): of each run."""
+    bound: Array
+    """(T, 5) posterior Cramér–Rao bound (bound.py): of the mean over runs."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +74,6 @@ class Case(ABC):
     """[s] unless the plan has another."""
     every: float = 0.1
     """Time between two estimates that are looked at [s]."""
-    slow_too: bool = False
-    """Whether estimators take part that need a minute a run."""
 
     @abstractmethod
     def batch(self, plan: Plan) -> Batch:
@@ -89,8 +97,8 @@ class Case(ABC):
         """When the parameters jump [s]; None where they do not."""
         return None
 
-    def least(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> Array | None:
-        """(B, T, 5) least variances (bound.variances), None where there is no bound."""
+    def references(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> References | None:
+        """What errors are held against; None where the truth is not drawn from the model."""
         return None
 
     def runs(self, plan: Plan) -> int:
@@ -110,7 +118,7 @@ class Case(ABC):
 class Matched(Case):
     """Random walks that are exactly what a filter assumes (matched.py), judged from a quarter of the run on.
 
-    With preload trim all estimators get detrended signals; the bound is for whoever knows the trim.
+    With preload trim all estimators get detrended signals; the references know the trim.
     """
 
     kind: str = "matched"
@@ -136,9 +144,12 @@ class Matched(Case):
     def judged(self, time: Array, plan: Plan) -> BoolArray:
         return time >= self.scaled(15.0, plan)
 
-    def least(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> Array:
+    def references(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> References:
         exact = batch if self.preload == "fixed" else self._exact(plan)
-        return variances(exact, posterior_bound(exact, at))
+        return References(
+            linearised.variances(exact, at, linearised.covariances(exact, at)),
+            bound.variances(exact, at, bound.posterior_cramer_rao(exact, at)),
+        )
 
     def _exact(self, plan: Plan) -> Batch:
         condition = Condition(
@@ -238,7 +249,6 @@ def _matched() -> Iterator[Case]:
                         preload=preload,
                         dither_rms=dither,
                         process_noise=noise,
-                        slow_too=preload == "fixed" and noise == ROUGH and (dither > 0.0 or model not in _WITH_TORQUE),
                     )
 
 
@@ -251,7 +261,6 @@ def _steps() -> Iterator[Case]:
                     title=f"k_p and c_p × {factor:g}, seen by {model}, process noise {noise:g} rad/s/√s",
                     model=model,
                     step=Step(factor=factor, process_noise=noise),
-                    slow_too=model == "lever" and noise == 0.05 and factor > 1.0,
                 )
 
 

@@ -22,16 +22,31 @@ _LANE = 22  # [pixels] of one estimator in a figure, for one series; further one
 _SHOWN_AFTER = 15.0  # [s] after a step
 
 
+def linearised(rows: Sequence[Row], model: str, preload: str) -> Figure | None:
+    """Error of each estimator in the matched cases of a model ÷ that of the filter linearised at the truth."""
+    chosen = [row for row in _walks(rows, model, preload) if math.isfinite(_average(row.linearised))]
+    return _lanes(
+        chosen,
+        "error ÷ Kalman filter linearised at the truth",
+        lambda row: _average(row.linearised),
+        lambda row: _average(row.linearised_error),
+        1.0,
+    )
+
+
 def bound(rows: Sequence[Row], model: str, preload: str) -> Figure | None:
-    """Error ÷ bound of each estimator in the matched cases of a model."""
+    """The same ÷ posterior Cramér–Rao bound."""
     chosen = [row for row in _walks(rows, model, preload) if math.isfinite(_average(row.bound))]
-    return _lanes(chosen, "error ÷ bound", lambda row: _average(row.bound), lambda row: _average(row.bound_error), 1.0)
+    return _lanes(chosen, "error ÷ posterior Cramér–Rao bound", lambda row: _average(row.bound), lambda _: 0.0, 1.0)
 
 
 def nees(rows: Sequence[Row], model: str) -> Figure | None:
-    """Mean NEES of each estimator in the matched cases of a model, preload fixed, with half its 95 % band."""
+    """Mean NEES of each estimator in the matched cases of a model, preload fixed, with its 95 % band."""
     chosen = [row for row in _walks(rows, model, "fixed") if math.isfinite(row.nees)]
-    return _lanes(chosen, "NEES", lambda row: row.nees, lambda row: row.nees_high - 3.0, 3.0)
+    figure = _lanes(chosen, "NEES", lambda row: row.nees, lambda _: 0.0, 3.0)
+    if figure is not None:
+        figure.shapes += [_vertical(edge, "fault") for edge in (chosen[0].nees_low, chosen[0].nees_high)]
+    return figure
 
 
 def _walks(rows: Sequence[Row], model: str, preload: str) -> list[Row]:

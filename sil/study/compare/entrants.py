@@ -8,27 +8,18 @@ are shipped, too, and told a measurement noise (r) and a process noise (q) wrong
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from importlib.util import find_spec
+from dataclasses import dataclass
 
 from lever_cdkf.host_tools.config import settings_table
 
 from ..baselines import BASELINES
-from ..data import Batch, Estimator, Truth
+from ..data import Estimator
 from ..firmware import Firmware
 from ..matched import KINDS
 from .cases import Case
 
 OURS = ("dual", "joint")
 _FACTORS = {"0.1": 0.1, "1": 1.0, "10": 10.0}
-FEW = {"filterpy_ukf": 2}
-"""Most runs of estimators that take a minute for each; they take part in a few cases only (Case.slow_too)."""
-_PACKAGES = {"filterpy_ukf": "filterpy"}
-
-
-def without_package() -> dict[str, str]:
-    """Estimators of a package that is not installed, with its name."""
-    return {name: package for name, package in _PACKAGES.items() if find_spec(package) is None}
 
 
 @dataclass(frozen=True)
@@ -39,28 +30,8 @@ class Entrant:
     title: str
     ours: bool
     make: Callable[[Case], Estimator]
-    few: int | None = None
-    """Most runs it gets; None: all."""
     reference: str = ""
     """The entrant against which errors are told besides."""
-
-    def share(self, batch: Batch) -> Batch:
-        """The part of the batch that it gets."""
-        return batch if self.few is None else first_runs(batch, self.few)
-
-
-def first_runs(batch: Batch, runs: int) -> Batch:
-    """The batch of the first runs of another."""
-    part, truth = slice(runs), batch.truth
-    return replace(
-        batch,
-        y=batch.y[part],
-        u=batch.u[part],
-        trim=batch.trim[part],
-        raw_y=batch.raw_y[part],
-        raw_u=batch.raw_u[part],
-        truth=Truth(truth.x[part], None if truth.p is None else truth.p[part], truth.dynamics[part]),
-    )
 
 
 def entrants(case: Case) -> dict[str, Entrant]:
@@ -137,9 +108,9 @@ def _baselines(case: Case) -> list[Entrant]:
     settings = {row.name: row.default for row in settings_table()}
     model = KINDS[case.model].make(settings, case.preload)
     return [
-        Entrant(name, f"{baseline.title} ({baseline.source})", False, _always(baseline.run), FEW.get(name))
+        Entrant(name, f"{baseline.title} ({baseline.source})", False, _always(baseline.run))
         for name, baseline in BASELINES.items()
-        if baseline.handles(model) and (name not in FEW or case.slow_too)
+        if baseline.handles(model)
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,8 @@ from ..data import OUTPUTS, PARAMETERS
 from ..matched import KINDS
 from ..scores import Consistency, consistency, honesty, median_and_worst, ratio, ratio_spread, rms, settling_times
 from .campaign import Outcome, Results
-from .cases import BoolArray, Case, cases
+from .cases import BoolArray, Case, References, cases
+from .comparison import Differences, corrected, of_errors, of_times
 from .entrants import Entrant, entrants
 
 Five = tuple[float, float, float, float, float]
@@ -39,19 +41,25 @@ class Row:
     rms: Five = UNKNOWN
     """Errors relative to the truth."""
     score: float = math.nan
-    """Geometric mean over the quantities of rms errors as they are held against the bound: who is best."""
+    """Geometric mean over the quantities of rms errors as they are held against the references: who is best."""
     against: Five = UNKNOWN
     """rms error ÷ that of the entrant's reference."""
+    linearised: Five = UNKNOWN
+    """rms error ÷ that of the Kalman filter linearised at the truth."""
+    linearised_error: Five = UNKNOWN
+    """Its standard error."""
     bound: Five = UNKNOWN
-    """rms error ÷ bound."""
-    bound_error: Five = UNKNOWN
+    """rms error ÷ posterior Cramér–Rao bound."""
+    baseline: Five = UNKNOWN
+    """Of ours: rms error ÷ that of the best baseline, quantity by quantity."""
+    baseline_error: Five = UNKNOWN
     """Its standard error."""
     honesty: Five = UNKNOWN
     """Stated standard deviation ÷ rms error."""
     nees: float = math.nan
     nees_low: float = math.nan
     nees_high: float = math.nan
-    """Where its mean would lie in 95 % of batches."""
+    """Where its mean would lie in 95 % of batches or more."""
     nees_inside: float = math.nan
     """Share of times at which the mean over runs is in its 95 % band."""
     nis: float = math.nan
@@ -89,7 +97,7 @@ def judge(results: Results) -> list[Row]:
             reference = judged.get(of_case[name].reference)
             against = UNKNOWN if reference is None else _five(np.divide(row.rms, reference.rms))
             rows.append(replace(row, against=against, relative_time=row.microseconds / pace))
-    return rows
+    return [_with_baseline(row, rows, results) for row in rows]
 
 
 def _row(case: Case, entrant: Entrant, results: Results) -> Row:
@@ -109,8 +117,8 @@ def _row(case: Case, entrant: Entrant, results: Results) -> Row:
         return row
     row = _with_errors(row, outcome, intact, judged)
     row = _with_consistency(row, outcome, intact, judged)
-    if case.name in results.least:
-        row = _with_bound(row, outcome.errors[intact][:, judged], results.least[case.name], intact, judged)
+    if case.name in results.references:
+        row = _with_references(row, outcome.errors[intact][:, judged], results.references[case.name], intact, judged)
     change = case.change(results.plan)
     if change is None:
         return row
@@ -136,14 +144,65 @@ def _with_errors(row: Row, outcome: Outcome, intact: BoolArray, judged: BoolArra
     return replace(row, honesty=_five(honesty(errors, outcome.stated[intact][:, judged])))
 
 
-def _with_bound(row: Row, errors: Array, least: Array, intact: BoolArray, judged: BoolArray) -> Row:
-    part = least[: len(intact)][intact][:, judged]
-    row = replace(row, bound=_five(ratio(errors, part)))
-    return replace(row, bound_error=_five(ratio_spread(errors, part, seed=0))) if len(errors) > 1 else row
+def _with_references(row: Row, errors: Array, known: References, intact: BoolArray, judged: BoolArray) -> Row:
+    linearised = known.linearised[intact][:, judged]
+    return replace(
+        row,
+        linearised=_five(ratio(errors, linearised)),
+        linearised_error=_five(ratio_spread(errors, linearised, seed=0)),
+        bound=_five(ratio(errors, known.bound[judged])),
+    )
+
+
+def _with_baseline(row: Row, rows: list[Row], results: Results) -> Row:
+    """One of ours beside the best baseline of each quantity."""
+    others = [other for other in rows if other.case == row.case and not other.ours and other.ranked]
+    if not (row.ours and row.ranked and others):
+        return row
+    best = [min(others, key=lambda other: other.rms[index]).estimator for index in range(len(UNKNOWN))]
+    own, case = judged_errors(results, row.case, row.estimator), row.case
+    theirs = np.stack([judged_errors(results, case, name)[..., i] for i, name in enumerate(best)], axis=-1)
+    squares = np.square(theirs)
+    return replace(row, baseline=_five(ratio(own, squares)), baseline_error=_five(ratio_spread(own, squares, seed=0)))
+
+
+def judged_errors(results: Results, case: str, estimator: str) -> Array:
+    """(B, T, 5) errors at the times that count."""
+    outcome = results.outcomes[case, estimator]
+    return outcome.errors[:, cases()[case].judged(outcome.time, results.plan)]
+
+
+def compare(results: Results, rows: list[Row]) -> tuple[Differences, Differences]:
+    """Of the errors, and of the times after a step, of those that did all runs of a case, against the best of them."""
+    errors: Differences = {}
+    times: Differences = {}
+    for case in {row.case: None for row in rows}:
+        names = [row.estimator for row in rows if row.case == case and row.ranked and math.isfinite(row.score)]
+        if len(names) < 2:
+            continue
+        squares = {name: np.square(judged_errors(results, case, name)).mean(axis=1) for name in names}
+        known = np.isfinite(next(iter(squares.values()))).all(axis=0)
+        errors |= of_errors(case, {name: square[:, known] for name, square in squares.items()})
+        change = cases()[case].change(results.plan)
+        if change is not None:
+            times |= of_times(case, _times(results, case, names, change))
+    first, second = corrected(errors, times)
+    return first, second
+
+
+def _times(results: Results, case: str, names: list[str], change: float) -> Mapping[str, Array]:
+    """(B,) settling times [s]; never counts as the time that was left, at once as the time between two estimates."""
+    found = {}
+    for name in names:
+        outcome = results.outcomes[case, name]
+        elapsed = outcome.time - change
+        times = settling_times(outcome.errors[..., FREQUENCY], elapsed)
+        found[name] = np.maximum(np.where(np.isnan(times), elapsed[-1], times), cases()[case].every)
+    return found
 
 
 def _with_consistency(row: Row, outcome: Outcome, intact: BoolArray, judged: BoolArray) -> Row:
-    """NEES and NIS, where they are known of at least two runs."""
+    """NEES and NIS, where they are known."""
     nees = _consistent(outcome.nees, PARAMETERS, intact, judged)
     if nees is not None:
         low, high = nees.mean_band
@@ -154,7 +213,7 @@ def _with_consistency(row: Row, outcome: Outcome, intact: BoolArray, judged: Boo
 
 def _consistent(squares: Array | None, freedom: int, intact: BoolArray, judged: BoolArray) -> Consistency | None:
     part = None if squares is None else squares[intact][:, judged]
-    if part is None or len(part) < 2 or not np.isfinite(part).all():
+    if part is None or not np.isfinite(part).all():
         return None
     return consistency(part, freedom)
 

@@ -51,8 +51,9 @@ def _line(row: Row) -> dict[str, Cell]:
     names = quantities(cases()[row.case])
     line: dict[str, Cell] = {"estimator": row.estimator, "runs": row.runs, "failed": row.failures}
     line |= {f"{name} rms [%]": _number(100.0 * value) for name, value in zip(names, row.rms, strict=True)}
-    line |= {f"{name} ÷ bound": _number(value) for name, value in zip(names, row.bound, strict=True)}
-    line["± of these"] = _number(max(row.bound_error), 2)
+    line |= {f"{name} ÷ linearised": _number(value) for name, value in zip(names, row.linearised, strict=True)}
+    line["± of these"] = _number(max(row.linearised_error), 2)
+    line |= {f"{name} ÷ Cramér-Rao": _number(value) for name, value in zip(names, row.bound, strict=True)}
     line |= {f"{name} ÷ reference": _number(value) for name, value in zip(names, row.against, strict=True)}
     line["NEES (3)"] = _number(row.nees)
     line["95 % band"] = None if math.isnan(row.nees_low) else f"{row.nees_low:.2f}-{row.nees_high:.2f}"

@@ -7,29 +7,35 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
+from scipy.stats import norm
+
 from .cases import Matched, Stepped, cases
+from .comparison import LEAST_RUNS, LEVEL, Differences
 from .entrants import OURS
 from .judgement import FREQUENCY, UNKNOWN, Five, Row, quantities
 
 NEAR = 1.03
-"""Two errors are as good as the same when one is no more than so many times the other."""
+"""Errors of the firmware may be so many times those of the best baseline."""
 
 
 # --- who wins --------------------------------------------------------------------------------------------------------
 
 
-def verdicts(rows: Sequence[Row]) -> dict[str, str]:
-    """A few sentences on each case."""
-    return {case: verdict(list(group)) for case, group in groupby(rows, key=lambda row: row.case)}
+def verdicts(rows: Sequence[Row], errors: Differences, times: Differences) -> dict[str, str]:
+    """A few sentences on each case; differences as of judgement.compare()."""
+    return {case: verdict(list(group), errors, times) for case, group in groupby(rows, key=lambda row: row.case)}
 
 
-def verdict(rows: Sequence[Row]) -> str:
+def verdict(rows: Sequence[Row], errors: Differences, times: Differences) -> str:
     """The sentences on one case."""
+    runs = rows[0].asked
+    if runs < LEAST_RUNS:
+        return " ".join((f"Too few runs for a verdict: {runs}, at least {LEAST_RUNS} are needed.", *_unranked(rows)))
     ranked = sorted((row for row in rows if row.ranked and math.isfinite(row.score)), key=lambda row: row.score)
-    when = " before the step" if rows and isinstance(cases()[rows[0].case], Stepped) else ""
-    parts = [f"Smallest errors{when}: {_winner(ranked)}"] if ranked else ["Nobody did all runs."]
-    parts += [_behind(ranked)] if ranked and not ranked[0].ours else []
-    parts += [_fastest(rows)] if any(not math.isnan(row.settled_median) for row in rows) else []
+    when = " before the step" if isinstance(cases()[rows[0].case], Stepped) else ""
+    parts = [f"Smallest errors{when}: {_winner(ranked, errors)}"] if ranked else ["Nobody did all runs."]
+    parts += [_behind(ranked, errors)] if ranked and not ranked[0].ours else []
+    parts += [_fastest(rows, times)] if any(not math.isnan(row.settled_median) for row in rows) else []
     parts += _unranked(rows)
     return " ".join(part for part in parts if part)
 
@@ -38,32 +44,36 @@ def _name(row: Row) -> str:
     return row.estimator if row.ours else f"{row.estimator} (baseline)"
 
 
-def _winner(ranked: Sequence[Row]) -> str:
+def _winner(ranked: Sequence[Row], errors: Differences) -> str:
     best, *others = ranked
-    near = [row for row in others if row.score <= NEAR * best.score]
-    beside = f"; within 3 %: {', '.join(_name(row) for row in near)}" if near else "; nobody is within 3 %"
+    alike = [row for row in others if not errors[row.case, row.estimator].significant]
+    names = ", ".join(f"{_name(row)} (+{100.0 * (row.score / best.score - 1.0):.0f} %)" for row in alike)
+    beside = f"; no significant difference to {names}" if alike else "; all others are significantly worse"
     return f"{_name(best)}{_size(best)}{beside if others else ''}."
 
 
 def _size(row: Row) -> str:
-    """Its errors, as times the bound where there is one."""
-    times = [value for value in row.bound if math.isfinite(value)]
+    """Its errors, as times those of the linearised filter where there is one."""
+    times = [value for value in row.linearised if math.isfinite(value)]
     if times:
-        return f" ({math.exp(math.fsum(map(math.log, times)) / len(times)):.2f} × the bound on average)"
+        mean = math.exp(math.fsum(map(math.log, times)) / len(times))
+        return f" ({mean:.2f} × the Kalman filter linearised at the truth on average)"
     return f" (natural frequency {100.0 * row.rms[FREQUENCY]:.2g} % rms)"
 
 
-def _behind(ranked: Sequence[Row]) -> str:
+def _behind(ranked: Sequence[Row], errors: Differences) -> str:
     ours = next((row for row in ranked if row.ours), None)
     if ours is None:
         return "None of ours took part with all runs."
-    loss = ours.score / ranked[0].score
-    if loss <= NEAR:
-        return f"Ours is not best, but {_name(ours)} is within 3 %."
-    return f"Ours is not best: {_name(ours)} has {100.0 * (loss - 1.0):.0f} % larger errors."
+    found = errors[ours.case, ours.estimator]
+    low, high = (100.0 * (edge - 1.0) for edge in found.interval())
+    more = f"{_name(ours)} has {100.0 * math.expm1(found.more):.0f} % larger errors ({low:.0f} to {high:.0f} %)"
+    if found.significant:
+        return f"Ours is not best: {more}."
+    return f"Ours is not best, but that may be chance: {more}."
 
 
-def _fastest(rows: Sequence[Row]) -> str:
+def _fastest(rows: Sequence[Row], times: Differences) -> str:
     able = [row for row in rows if row.ranked and math.isfinite(row.settled_median)]
     if not able:
         return "After the step nobody finds the natural frequency for good."
@@ -74,17 +84,16 @@ def _fastest(rows: Sequence[Row]) -> str:
     if others:
         second = min(others, key=lambda row: row.settled_median)
         who = "baseline" if best.ours else "of ours"
-        beside = f"; the fastest {who}, {second.estimator}: {second.settled_median:.2f} s"
+        found = times.get((best.case, second.estimator))  # None: as fast
+        chance = "" if found is not None and found.significant else ", which may be chance"
+        beside = f"; the fastest {who}, {second.estimator}: {second.settled_median:.2f} s{chance}"
     return f"Fastest after the step: {_name(best)} (median {best.settled_median:.2f} s, {worst}){beside}."
 
 
 def _unranked(rows: Sequence[Row]) -> Iterator[str]:
     failed = [f"{row.estimator} in {row.failures} of {row.runs} runs" for row in rows if row.failures]
-    few = [f"{row.estimator} ({row.runs} of {row.asked} runs)" for row in rows if row.runs < row.asked]
     if failed:
-        yield f"Broke down: {', '.join(failed)}."
-    if few:
-        yield f"Too slow to do all runs and so not ranked: {', '.join(few)}."
+        yield f"Broke down, and so not ranked: {', '.join(failed)}."
 
 
 # --- what was promised -----------------------------------------------------------------------------------------------
@@ -103,6 +112,8 @@ class Claim:
     """Standard error of what was measured; NaN: not known."""
     below: bool = True
     """Whether the limit is the most, or the least."""
+    by_chance: bool = False
+    """Whether no value misses the limit by more than chance may do, given how many values there are."""
 
     @property
     def kept(self) -> bool | None:
@@ -113,12 +124,12 @@ class Claim:
 
     @property
     def kept_in_words(self) -> str:
-        """With a note where more runs may tell otherwise: what is missed by no more than two standard errors."""
+        """With a note where more runs may tell otherwise."""
         if self.kept is None:
             return "not run"
         if self.kept:
             return "yes"
-        return "no, but within chance" if abs(self.measured - self.limit) <= 2.0 * self.error else "no"
+        return "no, but within chance" if self.by_chance else "no"
 
 
 Value = tuple[float, str, float]
@@ -132,17 +143,20 @@ def claims(rows: Sequence[Row]) -> list[Claim]:
     def add(text: str, limit: float, values: Iterable[Value], below: bool = True) -> None:
         known = [value for value in values if not math.isnan(value[0])]
         worst = (max if below else min)(known, key=lambda value: value[0], default=(math.nan, "not run", math.nan))
-        found.append(Claim(text, limit, *worst, below=below))
+        found.append(Claim(text, limit, *worst, below=below, by_chance=_by_chance(known, limit, below)))
 
     walks = {preload: [row for row in rows if _is_walk(row, preload)] for preload in ("fixed", "trim")}
     joint = [row for row in walks["fixed"] if row.estimator == "joint"]
     dual = [row for row in walks["fixed"] if row.estimator == "dual"]
-    add("joint: error ÷ bound", 1.10, _each(joint, lambda row: row.bound, lambda row: row.bound_error))
     dithered = [row for row in dual if _dithered(row)]
-    add("dual: error ÷ bound, with dither", 1.30, _each(dithered, lambda row: row.bound, lambda row: row.bound_error))
+    for text, limit, own in (("joint: error ÷ {}", 1.10, joint), ("dual: error ÷ {}, with dither", 1.30, dithered)):
+        values = _each(own, lambda row: row.linearised, lambda row: row.linearised_error)
+        add(text.format("Kalman filter linearised at the truth"), limit, values)
     for preload, of_preload in walks.items():
         for name in OURS:
-            add(f"{name}: error ÷ best baseline's, preload {preload}", NEAR, _against_baselines(of_preload, name))
+            own = [row for row in of_preload if row.estimator == name]
+            values = _each(own, lambda row: row.baseline, lambda row: row.baseline_error)
+            add(f"{name}: error ÷ best baseline's, preload {preload}", NEAR, values)
     add("joint: NEES ÷ its 95 % limit", 1.0, _of(joint, lambda row: row.nees / row.nees_high))
     add("joint: NEES ÷ its lower 95 % limit", 1.0, _of(joint, lambda row: row.nees / row.nees_low), False)
     add("dual: stated σ ÷ rms error", 0.5, _each(dual, lambda row: row.honesty), False)
@@ -157,6 +171,13 @@ def claims(rows: Sequence[Row]) -> list[Claim]:
         _of((row for row in rows if row.ours), lambda row: float(row.failures)),
     )
     return found
+
+
+def _by_chance(values: Sequence[Value], limit: float, below: bool) -> bool:
+    """Bonferroni, the first step of Holm: that chance makes any of the values miss its limit has probability LEVEL."""
+    errors = float(norm.isf(LEVEL / max(len(values), 1)))
+    sign = 1.0 if below else -1.0
+    return all(sign * (value - limit) <= errors * error or sign * (value - limit) <= 0.0 for value, _, error in values)
 
 
 def _add_steps(add: Callable[..., None], rows: Sequence[Row]) -> None:
@@ -198,16 +219,3 @@ def _each(
     for row in rows:
         for name, value, error in zip(quantities(cases()[row.case]), values(row), errors(row), strict=True):
             yield value, f"{_place(row)}, {name}", error
-
-
-def _against_baselines(rows: Iterable[Row], name: str) -> Iterator[Value]:
-    """rms error ÷ that of the best baseline, for each case and quantity."""
-    for case, group in groupby(rows, key=lambda row: row.case):
-        members = [row for row in group if row.ranked]
-        own = next((row for row in members if row.estimator == name), None)
-        others = [row for row in members if not row.ours]
-        if own is None or not others:
-            continue
-        for index, quantity in enumerate(quantities(cases()[case])):
-            best = min(others, key=lambda row: row.rms[index])
-            yield own.rms[index] / best.rms[index], f"{case}, {quantity}, {best.estimator}", math.nan

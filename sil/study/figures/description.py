@@ -35,7 +35,7 @@ LOOKS: Mapping[str, Look] = {
     "estimate-band": Look("estimate-band"),
     "joint": Look("joint", 1.8, "dash"),
     "joint-edge": Look("joint", 0.9, "dash"),
-    "bound": Look("bound-band"),
+    "reference": Look("reference-band"),
     "chance": Look("chance-band"),
     "measured": Look("measured"),
     "signal": Look("truth", 1.2),

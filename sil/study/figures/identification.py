@@ -1,4 +1,4 @@
-"""What can be known of the pilot with and without a known torque: estimates of the lever's model, and the bound."""
+"""What can be known of the pilot with and without a known torque: estimates of the lever's model, and a reference."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...oracle.cdkf import Array
-from ..bound import posterior_bound, variances
+from ..linearised import covariances, variances
 from ..matched import Condition, matched
 from .description import Column, Curve, Figure, Row, Trace, interval, number, percent
 from .runs import DITHER, PRIOR, WILD, Extent, estimates, matched_config, shown
@@ -26,14 +26,14 @@ class _Case:
     """(T,) [s]"""
     truth: Array
     """(T, 5)"""
-    least: Array
-    """(T, 5) the bound, as a standard deviation relative to the truth."""
+    linearised: Array
+    """(T, 5) standard deviation relative to the truth of a Kalman filter linearised at the truth."""
     estimates: dict[str, tuple[Array, Array]]
     """By estimator: values and standard deviations, each (T, 5)."""
 
 
 def identification(seed: int, extent: Extent) -> Figure:
-    """Parameters and dynamics of one pilot, dual and joint filter, without and with dither, and the bound."""
+    """Parameters and dynamics of one pilot, dual and joint filter, without and with dither, and a reference."""
     cases = {title: _case(seed, extent, dither) for title, dither in _CASES.items()}
     columns = tuple(
         Column(title, tuple(Row(label, _traces(case, index)) for index, label in enumerate(_LABELS)))
@@ -53,8 +53,8 @@ def _case(seed: int, extent: Extent, dither: float) -> _Case:
     for name in _ESTIMATORS:
         found[name] = _quantities(estimates(matched_config(condition, name), batch, at=at))
     truth = np.concatenate((batch.truth.p[0, at], batch.truth.dynamics[0, at]), axis=-1)
-    least = np.sqrt(variances(batch, posterior_bound(batch, at))[0])
-    return _Case(at * batch.period, truth, least, found)
+    linearised = np.sqrt(variances(batch, at, covariances(batch, at))[0])
+    return _Case(at * batch.period, truth, linearised, found)
 
 
 def _quantities(columns: dict[str, NDArray[np.float64]]) -> tuple[Array, Array]:
@@ -67,7 +67,8 @@ def _quantities(columns: dict[str, NDArray[np.float64]]) -> tuple[Array, Array]:
 
 def _traces(case: _Case, index: int) -> tuple[Trace, ...]:
     truth = case.truth[:, index]
-    traces: list[Trace] = [interval(case.time, truth, truth * case.least[:, index], "bound: truth ± 2σ", "bound")]
+    around = interval(case.time, truth, truth * case.linearised[:, index], "linearised at the truth: ± 2σ", "reference")
+    traces: list[Trace] = [around]
     for name, look in _ESTIMATORS.items():
         value, sigma = (part[:, index] for part in case.estimates[name])
         traces.append(Curve(case.time, value, name, look))
@@ -80,16 +81,16 @@ def _caption(cases: dict[str, _Case], settled: float) -> str:
     without, with_dither = cases.values()
     said = [
         f"{label.split()[0]} {number(100.0 * _claimed(without)[index])} → {percent(_claimed(with_dither)[index])} "
-        f"({number(100.0 * without.least[-1, index])} → {percent(with_dither.least[-1, index])})"
+        f"({number(100.0 * without.linearised[-1, index])} → {percent(with_dither.linearised[-1, index])})"
         for index, label in enumerate(_LABELS)
     ]
     apart = max(_apart(case) for case in cases.values())
     return (
         "Parameters, natural frequency f_n and damping ratio ζ of one pilot from the firmware's dual and joint filters "
-        "(thin lines: the ±2σ that they state). The shaded band is the posterior Cramér–Rao bound, ±2σ about the "
-        "truth: the least that is to be expected of any estimator. First the base alone shakes the lever, then the "
-        f"motor adds a known torque of {number(DITHER)} N m rms: same pilot, same axes. σ of the dual filter at the "
-        f"end, without → with that torque, and in brackets that of the bound: {', '.join(said)}. Dual and joint are "
+        "(thin lines: the ±2σ that they state). The shaded band is ±2σ, about the truth, of a Kalman filter linearised "
+        "there. First the base alone shakes the lever, then the motor adds a known torque of "
+        f"{number(DITHER)} N m rms: same pilot, same axes. σ of the dual filter at the end, without → with that "
+        f"torque, and in brackets that of the filter linearised at the truth: {', '.join(said)}. Dual and joint are "
         f"nowhere more than {number(apart)} σ apart. The axes are scaled to what follows the first {number(settled)} s."
     )
 

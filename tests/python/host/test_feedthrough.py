@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 ComplexArray = NDArray[np.complex128]
 DRAWS = 40_000
-CALIBRATED = dict.fromkeys(("z_ddot_gain_sigma", "z_ddot_delay_sigma", "tau_m_gain_sigma", "lever_friction_sigma"), 0.0)
-"""The band is then of the parameters alone."""
 
 
 def responses(model: str, p: NDArray[np.float64], trim: float, frequency: float) -> ComplexArray:
@@ -34,6 +32,7 @@ def responses(model: str, p: NDArray[np.float64], trim: float, frequency: float)
 
 LEVER = (0.5873, 8.01, 273.2, -1.311)
 """Inertia, damping, stiffness and forcing of 2.5 kg, 42 N s/m, 1500 N/m on the lever."""
+EXACT = dict.fromkeys(("z_ddot_gain_sigma", "z_ddot_delay_sigma", "tau_m_gain_sigma", "lever_friction_sigma"), 0.0)
 PLANTS = {"lever": LEVER, "linear_black_box": LEVER, "linear_physical": (2.5, 42.0, 1500.0, 2.5), "hand": LEVER}
 
 
@@ -52,7 +51,7 @@ def swing(estimator: Estimator, plant: tuple[float, float, float, float], second
 
 @pytest.mark.parametrize("model", ["lever", "linear_physical", "linear_black_box", "hand"])
 def test_value_and_band_are_those_of_the_parameters_and_their_covariance(model: str) -> None:
-    estimator = Estimator(Config(model=model, settings=CALIBRATED))
+    estimator = Estimator(Config(model=model, settings=EXACT))
     swing(estimator, PLANTS[model], 6.0)
     estimate = estimator.estimate()
     p, sigma = np.array(estimate.parameter), np.array(estimate.parameter_sigma)
@@ -73,15 +72,13 @@ def test_value_and_band_are_those_of_the_parameters_and_their_covariance(model: 
 def test_a_trunk_on_its_seat_is_part_of_the_response() -> None:
     """The first guess about 0 rad; the arm's spring and damper act on theta less what the trunk does."""
     frequency, zeta = 4.5, 0.4
-    settings = {"seat_frequency": frequency, "seat_damping_ratio": zeta}
-    estimator = Estimator(Config(settings=settings))
+    estimator = Estimator(Config(settings={"seat_frequency": frequency, "seat_damping_ratio": zeta}))
     for f in (2.0, 4.0, 8.0):
         s, omega = 2j * math.pi * f, 2.0 * math.pi * frequency
         trunk = -1.0 / (s**2 + 2.0 * zeta * omega * s + omega**2)  # its height in the cabin over z_ddot
         inertia, own, arm = 0.5870, 0.5 * s + 5.0, 0.45**2 * (42.0 * s + 1500.0)
         expected = (-0.45 * 3.1 + arm * trunk / 0.45) / (inertia * s**2 + own + arm)
-        found = estimator.feedthrough(f)
-        assert found.response == pytest.approx(expected, rel=1e-4)
+        assert estimator.feedthrough(f).response == pytest.approx(expected, rel=1e-4)
 
 
 def test_what_is_not_defined_is_not_finite() -> None:

@@ -129,6 +129,29 @@ def test_what_is_not_to_be_learnt_leaves_the_parameters_alone(form: str) -> None
     np.testing.assert_allclose(of.joint_factor[3:, :3], derivative @ W_FACTOR, atol=1e-8)
 
 
+@pytest.mark.parametrize("form", ["dual", "joint", "augmented"])
+def test_considered_errors_are_what_an_unknown_push_makes(form: str) -> None:
+    """Two filters on the same outputs: one knows the push, the other does not."""
+    rng = np.random.default_rng(31)
+    knows, considers, size = belief(form), belief(form), np.array([0.3, -0.2, 0.1, 0.5])
+    for index in range(300):
+        b, push, y = 0.03 * rng.standard_normal((2, 3)), 0.01 * rng.standard_normal((2, 4)), rng.standard_normal(2)
+        valid, moved = rng.random(2) > 0.2, (push @ size)[:, np.newaxis]
+        knows.predict(lambda x, w, b=b, moved=moved: A @ x + b @ w + moved, PROCESS)  # type: ignore[misc]
+        considers.predict(pushed(b, np.zeros((3, 1))), PROCESS, push)
+        for one in (knows, considers):
+            if index == 150:
+                one.start_state(X, X_FACTOR)
+            if valid.any():
+                one.update(y, valid, OUTPUT, learn=index % 7 > 1)
+            if index % 10 == 9:
+                one.learn(0.7)
+                one.forget(0.1)
+                one.walk(np.array([0.01, 0.02, 0.03]))
+        np.testing.assert_allclose(considers.errors @ size, estimate(knows) - estimate(considers), rtol=1e-6, atol=1e-9)
+    assert np.abs(considers.errors[:3] @ size).max() > 0.01
+
+
 # --- its two forms ---------------------------------------------------------------------------------------------------
 
 
@@ -147,21 +170,24 @@ def test_the_two_stage_joint_filter_is_the_augmented_one() -> None:
     two_stage, augmented = belief("joint"), belief("augmented")
     most = np.array([0.4, 0.6, 0.2])  # the last one is reached
     for index in range(300):
-        y = augmented.x + OUTPUT @ rng.standard_normal(2)
+        y, push = augmented.x + OUTPUT @ rng.standard_normal(2), 1e-3 * rng.standard_normal((2, 4))
         valid = rng.random(2) > 0.2
         nis = []
         for one in (two_stage, augmented):
-            one.predict(curved(index), PROCESS)
-            nis.append(one.update(y, valid, OUTPUT, learn=index % 7 > 1) if valid.any() else 0.0)
+            one.predict(curved(index), PROCESS, push)
+            nis.append(one.update(y, valid, OUTPUT, index % 7 > 1).normalised_square if valid.any() else 0.0)
             one.learn()
             one.forget(1e-3)
             one.walk(np.array([1e-5, 2e-5, 3e-3]))
             one.limit(most)
             if index == 150:
                 one.start_state(np.array([0.2, 0.1]), X_FACTOR)
+            if index in (200, 250):
+                one.restore(np.array([0.1, 0.2, 0.3]), 0.3 * W_FACTOR, errors=index == 200)
         assert nis[0] == pytest.approx(nis[1], rel=1e-9)
         np.testing.assert_allclose(estimate(two_stage), estimate(augmented), atol=1e-9)
         np.testing.assert_allclose(two_stage.joint_factor, augmented.joint_factor, atol=1e-9)
+        np.testing.assert_allclose(two_stage.errors, augmented.errors, atol=1e-7)
     assert cdkf.deviations(augmented.w_factor)[2] == pytest.approx(0.2)
 
 

@@ -22,7 +22,6 @@ PLANS = {
     "black_box": Plan(LinearBlackBox(), **(NEARLY_CONSTANT | SIGNED | {"walk": (0.5, 0.02, 1e-3)})),
 }
 EVERY = pytest.mark.parametrize("baseline", BASELINES.values(), ids=BASELINES)
-BATCHED = [baseline for baseline in BASELINES.values() if baseline.name != "filterpy_ukf"]
 
 
 @cache
@@ -39,9 +38,8 @@ def simulated(plan: str, runs: int, duration: float) -> Batch:
 @pytest.mark.parametrize("plan", PLANS)
 @EVERY
 def test_finds_parameters_that_hardly_move(baseline: Baseline, plan: str) -> None:
-    """To 0.02 of them (of what is not known of the black box's: 0.06). FilterPy, slow, gets less to do."""
-    size = (1, 1.0) if baseline.name == "filterpy_ukf" else (3, 5.0)
-    batch, p = recorded(plan, *size), simulated(plan, *size).truth.p
+    """To 0.02 of them (of what is not known of the black box's: 0.06)."""
+    batch, p = recorded(plan, 3, 5.0), simulated(plan, 3, 5.0).truth.p
     assert p is not None
     last = batch.samples - 1
     assert baseline.handles(batch.model)
@@ -67,7 +65,7 @@ def test_learns_from_the_past_alone_whenever_it_is_asked(baseline: Baseline) -> 
         assert (np.linalg.eigvalsh(seldom.covariance) > 0.0).all()
 
 
-@pytest.mark.parametrize("baseline", BATCHED, ids=lambda baseline: baseline.name)
+@EVERY
 def test_a_run_that_breaks_down_is_nan_and_the_others_do_not_notice(baseline: Baseline) -> None:
     batch = recorded("lever-trim", 3, 5.0)
     short = replace(batch, y=batch.y[:, :300].copy(), u=batch.u[:, :300], trim=batch.trim[:, :300])

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
-from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
-from lever_cdkf.host_tools.errors import LeverError
+from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 from lever_cdkf.sil.oracle.cdkf import Array
-from lever_cdkf.sil.study.baselines.algorithm1 import Algorithm1, ParameterFilter, differences, factor
+from lever_cdkf.sil.study.baselines.algorithm1 import Algorithm1, ParameterFilter, differences
 from lever_cdkf.sil.study.baselines.dual_ekf import DualEkf
-from lever_cdkf.sil.study.baselines.filterpy_ukf import FilterPyUkf
 from lever_cdkf.sil.study.baselines.joint_ekf import JointEkf, joint_ekf
+from lever_cdkf.sil.study.baselines.joint_ukf import JointUkf, UnscentedTransform
+from lever_cdkf.sil.study.baselines.recursion import factor
 from lever_cdkf.sil.study.data import Batch
 from python.study.baseline_runs import PERIOD, Plan, lever, simulate
 
@@ -256,49 +255,49 @@ def test_a_covariance_without_a_factor_is_one_runs_affair() -> None:
     assert np.isnan(factors[1]).all()
 
 
-# --- off the shelf ---------------------------------------------------------------------------------------------------
+# --- unscented -------------------------------------------------------------------------------------------------------
 
 
-def test_ukf_off_the_shelf_agrees_with_the_joint_ekf() -> None:
-    """Near enough to linear, on the same data and with the same noises, they are the same."""
-    batch = simulate(Plan(lever("trim"), runs=2, duration=1.0, sigma=(0.05, 0.05, 0.05)))
-    at = np.array([0, 500, 999])
-    ukf, ekf = FilterPyUkf(most_runs=1), joint_ekf(batch, at)
-    estimates = ukf(batch, at)
-    assert ekf.covariance is not None
-    assert estimates.covariance is not None
-    assert estimates.nis is not None
-    assert ekf.nis is not None
-    sigma = np.sqrt(np.einsum("btii->bti", ekf.covariance))
-    assert (np.abs(estimates.w - ekf.w)[0] < 0.05 * sigma[0]).all()
-    np.testing.assert_allclose(np.sqrt(np.einsum("tii->ti", estimates.covariance[0])), sigma[0], rtol=0.02)
-    np.testing.assert_allclose(estimates.nis[0, 1:], ekf.nis[0, 1:], rtol=0.05, atol=0.01)
-    assert np.isnan(estimates.nis[:, 0]).all()
-    assert np.isnan(estimates.w[1]).all()
-    assert ukf.breakdowns(estimates) == 0
+@pytest.mark.parametrize("alpha", [1.0, 1e-3])
+def test_joint_ukf_is_the_unscented_filter_of_filterpy(alpha: float) -> None:
+    """With sigma points drawn anew for the outputs, which FilterPy leaves to its user."""
+    batch = simulate(Plan(lever("trim"), runs=1, duration=0.4, sigma=(0.4, 0.4, 0.4)))
+    known, ours = batch.knowledge, JointUkf(batch, UnscentedTransform(alpha))
+
+    def move(z: Array, dt: float, k: int) -> Array:
+        return np.concatenate((z[:3], batch.move(k, z[np.newaxis, 3:], z[np.newaxis, :3])[0]))
+
+    points = MerweScaledSigmaPoints(5, alpha, 2.0, 0.0)
+    ukf = UnscentedKalmanFilter(5, 2, PERIOD, lambda z: z[3:], move, points)
+    ukf.x, ukf.R = np.concatenate((np.zeros(3), batch.y[0, 0])), np.diag(known.output_noise**2)
+    ukf.P = np.diag([*known.sigma**2, *known.output_noise**2])
+    ukf.Q = np.diag([*known.walk**2 * PERIOD, 0.0, 0.0])
+    ukf.Q[3:, 3:] = known.process_covariance(PERIOD)
+    for k in range(1, batch.samples):
+        ours.step(k)
+        ukf.predict(k=k - 1)
+        ukf.sigmas_f = points.sigma_points(ukf.x, ukf.P)
+        ukf.update(batch.y[0, k])
+        np.testing.assert_allclose(np.concatenate((ours.w[0], ours.x[0])), ukf.x, atol=1e-7)
+    np.testing.assert_allclose(ours.covariance[0], ukf.P, rtol=1e-4, atol=1e-9)
+    assert np.abs(ours.w).max() > 0.05
 
 
-def test_ukf_off_the_shelf_without_filterpy_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
-    batch = simulate(Plan(lever("trim"), runs=1, duration=0.01))
-    with pytest.raises(LeverError, match="pip install filterpy"):
-        FilterPyUkf()(batch, np.array([5]))
-
-
-def test_ukf_off_the_shelf_is_nan_from_where_it_breaks_down() -> None:
-    batch = simulate(Plan(lever("trim"), runs=2, duration=0.05))
-    batch.u[0, 30:] = np.nan
-    ukf = FilterPyUkf()
-    estimates = ukf(batch, np.array([0, 20, 40]))
-    np.testing.assert_array_equal(np.isnan(estimates.w).all(axis=2), [[False, False, True], [False, False, False]])
-    assert ukf.breakdowns(estimates) == 1
-
-
-def test_ukf_off_the_shelf_cannot_hold_a_parameter_fixed() -> None:
-    """With no uncertainty of one parameter there is no Cholesky factor, and FilterPy raises LinAlgError."""
-    batch = simulate(Plan(lever("trim"), runs=1, duration=0.05))
-    certain = replace(batch.knowledge, sigma=np.array([0.0, 0.2, 0.2]), walk=np.zeros(3))
-    ukf = FilterPyUkf()
-    estimates = ukf(replace(batch, knowledge=certain), np.array([0, 1]))
-    np.testing.assert_array_equal(estimates.w[0], [[0.0] * 3, [np.nan] * 3])
-    assert ukf.breakdowns(estimates) == 1
+@pytest.mark.parametrize("joint", [JointEkf, JointUkf])
+def test_a_missing_output_is_skipped(joint: type[JointEkf]) -> None:
+    """Without theta_dot from a sample on: FilterPy's filter with theta as its only output."""
+    batch = driven(runs=1, duration=0.3)
+    missing = np.zeros(batch.y.shape, dtype=bool)
+    missing[:, 100:, 1] = True
+    y = np.where(missing, 1e3, batch.y)
+    ours, kf = joint(replace(batch, y=y, missing=missing)), plain_filter(batch, 0, 5)
+    for k in range(1, batch.samples):
+        ours.step(k)
+        phi = inputs(batch, 0, k - 1)
+        kf.F[4, :3] = PERIOD * batch.knowledge.sigma * phi
+        kf.predict(u=phi[np.newaxis] @ batch.knowledge.guess)
+        if k < 100:
+            kf.update(batch.y[0, k])
+        else:
+            kf.update(batch.y[0, k, :1], R=kf.R[:1, :1], H=kf.H[:1])
+    np.testing.assert_allclose(np.concatenate((ours.w[0], ours.x[0])), kf.x, atol=1e-7)

@@ -1,4 +1,4 @@
-"""The bound against Kalman filters and Riccati equations of linear systems, and Monte Carlo."""
+"""The filter linearised at the truth and the bound, against Kalman filters, Riccati and Fisher, and Monte Carlo."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from lever_cdkf.host_tools.config import settings_table
 from lever_cdkf.sil.oracle.lever import Lever
-from lever_cdkf.sil.study import bound
+from lever_cdkf.sil.study import bound, linearised
 from lever_cdkf.sil.study.data import Batch, Knowledge, Truth
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
@@ -97,16 +97,15 @@ def kalman(run: int) -> tuple[Array, Array]:
     return np.array(means), np.array(covariances)
 
 
-# --- against Riccati -------------------------------------------------------------------------------------------------
+# --- the filter linearised at the truth ------------------------------------------------------------------------------
 
 
 def test_of_a_linear_system_it_is_the_covariance_of_the_kalman_filter() -> None:
     at = np.array([0, 1, 2, 10, 499, 500, 501, 699])
-    found = bound.posterior_bound(linear_batch(), at)
-    np.testing.assert_array_equal(found.at, at)
-    assert found.covariance.shape == (RUNS, len(at), 5, 5)
+    found = linearised.covariances(linear_batch(), at)
+    assert found.shape == (RUNS, len(at), 5, 5)
     for run in (0, 7):
-        np.testing.assert_allclose(found.covariance[run], kalman(run)[1][at], rtol=1e-6, atol=1e-12)
+        np.testing.assert_allclose(found[run], kalman(run)[1][at], rtol=1e-6, atol=1e-12)
 
 
 def test_it_settles_on_the_riccati_equation() -> None:
@@ -119,7 +118,7 @@ def test_it_settles_on_the_riccati_equation() -> None:
     output, noise = OUTPUT[:, [0, 1, 3, 4]], np.diag(known.output_noise**2)
     before = solve_discrete_are(scaled_matrix(known, 0.0)[left].T, output.T, process_covariance(known)[left], noise)
     settled = np.linalg.inv(np.linalg.inv(before) + output.T @ np.linalg.inv(noise) @ output)
-    found = bound.posterior_bound(batch, np.array([steps - 1])).covariance[0, 0]
+    found = linearised.covariances(batch, np.array([steps - 1]))[0, 0]
     np.testing.assert_allclose(found[left], settled, rtol=1e-6, atol=1e-12)
 
 
@@ -147,45 +146,97 @@ def test_without_any_process_noise_it_is_the_inverse_of_fishers_information() ->
     information = np.einsum("kai,ab,kbj->ij", slopes, weight, slopes) + np.diag((*known.sigma_w**-2, 0.0, 0.0))
     carry = np.vstack((np.eye(3, 5), slopes[-1]))
     expected = carry @ np.linalg.inv(information) @ carry.T
-    found = bound.posterior_bound(batch, np.array([last])).covariance[0, 0]
+    found = linearised.covariances(batch, np.array([last]))[0, 0]
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-6 * expected[0, 0] * known.output_noise[0])
+
+
+def test_a_truth_outside_the_model_has_no_reference() -> None:
+    batch = linear_batch()
+    without = dataclasses.replace(batch, truth=dataclasses.replace(batch.truth, p=None))
+    for function in (linearised.covariances, bound.posterior_cramer_rao):
+        with pytest.raises(ValueError, match="no member of the model"):
+            function(without, np.array([1]))
+
+
+# --- the bound -------------------------------------------------------------------------------------------------------
+
+
+def test_the_bound_is_tichavskys_recursion_of_information() -> None:
+    """Equations 20 to 24 of the paper as they stand, with the inverse of all of Q; expectations over the runs."""
+    batch, last = linear_batch(), 120
+    known, weight = batch.knowledge, np.linalg.inv(process_covariance(batch.knowledge))
+    information = np.diag((*known.sigma_w**-2, *known.output_noise**-2))
+    for k in range(last):
+        f = np.stack([scaled_matrix(known, mean) for mean in batch.u[:, k : k + 2, 0].mean(axis=1)])
+        mean = f.mean(axis=0)
+        scatter = np.einsum("bai,ac,bcj->ij", f - mean, weight, f - mean) / (RUNS - 1)
+        d11, d12 = mean.T @ weight @ mean + scatter, -mean.T @ weight
+        d22 = weight + OUTPUT.T @ np.diag(known.output_noise**-2) @ OUTPUT
+        information = d22 - d12.T @ np.linalg.inv(information + d11) @ d12
+    found = bound.posterior_cramer_rao(batch, np.array([10, last]))[1]
+    np.testing.assert_allclose(found, np.linalg.inv(information), rtol=1e-4, atol=1e-9)
+
+
+def test_where_all_runs_have_the_same_inputs_a_linear_system_has_one_covariance_and_that_is_the_bound() -> None:
+    batch, at = linear_batch(), np.array([0, 50, 699])
+    alike = dataclasses.replace(batch, u=np.broadcast_to(batch.u[:1], batch.u.shape))
+    expected = linearised.covariances(alike, at)[0]
+    np.testing.assert_allclose(bound.posterior_cramer_rao(alike, at), expected, rtol=1e-6, atol=1e-12)
+
+
+def test_the_bound_is_below_the_linearised_filter_on_average() -> None:
+    batch, at = matched(Condition(dither_rms=0.3), 6, 4.0, 3), np.arange(500, 4000, 500)
+    least = bound.variances(batch, at, bound.posterior_cramer_rao(batch, at))
+    ratio = linearised.variances(batch, at, linearised.covariances(batch, at)).mean(axis=0) / least
+    assert least.shape == (7, 5)
+    assert (ratio > 0.99).all()
+    assert ratio[-1].max() > 1.05
+
+
+def test_without_process_noise_there_is_no_bound() -> None:
+    batch = linear_batch()
+    calm = dataclasses.replace(batch, knowledge=dataclasses.replace(batch.knowledge, process_noise=0.0))
+    with pytest.raises(ValueError, match="needs process noise"):
+        bound.posterior_cramer_rao(calm, np.array([1]))
 
 
 # --- against Monte Carlo ---------------------------------------------------------------------------------------------
 
 
-def test_the_kalman_filter_reaches_it_and_does_not_get_below() -> None:
-    """Squared error ÷ bound of 120 runs: 1 on average, within the 99.9 % band of it, for w, for x, at each time."""
+def test_squared_errors_of_the_kalman_filter_are_those_of_the_covariance_and_above_the_bound() -> None:
+    """Squared error ÷ variance of 120 runs: 1 on average, within the 99.9 % band of it, for w, for x, at each time."""
     at = np.array([0, 10, 50, 200, 699])
     batch = linear_batch()
     assert batch.truth.p is not None
-    least = np.diagonal(bound.posterior_bound(batch, at).covariance, axis1=-2, axis2=-1)
+    least = np.diagonal(linearised.covariances(batch, at), axis1=-2, axis2=-1)
     estimates = np.stack([kalman(run)[0][at] for run in range(RUNS)])
     truth = np.concatenate((batch.truth.p / batch.knowledge.sigma, batch.truth.x), axis=-1)[:, at]
-    quotient = np.square(estimates - truth) / least
-    np.testing.assert_allclose(quotient.mean(axis=0), 1.0, atol=3.3 * np.sqrt(2.0 / RUNS))
-    of_runs = quotient.mean(axis=1)
+    squares = np.square(estimates - truth)
+    np.testing.assert_allclose((squares / least).mean(axis=0), 1.0, atol=3.3 * np.sqrt(2.0 / RUNS))
+    of_runs = (squares / least).mean(axis=1)
     assert (np.abs(of_runs.mean(axis=0) - 1.0) < 3.4 * of_runs.std(axis=0) / np.sqrt(RUNS)).all()
+    bounds = np.diagonal(bound.posterior_cramer_rao(batch, at), axis1=-2, axis2=-1)
+    assert (squares.mean(axis=0) > bounds * (1.0 - 3.3 * np.sqrt(2.0 / RUNS))).all()
 
 
 def test_dynamics_are_as_uncertain_as_a_cloud_of_parameters() -> None:
     settings = {row.name: row.default for row in settings_table()}
     batch = matched(Condition(preload="fixed", dither_rms=0.3), 2, 3.0, 6)
     at = np.array([1500, 2999])
-    found = bound.posterior_bound(batch, at)
-    least = bound.variances(batch, found)
+    found = linearised.covariances(batch, at)
+    least = linearised.variances(batch, at, found)
     assert least.shape == (2, 2, 5)
     assert batch.truth.p is not None
     lever, rng = Lever.from_settings(settings, "fixed"), np.random.default_rng(8)
     for run in range(2):
         for t, k in enumerate(at):
-            covariance = 1e-4 * found.covariance[run, t, :3, :3]  # so near that the first order is all
+            covariance = 1e-4 * found[run, t, :3, :3]  # so near that the first order is all
             w = rng.multivariate_normal(np.log(batch.truth.p[run, k] / batch.knowledge.guess), covariance, 100_000)
             angle = float(batch.rest(at)[run, t])
             cloud = lever.dynamics((batch.knowledge.guess * np.exp(w)).T, angle)
             relative = cloud.std(axis=1) / batch.truth.dynamics[run, k]
             np.testing.assert_allclose(np.sqrt(1e-4 * least[run, t, 3:]), relative, rtol=0.01)
-            np.testing.assert_allclose(least[run, t, :3], found.covariance[run, t, [0, 1, 2], [0, 1, 2]])
+            np.testing.assert_allclose(least[run, t, :3], found[run, t, [0, 1, 2], [0, 1, 2]])
 
 
 # --- what it should do -----------------------------------------------------------------------------------------------
@@ -197,13 +248,7 @@ def test_a_known_torque_makes_the_scale_known() -> None:
     shares = {}
     for dither in (0.0, 0.3):
         batch = matched(Condition(dither_rms=dither), 4, 10.0, 2)
-        shares[dither] = bound.rms(batch, bound.posterior_bound(batch, at))[0]
+        found = linearised.variances(batch, at, linearised.covariances(batch, at))
+        shares[dither] = np.sqrt(found.mean(axis=0))[0]
     assert (shares[0.3][:3] < 0.5 * shares[0.0][:3]).all()
     assert shares[0.0][3] < 0.1 * shares[0.0][2]
-
-
-def test_a_truth_outside_the_model_has_no_bound() -> None:
-    batch = linear_batch()
-    without = dataclasses.replace(batch, truth=dataclasses.replace(batch.truth, p=None))
-    with pytest.raises(ValueError, match="no member of the model"):
-        bound.posterior_bound(without, np.array([1]))

@@ -16,11 +16,10 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.native import enum_names
-from lever_cdkf.sil.study import compare
 from lever_cdkf.sil.study.baselines import BASELINES
-from lever_cdkf.sil.study.compare import campaign, judgement, table, words
+from lever_cdkf.sil.study.compare import campaign, comparison, judgement, table, words
 from lever_cdkf.sil.study.compare.campaign import Outcome, Results
-from lever_cdkf.sil.study.compare.cases import Plan, cases
+from lever_cdkf.sil.study.compare.cases import Plan, References, cases
 from lever_cdkf.sil.study.compare.entrants import entrants
 from lever_cdkf.sil.study.compare.judgement import Row
 from lever_cdkf.sil.study.data import Batch, Estimates
@@ -101,25 +100,27 @@ def made_up(errors: NDArray[Any], time: NDArray[Any], stated: float = 1.0) -> Ou
     return Outcome(time, errors, errors, np.full_like(errors, stated), nees, None, 2e-3, 1000)
 
 
-def one_row(outcome: Outcome, case: str = "lever_fixed_dither_quiet", least: NDArray[Any] | None = None) -> Row:
-    plan = Plan(len(outcome.errors))
-    results = Results(plan, {(case, "joint"): outcome}, {} if least is None else {case: least})
+def one_row(outcome: Outcome, references: References | None = None) -> Row:
+    case, plan = "lever_fixed_dither_quiet", Plan(len(outcome.errors))
+    results = Results(plan, {(case, "joint"): outcome}, {} if references is None else {case: references})
     (row,) = judgement.judge(results)
     return row
 
 
 def test_a_row_of_known_errors() -> None:
-    """Errors twice the bound, drawn with the stated variance: the window of judgement is from 15 s on."""
+    """Errors twice the reference, drawn with the stated variance: the window of judgement is from 15 s on."""
     time = np.arange(1.0, 61.0)
     errors = 0.2 * np.random.default_rng(3).standard_normal((200, 60, 5))
     errors[:, time < 15.0] = 7.0
-    row = one_row(made_up(errors, time, 0.04), least=np.full_like(errors, 0.01))
+    references = References(np.full_like(errors, 0.01), np.full((60, 5), 0.0064))
+    row = one_row(made_up(errors, time, 0.04), references)
     assert row.rms == pytest.approx([0.2] * 5, rel=0.03)
-    assert row.bound == pytest.approx([2.0] * 5, rel=0.03)
-    assert row.bound_error == pytest.approx([2.0 / math.sqrt(2 * 200 * 46)] * 5, rel=0.3)
+    assert row.linearised == pytest.approx([2.0] * 5, rel=0.03)
+    assert row.bound == pytest.approx([2.5] * 5, rel=0.03)
+    assert row.linearised_error == pytest.approx([2.0 / math.sqrt(2 * 200 * 46)] * 5, rel=0.3)
     assert row.honesty == pytest.approx([1.0] * 5, rel=0.03)
     assert row.nees == pytest.approx(3.0, rel=0.03)
-    assert row.nees_low < 3.0 < row.nees_high
+    assert (row.nees_low, row.nees_high) == pytest.approx((2.67, 3.35), abs=0.01)  # chi-square, 600 degrees, ÷ 200
     assert row.nees_inside > 0.8
     assert row.score == pytest.approx(0.2, rel=0.03)
     assert (row.runs, row.failures, row.ranked) == (200, 0, True)
@@ -161,6 +162,57 @@ def test_errors_of_signed_parameters_are_relative_to_the_truth() -> None:
     np.testing.assert_allclose(np.abs(outcome.relative[..., :3]), 0.1, rtol=1e-9)
 
 
+# --- who has smaller errors than whom ---------------------------------------------------------------------------------
+
+
+def drawn(runs: int, seed: int, ratio: float) -> dict[str, NDArray[Any]]:
+    """Mean squares of two estimators whose errors are alike run by run, but for a factor and some of their own."""
+    rng = np.random.default_rng(seed)
+    size = np.exp(0.3 * rng.standard_normal((runs, 1)))
+    own = (1.0 + 0.05 * rng.standard_normal((runs, 5)) for _ in range(2))
+    return {name: np.square(size * one * factor) for name, one, factor in zip("ab", own, (ratio, 1.0), strict=True)}
+
+
+def test_differences_are_of_pairs_of_runs() -> None:
+    """Runs differ by 30 %, estimators by 10 %: only run by run is that seen."""
+    found = comparison.of_errors("case", drawn(20, 1, 1.1))
+    assert found.keys() == {("case", "a")}  # b is best
+    one = found["case", "a"]
+    assert one.more == pytest.approx(math.log(1.1), abs=0.01)
+    assert one.error == pytest.approx(0.05 * math.sqrt(2 / 5 / 20), rel=0.5)
+    assert one.probability < 1e-6
+    assert one.interval()[0] < 1.1 < one.interval()[1]
+    other = comparison.of_errors("case", drawn(20, 1, 1.1), "a")["case", "b"]
+    assert (other.more, other.probability) == pytest.approx((-one.more, one.probability))
+    assert comparison.of_errors("case", drawn(7, 1, 1.1)) == {}
+
+
+def test_equal_estimators_differ_by_chance_only() -> None:
+    found = [comparison.of_errors("case", drawn(8, seed, 1.0), "a")["case", "b"] for seed in range(60)]
+    probabilities = np.array([one.probability for one in found])
+    assert 0 < np.sum(probabilities < 0.2) <= 24
+    assert probabilities.min() > 1e-4
+
+
+def test_medians_of_times_are_compared() -> None:
+    rng = np.random.default_rng(2)
+    times = {"slow": rng.uniform(1.8, 2.2, 20), "fast": np.full(20, 1.0), "alike": rng.uniform(0.9, 1.15, 20)}
+    found = comparison.of_times("case", times)
+    assert found["case", "slow"].probability < 1e-6
+    assert found["case", "alike"].probability > 0.05
+    (same,) = comparison.of_times("case", {"a": times["slow"], "b": times["slow"]}).values()
+    assert (same.more, same.probability) == (0.0, 1.0)
+
+
+def test_probabilities_are_corrected_by_holm_over_all_families() -> None:
+    """As R's p.adjust: 0.01, 0.02, 0.03, 0.04 become 0.04, 0.06, 0.06, 0.06."""
+    families = [against("a", 2.0, 0.03) | against("b", 2.0, 0.01), against("a", 2.0, 0.04) | against("b", 2.0, 0.02)]
+    first, second = comparison.corrected(*families)
+    assert [one.probability for one in first.values()] == pytest.approx([0.06, 0.04])
+    assert [one.probability for one in second.values()] == pytest.approx([0.06, 0.06])
+    assert first[CASE, "b"].more == math.log(2.0)
+
+
 # --- how it is said --------------------------------------------------------------------------------------------------
 
 CASE = "lever_fixed_dither_quiet"
@@ -169,53 +221,79 @@ CASE = "lever_fixed_dither_quiet"
 def row(estimator: str, score: float, **more: Any) -> Row:
     five = (score,) * 5
     known: dict[str, Any] = {"ours": estimator in ("dual", "joint"), "asked": 20, "runs": 20, "failures": 0}
-    known |= {"rms": five, "score": score, "bound": tuple(value / 0.1 for value in five)}
+    known |= {"rms": five, "score": score, "linearised": tuple(value / 0.1 for value in five)}
     return Row(**{"case": CASE, "estimator": estimator} | known | more)
 
 
-def test_winner_and_who_is_as_good() -> None:
-    said = words.verdict([row("dual", 0.108), row("joint", 0.104), row("joint_ekf", 0.1065), row("rls", 0.3)])
-    assert said == "Smallest errors: joint (1.04 × the bound on average); within 3 %: joint_ekf (baseline)."
+def against(name: str, more: float, probability: float, case: str = CASE) -> comparison.Differences:
+    """A difference to the best."""
+    return {(case, name): comparison.Difference(math.log(more), 0.02, 20, probability)}
 
 
-def test_says_so_when_ours_is_not_best() -> None:
-    near = words.verdict([row("joint", 0.102), row("joint_ekf", 0.1)])
-    assert "joint_ekf (baseline) (1.00 × the bound" in near
-    assert near.endswith("Ours is not best, but joint is within 3 %.")
-    far = words.verdict([row("joint", 0.12), row("joint_ekf", 0.1)])
-    assert far.endswith("nobody is within 3 %. Ours is not best: joint has 20 % larger errors.")
+def test_winner_and_who_may_be_as_good() -> None:
+    found = against("dual", 1.04, 0.2) | against("rls", 3.0, 1e-6)
+    rows = [row("dual", 0.108), row("joint", 0.104), row("rls", 0.3)]
+    assert words.verdict(rows, found, {}) == (
+        "Smallest errors: joint (1.04 × the Kalman filter linearised at the truth on average); no significant "
+        "difference to dual (+4 %)."
+    )
+    assert words.verdict(rows[1:], found, {}).endswith("; all others are significantly worse.")
 
 
-def test_who_broke_down_or_did_little_is_not_ranked() -> None:
-    said = words.verdict([row("joint", 0.12), row("lms", 0.01, failures=2), row("filterpy_ukf", 0.02, runs=2)])
+@pytest.mark.parametrize(
+    ("probability", "said"),
+    [
+        (0.001, "Ours is not best: joint has 20 % larger errors (15 to 25 %)."),
+        (0.3, "Ours is not best, but that may be chance: joint has 20 % larger errors (15 to 25 %)."),
+    ],
+)
+def test_says_so_when_ours_is_not_best(probability: float, said: str) -> None:
+    found = against("joint", 1.2, probability)
+    assert words.verdict([row("joint", 0.12), row("joint_ekf", 0.1)], found, {}).endswith(said)
+
+
+def test_who_broke_down_is_not_ranked() -> None:
+    said = words.verdict([row("joint", 0.12), row("lms", 0.01, failures=2)], {}, {})
     assert said.startswith("Smallest errors: joint")
-    assert "Broke down: lms in 2 of 20 runs." in said
-    assert "not ranked: filterpy_ukf (2 of 20 runs)." in said
-    assert words.verdict([row("lms", 0.1, failures=20)]).startswith("Nobody did all runs.")
+    assert said.endswith("Broke down, and so not ranked: lms in 2 of 20 runs.")
+    assert words.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("Nobody did all runs.")
+
+
+def test_seven_runs_are_too_few() -> None:
+    rows = [row("joint", 0.12, asked=7, runs=7), row("lms", 0.3, asked=7, runs=7)]
+    assert words.verdict(rows, {}, {}) == "Too few runs for a verdict: 7, at least 8 are needed."
 
 
 def test_fastest_after_a_step() -> None:
-    at = {"case": "step_up", "bound": (math.nan,) * 5}
-    said = words.verdict(
-        [
-            row("dual_shipped", 0.02, ours=True, settled_median=0.4, settled_worst=0.9, **at),
-            row("joint_ekf", 0.01, settled_median=1.5, settled_worst=math.inf, **at),
-        ]
-    )
+    at = {"case": "step_up", "linearised": (math.nan,) * 5}
+    rows = [
+        row("dual_shipped", 0.02, ours=True, settled_median=0.4, settled_worst=0.9, **at),
+        row("joint_ekf", 0.01, settled_median=1.5, settled_worst=math.inf, **at),
+    ]
+    errors = against("dual_shipped", 2.0, 1e-9, "step_up")
+    fastest = "dual_shipped (median 0.40 s, worst 0.90 s); the fastest baseline, joint_ekf: 1.50 s"
+    said = words.verdict(rows, errors, against("joint_ekf", 3.75, 1e-9, "step_up"))
     assert "joint_ekf (baseline) (natural frequency 1 % rms)" in said
-    fastest = "dual_shipped (median 0.40 s, worst 0.90 s); the fastest baseline, joint_ekf: 1.50 s."
-    assert said.endswith(f"Fastest after the step: {fastest}")
+    assert said.endswith(f"Fastest after the step: {fastest}.")
+    said = words.verdict(rows, errors, against("joint_ekf", 3.75, 0.2, "step_up"))
+    assert said.endswith(f"{fastest}, which may be chance.")
 
 
 def test_claims_take_the_worst_and_say_where() -> None:
     rows = [row("joint", 0.1), row("joint_ekf", 0.1)]
-    rows[0] = dataclasses.replace(rows[0], bound=(1.0, 1.0, 1.2, 1.0, 1.0), nees=3.2, nees_low=2.5, nees_high=3.5)
+    ratios = (1.0, 1.0, 1.2, 1.0, 1.0)
+    rows[0] = dataclasses.replace(
+        rows[0], linearised=ratios, baseline=(1.0,) * 5, nees=3.2, nees_low=2.5, nees_high=3.5
+    )
+    rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01,) * 5)
     found = {claim.text: claim for claim in words.claims(rows)}
-    bound = found["joint: error ÷ bound"]
-    assert (bound.measured, bound.where, bound.kept) == (1.2, f"{CASE}, joint, k_p", False)
-    assert bound.kept_in_words == "no"
-    rows[0] = dataclasses.replace(rows[0], bound_error=(0.01, 0.01, 0.06, 0.01, 0.01))
+    first = found["joint: error ÷ Kalman filter linearised at the truth"]
+    assert (first.measured, first.where, first.kept) == (1.2, f"{CASE}, joint, k_p", False)
+    assert first.kept_in_words == "no"
+    rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01, 0.01, 0.06, 0.01, 0.01))
     assert words.claims(rows)[0].kept_in_words == "no, but within chance"
+    rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01, 0.01, 0.04, 0.01, 0.01))  # of five: 2.3 sigma
+    assert words.claims(rows)[0].kept_in_words == "no"
     assert found["joint: NEES ÷ its 95 % limit"].kept
     assert found["joint: error ÷ best baseline's, preload fixed"].measured == 1.0
     assert found["firmware: runs with NaN or a refused factor"].kept
@@ -277,37 +355,20 @@ def test_a_small_campaign(lever: Lever, tmp_path: Path, capsys: pytest.CaptureFi
     out, tables = tmp_path / "deep" / "out", tmp_path / "tables.json"
     assert lever("compare", *chosen, *brief, "--jobs", "2", "--out", str(out), "--json", str(tables)) == 0
     printed = capsys.readouterr().out
-    assert "lever_fixed_dither_rough: Smallest errors: " in printed
+    assert "lever_fixed_dither_rough: Too few runs for a verdict: 2" in printed
     assert sorted(path.name for path in out.iterdir()) == ["compare.csv", "compare.html"]
     lines = list(csv.DictReader(io.StringIO((out / "compare.csv").read_text())))
     assert len(lines) == 5
     walk = next(line for line in lines if line["case"].startswith("lever") and line["estimator"] == "joint")
-    assert 0.1 < float(walk["bound_natural_frequency"]) < 10.0
+    assert 0.1 < float(walk["linearised_natural_frequency"]) < 10.0
     page = (out / "compare.html").read_text()
     figures = json.loads(page.split('<script type="application/json" id="figures">')[1].split("</script>")[0])
-    assert {"bound-lever", "settling-step_up", "following-step_up"} <= figures.keys()
+    assert {"linearised-lever", "bound-lever", "settling-step_up", "following-step_up"} <= figures.keys()
     assert all(f'id="{key}"' in page for key in figures)
     assert len(json.loads(tables.read_text())) == 2
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = judgement.judge(alone)
-    assert float(walk["bound_natural_frequency"]) == row.bound[3]
-
-
-def test_without_filterpy_the_others_run(
-    lever: Lever, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    taken: list[str | None] = []
-
-    def noted(todo: list[campaign.Task], *_: object) -> Results:
-        taken.extend(task.entrant for task in todo)
-        return Results(Plan(1), {}, {})
-
-    monkeypatch.setattr(campaign, "run", noted)
-    monkeypatch.setattr(compare.entrants, "find_spec", lambda _: None)
-    assert lever("compare", "--scenarios", "step_up") == 0
-    assert "filterpy_ukf" not in taken
-    assert "joint_ekf" in taken
-    assert "without filterpy_ukf; for that: pip install filterpy" in capsys.readouterr().err
+    assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
 
 
 def test_interrupted_it_writes_nothing(lever: Lever, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

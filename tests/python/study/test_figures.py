@@ -300,7 +300,7 @@ def test_linear_parameters_are_those_of_the_firmware(
 
 
 @pytest.mark.parametrize(("column", "dither"), [(0, 0.0), (1, 0.4)])
-def test_identification_shows_the_firmware_and_a_bound_that_starts_at_the_prior(column: int, dither: float) -> None:
+def test_identification_shows_the_firmware_and_a_reference_that_starts_at_the_prior(column: int, dither: float) -> None:
     batch = matched(Condition("lever", "fixed", dither_rms=dither, settings=PRIOR), 1, SHORT.duration, SEED)
     chart = rows("identification", column)
     assert batch.truth.p is not None
@@ -315,7 +315,7 @@ def test_identification_shows_the_firmware_and_a_bound_that_starts_at_the_prior(
         frequency = trace(chart["f_n [Hz]"], estimator)
         np.testing.assert_allclose(frequency.y, [found[k].natural_frequency for k in at])
     for label, prior in (("m_p [kg]", 0.25), ("c_p [N s/m]", 0.3), ("k_p [N/m]", 0.3)):
-        bound, truth = trace(chart[label], "bound: truth ± 2σ"), trace(chart[label], "truth")
+        bound, truth = trace(chart[label], "linearised at the truth: ± 2σ"), trace(chart[label], "truth")
         relative = (bound.high - bound.low) / (4.0 * truth.y)
         assert relative[0] == pytest.approx(prior)
         assert relative[-1] < 0.7 * prior
@@ -336,7 +336,7 @@ def test_the_identification_caption() -> None:
             sigma = (band.high - band.low) / 4.0
             apart = max(apart, float(np.max(np.abs(dual.y - joint.y) / sigma)))
             claims.append(two(100.0 * sigma[-1] / dual.y[-1]))
-            bound, truth = trace(side[label], "bound: truth ± 2σ"), trace(side[label], "truth")
+            bound, truth = trace(side[label], "linearised at the truth: ± 2σ"), trace(side[label], "truth")
             bounds.append(two(100.0 * (bound.high - bound.low)[-1] / (4.0 * truth.y[-1])))
         assert f"{label.split()[0]} {claims[0]} → {claims[1]} % ({bounds[0]} → {bounds[1]} %)" in caption
     assert f"nowhere more than {two(apart)} σ apart" in caption

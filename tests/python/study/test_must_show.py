@@ -1,6 +1,6 @@
 """What the firmware has to show, in the part of the campaign that takes seconds; `lever compare` is the whole of it.
 
-Seeds are fixed, so this is no lottery: a change of the firmware that costs accuracy, honesty or speed fails here.
+Seeds are fixed, so this is no lottery: a change of the firmware that costs accuracy, consistency or speed fails here.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from lever_cdkf.sil.study.compare.cases import Plan
 CASES = ("lever_fixed_dither_quiet", "linear_black_box_fixed_base_rough", "step_up", "step_down")
 ESTIMATORS = ("dual", "joint", "dual_shipped", "dual_no_change")
 MEASURED = {
-    "joint: error ÷ bound",
-    "dual: error ÷ bound, with dither",
+    "joint: error ÷ Kalman filter linearised at the truth",
+    "dual: error ÷ Kalman filter linearised at the truth, with dither",
     "joint: NEES ÷ its 95 % limit",
     "joint: NEES ÷ its lower 95 % limit",
     "dual: stated σ ÷ rms error",

@@ -30,7 +30,7 @@ def correlated(rng: np.random.Generator, runs: int, times: int, memory: float) -
     return white
 
 
-# --- errors and the bound --------------------------------------------------------------------------------------------
+# --- errors and references --------------------------------------------------------------------------------------------
 
 
 def test_errors_are_those_of_w_and_relative_ones_of_the_dynamics() -> None:
@@ -116,44 +116,28 @@ def test_normalised_squares_of_honest_errors_are_chi_square() -> None:
     assert stats.kstest(squares.ravel(), stats.chi2(3).cdf).pvalue > 1e-3
 
 
-@pytest.mark.parametrize("freedom", [1, 2, 3, 4, 40, 60, 61, 120, 300, 2001])
-def test_chi_square_band_is_scipys(freedom: int) -> None:
-    expected = stats.chi2.ppf((0.025, 0.975), freedom)
-    np.testing.assert_allclose(scores.chi_square_band(freedom), expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize("freedom", [3, 4, 7, 19, 39, 200])
-def test_students_t_is_scipys(freedom: int) -> None:
-    assert scores.student_95(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=2e-3)
-
-
-@pytest.mark.parametrize("memory", [0.0, 0.95])
+@pytest.mark.parametrize("memory", [0.95, 1.0])
 @pytest.mark.parametrize("freedom", [2, 3])
-def test_an_honest_filter_is_found_consistent_in_95_of_100_batches(freedom: int, memory: float) -> None:
-    """Exact chi-square, white or correlated over a tenth of the run: 600 batches of 20 runs."""
+def test_a_consistent_filter_is_found_so_in_95_of_100_batches_or_more(freedom: int, memory: float) -> None:
+    """Exact chi-square, correlated over a tenth of the run or all of it: 600 batches of 20 runs."""
     rng = np.random.default_rng(7)
     normal = np.stack([correlated(rng, 600 * 20, 200, memory) for _ in range(freedom)])
     batches = np.sum(np.square(normal), axis=0).reshape(600, 20, 200)
     found = [scores.consistency(squares, freedom) for squares in batches]
     assert all(one.expected == freedom for one in found)
-    share = np.mean([one.consistent for one in found])
-    assert share == pytest.approx(
-        0.95, abs=3.3 * np.sqrt(0.95 * 0.05 / 600) + 0.01
-    )  # 0.01: their means are no Gaussians
-    inside = np.mean([one.inside for one in found])
-    spread = np.std([one.inside for one in found]) / np.sqrt(600)
-    assert inside == pytest.approx(0.95, abs=3.3 * spread)
-    assert np.mean([one.mean for one in found]) == pytest.approx(freedom, rel=0.01)
+    share, spread = np.mean([one.consistent for one in found]), 3.3 * np.sqrt(0.95 * 0.05 / 600)
+    assert share > 0.95 - spread
+    if memory == 1.0:
+        assert share < 0.95 + spread
+    inside = [one.inside for one in found]
+    assert np.mean(inside) == pytest.approx(0.95, abs=3.3 * np.std(inside) / np.sqrt(600))
+    assert np.mean([one.mean for one in found]) == pytest.approx(freedom, rel=0.02)
 
 
-@pytest.mark.parametrize("runs", [4, 20])
-def test_the_band_of_the_mean_is_students(runs: int) -> None:
-    """Rejection of `freedom` as the mean of the runs' means: scipy's t test."""
-    squares = np.random.default_rng(runs).chisquare(3, (runs, 10))
-    found = scores.consistency(squares, 3)
-    interval = stats.ttest_1samp(squares.mean(axis=1), 3.0).confidence_interval(0.95)
-    np.testing.assert_allclose(np.diff(found.mean_band), interval.high - interval.low, rtol=2e-3)
-    assert sum(found.mean_band) / 2.0 == pytest.approx(3.0)
+def test_the_band_of_the_mean_is_chi_squares() -> None:
+    squares = np.random.default_rng(4).chisquare(3, (20, 10))
+    expected = stats.chi2.ppf((0.025, 0.975), 60) / 20
+    np.testing.assert_allclose(scores.consistency(squares, 3).mean_band, expected)
 
 
 @pytest.mark.parametrize("claim", [0.8, 1.25])

@@ -78,7 +78,7 @@ static bool fly(const lever_config_t *config, bool drifts, uint32_t samples)
     for (uint32_t index = 0u; (index < samples) && valid; index++) {
         set_arm(&simulation, drifts);
         const lever_sample_t sample = sample_of(&simulation, index);
-        (void)estimator_update(&estimator, &sample);
+        (void)estimator_update(&estimator, &sample, 0.0f);
         valid = (index == 0u) || (cdkf_is_valid(&estimator.cdkf) && (estimator.recoveries == 0u));
         if ((index % (uint32_t)SAMPLES_A_LINE) == 0u) {
             print_line(&estimator, &simulation);

@@ -42,7 +42,7 @@ def test_cycles_are_counted_of_the_same_calls(budget: dict[str, Any]) -> None:
 
 
 def test_a_gap_is_bounded(budget: dict[str, Any]) -> None:
-    """One call predicts at most 12 times: app/estimator.c."""
+    """One call predicts at most 12 times: app/prediction.c."""
     for estimator, most in budget["instructions_after_gap"].items():
         entry = budget["instructions"][estimator]["lever"]
         assert entry["worst"] < most < 16 * entry["mean"]

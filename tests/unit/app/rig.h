@@ -65,6 +65,15 @@ static inline float rig_first_sigma(lever_config_t *config, uint32_t i)
     return relative ? (sigma * *rig_parameter_setting(config, i, "")) : sigma;
 }
 
+/* Sensors and lever are exactly what the settings say. */
+static inline void rig_trust_calibration(lever_config_t *config)
+{
+    config->settings.z_ddot_gain_sigma = 0.0f;
+    config->settings.z_ddot_delay_sigma = 0.0f;
+    config->settings.tau_m_gain_sigma = 0.0f;
+    config->settings.lever_friction_sigma = 0.0f;
+}
+
 /* --- samples ------------------------------------------------------------------------------------------------------ */
 
 typedef struct rig {

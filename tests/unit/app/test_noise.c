@@ -33,7 +33,7 @@ static void run(uint32_t samples)
 {
     for (uint32_t k = 0u; k < samples; k++) {
         const lever_sample_t sample = rig_sample(&rig);
-        (void)estimator_update(&estimator, &sample);
+        (void)estimator_update(&estimator, &sample, 0.0f);
     }
 }
 
@@ -93,7 +93,7 @@ static void test_the_noise_of_a_missing_output_stays(void)
     for (uint32_t k = 0u; k < 10000u; k++) {
         lever_sample_t sample = rig_sample(&rig);
         sample.theta_dot_valid = false;
-        (void)estimator_update(&estimator, &sample);
+        (void)estimator_update(&estimator, &sample, 0.0f);
     }
     TEST_ASSERT_FLOAT_WITHIN(0.15f * before, before, estimator.cdkf.output_noise[1]);
 }

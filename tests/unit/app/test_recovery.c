@@ -15,7 +15,7 @@ static enum lever_mode run(uint32_t count)
     enum lever_mode mode = LEVER_MODE_INIT;
     for (uint32_t k = 0u; k < count; k++) {
         const lever_sample_t sample = rig_sample(&rig);
-        mode = estimator_update(&estimator, &sample);
+        mode = estimator_update(&estimator, &sample, 0.0f);
     }
     return mode;
 }
@@ -118,7 +118,7 @@ static void test_restart_without_a_measurement_begins_at_the_trim_and_at_rest(vo
 {
     const lever_sample_t sample = rig_sample_blind(&rig);
     estimator.cdkf.s_xx[0] = NAN;
-    (void)estimator_update(&estimator, &sample);
+    (void)estimator_update(&estimator, &sample, 0.0f);
     TEST_ASSERT_EQUAL_UINT32(1u, estimator.recoveries);
     TEST_ASSERT_DOUBLE_WITHIN(0.02, rig.simulation.plant.trim, (double)estimate().theta);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.0, (double)estimate().theta_dot);
@@ -155,7 +155,7 @@ static void test_only_a_reset_leaves_fault(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(6u));
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(20000u));
     const lever_sample_t after_a_gap = rig_sample_after(&rig, 2000u);
-    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, estimator_update(&estimator, &after_a_gap));
+    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, estimator_update(&estimator, &after_a_gap, 0.0f));
     request(LEVER_REQUEST_FREEZE);
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(1u));
     request(LEVER_REQUEST_RUN);
@@ -206,11 +206,11 @@ static void test_a_huge_innovation_after_an_outage_does_not_spoil_the_average(vo
     (void)run(2000u);
     request(LEVER_REQUEST_FREEZE);
     lever_sample_t sample = rig_sample_blind(&rig);
-    (void)estimator_update(&estimator, &sample);
+    (void)estimator_update(&estimator, &sample, 0.0f);
     sample = rig_sample_blind(&rig);
     sample.theta += 2.0f;
     sample.theta_valid = true;
-    (void)estimator_update(&estimator, &sample);
+    (void)estimator_update(&estimator, &sample, 0.0f);
     TEST_ASSERT_TRUE(isfinite(estimator.averages.innovation) && has_fault(LEVER_FAULT_INNOVATION));
     (void)run(16000u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_INNOVATION));

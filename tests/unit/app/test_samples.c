@@ -82,23 +82,55 @@ static void test_with_one_output_alone_it_still_learns(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.1 * fabs(truth[2]), truth[2], (double)rig_estimate(other).parameter[2]);
 }
 
-static void test_torque_that_is_not_valid_counts_as_none_and_base_acceleration_is_held(void)
+/* Without dither nothing is asked of the motor. */
+static void test_torque_that_is_not_valid_counts_as_what_was_asked_of_the_motor(void)
 {
     run_both(1000u);
-    const float held = (float)rig.simulation.z_ddot;
     for (uint32_t k = 0u; k < 20u; k++) {
-        const bool torque = (k < 10u);
         lever_sample_t sample = rig_sample(&rig);
-        sample.tau_m = torque ? 0.0f : sample.tau_m;
-        sample.z_ddot = torque ? held : sample.z_ddot;
+        sample.tau_m = 0.0f;
         (void)lever_update(other, &sample);
-        sample.tau_m = torque ? NAN : sample.tau_m;
-        sample.z_ddot = torque ? NAN : sample.z_ddot;
-        sample.tau_m_valid = !torque;
-        sample.z_ddot_valid = !torque;
+        sample.tau_m = NAN;
+        sample.tau_m_valid = false;
         (void)lever_update(lever, &sample);
         rig_assert_same_estimates(lever, other);
-        TEST_ASSERT_EQUAL_UINT32(torque ? (LEVER_FAULT_TORQUE | LEVER_FAULT_BASE) : 0u, faults());
+        TEST_ASSERT_EQUAL_UINT32(LEVER_FAULT_TORQUE, faults() & ~(uint32_t)LEVER_FAULT_SETTLING);
+    }
+}
+
+/* What it is does not matter; nothing is learnt, and the state is less certain. For more than 20 ms, the levels have to
+ * settle again. */
+static void test_without_base_acceleration_nothing_is_learnt(void)
+{
+    for (uint32_t k = 0u; k < 2u; k++) {
+        const uint32_t missing = (k == 0u) ? 20u : 300u;
+        setUp();
+        (void)rig_run(&rig, lever, 3000u);
+        (void)rig_run(&rig, lever, 20u - (rig_health(lever).samples % 20u));
+        lever_estimate_t learnt = rig_estimate(lever);
+        const float sigma = learnt.theta_dot_sigma;
+        for (uint32_t n = 0u; n < missing; n++) {
+            lever_sample_t sample = rig_sample(&rig);
+            sample.z_ddot = ((n % 2u) == 0u) ? NAN : 5.0f;
+            sample.z_ddot_valid = false;
+            TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
+            TEST_ASSERT_TRUE((faults() & (uint32_t)LEVER_FAULT_BASE) != 0u);
+            if (n == 20u) { /* what was pending is dropped or learnt by now */
+                learnt = rig_estimate(lever);
+            }
+        }
+        const lever_estimate_t after = rig_estimate(lever);
+        TEST_ASSERT_TRUE(after.theta_dot_sigma > (1.02f * sigma));
+        TEST_ASSERT_EQUAL((k == 1u),
+            rig_run(&rig, lever, 1u) == LEVER_MODE_RUN && ((faults() & (uint32_t)LEVER_FAULT_SETTLING) != 0u));
+        TEST_ASSERT_EQUAL_UINT32(0u, faults() & (uint32_t)LEVER_FAULT_BASE);
+        if (k == 1u) {
+            TEST_ASSERT_EQUAL_MEMORY(learnt.parameter, after.parameter, sizeof after.parameter);
+            (void)rig_run(&rig, lever, 850u);
+            TEST_ASSERT_EQUAL_MEMORY(learnt.parameter, rig_estimate(lever).parameter, sizeof after.parameter);
+            (void)rig_run(&rig, lever, 400u);
+            TEST_ASSERT_TRUE(learnt.parameter[0] != rig_estimate(lever).parameter[0]);
+        }
     }
 }
 
@@ -119,7 +151,7 @@ static void test_inputs_between_two_samples_are_the_mean_of_both(void)
     const double pushed = plant_acceleration(plant, plant->theta, 0.0, 2.0, 2.0);
     const double wanted = 1.0e-3 * (pushed - plant_acceleration(plant, plant->theta, 0.0, 0.0, 0.0));
     const double found = (double)rig_estimate(other).theta_dot - (double)rig_estimate(lever).theta_dot;
-    TEST_ASSERT_DOUBLE_WITHIN(0.05 * fabs(wanted), wanted, found);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * fabs(wanted), wanted, found); /* the arm is known to some per cent */
 }
 
 /* --- what is wrong ------------------------------------------------------------------------------------------------ */
@@ -201,7 +233,7 @@ enum { CLOCK = 4096 }; /* LEVER_FAULT_CLOCK: of a late sample it may be the only
 static void test_a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothing(void)
 {
     const uint32_t older_us[] = {0u, 5000u, 1800000000u}; /* half a turn of the clock is 36 minutes */
-    run_both(500u);
+    run_both(1500u);                                      /* settled */
     lever_sample_t sample = rig_sample(&rig);
     (void)lever_update(lever, &sample);
     (void)lever_update(other, &sample);
@@ -210,7 +242,7 @@ static void test_a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothi
         sample.time_us = rig.time_us - older_us[k];
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
         TEST_ASSERT_EQUAL_UINT32(k + 1u, rig_health(lever).late);
-        TEST_ASSERT_EQUAL_UINT32(501u, rig_health(lever).samples);
+        TEST_ASSERT_EQUAL_UINT32(1501u, rig_health(lever).samples);
         TEST_ASSERT_EQUAL_UINT32(0u, faults() & ~(uint32_t)CLOCK);
     }
     rig_assert_same_estimates(lever, other);
@@ -349,7 +381,8 @@ int main(void)
         RIG_RUN_TEST(test_good_samples_have_no_fault, combination);
         RIG_RUN_TEST(test_without_one_output_it_runs_on_the_other, combination);
         RIG_RUN_TEST(test_with_one_output_alone_it_still_learns, combination);
-        RIG_RUN_TEST(test_torque_that_is_not_valid_counts_as_none_and_base_acceleration_is_held, combination);
+        RIG_RUN_TEST(test_torque_that_is_not_valid_counts_as_what_was_asked_of_the_motor, combination);
+        RIG_RUN_TEST(test_without_base_acceleration_nothing_is_learnt, combination);
         RIG_RUN_TEST(test_inputs_between_two_samples_are_the_mean_of_both, combination);
         RIG_RUN_TEST(test_a_value_that_is_not_finite_is_corrupt_and_counts_as_invalid, combination);
         RIG_RUN_TEST(test_a_value_that_is_flagged_invalid_is_not_read, combination);

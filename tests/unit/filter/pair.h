@@ -61,6 +61,8 @@ static inline void pair_respond(const model_constants_t *constants, const model_
     response->mean = (float)mean;
     response->slope[0] = (float)slope[3];
     response->slope[1] = (float)slope[4];
+    response->base = at->period * points->coefficients[0].c[0];
+    response->torque = at->period * points->coefficients[0].c[1];
 }
 
 static const model_t pair_model = {.name = "linear",
@@ -68,6 +70,8 @@ static const model_t pair_model = {.name = "linear",
     .positive = false,
     .prepare = pair_prepare,
     .respond = pair_respond};
+
+static const float pair_no_error[CDKF_CONSIDERED] = {0.0f, 0.0f, 0.0f, 0.0f};
 
 static const prior_t pair_prior = {.guess = {0.0f, 0.0f, 0.0f}, .sigma = {0.4f, 0.6f, 0.5f}};
 
@@ -90,7 +94,8 @@ static inline matrix_t pair_transition(const model_step_t *at)
 static inline matrix_t pair_process_noise(const cdkf_t *cdkf, double period)
 {
     const double own = (double)cdkf->process_noise[0] * (double)cdkf->process_noise[0];
-    const double variance = (double)cdkf->process_noise[1] * (double)cdkf->process_noise[1];
+    const double walk = (double)cdkf->process_noise[1] + (double)cdkf->disturbance;
+    const double variance = walk * walk;
     matrix_t noise = matrix_zero((uint32_t)PAIR_Z, (uint32_t)PAIR_Z);
     noise.at[3][3] = (variance * period * period * period / 3.0) + (own * period);
     noise.at[3][4] = variance * period * period / 2.0;
@@ -169,7 +174,7 @@ static inline void pair_predict(pair_t *pair, float period)
         .z_ddot = (float)(30.0 * random_normal(&pair->source)),
         .tau_m = (float)(30.0 * random_normal(&pair->source)),
         .trim = (float)(30.0 * random_normal(&pair->source))};
-    cdkf_time_update(&pair->cdkf, &pair_model, NULL, &pair->step);
+    cdkf_time_update(&pair->cdkf, &pair_model, NULL, &pair->step, pair_no_error);
     kalman_predict(&pair->reference, pair_transition(&pair->step), pair_process_noise(&pair->cdkf, (double)period));
 }
 

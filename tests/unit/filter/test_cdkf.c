@@ -26,6 +26,7 @@ static void test_time_update_is_the_prediction_of_the_textbook_with_its_process_
         pair = pair_random(repeat);
         cdkf->process_noise[0] = (float)random_between(&pair.source, 0.0, 0.02);
         cdkf->process_noise[1] = (float)random_between(&pair.source, 0.0, 0.5);
+        cdkf->disturbance = ((repeat % 2u) == 0u) ? 0.3f : 0.0f;
         const float before[N] = {cdkf->response[0], cdkf->response[1]};
         pair_predict(&pair, (float)random_between(&pair.source, 1.0e-4, 2.0e-2));
         pair_assert_equal(&pair, 2.0e-3, 5.0e-6);
@@ -58,7 +59,7 @@ static void test_curvature_along_a_parameter_has_the_moments_of_a_gaussian(void)
     cdkf->process_noise[1] = 0.0f;
     const matrix_t before = pair_covariance(cdkf);
     const model_step_t step = {.period = (float)period};
-    cdkf_time_update(cdkf, &model, NULL, &step);
+    cdkf_time_update(cdkf, &model, NULL, &step, pair_no_error);
     const matrix_t after = pair_covariance(cdkf);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, 2.0 * 0.16, (double)cdkf->x[1]);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, 0.1 + (0.5 * period * 0.32), (double)cdkf->x[0]);

@@ -68,7 +68,7 @@ static subject_t subject_of(uint32_t kind, const double p[L], double period, dou
     subject.constants = constants_of(plant);
     subject.step = (model_step_t){.period = (float)period,
         .z_ddot = (float)z_ddot,
-        .z_dot = (float)plant->z_dot,
+        .seat_dot = (float)(-plant->z_dot / (0.45 * cos(TRIM))),
         .tau_m = (float)tau_m,
         .origin = 0.31f,
         .trim = (float)plant->trim,
@@ -95,7 +95,7 @@ static subject_t random_subject(uint32_t kind, double period)
     subject.plant.theta += random_between(&source, -0.1, 0.1);
     subject.plant.theta_dot = random_between(&source, -1.5, 1.5);
     subject.plant.z_dot = random_between(&source, -0.5, 0.5);
-    subject.step.z_dot = (float)subject.plant.z_dot;
+    subject.step.seat_dot = (float)(-subject.plant.z_dot / (0.45 * cos(TRIM)));
     return subject;
 }
 
@@ -254,7 +254,7 @@ static void test_at_rest_it_stays_at_rest(void)
     const double p[MODELS][L] = {{2.5, 42.0, 1500.0}, {2.5, 42.0, 1500.0}, {-465.0, -13.7, -2.2}, {500.0, 13.5, 9.0}};
     for (uint32_t kind = 0u; kind < (uint32_t)KINDS; kind++) {
         subject_t subject = subject_of(kind, p[kind / 2u], 1.0e-3, 0.0, 0.0);
-        subject.step.z_dot = 0.0f;
+        subject.step.seat_dot = 0.0f;
         if (kind == 1u) {
             const double mu = (subject.plant.mass_position * subject.plant.mass) + subject.plant.m_p;
             const double bears = PLANT_GRAVITY * mu / (subject.plant.k_p * subject.plant.length);
@@ -293,7 +293,7 @@ static void test_heavy_damping_and_a_long_step_still_decay(void)
     const double p[MODELS][L] = {{0.3, 400.0, 200.0}, {0.05, 600.0, 1.0}, {-1.0, -320.0, 0.0}, {20.0, 320.0, 0.1}};
     for (uint32_t model = 0u; model < (uint32_t)MODELS; model++) {
         subject_t subject = subject_of(2u * model, p[model], 2.0e-2, 0.0, 0.0);
-        subject.step.z_dot = 0.0f;
+        subject.step.seat_dot = 0.0f;
         for (double rate = 1.0; fabs(rate) > 1.0e-6;) {
             subject.plant.theta_dot = rate;
             const double next = rate + mean_change(&subject);

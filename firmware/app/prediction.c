@@ -1,0 +1,128 @@
+#include "app/prediction.h"
+
+#include <math.h>
+
+#define OUTAGE 0.0205f    /* a base acceleration missing for longer is out [s] */
+#define MISSING 10.0f     /* process noise for a base acceleration that is missing, in those that are set, */
+#define WRONG 3.0f        /* and for a wrong one, so that it is noticed when it is right again */
+#define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
+#define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
+
+/* Torque of one newton metre of Coulomb friction, smooth about standstill. */
+static float friction(float rate)
+{
+    return rate / (fabsf(rate) + STOP_RATE);
+}
+
+/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
+ * measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
+static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
+{
+    error[CDKF_BASE_GAIN] = -z_ddot;
+    error[CDKF_BASE_DELAY] = z_ddot - estimator->z_ddot; /* in sample periods */
+    error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
+    error[CDKF_FRICTION] = -stop;
+}
+
+/* One step of the model, with the mean of the inputs at both ends. A base that cannot be used is unknown: then the
+ * state has the process noise for it. */
+static void predict(estimator_t *estimator, float z_ddot, float tau_m, float period)
+{
+    trim_t *trim = &estimator->trim;
+    cdkf_t *cdkf = &estimator->cdkf;
+    learning_t *learning = &estimator->learning;
+    const setup_t *setup = &estimator->setup;
+    const lever_settings_t *s = setup->settings;
+    const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
+    const float stop = trim_input(trim, 2u, friction(trim->origin[1] + cdkf->x[1]), period);
+    const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
+    const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
+    float error[CDKF_CONSIDERED];
+    trim_set_origin(trim);
+    model_step_t step = {.period = period,
+        .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
+        .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
+        .origin = trim->origin[0],
+        .trim = trim_angle(trim),
+        .trim_sine = estimator->trim_angle.sine,
+        .trim_cosine = estimator->trim_angle.cosine};
+    if (setup->model_in_use->uses_base_motion) {
+        base_motion_step(&estimator->base_motion, &setup->constants, &step);
+    }
+    hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
+    if (unknown) {
+        step.z_ddot = 0.0f;
+        step.seat_dot = 0.0f;
+        cdkf->disturbance = (learning->monitor.base_wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
+    }
+    considered_errors(estimator, next_z_ddot, stop, error);
+    cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
+    estimator->z_ddot = next_z_ddot;
+    estimator->tau_m = next_tau_m;
+}
+
+/* Subtracts the slow level from the outputs, and renews the trim angle. Returns true at the end of an outage. */
+static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], float period)
+{
+    const bool back = trim_outputs(&estimator->trim, estimator->cdkf.x, y, valid, period);
+    estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
+    return back;
+}
+
+/* Predicts through a gap in `substeps`, inputs in between on a straight line from the last ones, up to the last
+ * step. */
+static void cross_gap(
+    estimator_t *estimator, const checked_t *sample, const inputs_t *last, float period, uint32_t substeps)
+{
+    static const bool missing[CDKF_OUTPUTS] = {false, false};
+    const float part = 1.0f / (float)substeps;
+    float unused[CDKF_OUTPUTS] = {0.0f, 0.0f};
+    for (uint32_t i = 1u; i < substeps; i++) {
+        const float share = part * (float)i;
+        predict(estimator, last->z_ddot + (share * (sample->z_ddot - last->z_ddot)),
+            last->tau_m + (share * (sample->tau_m - last->tau_m)), period);
+        (void)subtract_trim(estimator, unused, missing, period);
+    }
+}
+
+/* After an outage of the base its level has to settle again. */
+static void follow_base(estimator_t *estimator, bool valid, float elapsed)
+{
+    if (valid && (estimator->base_missing > OUTAGE)) {
+        trim_unsettle(&estimator->trim);
+    }
+    estimator->base_missing = valid ? 0.0f : (estimator->base_missing + elapsed);
+}
+
+/* An output far from what is expected is not valid. */
+static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elapsed)
+{
+    const float average = estimator->averages.innovation;
+    const float level = (average > 1.0f) ? average : 1.0f;
+    monitor_t *monitor = &estimator->learning.monitor;
+    for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
+        const float y = sample->y[i] - estimator->trim.origin[i];
+        if (sample->valid[i] && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
+            sample->valid[i] = false;
+            estimator->corrupt++;
+            estimator->faults |= (i == 0u) ? (uint32_t)LEVER_FAULT_THETA : (uint32_t)LEVER_FAULT_THETA_DOT;
+        }
+    }
+}
+
+void prediction_advance(
+    estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed, uint32_t periods)
+{
+    float period = elapsed;
+    if (periods > 1u) {
+        const uint32_t substeps = (periods < SUBSTEPS_MOST) ? periods : SUBSTEPS_MOST;
+        period = elapsed / (float)substeps;
+        cross_gap(estimator, sample, last, period, substeps);
+    }
+    follow_base(estimator, sample->base, elapsed);
+    predict(estimator, sample->z_ddot, sample->tau_m, period);
+    refuse_spikes(estimator, sample, elapsed);
+    if (subtract_trim(estimator, sample->y, sample->valid, period)) {
+        alignment_end_outage(estimator, sample);
+    }
+}

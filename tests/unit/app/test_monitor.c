@@ -1,0 +1,268 @@
+/* What makes a signal unbelievable: that it stands still, an output far from what is expected, a response to the base
+ * that is not about once what it should be. Each must be found, and none where nothing is wrong. */
+#include "app/monitor.h"
+
+#include "../filter/pair.h"
+
+enum { SAMPLES = 20 }; /* in a block */
+
+#define PERIOD 1.0e-3f
+
+static monitor_t monitor;
+static pair_t pair;
+static random_source_t source;
+
+void setUp(void)
+{
+    monitor_start(&monitor);
+    pair = pair_random(11u);
+    source.state = 21u;
+}
+
+void tearDown(void)
+{
+}
+
+/* --- stuck signals ------------------------------------------------------------------------------------------------ */
+
+static void surprise(double ratio, uint32_t samples)
+{
+    for (uint32_t k = 0u; k < samples; k++) {
+        monitor_add(&monitor, (float)ratio, PERIOD);
+    }
+}
+
+/* A block at whose end signal `which` is at a value and the others at one never seen before; true when one has just
+ * been found stuck. */
+static bool block(uint32_t which, float value)
+{
+    for (uint32_t i = 0u; i < (uint32_t)MONITOR_SIGNALS; i++) {
+        const float other = (float)random_normal(&source);
+        (void)monitor_is_alive(&monitor, (enum monitor_signal)i, (i == which) ? value : other);
+    }
+    return monitor_has_just_stuck(&monitor);
+}
+
+static bool is_alive(uint32_t which, float value)
+{
+    return monitor_is_alive(&monitor, (enum monitor_signal)which, value);
+}
+
+/* 100 ms without a change, when the innovations say that something is wrong; said once, and no longer as soon as it
+ * changes. */
+static void test_a_signal_that_stands_still_against_the_innovations_is_stuck(void)
+{
+    for (uint32_t which = 0u; which < (uint32_t)MONITOR_SIGNALS; which++) {
+        setUp();
+        TEST_ASSERT_FALSE(block(which, 0.5f));
+        surprise(4.0, 300u);
+        for (uint32_t k = 0u; k < 4u; k++) {
+            TEST_ASSERT_TRUE(!block(which, 0.5f) && is_alive(which, 0.5f));
+        }
+        TEST_ASSERT_TRUE(block(which, 0.5f));
+        TEST_ASSERT_TRUE(!is_alive(which, 0.5f) && monitor_has_stuck(&monitor));
+        surprise(1.0, 1000u); /* without the signal nothing surprises any more */
+        TEST_ASSERT_TRUE(!block(which, 0.5f) && !is_alive(which, 0.5f));
+        TEST_ASSERT_FALSE(is_alive(which, 0.6f)); /* until the end of the block */
+        TEST_ASSERT_FALSE(block(which, 0.6f));
+        TEST_ASSERT_TRUE(is_alive(which, 0.6f) && !monitor_has_stuck(&monitor));
+    }
+}
+
+/* Its sender says so itself: then it is missing, not stuck, however long, and counts anew when it is back. */
+static void test_a_signal_that_is_not_sent_or_not_valid_is_not_stuck(void)
+{
+    (void)block((uint32_t)MONITOR_THETA, 0.5f);
+    surprise(4.0, 300u);
+    for (uint32_t k = 0u; k < 50u; k++) {
+        TEST_ASSERT_FALSE(monitor_has_just_stuck(&monitor));
+    }
+    for (uint32_t k = 0u; k < 4u; k++) {
+        TEST_ASSERT_FALSE(block((uint32_t)MONITOR_THETA, 0.5f));
+    }
+    TEST_ASSERT_TRUE(block((uint32_t)MONITOR_THETA, 0.5f));
+    TEST_ASSERT_FALSE(monitor_has_just_stuck(&monitor) || monitor_has_stuck(&monitor));
+}
+
+/* At rest a sensor of coarse resolution stands still, and is right. */
+static void test_outputs_that_stand_still_as_expected_are_not_stuck(void)
+{
+    for (uint32_t which = 0u; which < (uint32_t)CDKF_OUTPUTS; which++) {
+        setUp();
+        for (uint32_t k = 0u; k < 50u; k++) {
+            (void)block(which, (float)k);
+        }
+        for (uint32_t k = 0u; k < 1000u; k++) {
+            surprise(1.2, (uint32_t)SAMPLES);
+            TEST_ASSERT_FALSE(block(which, 0.5f));
+        }
+    }
+}
+
+/* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never stands still. */
+static void test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations(void)
+{
+    for (uint32_t changes = 19u; changes <= 20u; changes++) {
+        bool stuck = false;
+        setUp();
+        for (uint32_t k = 0u; k < changes; k++) {
+            stuck = block((uint32_t)MONITOR_Z_DDOT, 1.0f + (float)k) || stuck;
+        }
+        for (uint32_t k = 0u; k < 10u; k++) {
+            stuck = block((uint32_t)MONITOR_Z_DDOT, (float)changes) || stuck;
+        }
+        TEST_ASSERT_EQUAL(changes == 20u, stuck);
+        for (uint32_t k = 0u; k < 5u; k++) { /* having stood still, it is not taken for granted any more */
+            (void)block((uint32_t)MONITOR_Z_DDOT, 0.5f + (float)k);
+        }
+        for (uint32_t k = 0u; k < 10u; k++) {
+            TEST_ASSERT_FALSE(block((uint32_t)MONITOR_Z_DDOT, 0.1f));
+        }
+    }
+}
+
+static void test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second(void)
+{
+    surprise(3.0, 100u);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 + (2.0 * (1.0 - exp(-1.0))), (double)monitor.surprise);
+    monitor_start(&monitor);
+    surprise(1.0e3, 1u);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 1.0f + (0.01f * 99.0f), monitor.surprise);
+    monitor_add(&monitor, 2.0f, 10.0f);
+    TEST_ASSERT_TRUE(monitor.surprise == 2.0f);
+}
+
+/* --- spikes ------------------------------------------------------------------------------------------------------- */
+
+/* Output i so many standard deviations off. */
+static bool is_spike(uint32_t i, double sigmas, float level)
+{
+    const double noise = (double)pair.cdkf.output_noise[i];
+    const double variance = pair.reference.p.at[PAIR_W + i][PAIR_W + i] + (noise * noise);
+    const double y = pair.reference.x.at[PAIR_W + i][0] + (sigmas * sqrt(variance));
+    return monitor_is_spike(&monitor, &pair.cdkf, i, (float)y, level, PERIOD);
+}
+
+static void test_an_output_beyond_six_standard_deviations_is_refused(void)
+{
+    for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
+        TEST_ASSERT_TRUE(!is_spike(i, 5.9, 1.0f) && !is_spike(i, -5.9, 1.0f));
+        TEST_ASSERT_TRUE(is_spike(i, 6.1, 1.0f) && is_spike(i, -6.1, 1.0f));
+        TEST_ASSERT_TRUE(
+            !is_spike(i, 11.8, 4.0f) && is_spike(i, 12.2, 4.0f)); /* innovations are twice as large anyway */
+    }
+}
+
+static void test_what_lasts_for_20_ms_is_no_spike(void)
+{
+    for (uint32_t repeat = 0u; repeat < 3u; repeat++) {
+        for (uint32_t k = 0u; k < 19u; k++) {
+            TEST_ASSERT_TRUE(is_spike(0u, 100.0, 1.0f));
+            TEST_ASSERT_FALSE(is_spike(1u, 1.0, 1.0f));
+        }
+        TEST_ASSERT_FALSE(is_spike(0u, (repeat == 1u) ? 1.0 : 100.0, 1.0f) && (repeat == 1u));
+        (void)is_spike(0u, 100.0, 1.0f);
+        TEST_ASSERT_EQUAL(repeat == 1u, is_spike(0u, 100.0, 1.0f));
+        TEST_ASSERT_TRUE(is_spike(1u, 100.0, 1.0f)); /* each output for itself */
+        TEST_ASSERT_FALSE(is_spike(0u, 1.0, 1.0f) || is_spike(1u, 1.0, 1.0f));
+    }
+}
+
+/* --- the base ----------------------------------------------------------------------------------------------------- */
+
+/* Blocks with the base acceleration so many times the measured one, of which the filter expects it once, or not at all
+ * while it is not used: the score is of the gain's error. The response is known to 1 / sqrt(rate) in a second. Returns
+ * how often it has been said that it is wrong. */
+static uint32_t respond(uint32_t blocks, double gain, double rate)
+{
+    uint32_t said = 0u;
+    for (uint32_t k = 0u; k < blocks; k++) {
+        const double information = rate * (double)SAMPLES * (double)PERIOD;
+        const double error = (monitor.base_wrong ? 0.0 : 1.0) - gain;
+        const score_t sudden = {
+            (float)((information * error) + (sqrt(information) * random_normal(&source))), (float)information};
+        said += monitor_step(&monitor, &sudden, (float)SAMPLES * PERIOD) ? 1u : 0u;
+    }
+    return said;
+}
+
+static void test_a_base_that_is_about_right_is_used_for_an_hour(void)
+{
+    const double gains[] = {1.0, 0.7, 1.3};
+    for (uint32_t k = 0u; k < 3u; k++) {
+        setUp();
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(180000u, gains[k], 1000.0));
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(180000u, gains[k], 100.0));
+    }
+}
+
+/* No sensor, the wrong sign, the wrong unit: within a second, said once; and used again within one when it is right. */
+static void test_a_wrong_base_is_found_and_trusted_again(void)
+{
+    const double gains[] = {0.0, -1.0, 9.81, 2.0};
+    for (uint32_t k = 0u; k < 4u; k++) {
+        setUp();
+        (void)respond(500u, 1.0, 1000.0);
+        TEST_ASSERT_EQUAL_UINT32(1u, respond(50u, gains[k], 1000.0));
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(5000u, gains[k], 1000.0));
+        TEST_ASSERT_TRUE(monitor.base_wrong);
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(50u, 1.0, 1000.0));
+        TEST_ASSERT_FALSE(monitor.base_wrong);
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(5000u, 1.0, 1000.0));
+    }
+}
+
+/* Gains between: not wrong enough to be refused, not right enough to be trusted again. */
+static void test_the_verdict_on_the_base_has_hysteresis(void)
+{
+    const double gains[] = {0.55, 1.45};
+    const double beyond[] = {0.0, 9.81};
+    for (uint32_t k = 0u; k < 2u; k++) {
+        setUp();
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(500u, gains[k], 1.0e5));
+        (void)respond(100u, beyond[k], 1.0e5);
+        TEST_ASSERT_TRUE(monitor.base_wrong);
+        (void)respond(500u, gains[k], 1.0e5);
+        TEST_ASSERT_TRUE(monitor.base_wrong);
+    }
+}
+
+static void test_too_little_information_says_nothing_of_the_base(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(0u, respond(50000u, -1.0, 100.0)); /* known to 0.14 over the memory of half a second */
+    TEST_ASSERT_EQUAL_UINT32(1u, respond(100u, -1.0, 400.0));
+    (void)respond(50000u, 1.0, 30.0); /* to a third over 0.3 s */
+    TEST_ASSERT_TRUE(monitor.base_wrong);
+    (void)respond(200u, 1.0, 100.0);
+    TEST_ASSERT_FALSE(monitor.base_wrong);
+}
+
+static void test_what_was_seen_of_the_base_can_be_forgotten(void)
+{
+    (void)respond(100u, 0.0, 1000.0);
+    TEST_ASSERT_TRUE(monitor.base_wrong);
+    monitor_trust_base(&monitor);
+    TEST_ASSERT_FALSE(monitor.base_wrong);
+    (void)respond(10u, 0.0, 450.0);
+    monitor_trust_base(&monitor);
+    (void)respond(10u, 0.0, 450.0); /* together it would be enough */
+    TEST_ASSERT_FALSE(monitor.base_wrong);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_a_signal_that_stands_still_against_the_innovations_is_stuck);
+    RUN_TEST(test_a_signal_that_is_not_sent_or_not_valid_is_not_stuck);
+    RUN_TEST(test_outputs_that_stand_still_as_expected_are_not_stuck);
+    RUN_TEST(test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations);
+    RUN_TEST(test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second);
+    RUN_TEST(test_an_output_beyond_six_standard_deviations_is_refused);
+    RUN_TEST(test_what_lasts_for_20_ms_is_no_spike);
+    RUN_TEST(test_a_base_that_is_about_right_is_used_for_an_hour);
+    RUN_TEST(test_a_wrong_base_is_found_and_trusted_again);
+    RUN_TEST(test_the_verdict_on_the_base_has_hysteresis);
+    RUN_TEST(test_too_little_information_says_nothing_of_the_base);
+    RUN_TEST(test_what_was_seen_of_the_base_can_be_forgotten);
+    return UNITY_END();
+}

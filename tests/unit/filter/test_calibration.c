@@ -1,0 +1,114 @@
+/* Calibration: an error as large as stated is tolerated, a larger one found, from scores that are drawn as theirs are
+ * distributed: vector = information b + noise of variance information. */
+#include "filter/calibration.h"
+
+#include "../math/dense.h"
+#include "unity.h"
+
+enum { C = CDKF_CONSIDERED };
+
+#define PERIOD 0.02f
+#define MEMORY 20.0 /* [s] */
+
+static random_source_t source;
+static calibration_t calibration;
+static cdkf_t cdkf;
+
+void setUp(void)
+{
+    source.state = 5u;
+    calibration_start(&calibration);
+    cdkf.considered_sigma[CDKF_BASE_GAIN] = 0.02f;
+    cdkf.considered_sigma[CDKF_BASE_DELAY] = 0.5f;
+    cdkf.considered_sigma[CDKF_TORQUE_GAIN] = 0.07f;
+    cdkf.considered_sigma[CDKF_FRICTION] = 0.06f;
+}
+
+void tearDown(void)
+{
+}
+
+/* Blocks in which error c is so many of its standard deviations, and nothing is said of the others; `rate` is the
+ * information of a second about it, in 1 / sigma^2. Returns how many blocks had the verdict wrong at their end. */
+static uint32_t run(uint32_t blocks, uint32_t c, double sigmas, double rate)
+{
+    const double sigma = (double)cdkf.considered_sigma[c];
+    const double information = rate * (double)PERIOD / (sigma * sigma);
+    uint32_t wrong = 0u;
+    for (uint32_t block = 0u; block < blocks; block++) {
+        score_t score[C] = {{0.0f, 0.0f}};
+        score[c].vector = (float)((information * sigmas * sigma) + (sqrt(information) * random_normal(&source)));
+        score[c].information = (float)information;
+        calibration_step(&calibration, &cdkf, score, PERIOD);
+        wrong += calibration.wrong ? 1u : 0u;
+    }
+    return wrong;
+}
+
+/* Ten minutes each. */
+static void test_an_error_within_what_is_stated_is_tolerated(void)
+{
+    const double sigmas[] = {0.0, 1.5, -1.5};
+    const double rates[] = {0.01, 1.0, 100.0};
+    for (uint32_t c = 0u; c < (uint32_t)C; c++) {
+        for (uint32_t k = 0u; k < 9u; k++) {
+            setUp();
+            TEST_ASSERT_EQUAL_UINT32(0u, run(30000u, c, sigmas[k % 3u], rates[k / 3u]));
+        }
+    }
+}
+
+/* Twice what is stated, and four standard deviations of the innovations' noise. */
+static void test_a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_gone(void)
+{
+    for (uint32_t c = 0u; c < (uint32_t)C; c++) {
+        const double sign = ((c % 2u) == 0u) ? 1.0 : -1.0;
+        setUp();
+        (void)run(1000u, c, 0.0, 100.0);
+        TEST_ASSERT_FALSE(calibration.wrong);
+        (void)run(3000u, c, 3.0 * sign, 100.0);
+        TEST_ASSERT_TRUE(calibration.wrong);
+        (void)run(3000u, c, 0.0, 100.0);
+        TEST_ASSERT_FALSE(calibration.wrong);
+    }
+}
+
+/* Of an error that is hardly seen nothing is said, however large. */
+static void test_noise_alone_decides_nothing(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(0u, run(30000u, (uint32_t)CDKF_FRICTION, 4.0, 0.01));
+}
+
+/* Without noise: the score of many times MEMORY is what comes in MEMORY; the limits are 2 sigma + 4 / sqrt(information), and three
+ * quarters of that. */
+static void test_limits_and_memory_are_what_is_said(void)
+{
+    const double information = 1.0e4;
+    for (uint32_t k = 0u; k < 4u; k++) {
+        const double part[] = {0.97, 1.03, 0.78, 0.72};
+        const double limit = (2.0 * 0.02) + (4.0 / sqrt(information * MEMORY));
+        score_t score[C] = {{0.0f, 0.0f}};
+        setUp();
+        calibration.wrong = (k >= 2u);
+        score[CDKF_BASE_GAIN].information = (float)(information * (double)PERIOD);
+        score[CDKF_BASE_GAIN].vector = (float)(part[k] * limit) * score[CDKF_BASE_GAIN].information;
+        for (uint32_t block = 0u; block < 10000u; block++) {
+            const bool begins = (block < 3000u);
+            calibration.wrong = begins ? (k >= 2u) : calibration.wrong;
+            calibration_step(&calibration, &cdkf, score, PERIOD);
+        }
+        TEST_ASSERT_EQUAL((k == 1u) || (k == 2u), calibration.wrong);
+        TEST_ASSERT_DOUBLE_WITHIN(
+            0.02 * information * MEMORY, information * MEMORY, (double)calibration.score[CDKF_BASE_GAIN].information);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_an_error_within_what_is_stated_is_tolerated);
+    RUN_TEST(test_a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_gone);
+    RUN_TEST(test_noise_alone_decides_nothing);
+    RUN_TEST(test_limits_and_memory_are_what_is_said);
+    return UNITY_END();
+}

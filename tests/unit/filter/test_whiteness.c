@@ -1,0 +1,133 @@
+/* Whiteness: white innovations stay white however long, coloured ones are found; against their known correlations. */
+#include "filter/whiteness.h"
+
+#include "../math/dense.h"
+#include "unity.h"
+
+enum { SAMPLES = 20 }; /* in a block */
+
+#define PERIOD 0.02f
+
+static random_source_t source;
+static whiteness_t whiteness;
+static double state;
+
+void setUp(void)
+{
+    source.state = 17u;
+    state = 0.0;
+    whiteness_start(&whiteness);
+}
+
+void tearDown(void)
+{
+}
+
+/* Blocks of white noise of variance 1, on top of which is a first-order process of variance `share` that keeps the
+ * part `keep` from one block to the next. Returns how many had the verdict coloured at their end. */
+static uint32_t run(uint32_t blocks, double share, double keep, bool counts)
+{
+    uint32_t coloured = 0u;
+    for (uint32_t block = 0u; block < blocks; block++) {
+        state = (keep * state) + (sqrt(share * (1.0 - (keep * keep))) * random_normal(&source));
+        for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
+            whiteness_add(&whiteness, (float)(state + random_normal(&source)));
+        }
+        whiteness_step(&whiteness, PERIOD, counts);
+        coloured += whiteness.coloured ? 1u : 0u;
+    }
+    return coloured;
+}
+
+/* Three minutes. */
+static void test_white_innovations_are_white(void)
+{
+    for (uint64_t seed = 1u; seed <= 20u; seed++) {
+        setUp();
+        source.state = seed;
+        TEST_ASSERT_EQUAL_UINT32(0u, run(9000u, 0.0, 0.0, true));
+    }
+}
+
+/* A share s of n samples' mean has the correlation keep^k s / (s + 1/n) at lag k: far below the noise of a sample,
+ * which nis = 1 + s would show. Sign does not matter. */
+static void test_a_coloured_part_far_below_the_noise_of_a_sample_is_found_within_seconds(void)
+{
+    const double keep[] = {0.9, -0.9, 0.7};
+    for (uint32_t k = 0u; k < 3u; k++) {
+        setUp();
+        (void)run(500u, 0.0, 0.0, true);
+        TEST_ASSERT_FALSE(whiteness.coloured);
+        (void)run(250u, 0.15, keep[k], true);
+        TEST_ASSERT_TRUE(whiteness.coloured);
+        (void)run(1000u, 0.15, keep[k], true);
+        double correlation = 0.0;
+        for (uint32_t block = 0u; block < 5000u; block++) {
+            (void)run(1u, 0.15, keep[k], true);
+            correlation += (double)whiteness_correlation(&whiteness) / 5000.0;
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.06, fabs(keep[k]) * 0.15 / (0.15 + 0.05), correlation);
+        (void)run(1000u, 0.0, 0.0, true);
+        TEST_ASSERT_FALSE(whiteness.coloured);
+    }
+}
+
+/* Each alone of the lags is looked at: blocks that repeat k blocks later. */
+static void test_every_lag_of_20_to_80_ms_is_seen(void)
+{
+    for (uint32_t lag = 1u; lag <= (uint32_t)WHITENESS_LAGS + 1u; lag++) {
+        float before[WHITENESS_LAGS + 1] = {0.0f};
+        setUp();
+        for (uint32_t block = 0u; block < 2000u; block++) {
+            const bool repeats = ((block / lag) % 2u) == 1u;
+            const float sum = repeats ? before[lag - 1u] : (float)random_normal(&source);
+            for (uint32_t k = (uint32_t)WHITENESS_LAGS; k > 0u; k--) {
+                before[k] = before[k - 1u];
+            }
+            before[0] = sum;
+            whiteness_add(&whiteness, sum);
+            whiteness_step(&whiteness, PERIOD, true);
+        }
+        TEST_ASSERT_EQUAL(lag <= (uint32_t)WHITENESS_LAGS, whiteness_correlation(&whiteness) > 0.35f);
+    }
+}
+
+static void test_blocks_that_do_not_count_and_the_first_two_seconds_say_nothing(void)
+{
+    (void)run(99u, 10.0, 0.99, true);
+    TEST_ASSERT_TRUE(!whiteness.coloured && (whiteness_correlation(&whiteness) == 0.0f));
+    (void)run(2u, 10.0, 0.99, true);
+    TEST_ASSERT_TRUE(whiteness.coloured);
+    setUp();
+    (void)run(500u, 0.0, 0.0, true);
+    const whiteness_t before = whiteness;
+    TEST_ASSERT_EQUAL_UINT32(0u, run(500u, 10.0, 0.99, false));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &whiteness, sizeof before);
+    whiteness.coloured = true;
+    TEST_ASSERT_EQUAL_UINT32(10u, run(10u, 0.0, 0.0, false)); /* a verdict stays until there is another */
+}
+
+/* Between the two thresholds a verdict stays what it is. */
+static void test_a_verdict_has_hysteresis(void)
+{
+    for (uint32_t was = 0u; was < 2u; was++) {
+        setUp();
+        whiteness.time = 5.0f;
+        whiteness.variance = 1.0f;
+        whiteness.product[2] = -0.3f;
+        whiteness.coloured = (was == 1u);
+        whiteness_step(&whiteness, 1.0e-6f, true);
+        TEST_ASSERT_EQUAL(was == 1u, whiteness.coloured);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_white_innovations_are_white);
+    RUN_TEST(test_a_coloured_part_far_below_the_noise_of_a_sample_is_found_within_seconds);
+    RUN_TEST(test_every_lag_of_20_to_80_ms_is_seen);
+    RUN_TEST(test_blocks_that_do_not_count_and_the_first_two_seconds_say_nothing);
+    RUN_TEST(test_a_verdict_has_hysteresis);
+    return UNITY_END();
+}
