@@ -26,7 +26,7 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
         const bool seen = (alignment->count > 0.0f);
         trim_start(&estimator->trim, seen ? (alignment->theta_sum / alignment->count) : settings->lever_preload_angle,
             settings->trim_corner, estimator->setup.constants.trim);
-        estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
+        estimator->trim_sine_cosine = sine_cosine(trim_angle(&estimator->trim));
         estimator->z_ddot = sample->z_ddot;
         estimator->tau_m = sample->tau_m;
         (void)memset(&estimator->base_motion, 0, sizeof estimator->base_motion);

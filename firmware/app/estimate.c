@@ -26,7 +26,7 @@ void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_P
 
 static model_step_t at_trim(const estimator_t *estimator)
 {
-    const sine_cosine_t *angle = &estimator->trim_angle;
+    const sine_cosine_t *angle = &estimator->trim_sine_cosine;
     const model_step_t step = {
         .trim = trim_angle(&estimator->trim), .trim_sine = angle->sine, .trim_cosine = angle->cosine};
     return step;

@@ -54,7 +54,7 @@ void estimator_start_over(estimator_t *estimator)
     start_filter(estimator);
     (void)memset(&estimator->averages, 0, sizeof estimator->averages);
     (void)memset(&estimator->trim, 0, sizeof estimator->trim);
-    estimator->trim_angle = sine_cosine(0.0f);
+    estimator->trim_sine_cosine = sine_cosine(0.0f);
     estimator->mode = LEVER_MODE_INIT;
     estimator->frozen = false;
     estimator->last_z_ddot = 0.0f;

@@ -35,7 +35,7 @@ typedef struct estimator {
     cdkf_t cdkf;
     learning_t learning;
     trim_t trim;
-    sine_cosine_t trim_angle; /* its sine and cosine */
+    sine_cosine_t trim_sine_cosine; /* sine and cosine of the trim angle */
     averages_t averages;
     alignment_t alignment;
     enum lever_mode mode;

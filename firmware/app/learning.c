@@ -12,7 +12,7 @@
 
 void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
 {
-    const adaptation_t adaptation = setup_adaptation(setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    const adaptation_t adaptation = setup_adaptation(setup);
     adaptation_start(&adaptation, cdkf);
     change_detection_init(&learning->change);
     noise_estimation_begin(&learning->noise);
@@ -99,7 +99,7 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
 {
     const bool held = !learning->hands.off;
     const bool counts = lesson->measured && lesson->excited;
-    const score_t sudden = cdkf_sudden_score(cdkf); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    const score_t sudden = cdkf_sudden_score(cdkf);
     score_t constant[CDKF_CONSIDERED];
     cdkf_constant_scores(cdkf, constant);
     hands_step(&learning->hands, &setup->constants, cdkf->x[1], period,
@@ -139,7 +139,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
 {
     const lever_settings_t *s = setup->settings;
     const bool joint = (setup->estimator == (uint8_t)LEVER_ESTIMATOR_JOINT);
-    const adaptation_t adaptation = setup_adaptation(setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    const adaptation_t adaptation = setup_adaptation(setup);
     const float period = learning->elapsed;
     float variance[MODEL_PARAMETERS];
     correction_t correction;

@@ -14,8 +14,8 @@ static float friction(float rate)
     return rate / (fabsf(rate) + STOP_RATE);
 }
 
-/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true =
- * measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
+/* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true
+ * = measured later by the delay. `stop`: friction of a newton metre, high-passed like any torque. */
 static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
 {
     error[CDKF_BASE_GAIN] = -z_ddot;
@@ -44,8 +44,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
         .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
         .origin = trim->origin[0],
         .trim = trim_angle(trim),
-        .trim_sine = estimator->trim_angle.sine,
-        .trim_cosine = estimator->trim_angle.cosine};
+        .trim_sine = estimator->trim_sine_cosine.sine,
+        .trim_cosine = estimator->trim_sine_cosine.cosine};
     if (setup->model_in_use->uses_base_motion) {
         base_motion_step(&estimator->base_motion, &setup->constants, &step);
     }
@@ -65,7 +65,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
 static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], float period)
 {
     const bool back = trim_outputs(&estimator->trim, estimator->cdkf.x, y, valid, period);
-    estimator->trim_angle = sine_cosine(trim_angle(&estimator->trim));
+    estimator->trim_sine_cosine = sine_cosine(trim_angle(&estimator->trim));
     return back;
 }
 

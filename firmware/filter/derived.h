@@ -1,5 +1,5 @@
-/* Quantities derived from the parameters, with standard deviations: the values are those at the estimate, the deviations
- * by the central difference transform over the covariance of the parameters (cdkf.h). */
+/* Quantities derived from the parameters, with standard deviations: the values are those at the estimate, the
+ * deviations by the central difference transform over the covariance of the parameters (cdkf.h). */
 #ifndef FILTER_DERIVED_H
 #define FILTER_DERIVED_H
 

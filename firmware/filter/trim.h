@@ -5,8 +5,9 @@
  * high-pass, the deviations obey the same system, and whatever is slow and not known drops out: the pilot's trim and
  * how he moves the lever on purpose, gravity, the bias of an accelerometer. Second order lets through enough of such
  * motion to be taken for a low stiffness: 3 degrees rms of random motion up to 0.5 Hz make 45 % of the natural
- * frequency; fourth order 5 %, sixth 1 %. To do so with the angle alone (a trim angle by low-pass) would bias the damping by 1 / (2 zeta omega T) and fail on a re-trim, which
- * for T of seconds looks like a torque larger than all others.
+ * frequency; fourth order 5 %, sixth 1 %. To do so with the angle alone (a trim angle by low-pass) would bias the
+ * damping by 1 / (2 zeta omega T) and fail on a re-trim, which for T of seconds looks like a torque larger than all
+ * others.
  *
  * In preload trim the estimator works on deviations. In preload fixed signals stay as they come, and the level of
  * theta only serves as the trim angle.

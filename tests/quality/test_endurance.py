@@ -61,10 +61,11 @@ def test_single_precision_goes_where_double_goes(
 
 @pytest.mark.requires("cc|gcc|clang")
 def test_the_two_scenes_are_what_they_claim(programs: Path) -> None:
-    """Drift: followed, with a small sigma. Calm: little is learnt, and uncertainty does not wind up."""
+    """Drift: followed, with a small sigma, most of it what is stated of the sensors. Calm: little is learnt, and
+    uncertainty does not wind up."""
     drift, calm = (flown(programs / "single", scene, 0, "default") for scene in ("drift", "calm"))
     drift_sigma, calm_sigma = (np.median(run[:, 6] / run[:, 5]) for run in (drift, calm))
     assert drift[600:, 5].max() / drift[600:, 5].min() > 1.8
-    assert drift_sigma < 0.06
+    assert drift_sigma < 0.09
     assert calm_sigma > 2.0 * drift_sigma
     assert (calm[:, 2] / calm[:, 1]).max() <= setting("m_p_sigma").default * (1.0 + 1e-5)

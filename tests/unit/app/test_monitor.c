@@ -99,7 +99,8 @@ static void test_outputs_that_stand_still_as_expected_are_not_stuck(void)
     }
 }
 
-/* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never stands still. */
+/* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never
+ * stands still. */
 static void test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations(void)
 {
     for (uint32_t changes = 19u; changes <= 20u; changes++) {
@@ -143,13 +144,13 @@ static bool is_spike(uint32_t i, double sigmas, float level)
     return monitor_is_spike(&monitor, &pair.cdkf, i, (float)y, level, PERIOD);
 }
 
-static void test_an_output_beyond_six_standard_deviations_is_refused(void)
+static void test_an_output_beyond_eight_standard_deviations_is_refused(void)
 {
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
-        TEST_ASSERT_TRUE(!is_spike(i, 5.9, 1.0f) && !is_spike(i, -5.9, 1.0f));
-        TEST_ASSERT_TRUE(is_spike(i, 6.1, 1.0f) && is_spike(i, -6.1, 1.0f));
+        TEST_ASSERT_TRUE(!is_spike(i, 7.9, 1.0f) && !is_spike(i, -7.9, 1.0f));
+        TEST_ASSERT_TRUE(is_spike(i, 8.1, 1.0f) && is_spike(i, -8.1, 1.0f));
         TEST_ASSERT_TRUE(
-            !is_spike(i, 11.8, 4.0f) && is_spike(i, 12.2, 4.0f)); /* innovations are twice as large anyway */
+            !is_spike(i, 15.8, 4.0f) && is_spike(i, 16.2, 4.0f)); /* innovations are twice as large anyway */
     }
 }
 
@@ -257,7 +258,7 @@ int main(void)
     RUN_TEST(test_outputs_that_stand_still_as_expected_are_not_stuck);
     RUN_TEST(test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations);
     RUN_TEST(test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second);
-    RUN_TEST(test_an_output_beyond_six_standard_deviations_is_refused);
+    RUN_TEST(test_an_output_beyond_eight_standard_deviations_is_refused);
     RUN_TEST(test_what_lasts_for_20_ms_is_no_spike);
     RUN_TEST(test_a_base_that_is_about_right_is_used_for_an_hour);
     RUN_TEST(test_a_wrong_base_is_found_and_trusted_again);

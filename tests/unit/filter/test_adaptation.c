@@ -101,7 +101,8 @@ static void test_robbins_monro_averages_the_square_of_the_corrections_summed_up(
 }
 
 /* Corrections that the walk itself explains, white and of its variance, leave it; behind a ramp as fast as that noise
- * in the memory they add up. With the squares of single corrections both would be alike: the ramp adds 1 / 50 to them. */
+ * in the memory they add up. With the squares of single corrections both would be alike: the ramp adds a
+ * fiftieth. */
 static void test_robbins_monro_tells_a_ramp_from_white_corrections(void)
 {
     random_source_t source = {3u};

@@ -79,8 +79,8 @@ static void test_noise_alone_decides_nothing(void)
     TEST_ASSERT_EQUAL_UINT32(0u, run(30000u, (uint32_t)CDKF_FRICTION, 4.0, 0.01));
 }
 
-/* Without noise: the score of many times MEMORY is what comes in MEMORY; the limits are 2 sigma + 4 / sqrt(information), and three
- * quarters of that. */
+/* Without noise: the score of many times MEMORY is what comes in MEMORY; the limits are 2 sigma +
+ * 4 / sqrt(information), and three quarters of that. */
 static void test_limits_and_memory_are_what_is_said(void)
 {
     const double information = 1.0e4;

@@ -108,8 +108,8 @@ typedef struct window {
 
 /* Outputs, enough gain: 4 times too large counts at once; 1.2 times by its noise's part, a half, and a fifth of that.
  * The process noise goes with the geometric mean of the factors 4 and 1.1, and the gain of 0.9.
- * Too little gain, 1.25: innovations 2 and 1.2 times too large leave R, half of what it was raised by (in logarithms) is
- * taken back, and the process noise goes with the square of 1.25.
+ * Too little gain, 1.25: innovations 2 and 1.2 times too large leave R, half of what it was raised by (in logarithms)
+ * is taken back, and the process noise goes with the square of 1.25.
  * Innovations half as large as expected lower R whatever the gain. */
 static void test_a_window_changes_the_noise_by_the_stated_formulas(void)
 {

@@ -288,8 +288,8 @@ static void assert_is_factor(const float s[9], const double mean[3])
     }
 }
 
-/* More than a float can tell from a matrix without rank; and the same precise outputs of three elements again and again: what
- * is left is anything, but a factor. */
+/* More than a float can tell from a matrix without rank; and the same precise outputs of three elements again and
+ * again: what is left is anything, but a factor. */
 static void test_any_information_leaves_a_factor(void)
 {
     for (double scale = 1.0e2; scale < 1.0e16; scale *= 3.0) {
