@@ -29,7 +29,7 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
         estimator->trim_sine_cosine = sine_cosine(trim_angle(&estimator->trim));
         estimator->z_ddot = sample->z_ddot;
         estimator->tau_m = sample->tau_m;
-        estimator->z_dot = 0.0f;
+        (void)memset(&estimator->base_motion, 0, sizeof estimator->base_motion);
         const float y[CDKF_OUTPUTS] = {sample->y[0] - estimator->trim.origin[0], sample->y[1]};
         alignment_start_state(estimator, y, sample->valid);
         if (alignment->time > (settings->align_time - (0.5f * settings->sample_period))) {

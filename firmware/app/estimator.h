@@ -10,6 +10,7 @@
 #include "filter/trim.h"
 #include "lever_cdkf.h"
 #include "math/trigonometry.h"
+#include "model/base_motion.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -47,8 +48,8 @@ typedef struct estimator {
     float last_tau_m;
     float z_ddot; /* the same as the model takes them: deviations in preload trim */
     float tau_m;
-    float z_dot; /* the integral of z_ddot, to the middle of the next step [m/s] */
-    float nis;   /* of the last sample */
+    base_motion_t base_motion; /* what follows from that */
+    float nis;                 /* of the last sample */
     uint8_t nis_size;
     bool frozen;
     bool communication_fault; /* reported by the CAN side for the next sample */

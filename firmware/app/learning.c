@@ -102,8 +102,8 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     const score_t sudden = cdkf_sudden_score(cdkf);
     score_t constant[CDKF_CONSIDERED];
     cdkf_constant_scores(cdkf, constant);
-    hands_step(
-        &learning->hands, &setup->constants, cdkf->x[1], period, counts && (setup->model_in_use == &model_lever));
+    hands_step(&learning->hands, &setup->constants, cdkf->x[1], period,
+        counts && (setup->model == (uint8_t)LEVER_MODEL_LEVER));
     const bool known = (learning->kept[1].trust >= 1.0f) || learning->monitor.base_wrong;
     bool base_wrong = false;
     if (known && !learning->hands.off) {

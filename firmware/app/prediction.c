@@ -2,13 +2,12 @@
 
 #include <math.h>
 
-#define OUTAGE 0.0205f      /* a base acceleration missing for longer is out [s] */
-#define MISSING 10.0f       /* process noise for a base acceleration that is missing, in those that are set, */
-#define WRONG 3.0f          /* and for a wrong one, so that it is noticed when it is right again */
-#define Z_DOT_KEPT 0.99998f /* in a step: what rounding adds to the base velocity is forgotten */
-#define STOP_RATE 0.002f    /* friction is at half of its limit [rad/s] */
-#define RATE_MOST 1.0e4f    /* [rad/s] */
-#define SUBSTEPS_MOST 12u   /* predictions through a gap: bounds the time of one call */
+#define OUTAGE 0.0205f    /* a base acceleration missing for longer is out [s] */
+#define MISSING 10.0f     /* process noise for a base acceleration that is missing, in those that are set, */
+#define WRONG 3.0f        /* and for a wrong one, so that it is noticed when it is right again */
+#define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
+#define RATE_MOST 1.0e4f  /* [rad/s] */
+#define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is
  * not a number would stay in the trim. */
@@ -43,22 +42,22 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     const float stop = trim_input(trim, 2u, friction(trim->origin[1] + cdkf->x[1]), period);
     const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
     const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
-    const float z_dot = estimator->z_dot;
     float error[CDKF_CONSIDERED];
-    estimator->z_dot = (Z_DOT_KEPT * z_dot) + (period * next_z_ddot);
     trim_set_origin(trim);
     model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
-        .z_dot = z_dot,
         .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
         .origin = trim->origin[0],
         .trim = trim_angle(trim),
         .trim_sine = estimator->trim_sine_cosine.sine,
         .trim_cosine = estimator->trim_sine_cosine.cosine};
+    if (setup->model_in_use->uses_base_motion) {
+        base_motion_step(&estimator->base_motion, &setup->constants, &step);
+    }
     hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
     if (unknown) {
         step.z_ddot = 0.0f;
-        step.z_dot = 0.0f;
+        step.seat_dot = 0.0f;
         cdkf->disturbance = (learning->monitor.base_wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);

@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#define TURN 6.28318531f
+
 const model_t *setup_model(uint8_t model)
 {
     static const model_t *const models[LEVER_MODEL_COUNT] = {
@@ -28,7 +30,11 @@ void setup_choose(setup_t *setup)
     constants->trim = (setup->preload == (uint8_t)LEVER_PRELOAD_TRIM);
     setup->base_scale = 1.0f / s->z_ddot_gain;
     setup->torque_scale = 1.0f / s->tau_m_gain;
-    setup->model_in_use = setup_model(setup->model);
+    const bool seated = (setup->model == (uint8_t)LEVER_MODEL_LEVER) && (s->seat_frequency > 0.0f);
+    const float seat = seated ? (TURN * s->seat_frequency) : 0.0f;
+    constants->seat_stiffness = seat * seat;
+    constants->seat_damping = 2.0f * (s->seat_damping_ratio * seat);
+    setup->model_in_use = seated ? &model_lever_on_seat : setup_model(setup->model);
 }
 
 /* The rows of lever_settings.def that a model uses. */

@@ -1,10 +1,15 @@
 #include "filter/derived.h"
 
 #include "math/factor.h"
+#include "model/base_motion.h"
 
 #include <math.h>
 
 #define TURN 6.28318531f
+
+/* Of gain and of phase, where a trunk on a seat is part of the model: what its filter is off by with seat settings that
+ * are 10 % off. */
+#define SEAT_VARIANCE 1.6e-3f
 
 /* Two quantities: at a sigma point, or summed up. */
 typedef struct couple {
@@ -68,15 +73,30 @@ static couple_t oscillation(const model_dynamics_t *dynamics)
     return result;
 }
 
-/* Real and imaginary part of forcing (1 + space / (i omega)) / (stiffness - omega^2 + i omega damping). */
-static couple_t response_at(const model_dynamics_t *dynamics, float omega)
+/* Of complex numbers. */
+static couple_t quotient(float real, float imaginary, float by_real, float by_imaginary)
 {
-    const float in_phase = dynamics->stiffness - (omega * omega);
-    const float quadrature = omega * dynamics->damping;
-    const float scale = dynamics->forcing / ((in_phase * in_phase) + (quadrature * quadrature));
-    const float lag = (dynamics->space > 0.0f) ? (dynamics->space / omega) : 0.0f;
-    const couple_t result = {scale * (in_phase - (lag * quadrature)), -(scale * (quadrature + (lag * in_phase)))};
+    const float scale = 1.0f / ((by_real * by_real) + (by_imaginary * by_imaginary));
+    const couple_t result = {scale * ((real * by_real) + (imaginary * by_imaginary)),
+        scale * ((imaginary * by_real) - (real * by_imaginary))};
     return result;
+}
+
+/* theta/z_ddot of a model's dynamics at s = i omega, z_dot = z_ddot / s, and with a trunk that gives way
+ * seat = -angle z_ddot / (s^2 + seat_damping s + seat_stiffness). */
+static couple_t response_at(
+    const model_dynamics_t *dynamics, const model_constants_t *constants, float angle, float omega)
+{
+    const float square = omega * omega;
+    float real = dynamics->forcing;
+    float imaginary = (dynamics->space > 0.0f) ? -(dynamics->forcing * (dynamics->space / omega)) : 0.0f;
+    if (constants->seat_stiffness > 0.0f) {
+        const couple_t arm = quotient(dynamics->arm_stiffness, omega * dynamics->arm_damping,
+            constants->seat_stiffness - square, omega * constants->seat_damping);
+        real -= angle * arm.first;
+        imaginary -= angle * arm.second;
+    }
+    return quotient(real, imaginary, dynamics->stiffness - square, omega * dynamics->damping);
 }
 
 derived_dynamics_t derived_dynamics(
@@ -101,9 +121,10 @@ derived_feedthrough_t derived_feedthrough(const cdkf_t *cdkf, const model_t *mod
     couple_t value[MODEL_POINTS]; /* in units of the response at the estimate */
     couple_t mean = {0.0f, 0.0f};
     float inverse = 0.0f;
+    const float angle = base_motion_angle(constants, step);
     for (uint32_t k = 0u; k < (uint32_t)MODEL_POINTS; k++) {
         const model_dynamics_t dynamics = model->dynamics(constants, step, &cdkf->points[k]);
-        const couple_t at = response_at(&dynamics, TURN * frequency);
+        const couple_t at = response_at(&dynamics, constants, angle, TURN * frequency);
         if (k == 0u) {
             mean = at;
             inverse = 1.0f / ((at.first * at.first) + (at.second * at.second));
@@ -112,11 +133,14 @@ derived_feedthrough_t derived_feedthrough(const cdkf_t *cdkf, const model_t *mod
         value[k].second = inverse * ((at.second * mean.first) - (at.first * mean.second));
     }
     const deviation_t deviation = deviation_of(cdkf, value);
-    const float product = deviation.sigma.first * deviation.sigma.second;
+    const float more = (constants->seat_stiffness > 0.0f) ? SEAT_VARIANCE : 0.0f;
+    const float gain_sigma = sqrtf((deviation.sigma.first * deviation.sigma.first) + more);
+    const float phase_sigma = sqrtf((deviation.sigma.second * deviation.sigma.second) + more);
+    const float product = gain_sigma * phase_sigma;
     const derived_feedthrough_t result = {.real = mean.first,
         .imaginary = mean.second,
-        .gain_sigma = deviation.sigma.first,
-        .phase_sigma = deviation.sigma.second,
+        .gain_sigma = gain_sigma,
+        .phase_sigma = phase_sigma,
         .correlation = (product > 0.0f) ? (deviation.covariance / product) : 0.0f};
     return result;
 }

@@ -9,12 +9,11 @@
  * spring and damper has. Mayo's pilots: 452.3, 13.70, 8.51 (ectomorphic), 555.4, 13.31, 9.29 (mesomorphic).
  *
  * The mass itself is not known. So the motor torque acts on M = eta^2 m_l l^2 + J_l + m_p l^2 with the first guess of
- * m_p. z_dot is integrated from z_ddot as the model gets it, so that in preload trim it has no slow part either.
+ * m_p. z_dot: base_motion.h. In preload fixed its value at the start would have to be known.
  */
+#include "model/base_motion.h"
 #include "model/linear.h"
 #include "model/model.h"
-
-#define COSINE_LEAST 0.2f /* a trim beyond 78 degrees is taken for that */
 
 /* The step is that of linear.c, its two inputs the drive that no parameter changes and what c_space multiplies. */
 static void prepare(
@@ -27,20 +26,14 @@ static void prepare(
     coefficients->c[LINEAR_TORQUE] = p[2];
 }
 
-/* theta per d, and against the base [1/m] */
-static float forcing(const model_constants_t *constants, const model_step_t *step)
-{
-    return -1.0f / (constants->length * ((step->trim_cosine > COSINE_LEAST) ? step->trim_cosine : COSINE_LEAST));
-}
-
 static void respond(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
     model_response_t *response)
 {
-    const float base = forcing(constants, step);
+    const float base = -base_motion_angle(constants, step);
     const float torque = 1.0f / constants->hand_inertia;
     model_step_t drive = *step;
     drive.z_ddot = (base * step->z_ddot) + (torque * step->tau_m);
-    drive.tau_m = base * step->z_dot;
+    drive.tau_m = step->seat_dot; /* -z_dot, as an angle */
     linear_respond(constants, &drive, points, response);
     response->torque = torque * response->base;
     response->base *= base;
@@ -51,8 +44,10 @@ static model_dynamics_t dynamics(
 {
     const model_dynamics_t result = {.stiffness = coefficients->c[LINEAR_STIFFNESS],
         .damping = coefficients->c[LINEAR_DAMPING],
-        .forcing = forcing(constants, step),
-        .space = coefficients->c[LINEAR_TORQUE]};
+        .forcing = -base_motion_angle(constants, step),
+        .space = coefficients->c[LINEAR_TORQUE],
+        .arm_stiffness = 0.0f,
+        .arm_damping = 0.0f};
     return result;
 }
 
@@ -60,6 +55,7 @@ const model_t model_hand = {
     .name = "hand",
     .parameter = {{"k_hand", "1/s^2", 20.0f, 3200.0f}, {"c_hand", "1/s", 0.5f, 320.0f},
         {"c_space", "1/s", 0.1f, 320.0f}},
+    .uses_base_motion = true,
     .positive = true,
     .prepare = prepare,
     .respond = respond,

@@ -135,6 +135,17 @@ static void respond(const model_constants_t *constants, const model_step_t *step
     }
 }
 
+/* A trunk that gives way on its seat (base_motion.h) moves where the arm rests by the angle `seat`: this is the lever as
+ * seen from there. Cosines are taken of the angle from there, a few milliradians off. */
+static void respond_on_seat(const model_constants_t *constants, const model_step_t *step, const model_points_t *points,
+    model_response_t *response)
+{
+    model_points_t from_seat = *points; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    from_seat.x[0] -= step->seat - ((0.5f * step->period) * step->seat_dot);
+    from_seat.x[1] -= step->seat_dot;
+    respond(constants, step, &from_seat, response);
+}
+
 /* K = d/dtheta of the restoring torque, D and l mu cos theta at the trim, each over M. */
 static model_dynamics_t dynamics(
     const model_constants_t *constants, const model_step_t *step, const model_coefficients_t *coefficients)
@@ -150,15 +161,30 @@ static model_dynamics_t dynamics(
     const model_dynamics_t result = {.stiffness = stiffness * inverse,
         .damping = damping * inverse,
         .forcing = -((c[FORCING] * step->trim_cosine) * inverse),
-        .space = 0.0f};
+        .space = 0.0f,
+        .arm_stiffness = (c[STIFFNESS] * squared) * inverse,
+        .arm_damping = (c[DAMPING] * squared) * inverse};
     return result;
 }
 
+#define PARAMETER {{"m_p", "kg", 0.3f, 10.0f}, {"c_p", "N s/m", 2.0f, 400.0f}, {"k_p", "N/m", 50.0f, 6500.0f}}
+
 const model_t model_lever = {
     .name = "lever",
-    .parameter = {{"m_p", "kg", 0.3f, 10.0f}, {"c_p", "N s/m", 2.0f, 400.0f}, {"k_p", "N/m", 50.0f, 6500.0f}},
+    .parameter = PARAMETER,
+    .uses_base_motion = false,
     .positive = true,
     .prepare = prepare,
     .respond = respond,
+    .dynamics = dynamics,
+};
+
+const model_t model_lever_on_seat = {
+    .name = "lever",
+    .parameter = PARAMETER,
+    .uses_base_motion = true,
+    .positive = true,
+    .prepare = prepare,
+    .respond = respond_on_seat,
     .dynamics = dynamics,
 };

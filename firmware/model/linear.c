@@ -58,6 +58,8 @@ model_dynamics_t linear_dynamics(
     const model_dynamics_t result = {.stiffness = coefficients->c[LINEAR_STIFFNESS],
         .damping = coefficients->c[LINEAR_DAMPING],
         .forcing = coefficients->c[LINEAR_BASE],
-        .space = 0.0f};
+        .space = 0.0f,
+        .arm_stiffness = 0.0f,
+        .arm_damping = 0.0f};
     return result;
 }

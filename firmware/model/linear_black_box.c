@@ -21,6 +21,7 @@ static void prepare(
 const model_t model_linear_black_box = {
     .name = "linear_black_box",
     .parameter = {{"a21", "1/s^2", -3200.0f, 3200.0f}, {"a22", "1/s", -320.0f, 320.0f}, {"b21", "1", -32.0f, 32.0f}},
+    .uses_base_motion = false,
     .positive = false,
     .prepare = prepare,
     .respond = linear_respond,

@@ -24,6 +24,7 @@ static void prepare(
 const model_t model_linear_physical = {
     .name = "linear_physical",
     .parameter = {{"m", "kg", 0.05f, 60.0f}, {"c", "N s/m", 0.1f, 600.0f}, {"k", "N/m", 1.0f, 6500.0f}},
+    .uses_base_motion = false,
     .positive = true,
     .prepare = prepare,
     .respond = linear_respond,

@@ -2,7 +2,7 @@
  * bounds.
  *
  * All models have the state x = [theta, theta_dot] (in preload trim: deviations from the trim), three parameters p,
- * the inputs u = [z_ddot, tau_m] and the integral of the first, and the outputs y = x. Over a step of T seconds theta_dot changes by what the model
+ * the inputs u = [z_ddot, tau_m] and the outputs y = x. Over a step of T seconds theta_dot changes by what the model
  * says, and theta by T (theta_dot + change / 2): the midpoint rule, the same for all models. Models return changes,
  * not new values, and points are given by their offsets from the mean. So differences are those of small numbers,
  * which single precision needs when the measurement noise is near its resolution.
@@ -56,6 +56,8 @@ typedef struct model_constants {
     float arm_preload_sine;    /* sine of the arm's preload angle (preload fixed) */
     float lever_preload_angle; /* the lever's preload angle [rad] (preload fixed) */
     float hand_inertia;        /* of lever and hand where the model does not know the mass [kg m^2] */
+    float seat_stiffness;      /* of the trunk on its seat, per mass [1/s^2]; 0: the seat is rigid */
+    float seat_damping;        /* [1/s] */
     bool trim;                 /* preload trim instead of fixed */
 } model_constants_t;
 
@@ -63,7 +65,8 @@ typedef struct model_constants {
 typedef struct model_step {
     float period;    /* [s] */
     float z_ddot;    /* base acceleration, mean over the step [m/s^2] */
-    float z_dot;     /* base velocity, likewise, without its slow part in preload trim [m/s] */
+    float seat;      /* base_motion.h, for the models that use it [rad] */
+    float seat_dot;  /* [rad/s] */
     float tau_m;     /* motor torque, mean over the step [N m] */
     float origin;    /* angle that the state's theta counts from [rad]; 0 unless preload trim */
     float trim;      /* trim angle [rad] */
@@ -78,17 +81,21 @@ typedef struct model_parameter {
     float greatest;
 } model_parameter_t;
 
-/* theta_ddot + damping theta_dot + stiffness theta = forcing (z_ddot + space z_dot) */
+/* theta_ddot + damping theta_dot + stiffness theta
+ *   = forcing (z_ddot + space z_dot) + arm_stiffness seat + arm_damping seat_dot */
 typedef struct model_dynamics {
-    float stiffness; /* [1/s^2] */
-    float damping;   /* [1/s] */
-    float forcing;   /* [unit of theta / m] */
-    float space;     /* [1/s] */
+    float stiffness;     /* [1/s^2] */
+    float damping;       /* [1/s] */
+    float forcing;       /* [unit of theta / m] */
+    float space;         /* [1/s] */
+    float arm_stiffness; /* [1/s^2] */
+    float arm_damping;   /* [1/s] */
 } model_dynamics_t;
 
 typedef struct model {
     const char *name;
     model_parameter_t parameter[MODEL_PARAMETERS];
+    bool uses_base_motion;
     bool positive; /* all parameters are, and are estimated on a logarithmic scale; else on a linear one */
 
     void (*prepare)(
@@ -117,6 +124,7 @@ static inline void model_response_pair(model_response_t *response, uint32_t pair
 extern const model_t model_lever;            /* nonlinear lever: m_p, c_p, k_p */
 extern const model_t model_linear_physical;  /* mass, spring and damper: m, c, k */
 extern const model_t model_linear_black_box; /* second-order system: a21, a22, b21 */
+extern const model_t model_lever_on_seat;    /* the same, and the pilot's trunk gives way on its seat */
 extern const model_t model_hand;             /* Mayo's hand: k_hand, c_hand, c_space */
 
 #endif

@@ -254,6 +254,11 @@ _PILOTS = (
     _pilot("two_dof", "arm on a trunk on a seat", 0.3),
     _pilot("mayo_ectomorphic", "Mayo's ectomorphic pilot", 0.0),
     _pilot("mayo_mesomorphic", "Mayo's mesomorphic pilot", 0.0),
+    replace(
+        _pilot("two_dof", "arm on a trunk on a seat, whose frequency is set", 0.3),
+        name="two_dof_seat",
+        settings={"seat_frequency": 4.5},
+    ),
     _hand("mayo_ectomorphic", "Mayo's ectomorphic pilot"),
     _hand("mayo_mesomorphic", "Mayo's mesomorphic pilot"),
     _hand("mayo_random", "hands about Mayo's two pilots"),

@@ -107,7 +107,7 @@ class Estimator:
         self._wait_for_levels()
         self.last_raw = start.input
         self.last_input = start.input  # the same, as deviations in preload trim
-        self.velocity = 0.0  # of the base, from the end of a step to the middle of the next one [m/s]
+        self.velocity = 0.0  # of the base [m/s]
         self.last_measured_base = start.measured_base
         self.time = start.time
 
@@ -188,8 +188,9 @@ class Estimator:
         u, last = (base, torque - self.settings["lever_friction"] * stop), self.last_input
         if self.detrended:
             self.origin = np.array([detrend.level for detrend in self.outputs])
-        z_ddot, z_dot = 0.5 * (base + last[0]), self.velocity
-        self.velocity = VELOCITY_KEPT * self.velocity + dt * base
+        z_ddot = 0.5 * (base + last[0])
+        z_dot = self.velocity + 0.5 * dt * z_ddot
+        self.velocity = VELOCITY_KEPT * z_dot + 0.5 * dt * z_ddot
         if self.base_missing > 0.0:
             z_ddot, z_dot = 0.0, 0.0
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]

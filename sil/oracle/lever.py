@@ -29,6 +29,8 @@ class Lever:
     arm_preload_angle: float  # θ_arm [rad]
     lever_preload_angle: float  # θ_lever [rad]
     preload: str = "trim"
+    seat_frequency: float = 0.0  # of the trunk on its seat [Hz]; 0: rigid. The response alone knows it, not `step`
+    seat_damping_ratio: float = 0.0  # [1]
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, float], preload: str) -> "Lever":
@@ -45,6 +47,8 @@ class Lever:
             settings["arm_preload_angle"],
             settings["lever_preload_angle"],
             preload,
+            settings.get("seat_frequency", 0.0),
+            settings.get("seat_damping_ratio", 0.0),
         )
 
     def total_inertia(self, m_p: Array) -> Array:

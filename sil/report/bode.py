@@ -19,11 +19,21 @@ def transfer(model: str, lever: Lever, parameters: Array, trim: Array) -> Transf
 
 
 def _of_lever(lever: Lever, parameters: Array, trim: Array) -> Transfer:
-    """About the trim the lever of DESIGN section 3 is M θ̈ + D θ̇ + K θ = -l μ cos(trim) z̈."""
+    """About the trim the lever of DESIGN section 3 is M θ̈ + D θ̇ + K θ = -l μ cos(trim) z̈.
+
+    Where the trunk gives way by s on its seat, s̈ + 2 ζ ω ṡ + ω² s = -z̈, the arm adds l cos(trim) (c_p ṡ + k_p s).
+    """
     m_p, c_p, k_p = parameters
     stiffness = lever.rotational_stiffness(trim, m_p, k_p, trim)
-    resistance = (lever.total_inertia(m_p), lever.rotational_damping(trim, c_p), stiffness)
-    return Transfer((-lever.unbalance(m_p) * np.cos(trim))[:, np.newaxis], np.column_stack(resistance))
+    resistance = np.column_stack((lever.total_inertia(m_p), lever.rotational_damping(trim, c_p), stiffness))
+    forcing = (-lever.unbalance(m_p) * np.cos(trim))[:, np.newaxis]
+    if lever.seat_frequency == 0.0:
+        return Transfer(forcing, resistance)
+    omega = 2.0 * np.pi * lever.seat_frequency
+    trunk = np.array((1.0, 2.0 * lever.seat_damping_ratio * omega, omega**2))
+    rise = (lever.length * np.cos(trim))[:, np.newaxis]
+    arm = rise * np.column_stack((0.0 * c_p, c_p, k_p))
+    return Transfer(forcing * trunk - arm, np.array([np.polymul(row, trunk) for row in resistance]))
 
 
 def _of_linear_physical(_: Lever, parameters: Array, __: Array) -> Transfer:

@@ -69,6 +69,18 @@ def test_value_and_band_are_those_of_the_parameters_and_their_covariance(model: 
         assert found.correlation == pytest.approx(np.corrcoef(errors.real, errors.imag)[0, 1], abs=0.06)
 
 
+def test_a_trunk_on_its_seat_is_part_of_the_response() -> None:
+    """The first guess about 0 rad; the arm's spring and damper act on theta less what the trunk does."""
+    frequency, zeta = 4.5, 0.4
+    estimator = Estimator(Config(settings={"seat_frequency": frequency, "seat_damping_ratio": zeta}))
+    for f in (2.0, 4.0, 8.0):
+        s, omega = 2j * math.pi * f, 2.0 * math.pi * frequency
+        trunk = -1.0 / (s**2 + 2.0 * zeta * omega * s + omega**2)  # its height in the cabin over z_ddot
+        inertia, own, arm = 0.5870, 0.5 * s + 5.0, 0.45**2 * (42.0 * s + 1500.0)
+        expected = (-0.45 * 3.1 + arm * trunk / 0.45) / (inertia * s**2 + own + arm)
+        assert estimator.feedthrough(f).response == pytest.approx(expected, rel=1e-4)
+
+
 def test_what_is_not_defined_is_not_finite() -> None:
     estimator = Estimator(Config(model="linear_black_box", settings={"b21": 0.0}))
     assert isinstance(estimator.feedthrough(3.0), Feedthrough)

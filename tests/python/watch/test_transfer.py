@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.estimator import Estimator
 from lever_cdkf.host_tools.watch.model import Feedthrough
 from lever_cdkf.sil.watch.transfer import FREQUENCIES, SIGMAS, Geometry
 
@@ -64,6 +65,17 @@ def test_response(model: str, parameters: tuple[float, float, float], expected: 
     phasor = np.exp(1j * np.radians(response.phase))
     np.testing.assert_allclose(phasor, values / np.abs(values), atol=1e-6)
     assert np.all(np.abs(np.diff(response.phase)) < 20.0)  # goes on, instead of jumping by 360
+
+
+def test_a_trunk_on_its_seat_is_part_of_it() -> None:
+    """Against the C library at the first guess, about an angle of 0."""
+    config = Config(settings={"seat_frequency": 4.5})
+    response = Geometry(config).response("lever", (2.5, 42.0, 1500.0), 0.0, SENT)
+    assert response is not None
+    estimator = Estimator(config)
+    expected = np.array([estimator.feedthrough(f).response for f in FREQUENCIES])
+    np.testing.assert_allclose(response.magnitude, DEGREES * np.abs(expected), rtol=1e-4)
+    np.testing.assert_allclose(np.exp(1j * np.radians(response.phase)), expected / np.abs(expected), atol=1e-4)
 
 
 def test_the_band_is_what_was_sent_and_none_beyond() -> None:

@@ -68,7 +68,7 @@ static subject_t subject_of(uint32_t kind, const double p[L], double period, dou
     subject.constants = constants_of(plant);
     subject.step = (model_step_t){.period = (float)period,
         .z_ddot = (float)z_ddot,
-        .z_dot = (float)plant->z_dot,
+        .seat_dot = (float)(-plant->z_dot / (0.45 * cos(TRIM))),
         .tau_m = (float)tau_m,
         .origin = 0.31f,
         .trim = (float)plant->trim,
@@ -95,7 +95,7 @@ static subject_t random_subject(uint32_t kind, double period)
     subject.plant.theta += random_between(&source, -0.1, 0.1);
     subject.plant.theta_dot = random_between(&source, -1.5, 1.5);
     subject.plant.z_dot = random_between(&source, -0.5, 0.5);
-    subject.step.z_dot = (float)subject.plant.z_dot;
+    subject.step.seat_dot = (float)(-subject.plant.z_dot / (0.45 * cos(TRIM)));
     return subject;
 }
 
@@ -254,7 +254,7 @@ static void test_at_rest_it_stays_at_rest(void)
     const double p[MODELS][L] = {{2.5, 42.0, 1500.0}, {2.5, 42.0, 1500.0}, {-465.0, -13.7, -2.2}, {500.0, 13.5, 9.0}};
     for (uint32_t kind = 0u; kind < (uint32_t)KINDS; kind++) {
         subject_t subject = subject_of(kind, p[kind / 2u], 1.0e-3, 0.0, 0.0);
-        subject.step.z_dot = 0.0f;
+        subject.step.seat_dot = 0.0f;
         if (kind == 1u) {
             const double mu = (subject.plant.mass_position * subject.plant.mass) + subject.plant.m_p;
             const double bears = PLANT_GRAVITY * mu / (subject.plant.k_p * subject.plant.length);
@@ -265,12 +265,35 @@ static void test_at_rest_it_stays_at_rest(void)
     }
 }
 
+/* The arm hangs on a trunk that has moved by s = seat l cos(trim): its spring and damper pull by l cos(theta) (k_p s + c_p
+ * s_dot) more. To first order in seat. */
+static void test_a_trunk_that_gives_way_pulls_by_spring_and_damper_of_the_arm(void)
+{
+    for (uint32_t repeat = 0u; repeat < (uint32_t)REPEATS; repeat++) {
+        subject_t subject = random_subject(0u, 1.0e-3);
+        plant_t *plant = &subject.plant;
+        plant->theta = plant->trim + random_between(&source, -0.02, 0.02);
+        const double rigid = mean_change(&subject);
+        const double seat = random_between(&source, -0.004, 0.004);
+        const double seat_dot = random_between(&source, -0.1, 0.1);
+        const double inertia = plant_inertia(plant);
+        const double rise = plant->length * cos(plant->trim);
+        const double pull = rise * rise * ((plant->k_p * seat) + (plant->c_p * seat_dot)) / inertia;
+        subject.model = &model_lever_on_seat;
+        subject.step.seat = (float)seat;
+        subject.step.seat_dot = (float)seat_dot;
+        subject.step.tau_m -= (float)((plant->stiffness * seat) + (plant->damping * seat_dot));
+        const double size = rise * rise * ((plant->k_p * 0.004) + (plant->c_p * 0.1)) / inertia;
+        TEST_ASSERT_DOUBLE_WITHIN(0.05 * 1.0e-3 * size, 1.0e-3 * pull, mean_change(&subject) - rigid);
+    }
+}
+
 static void test_heavy_damping_and_a_long_step_still_decay(void)
 {
     const double p[MODELS][L] = {{0.3, 400.0, 200.0}, {0.05, 600.0, 1.0}, {-1.0, -320.0, 0.0}, {20.0, 320.0, 0.1}};
     for (uint32_t model = 0u; model < (uint32_t)MODELS; model++) {
         subject_t subject = subject_of(2u * model, p[model], 2.0e-2, 0.0, 0.0);
-        subject.step.z_dot = 0.0f;
+        subject.step.seat_dot = 0.0f;
         for (double rate = 1.0; fabs(rate) > 1.0e-6;) {
             subject.plant.theta_dot = rate;
             const double next = rate + mean_change(&subject);
@@ -368,6 +391,7 @@ int main(void)
     RUN_TEST(test_a_step_follows_the_equation_of_motion);
     RUN_TEST(test_halving_the_step_makes_its_error_eight_times_smaller);
     RUN_TEST(test_at_rest_it_stays_at_rest);
+    RUN_TEST(test_a_trunk_that_gives_way_pulls_by_spring_and_damper_of_the_arm);
     RUN_TEST(test_heavy_damping_and_a_long_step_still_decay);
     RUN_TEST(test_negative_damping_grows_in_any_step);
     RUN_TEST(test_dynamics_are_those_of_the_equation_linearised_at_the_trim);
