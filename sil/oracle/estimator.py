@@ -23,6 +23,8 @@ from .scale import Scale
 ESTIMATORS = ("dual", "joint", "augmented")
 OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 12  # predictions through a gap
+MOST_STEPS = 24  # of a level, when an output is back
+LEVEL_NOISE = 22.2  # noise bandwidth of a level, in corners
 SETTLING = 0.9  # [1] time that levels need, in periods of the corner
 MOTION_TIME = 0.1  # [s] of the shorter average of motion
 VELOCITY_KEPT = 0.99998  # of the base's, in a step
@@ -103,6 +105,8 @@ class Estimator:
         self.average_nis, self.surprise = 1.0, 1.0  # per output, over a long time and a short one
         self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
         self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
+        self.last_output = [0.0, 0.0]
+        self.ahead: Array = np.zeros(2)  # of the levels since the last sample of each output
         self.base_missing = seconds(0.0)
         self._wait_for_levels()
         self.last_raw = start.input
@@ -160,7 +164,7 @@ class Estimator:
         noise = self.learning.noise.output_noise
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
         expected = np.maximum(max(self.average_nis, 1.0) * (state**2 + noise**2), noise**2)
-        far = valid & ((y - self.origin - self.belief.x) ** 2 > SPIKE**2 * expected)
+        far = valid & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
         for i in np.flatnonzero(valid):
             self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
@@ -207,21 +211,25 @@ class Estimator:
     def _subtract_trim(self, y: Array, valid: NDArray[np.bool_], dt: float) -> tuple[Array, bool]:
         """The outputs without their slow level, as x is in preload trim, and whether one is back after an outage.
 
-        A level follows the prediction through a few missing samples, then waits.
+        Through a few missing samples a level goes `ahead` with the prediction, and takes a straight line when it
+        is back; after more of them it waits.
         """
         deviation, back = np.zeros(2), False
         for i, detrend in enumerate(self.outputs):
             waiting = bool(self.missing[i] > OUTAGE)
             if valid[i]:
-                deviation[i] = self._deviation(detrend, float(y[i]), dt)
+                steps = 1 if waiting else min(round(float(self.missing[i]) / dt) + 1, MOST_STEPS)
+                elapsed = dt if waiting else float(self.missing[i]) + dt
+                for value in np.linspace(self.last_output[i], float(y[i]), steps + 1)[1:].tolist():
+                    deviation[i] = self._deviation(detrend, value, elapsed / steps)
                 back = back or waiting
-                self.missing[i] = seconds(0.0)
+                self.last_output[i], self.ahead[i], self.missing[i] = float(y[i]), 0.0, seconds(0.0)
                 continue
-            self.missing[i] += seconds(dt)
             if waiting:
                 detrend.hold()
-            else:
-                self._deviation(detrend, float(self.origin[i] + self.belief.x[i]), dt)
+            elif self.detrended:
+                self.ahead[i] += dt * detrend.rate(float(self.belief.x[i]), self.settings["trim_corner"])
+            self.missing[i] += seconds(dt)
         return deviation, back
 
     def _end_outage(self, y: Array, valid: NDArray[np.bool_]) -> None:
@@ -277,13 +285,16 @@ class Estimator:
         return self.outputs[0].level
 
     def state_deviations(self) -> Array:
-        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration included. While
-        a level waits, what moves slower than the corner is not predicted: taken to be a quarter of the motion."""
+        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration included; that of
+        the level, too, which has the noise of the samples, and does not know the motion while it waits."""
         sigma = self._with_considered(self.belief.joint_factor, self.belief.errors)[len(self.scale.names) :]
         if not self.detrended:
             return sigma
-        slow = 0.25 * math.sqrt(self.excitation_square) * (np.array(self.missing) > OUTAGE)
-        total: Array = np.hypot(sigma, slow / np.array((2.0 * math.pi * self.settings["trim_corner"], 1.0)))
+        corner = self.settings["trim_corner"]
+        unknown = math.sqrt(self.excitation_square) * (np.array(self.missing) > OUTAGE)
+        unknown = unknown / np.array((2.0 * math.pi * corner, 1.0))
+        noise = self.learning.noise.output_noise**2 * LEVEL_NOISE * corner * self.settings["sample_period"]
+        total: Array = np.sqrt(sigma**2 + unknown**2 + noise)
         return total
 
     def _with_considered(self, factor: Array, errors: Array) -> Array:
@@ -353,7 +364,7 @@ def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, ever
     for index in range(first, len(time)):
         estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index])
         if (index - first) % every == 0:
-            x = (estimator.origin + estimator.belief.x, estimator.state_deviations())
+            x = (estimator.origin + estimator.ahead + estimator.belief.x, estimator.state_deviations())
             others = (*estimator.parameters(), *estimator.dynamics(), (estimator.trim, estimator.nis))
             rows.append(np.concatenate((*x, *others)))
     return dict(zip(columns(estimator), np.array(rows).T, strict=True))
