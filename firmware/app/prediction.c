@@ -23,7 +23,7 @@ static void considered_errors(const estimator_t *estimator, float z_ddot, float 
 {
     const setup_t *setup = &estimator->setup;
     const float space = (setup->model_in_use == &model_hand) ? estimator->cdkf.p[2] : 0.0f;
-    error[CDKF_BASE_GAIN] = -(z_ddot + (space * estimator->z_dot));
+    error[CDKF_BASE_GAIN] = -(z_ddot - (space * estimator->base_motion.seat_dot)); /* without a seat it is -z_dot */
     error[CDKF_BASE_DELAY] = (z_ddot - estimator->z_ddot) + (space * (setup->settings->sample_period * z_ddot));
     error[CDKF_TORQUE_GAIN] = -estimator->tau_m;
     error[CDKF_FRICTION] = -stop;
