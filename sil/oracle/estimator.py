@@ -160,12 +160,13 @@ class Estimator:
         self.unsettled -= counted(duration)
 
     def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
-        """Outputs far from what is expected, until they have been for SPIKE_TIME."""
+        """Outputs far from what is expected, until they have been for SPIKE_TIME. After an outage nothing is."""
         noise = self.learning.noise.output_noise
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
         expected = np.maximum(max(self.average_nis, 1.0) * (state**2 + noise**2), noise**2)
-        far = valid & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
-        for i in np.flatnonzero(valid):
+        known = valid & (np.array(self.missing) <= OUTAGE)
+        far = known & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
+        for i in np.flatnonzero(known):
             self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
         return spikes
