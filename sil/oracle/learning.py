@@ -122,7 +122,7 @@ class Learning:
         self.belief.forget(self.growth * period)
         self.belief.walk(self.walk * period + self.floor * suddenly)
         self.belief.limit(self.greatest_sigma)
-        if taught:
+        if taught or not lesson.excited:
             self._adapt_walk(correction, period, lesson.excited)
         else:
             self.growth = 0.0  # what cannot be learnt again is not forgotten

@@ -20,6 +20,7 @@ STEP = (0.33, 10.0)  # within these
 SHARE = 0.2
 PROCESS_LEAST = 0.6  # factor of the process noise
 STARVED = 1.15  # times the gain, from which on it is the process noise that is too small
+CHANCE = 3.0  # standard deviations of the regression, 1 / sqrt(response_square), that the gain must be above 1
 OUTLIERS = 3.0  # innovations so many times too large are never those of process noise
 
 
@@ -59,7 +60,7 @@ class NoiseEstimation:
         if self.window <= 0.0 or self.elapsed < self.window:
             return False
         gain = 1.0 + (self.product / self.response_square if self.response_square > 0.0 else 0.0)
-        starved = gain > STARVED
+        starved = gain > STARVED and self.product > CHANCE * math.sqrt(self.response_square)
         factors = [self._correct_output(i, starved) for i in range(2) if self.samples[i] >= SAMPLES_LEAST]
         factor = max(gain**2 if starved else gain * math.sqrt(math.prod(factors)), PROCESS_LEAST)
         before = self.process_noise
