@@ -22,6 +22,14 @@ class Detrend:
     def level(self) -> float:
         return sum(self._levels)
 
+    def rate(self, deviation: float, corner: float) -> float:
+        """Of the level, where its last section leaves this deviation; corner [Hz]."""
+        rate, seen = 0.0, deviation
+        for level, slope, damping in zip(self._levels[::-1], self._slopes[::-1], DAMPING[::-1], strict=True):
+            rate += slope + damping * 2.0 * math.pi * corner * seen
+            seen += level
+        return rate
+
     def hold(self) -> None:
         """The level stays where it is until the next value."""
         self._slopes = [0.0] * len(DAMPING)

@@ -23,8 +23,8 @@ from .scale import Scale
 ESTIMATORS = ("dual", "joint", "augmented")
 OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 12  # predictions through a gap
-LINE_STEPS = 24  # of a level on the straight line between two samples
-LEVEL_NOISE = 22.2  # noise bandwidth of the level, 2 x integral of |1 - H|^2, in corners
+MOST_STEPS = 24  # of a level, when an output is back
+LEVEL_NOISE = 22.2  # noise bandwidth of a level, in corners
 SETTLING = 0.9  # [1] time that levels need, in periods of the corner
 MOTION_TIME = 0.1  # [s] of the shorter average of motion
 VELOCITY_KEPT = 0.99998  # of the base's, in a step
@@ -105,8 +105,8 @@ class Estimator:
         self.average_nis, self.surprise = 1.0, 1.0  # per output, over a long time and a short one
         self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
         self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
-        self.last_output = start.state.astype(np.float64)  # that sample
-        self.ahead = np.zeros(2)  # by which the level of a missing output has moved since
+        self.last_output = [0.0, 0.0]
+        self.ahead: Array = np.zeros(2)  # of the levels since the last sample of each output
         self.base_missing = seconds(0.0)
         self._wait_for_levels()
         self.last_raw = start.input
@@ -164,9 +164,8 @@ class Estimator:
         noise = self.learning.noise.output_noise
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
         expected = np.maximum(max(self.average_nis, 1.0) * (state**2 + noise**2), noise**2)
-        awaited = valid & (np.array(self.missing) <= OUTAGE)
-        far = awaited & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
-        for i in np.flatnonzero(awaited):
+        far = valid & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
+        for i in np.flatnonzero(valid):
             self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
         return spikes
@@ -212,20 +211,19 @@ class Estimator:
     def _subtract_trim(self, y: Array, valid: NDArray[np.bool_], dt: float) -> tuple[Array, bool]:
         """The outputs without their slow level, as x is in preload trim, and whether one is back after an outage.
 
-        A level waits while samples are missing. After a few it takes the straight line to the next one; meanwhile
-        `ahead` goes where it would have gone with the prediction.
+        Through a few missing samples a level goes `ahead` with the prediction, and takes a straight line when it
+        is back; after more of them it waits.
         """
         deviation, back = np.zeros(2), False
         for i, detrend in enumerate(self.outputs):
             waiting = bool(self.missing[i] > OUTAGE)
             if valid[i]:
-                elapsed = float(self.missing[i]) + dt
-                steps = 1 if waiting else min(math.floor(elapsed / dt + 0.5), LINE_STEPS)
-                for share in np.arange(1, steps + 1) / steps:
-                    value = self.last_output[i] + share * (y[i] - self.last_output[i])
-                    deviation[i] = self._deviation(detrend, float(value), dt if waiting else elapsed / steps)
+                steps = 1 if waiting else min(round(float(self.missing[i]) / dt) + 1, MOST_STEPS)
+                elapsed = dt if waiting else float(self.missing[i]) + dt
+                for value in np.linspace(self.last_output[i], float(y[i]), steps + 1)[1:].tolist():
+                    deviation[i] = self._deviation(detrend, value, elapsed / steps)
                 back = back or waiting
-                self.missing[i], self.last_output[i], self.ahead[i] = seconds(0.0), y[i], 0.0
+                self.last_output[i], self.ahead[i], self.missing[i] = float(y[i]), 0.0, seconds(0.0)
                 continue
             if waiting:
                 detrend.hold()
@@ -287,15 +285,16 @@ class Estimator:
         return self.outputs[0].level
 
     def state_deviations(self) -> Array:
-        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration included. A level
-        has the noise of the samples; while it waits, what it makes up of the motion is not predicted."""
+        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration included; that of
+        the level, too, which has the noise of the samples, and does not know the motion while it waits."""
         sigma = self._with_considered(self.belief.joint_factor, self.belief.errors)[len(self.scale.names) :]
         if not self.detrended:
             return sigma
         corner = self.settings["trim_corner"]
-        slow = math.sqrt(self.excitation_square) * (np.array(self.missing) > OUTAGE)
-        noise = self.learning.noise.output_noise * math.sqrt(LEVEL_NOISE * corner * self.settings["sample_period"])
-        total: Array = np.sqrt(sigma**2 + (slow / np.array((2.0 * math.pi * corner, 1.0))) ** 2 + noise**2)
+        unknown = math.sqrt(self.excitation_square) * (np.array(self.missing) > OUTAGE)
+        unknown = unknown / np.array((2.0 * math.pi * corner, 1.0))
+        noise = self.learning.noise.output_noise**2 * LEVEL_NOISE * corner * self.settings["sample_period"]
+        total: Array = np.sqrt(sigma**2 + unknown**2 + noise)
         return total
 
     def _with_considered(self, factor: Array, errors: Array) -> Array:

@@ -20,7 +20,7 @@ STEP = (0.33, 10.0)  # within these
 SHARE = 0.2
 PROCESS_LEAST = 0.6  # factor of the process noise
 STARVED = 1.15  # times the gain, from which on it is the process noise that is too small
-CHANCE = 3.0  # standard deviations of the regression, 1 / sqrt(response_square), that the gain must be above 1
+CHANCE = 3.0  # standard deviations of the regression, 1 / sqrt(response_square), that this must be
 OUTLIERS = 3.0  # innovations so many times too large are never those of process noise
 
 
