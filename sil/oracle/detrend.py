@@ -34,14 +34,6 @@ class Detrend:
         """The level stays where it is until the next value."""
         self._slopes = [0.0] * len(DAMPING)
 
-    def rate(self, deviation: float, corner: float) -> float:
-        """At which the level moves while `deviation` is what the last section leaves [unit of the signal / s]."""
-        w, rate = 2.0 * math.pi * corner, 0.0
-        for level, slope, damping in zip(reversed(self._levels), reversed(self._slopes), reversed(DAMPING), strict=True):
-            rate += slope + damping * w * deviation
-            deviation += level
-        return rate
-
     def step(self, value: float, corner: float, dt: float) -> float:
         """The deviation of `value` from the level before it, `dt` [s] after the last one; corner [Hz]."""
         w = 2.0 * math.pi * corner
