@@ -43,6 +43,7 @@ void trim_start(trim_t *trim, float angle, float corner, bool deviations)
     trim->settling_time = 0.9f / corner;
     trim->deviations = deviations;
     trim->output[0].section[0].level = angle;
+    trim->last[0] = angle;
     trim_set_origin(trim);
     trim_unsettle(trim);
 }

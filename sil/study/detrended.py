@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..oracle.cdkf import Array
+from ..oracle.detrend import DAMPING
 from .data import OUTPUTS, Batch
 
 
@@ -30,12 +31,15 @@ def deviations(signals: Array, start: Array, corner: float, dt: float) -> tuple[
     The levels start at `start` (B, n), at rest; corner [Hz], dt [s].
     """
     w = 2.0 * math.pi * corner
-    level, slope = start.copy(), np.zeros_like(start)
+    level = np.stack((start, *(np.zeros_like(start) for _ in DAMPING[1:])))  # of each section
+    slope = np.zeros_like(level)
     levels = np.empty((signals.shape[1], *start.shape))
     for k, values in enumerate(np.ascontiguousarray(signals.swapaxes(0, 1))):
-        levels[k] = level
-        deviation = values - level
-        slope += dt * w**2 * deviation
-        level += dt * (slope + math.sqrt(2.0) * w * deviation)
+        levels[k] = level.sum(axis=0)
+        deviation = values
+        for i, damping in enumerate(DAMPING):
+            deviation = deviation - level[i]
+            slope[i] += dt * w**2 * deviation
+            level[i] += dt * (slope[i] + damping * w * deviation)
     levels = np.ascontiguousarray(levels.swapaxes(0, 1))
     return signals - levels, levels
