@@ -17,6 +17,7 @@ from lever_cdkf.host_tools.native import Config, Estimator
 from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.figures import catalogue, grip, runs
 from lever_cdkf.sil.study.figures.description import LOOKS, Band, Curve, Figure, Points, Row, Surface, Trace, number
+from lever_cdkf.sil.study.firmware import EXACT
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -305,7 +306,7 @@ def test_identification_shows_the_firmware_and_a_reference_that_starts_at_the_pr
     chart = rows("identification", column)
     assert batch.truth.p is not None
     for estimator in ("dual", "joint"):
-        found = by_sample(Config("lever", "fixed", estimator, "fixed", settings={**PRIOR, **MATCHED}), batch)
+        found = by_sample(Config("lever", "fixed", estimator, "fixed", settings={**EXACT, **PRIOR, **MATCHED}), batch)
         for index, label in enumerate(("m_p [kg]", "c_p [N s/m]", "k_p [N/m]")):
             estimate, band = trace(chart[label], estimator), trace(chart[label], f"{estimator} ± 2σ")
             at = np.round(estimate.x / batch.period).astype(int)
