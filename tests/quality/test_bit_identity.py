@@ -70,7 +70,7 @@ def test_the_program_exercises_the_filter(reference: list[str]) -> None:
         for first, last in zip(lines[0][7:13:2], lines[-1][7:13:2], strict=True):
             start, end = (struct.unpack(">f", bytes.fromhex(bits))[0] for bits in (first, last))
             assert start != 0.0
-            assert 0.01 < abs(end / start - 1.0) < 10.0
+            assert 0.001 < abs(end / start - 1.0) < 10.0
 
 
 @pytest.mark.parametrize(("compiler", "flags"), BUILDS)
