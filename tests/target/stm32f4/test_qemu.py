@@ -73,7 +73,7 @@ def test_rom_crc_finds_a_wrong_crc(slcan_image: Path, tmp_path: Path) -> None:
 def test_self_test_finds_a_wrong_instruction(slcan_image: Path, tmp_path: Path) -> None:
     """An addition in the filter has become a subtraction, with the CRC made good again."""
     flash = elf.flash_bytes(slcan_image)
-    code = elf.instructions(slcan_image, "respond")
+    code = elf.instructions(slcan_image, "predict")
     address, encoding, _ = next(row for row in code if row[2].startswith("vadd.f32"))
     flash[address - elf.FLASH + 2] = encoding[2] | 0x40  # VADD to VSUB: ARMv7-M A7.7.225 and A7.7.260
     elf.put_crc(flash)
