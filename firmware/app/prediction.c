@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-#define OUTAGE 0.0205f    /* a base acceleration missing for longer is out [s] */
 #define MISSING 10.0f     /* process noise for a base acceleration that is missing, in those that are set, */
 #define WRONG 3.0f        /* and for a wrong one, so that it is noticed when it is right again */
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
@@ -93,7 +92,7 @@ static void cross_gap(
 /* After an outage of the base its level has to settle again. */
 static void follow_base(estimator_t *estimator, bool valid, float elapsed)
 {
-    if (valid && (estimator->base_missing > OUTAGE)) {
+    if (valid && (estimator->base_missing > TRIM_OUTAGE)) {
         trim_unsettle(&estimator->trim);
     }
     estimator->base_missing = valid ? 0.0f : (estimator->base_missing + elapsed);

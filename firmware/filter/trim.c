@@ -5,7 +5,6 @@
 
 #define TURN 6.28318531f
 #define STEPS_MOST 24.0f /* of that line */
-#define OUTAGE 0.0205f   /* an output missing for longer is out [s]; not a whole number of periods */
 
 high_pass_corner_t high_pass_corner(float frequency, float damping)
 {
@@ -76,7 +75,7 @@ float trim_input(trim_t *trim, uint32_t i, float value, float period)
 
 bool trim_is_waiting(const trim_t *trim, uint32_t i)
 {
-    return trim->missing[i] > OUTAGE;
+    return trim->missing[i] > TRIM_OUTAGE;
 }
 
 /* The deviation of output i, which is back at `value`: its level takes the straight line from the last one. */

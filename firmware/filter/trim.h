@@ -40,6 +40,8 @@ high_pass_corner_t high_pass_corner(float frequency, float damping);
 /* One value after `period` seconds. Returns its deviation from the level before it. */
 float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period);
 
+#define TRIM_OUTAGE 0.0205f /* a signal missing for longer is out [s]; not a whole number of periods */
+
 enum { TRIM_INPUTS = 3, TRIM_SECTIONS = 3 };
 
 /* A signal's slow part. */
