@@ -1,6 +1,7 @@
 #include "app/estimator.h"
 #include "app/alignment.h"
 #include "app/prediction.h"
+#include "math/share.h"
 
 #include <math.h>
 #include <string.h>
@@ -157,10 +158,11 @@ static void average(estimator_t *estimator, float elapsed)
 {
     const float time = estimator->setup.settings->excitation_time;
     averages_t *averages = &estimator->averages;
-    const float share = (elapsed < time) ? (elapsed / time) : 1.0f;
-    averages->excitation_square += share * (squared(estimator->cdkf.x[1]) - averages->excitation_square);
-    averages->motion_square += ((elapsed < MOTION_TIME) ? (elapsed * (1.0f / MOTION_TIME)) : 1.0f) *
-                               (squared(estimator->cdkf.x[1]) - averages->motion_square);
+    const float share = share_of(elapsed, time);
+    const float square = squared(estimator->cdkf.x[1]);
+    averages->excitation_square += share * (square - averages->excitation_square);
+    averages->motion_square +=
+        ((elapsed < MOTION_TIME) ? (elapsed * (1.0f / MOTION_TIME)) : 1.0f) * (square - averages->motion_square);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);
     }

@@ -1,4 +1,5 @@
 #include "app/hands.h"
+#include "math/share.h"
 
 #include <string.h>
 
@@ -27,7 +28,7 @@ void hands_step(hands_t *hands, const model_constants_t *constants, float theta_
     hands->begin = theta_dot;
     hands->impulse = 0.0f;
     if (counts) {
-        const float share = (period < MEMORY) ? (period / MEMORY) : 1.0f;
+        const float share = share_of(period, MEMORY);
         hands->change += share * ((change * change) - hands->change);
         hands->residual += share * ((residual * residual) - hands->residual);
         hands->off = (hands->residual < ((hands->off ? ON : OFF) * hands->change));

@@ -1,4 +1,5 @@
 #include "app/monitor.h"
+#include "math/share.h"
 
 #include <math.h>
 #include <string.h>
@@ -83,7 +84,7 @@ bool monitor_step(monitor_t *monitor, const score_t *sudden, float period)
 {
     const bool before = monitor->base_wrong;
     const float memory = before ? BASE_MEMORY_AGAIN : BASE_MEMORY;
-    const float keep = (period < memory) ? (1.0f - (period / memory)) : 0.0f;
+    const float keep = 1.0f - share_of(period, memory);
     score_t *base = &monitor->base;
     base->vector = (keep * base->vector) + sudden->vector;
     base->information = (keep * base->information) + sudden->information;

@@ -28,7 +28,7 @@ typedef struct stillness {
 typedef struct monitor {
     stillness_t stillness[MONITOR_SIGNALS];
     float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been spikes [s] */
-    float surprise;              /* mean of nis / nis_size over 50 ms; expected 1 */
+    float surprise;              /* mean of nis / nis_size over 0.1 s; expected 1 */
     score_t base;                /* of CDKF_BASE_GAIN, with exponential forgetting */
     bool base_wrong;             /* the base acceleration is not used */
 } monitor_t;

@@ -1,6 +1,7 @@
 #include "filter/adaptation.h"
 
 #include "lever_cdkf.h"
+#include "math/share.h"
 
 void adaptation_start(const adaptation_t *adaptation, cdkf_t *cdkf)
 {
@@ -11,11 +12,6 @@ void adaptation_start(const adaptation_t *adaptation, cdkf_t *cdkf)
         cdkf->drift[i] = 0.0f;
     }
     cdkf->growth = forgets ? (1.0f / adaptation->forgetting_time) : 0.0f;
-}
-
-static float share_of(float period, float time)
-{
-    return (period < time) ? (period / time) : 1.0f;
 }
 
 void adaptation_step(

@@ -2,6 +2,7 @@
 #include "filter/cdkf.h"
 #include "filter/considered.h"
 #include "math/factor.h"
+#include "math/share.h"
 
 #include <string.h>
 
@@ -43,7 +44,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
     float *u = cdkf->pending.matrix;
     float *step = cdkf->pending.vector; /* of w in coordinates of the columns of S_ww */
     if (u[0] > 0.0f) {                  /* there is information */
-        const float trust = cdkf->trust + ((period < caution) ? (period / caution) : 1.0f);
+        const float trust = cdkf->trust + share_of(period, caution);
         cdkf->trust = (trust < 1.0f) ? trust : 1.0f;
     }
     for (uint32_t i = 0u; i < L; i++) {

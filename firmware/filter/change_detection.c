@@ -1,4 +1,5 @@
 #include "filter/change_detection.h"
+#include "math/share.h"
 
 #include <string.h>
 
@@ -14,7 +15,7 @@ void change_detection_init(change_detection_t *change)
 bool change_detection_step(
     change_detection_t *change, const correction_t *correction, float period, float memory, float threshold)
 {
-    const float share = (period < memory) ? (period / memory) : 1.0f;
+    const float share = share_of(period, memory);
     const float keep = 1.0f - share;
     float statistic = 0.0f;
     for (uint32_t i = 0u; i < L; i++) {

@@ -1,0 +1,11 @@
+/* Steps of a first-order mean. */
+#ifndef MATH_SHARE_H
+#define MATH_SHARE_H
+
+/* The share of the new value in a mean over `time`, `period` after the last value; at most 1. Both positive [s]. */
+static inline float share_of(float period, float time)
+{
+    return (period < time) ? (period / time) : 1.0f;
+}
+
+#endif
