@@ -1,4 +1,5 @@
 #include "app/learning.h"
+#include "math/share.h"
 
 #define REPORTED 3.0f         /* time for which a change is reported, and not followed by another [s] */
 #define TRANSIENT 2.0f        /* left of it when innovations are noise again, and not of the change [s] */
@@ -10,6 +11,14 @@
 #define DISTURBANCE 2.0f      /* process noise after a change, in noise_range times the one that is set */
 #define DISTURBANCE_TIME 0.4f /* its time constant [s] */
 
+/* The belief of now is the only one to return to. */
+static void keep_only(learning_t *learning, const cdkf_t *cdkf)
+{
+    cdkf_keep(cdkf, &learning->kept[0]);
+    learning->kept[1] = learning->kept[0];
+    learning->kept_ago = 0.0f;
+}
+
 void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
 {
     const adaptation_t adaptation = setup_adaptation(setup);
@@ -20,22 +29,22 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
     calibration_start(&learning->calibration);
     monitor_start(&learning->monitor);
     hands_start(&learning->hands);
-    cdkf_keep(cdkf, &learning->kept[0]);
-    learning->kept[1] = learning->kept[0];
-    learning->kept_ago = 0.0f;
+    keep_only(learning, cdkf);
     learning->elapsed = 0.0f;
     learning->wait = 0.0f;
     learning->changed = 0.0f;
     learning->bounded = false;
 }
 
-bool learning_is_taught(const learning_t *learning, const lesson_t *lesson)
+/* The lesson teaches the parameters: besides, the sensors are right and somebody holds the lever. */
+static bool teaches(const learning_t *learning, const lesson_t *lesson)
 {
-    return lesson->walks && lesson->measured && !learning->monitor.base_wrong &&
+    return lesson->walks && lesson->measured && lesson->excited && !learning->monitor.base_wrong &&
            !monitor_has_stuck(&learning->monitor) && !learning->hands.off && (learning->wait <= 0.0f);
 }
 
-void learning_take_back(learning_t *learning, cdkf_t *cdkf)
+/* What was learnt in the last one to two seconds: they were not what they seemed. */
+static void take_back(learning_t *learning, cdkf_t *cdkf)
 {
     cdkf_return(cdkf, &learning->kept[1]);
     learning->kept[0] = learning->kept[1];
@@ -88,14 +97,14 @@ static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *c
         noise_estimation_begin(&learning->noise);
     } else if (noise_estimation_step(&learning->noise, cdkf, &noise, period) &&
                (started || (learning->changed <= 0.0f))) {
-        learning_take_back(learning, cdkf);
+        take_back(learning, cdkf);
     } else {
         keep(learning, cdkf, period);
     }
 }
 
-/* What the block says against sensors, settings and model, before it is learnt. */
-static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float period)
+/* What the block says against sensors, settings and model, before it is learnt. Returns true when it teaches. */
+static bool judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float period)
 {
     const bool held = !learning->hands.off;
     const bool counts = lesson->measured && lesson->excited;
@@ -114,17 +123,17 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong;
     if (fails || (held && learning->hands.off)) {
         whiteness_start(&learning->whiteness);
-        learning_take_back(learning, cdkf);
+        take_back(learning, cdkf);
     } else if (!held && !learning->hands.off) { /* another grip */
         cdkf_open(cdkf);
-        cdkf_keep(cdkf, &learning->kept[1]);
-        learning_take_back(learning, cdkf);
+        keep_only(learning, cdkf);
+        noise_estimation_begin(&learning->noise);
         disturb(setup->settings, cdkf, 1.0f);
         learning->wait = REGRIP;
     } else {
         /* as before */
     }
-    const bool taught = counts && learning_is_taught(learning, lesson);
+    const bool taught = teaches(learning, lesson);
     const bool settled = taught && (cdkf->trust >= 1.0f) && (learning->changed <= TRANSIENT);
     whiteness_step(&learning->whiteness, period, settled);
     if (settled) {
@@ -133,6 +142,7 @@ static void judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     if (!taught) {
         cdkf_drop_pending(cdkf);
     }
+    return taught;
 }
 
 static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson)
@@ -152,17 +162,16 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     if (learning->hands.off) {
         disturb(s, cdkf, 1.0f);
     }
-    cdkf->disturbance -= cdkf->disturbance * ((period < DISTURBANCE_TIME) ? (period / DISTURBANCE_TIME) : 1.0f);
-    judge(learning, setup, cdkf, lesson, period);
-    const bool taught = learning_is_taught(learning, lesson);
-    if (taught && lesson->excited) {
+    cdkf->disturbance -= cdkf->disturbance * share_of(period, DISTURBANCE_TIME);
+    const bool taught = judge(learning, setup, cdkf, lesson, period);
+    if (taught) {
         estimate_noise(learning, setup, cdkf, period);
     } else {
         noise_estimation_begin(&learning->noise);
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
     learning->bounded = correction.bounded;
-    const float more = (taught && lesson->excited) ? detect_change(learning, s, cdkf, &correction, period) : 0.0f;
+    const float more = taught ? detect_change(learning, s, cdkf, &correction, period) : 0.0f;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         variance[i] = adaptation.floor[i] * more;
     }

@@ -41,17 +41,11 @@ typedef struct lesson {
     bool excited;  /* there was enough motion lately: at rest, only the walk goes on */
 } lesson_t;
 
-/* The lesson teaches the parameters: besides, the sensors are right and somebody holds the lever. */
-bool learning_is_taught(const learning_t *learning, const lesson_t *lesson);
-
 /* After the measurement update with a sample, `elapsed` seconds after the last one. Returns true when the parameters
  * have learnt. */
 bool learning_step(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float elapsed);
 
 /* After `elapsed` seconds without samples: the parameters learn what is pending, and walk for that time. */
 void learning_skip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float elapsed);
-
-/* Takes back what was learnt in the last one to two seconds: they were not what they seemed. */
-void learning_take_back(learning_t *learning, cdkf_t *cdkf);
 
 #endif
