@@ -51,31 +51,17 @@ static float scaled(float now, float factor, float set, float range)
     return clamped(now * step, set / range, set * range);
 }
 
-/* The factor by which the noise of output i is wrong, by this window, and how far its innovations are too large. */
-typedef struct error {
-    float factor;
-    float excess;
-} error_t;
-
-static error_t error_of(const noise_estimation_t *noise, uint32_t i)
-{
-    error_t error;
-    error.excess = sqrtf(noise->ratio[i] / noise->samples[i]);
-    error.factor = (error.excess > CERTAIN) ? error.excess : (1.0f + (noise->share[i] * (error.excess - 1.0f)));
-    return error;
-}
-
 /* Sets the noise of output i. With too little gain innovations are large although R is right: then it stays, and what
- * it was raised by before is halved. Returns the factor. */
+ * it was raised by before is halved, as a logarithm. Returns the factor. */
 static float correct_output(
     const noise_estimation_t *noise, cdkf_t *cdkf, const noise_setting_t *setting, uint32_t i, bool starved)
 {
     float *now = &cdkf->output_noise[i];
     const float set = setting->output_noise[i];
-    const error_t error = error_of(noise, i);
+    const float excess = sqrtf(noise->ratio[i] / noise->samples[i]); /* how far its innovations are too large */
     float factor = 1.0f;
-    if (!starved || (error.excess > CERTAIN) || (error.excess < 1.0f)) {
-        factor = error.factor;
+    if (!starved || (excess > CERTAIN) || (excess < 1.0f)) {
+        factor = (excess > CERTAIN) ? excess : (1.0f + (noise->share[i] * (excess - 1.0f)));
         *now = scaled(*now, factor, set, setting->range);
     } else if (*now > set) {
         *now = sqrtf(*now * set);
