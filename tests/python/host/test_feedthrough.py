@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.native import Config, Estimator, Feedthrough
+from lever_cdkf.sil.study.firmware import EXACT
 from numpy.typing import NDArray
 
 ComplexArray = NDArray[np.complex128]
@@ -32,7 +33,6 @@ def responses(model: str, p: NDArray[np.float64], trim: float, frequency: float)
 
 LEVER = (0.5873, 8.01, 273.2, -1.311)
 """Inertia, damping, stiffness and forcing of 2.5 kg, 42 N s/m, 1500 N/m on the lever."""
-EXACT = dict.fromkeys(("z_ddot_gain_sigma", "z_ddot_delay_sigma", "tau_m_gain_sigma", "lever_friction_sigma"), 0.0)
 PLANTS = {"lever": LEVER, "linear_black_box": LEVER, "linear_physical": (2.5, 42.0, 1500.0, 2.5), "hand": LEVER}
 
 
