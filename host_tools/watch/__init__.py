@@ -7,5 +7,5 @@
     panels.py    the picture as tables of text
     terminal.py  the tables in a terminal, ten times a second
 
-What needs the simulation or the model's transfer function is in sil/watch, and the commands are there, too.
+    state.py server.py transfer.py page/   the page that `lever live` serves
 """

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import codec, fields
-from ..coherence import Coherence
+from ..can import codec, fields
+from ..results.coherence import Coherence
 
 FloatArray = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from .. import codec
-from ..buses import open_bus
-from ..commander import KEEP_ALIVE, Commander
+from ..can import codec
+from ..can.buses import open_bus
+from ..can.commander import KEEP_ALIVE, Commander
 from ..errors import LeverError
 from .model import ERROR, FOREIGN, STEP, Frame, Picture
 
@@ -158,7 +158,7 @@ class LogSource(Source):
 
     def __init__(self, path: str, channel: str | None = None) -> None:
         """Opens the log. Raises LeverError."""
-        from ..logs import Recording
+        from ..can.logs import Recording
 
         super().__init__()
         self.title = path
@@ -187,7 +187,7 @@ class LogSource(Source):
 
     def _frames(self) -> Iterator[tuple[float, Frame]]:
         """Each frame with the time after the one before it [s]; a clock that went back or jumped far counts as 0."""
-        from ..bulk import ERROR as ERROR_FRAME
+        from ..firmware.bulk import ERROR as ERROR_FRAME
 
         last: int | None = None
         for chunk in self._log.chunks():

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.config import Config
-from lever_cdkf.host_tools.estimator import Estimator
-from lever_cdkf.host_tools.library import ffi, lib, struct_dtype
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.estimator import Estimator
+from lever_cdkf.host_tools.firmware.library import ffi, lib, struct_dtype
 from numpy.typing import NDArray
 
 from .condition import ClosedLoop

@@ -9,7 +9,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.library import lib
+from lever_cdkf.host_tools.firmware.library import lib
 from numpy.typing import NDArray
 
 from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.models.transfer import BAND as BOUNCE_BAND
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ..transfer import BAND as BOUNCE_BAND
 from .plant import FloatArray, Hardware, Lanes, natural_frequency_and_damping
 
 PERIOD = 1e-3

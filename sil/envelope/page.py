@@ -6,12 +6,12 @@ import html
 from collections.abc import Sequence
 
 import numpy as np
+from lever_cdkf.host_tools.report.document import document
+from lever_cdkf.host_tools.report.figure import Figure, axis, band, dots, line, time_axis
+from lever_cdkf.host_tools.report.page import Page
+from lever_cdkf.host_tools.report.words import table
 from lever_cdkf.host_tools.tables import Row
 
-from ..report.document import document
-from ..report.figure import Figure, axis, band, dots, line, time_axis
-from ..report.page import Page
-from ..report.words import table
 from .campaign import Result
 from .measure import FIGURES, FLAGS, Excerpt
 from .table import MISSED, figures, lines, state

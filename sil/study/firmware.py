@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from lever_cdkf.host_tools.native import Config, run_samples
+from lever_cdkf.host_tools.firmware.native import Config, run_samples
 from numpy.typing import NDArray
 
 from ..oracle.cdkf import Array

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.sil import seeds
-from lever_cdkf.sil.quantities import DYNAMICS
-from lever_cdkf.sil.seeds import FloatArray, Summary
+from lever_cdkf.host_tools.firmware.quantities import DYNAMICS
+from lever_cdkf.sil.run import seeds
+from lever_cdkf.sil.run.seeds import FloatArray, Summary
 
 SEEDS = 20
 """Runs of each scenario: seeds 1 to 20."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import numpy as np
-from lever_cdkf.host_tools.config import settings_table
+from lever_cdkf.host_tools.firmware.config import settings_table
 from numpy.typing import NDArray
 
-from ... import scenario as scenarios
 from ...oracle.cdkf import Array
+from ...scenarios import scenario as scenarios
 from .. import bound, linearised
 from ..data import Batch
 from ..detrended import detrended

@@ -6,11 +6,11 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 
+from lever_cdkf.host_tools.report.document import document
+from lever_cdkf.host_tools.report.page import Page
+from lever_cdkf.host_tools.report.words import number, table
 from lever_cdkf.host_tools.tables import Row as TableRow
 
-from ...report.document import document
-from ...report.page import Page
-from ...report.words import number, table
 from . import charts
 from .campaign import Results
 from .cases import PRIOR, cases

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from lever_cdkf.host_tools.config import setting
+from lever_cdkf.host_tools.firmware.config import setting
 from numpy.typing import NDArray
 
 from ...oracle.cdkf import Array

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ...report import figure as chart
-from ...report.document import document
-from ...report.series import packed
+from lever_cdkf.host_tools.report import figure as chart
+from lever_cdkf.host_tools.report.document import document
+from lever_cdkf.host_tools.report.series import packed
+
 from .description import LOOKS, Band, Column, Figure, Points, Surface, Trace
 from .typesetting import in_html, own_css
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from lever_cdkf.host_tools.config import Config
 from lever_cdkf.host_tools.errors import SettingsError
+from lever_cdkf.host_tools.firmware.config import Config
 
 from ...envelope import firmware, pilots, plant
 from ...envelope.condition import ClosedLoop, Condition

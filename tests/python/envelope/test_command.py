@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.sil.envelope import campaign, conditions, firmware, page, table
 from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
 from lever_cdkf.sil.envelope.measure import fault_mask

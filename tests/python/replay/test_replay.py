@@ -14,12 +14,12 @@ import numpy as np
 import polars
 import pytest
 from asammdf import MDF
-from lever_cdkf.host_tools import cli, codec
-from lever_cdkf.sil.replay import reduction
-from lever_cdkf.sil.replay.outputs import FILES
-
-from ..report.reading import figures, read
-from .conftest import Session, simulated
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.replay import reduction
+from lever_cdkf.host_tools.replay.outputs import FILES
+from python.conftest import Session, simulated
+from python.report.reading import figures, read
 
 Summary = dict[str, Any]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.sil import pilots
-from lever_cdkf.sil.report import models, write_report
-from lever_cdkf.sil.runner import Result
+from lever_cdkf.host_tools.report import models, write_report
+from lever_cdkf.sil.plants import pilots
+from lever_cdkf.sil.run.runner import Result
 from scipy import signal
 
 from .conftest import run

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.native import enum_names
-from lever_cdkf.sil.report import picture, words, write_report
-from lever_cdkf.sil.report.charts.health import FAULT_WORDS
-from lever_cdkf.sil.report.run import COHERENT, Run
-from lever_cdkf.sil.runner import Result
+from lever_cdkf.host_tools.firmware.native import enum_names
+from lever_cdkf.host_tools.report import picture, words, write_report
+from lever_cdkf.host_tools.report.charts.health import FAULT_WORDS
+from lever_cdkf.host_tools.report.run import COHERENT, Run
+from lever_cdkf.sil.run.runner import Result
 
 from .reading import Reader, figures, first_number, read, unpack
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.native import enum_names
+from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.sil.study.baselines import BASELINES
 from lever_cdkf.sil.study.compare import campaign, comparison, judgement, table, words
 from lever_cdkf.sil.study.compare.campaign import Outcome, Results
@@ -31,7 +31,7 @@ Lever = Callable[..., int]
 @pytest.fixture
 def lever(monkeypatch: pytest.MonkeyPatch) -> Lever:
     """lever("compare", …): the exit status. What is installed may be older than this tree and not know the command."""
-    entry = importlib.metadata.EntryPoint("study", "lever_cdkf.sil.study.commands", cli.COMMANDS)
+    entry = importlib.metadata.EntryPoint("study", "lever_cdkf.sil.commands.compare", cli.COMMANDS)
     others = importlib.metadata.entry_points
 
     def entry_points(group: str) -> Any:

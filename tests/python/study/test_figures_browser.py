@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from lever_cdkf.sil.report import picture
+from lever_cdkf.host_tools.report import picture
 from lever_cdkf.sil.study.figures import catalogue, page, runs
 
 SHORT = runs.Extent(duration=3.0, runs=3)

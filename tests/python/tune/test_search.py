@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.tune import judgement, recording
-from lever_cdkf.sil.tune.likelihood import Likelihood
-from lever_cdkf.sil.tune.search import Found, Search, groups
+from lever_cdkf.host_tools.tune import judgement, recording
+from lever_cdkf.host_tools.tune.likelihood import Likelihood
+from lever_cdkf.host_tools.tune.search import Found, Search, groups
 from python.tune.conftest import NOISE, WALK, Simulate
 
 

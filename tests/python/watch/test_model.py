@@ -10,10 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import codec
-from lever_cdkf.host_tools.commander import KEEP
-from lever_cdkf.host_tools.config import Config, model_parameters
-from lever_cdkf.host_tools.library import enum_names, ffi, lib
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.commander import KEEP
+from lever_cdkf.host_tools.firmware.config import Config, model_parameters
+from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
 from lever_cdkf.host_tools.watch import model, words
 from lever_cdkf.host_tools.watch.model import Frame, Picture
 from lever_cdkf.host_tools.watch.paired import Paired

@@ -1,0 +1,217 @@
+"""Which frames of a recording are the estimator's: those of one bus, and a count of all the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..firmware.bulk import ERROR, EXTENDED, FD, REMOTE, Frames
+from . import codec
+from .logs import LogError, Recording
+
+INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")
+"""What the estimator takes."""
+
+_KEPT_BEFORE_SAMPLES = 1000  # commands that a recording may have long before its first sample
+_WORDS = {
+    "other_buses": "of other buses",
+    "other_identifiers": "of other messages",
+    "extended": "with 29-bit identifiers",
+    "remote": "remote requests",
+    "error": "error frames",
+    "fd": "CAN FD",
+}
+
+
+class Traffic:
+    """Picks the frames; the counts are of what has been read so far."""
+
+    def __init__(self, recording: Recording, channel: str | None = None) -> None:
+        """`channel`: the bus with the samples; by default the only one that has any."""
+        self.recording = recording
+        self.channel = channel
+        """Name of the bus, once it is known."""
+        self.frames = 0
+        """All frames in the recording."""
+        self.others = dict.fromkeys(_WORDS, 0)
+        """Frames that are neither for nor from the estimator, by kind."""
+        self.corrupt_answers = 0
+        """Recorded answers of an estimator whose CRC or length is wrong; left out."""
+        self.first_us = self.last_us = 0
+        """Recorded times of the first and last frame of any kind [us]."""
+        self.other_samples: set[str] = set()
+        """Other buses that also carry samples."""
+        messages = codec.database().messages
+        self._answers = {m.frame_id: m.name for m in messages if m.name not in INPUTS}
+        self._known = np.zeros(0x800, np.bool_)
+        self._known[[m.frame_id for m in messages]] = True
+        self._base = codec.message("BASE_SAMPLE").frame_id
+        self._command = codec.message("COMMAND").frame_id
+        self._bus: int | None = None
+
+    def chunks(self) -> Iterator[Frames]:
+        """The estimator's frames, inputs and recorded answers, in recorded order. Raises LogError without a sample."""
+        waiting: list[Frames] = []
+        for frames in self.recording.chunks():
+            self._count(frames)
+            if self._bus is None:
+                self._find_bus(frames)
+            if self._bus is not None:
+                for each in (*waiting, frames):
+                    yield self._select(each)
+                waiting.clear()
+            else:
+                kept = frames[(frames["id"] == self._command) & (frames["flags"] == 0)]
+                room = _KEPT_BEFORE_SAMPLES - sum(map(len, waiting))
+                waiting.append(kept[: max(room, 0)].copy())
+                self._count_others(frames, np.zeros(len(frames), np.bool_))
+        if self._bus is None:
+            raise LogError(self._why_no_samples())
+
+    def described(self) -> list[str]:
+        """What was left out, in words, an entry for each kind that occurred."""
+        return [f"{count:,} {_WORDS[kind]}" for kind, count in self.others.items() if count]
+
+    def _count(self, frames: Frames) -> None:
+        if self.frames == 0:
+            self.first_us = int(frames["time_us"][0])
+        self.frames += len(frames)
+        self.last_us = int(frames["time_us"][-1])
+
+    def _find_bus(self, frames: Frames) -> None:
+        names = self.recording.buses.names()
+        carrying = self._carrying_samples(frames)
+        if self.channel is not None:
+            if self.channel in names and names.index(self.channel) in carrying:
+                self._bus = names.index(self.channel)
+        elif len(carrying) > 1:
+            buses = ", ".join(names[bus] for bus in carrying)
+            raise LogError(f"{self.recording.paths[0]}: several buses carry samples: choose with --channel: {buses}")
+        elif carrying:
+            self._bus = carrying[0]
+            self.channel = names[self._bus]
+
+    def _carrying_samples(self, frames: Frames) -> list[int]:
+        """Buses with a BASE_SAMPLE that has the right CRC."""
+        found = frames[(frames["id"] == self._base) & (frames["flags"] == 0) & (frames["length"] == 8)]
+        return [int(bus) for bus in np.unique(found["bus"][codec.check_columns("BASE_SAMPLE", found["data"])])]
+
+    def _select(self, frames: Frames) -> Frames:
+        known = self._known[np.minimum(frames["id"], 0x7FF)] & (frames["flags"] == 0)
+        ours = known & (frames["bus"] == self._bus)
+        if not ours.all():
+            self._count_others(frames, ours)
+            elsewhere = self._carrying_samples(frames[known & ~ours])
+            names = self.recording.buses.names()
+            self.other_samples.update(names[bus] for bus in elsewhere)
+        selected: Frames = frames[ours]
+        right = self._right(selected)
+        self.corrupt_answers += int(len(right) - right.sum())
+        kept: Frames = selected[right]
+        return kept
+
+    def _right(self, frames: Frames) -> NDArray[np.bool_]:
+        """False for recorded answers that are corrupt; inputs are the estimator's to judge."""
+        right = np.ones(len(frames), np.bool_)
+        for identifier, name in self._answers.items():
+            where = np.flatnonzero(frames["id"] == identifier)
+            if len(where):
+                answers = frames[where]
+                right[where] = (answers["length"] == 8) & codec.check_columns(name, answers["data"])
+        return right
+
+    def _count_others(self, frames: Frames, ours: NDArray[np.bool_]) -> None:
+        """Counts each frame that is not ours under the first kind that fits."""
+        left, flags = ~ours, frames["flags"]
+        kinds = {
+            "error": flags & ERROR != 0,
+            "other_buses": frames["bus"] != (0xFFFF if self._bus is None else self._bus),
+            "fd": flags & FD != 0,
+            "remote": flags & REMOTE != 0,
+            "extended": flags & EXTENDED != 0,
+        }
+        if self._bus is None:
+            del kinds["other_buses"]
+        for kind, is_kind in kinds.items():
+            self.others[kind] += int(np.count_nonzero(left & is_kind))
+            left &= ~is_kind
+        self.others["other_identifiers"] += int(np.count_nonzero(left))
+
+    def _why_no_samples(self) -> str:
+        names = self.recording.buses.names()
+        where = f"on bus {self.channel} " if self.channel is not None else ""
+        there = f"; its buses: {', '.join(names)}" if names else ""
+        wanted = f"{self._base:#x} BASE_SAMPLE"
+        return (
+            f"{', '.join(self.recording.paths)}: {self.frames} frames, but no sample ({wanted}) {where}in them{there}"
+        )
+
+
+def sample_chunks(traffic: Traffic) -> Iterator[dict[str, NDArray[np.float64]]]:
+    """The samples, as run_samples() takes them, a chunk at a time: time_us (continued beyond 32 bits), theta [rad],
+    theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2]; NaN where a value is invalid or its LEVER_SAMPLE is missing.
+
+    Corrupt frames are left out, and samples with the time of the one before. Raises LogError.
+    """
+    pairing = _Pairing()
+    for frames in traffic.chunks():
+        samples = pairing.add(frames)
+        if len(samples["time_us"]):
+            yield samples
+
+
+class _Pairing:
+    """LEVER_SAMPLE and BASE_SAMPLE by their counters, across chunks."""
+
+    def __init__(self) -> None:
+        self._rest: Frames | None = None
+        self._time_us: int | None = None
+
+    def add(self, frames: Frames) -> dict[str, NDArray[np.float64]]:
+        identifiers = {name: codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE")}
+        parts = []
+        for name, identifier in identifiers.items():
+            where = np.flatnonzero((frames["id"] == identifier) & (frames["length"] == 8))
+            parts.append(where[codec.check_columns(name, frames["data"][where])])
+        both = frames[np.sort(np.concatenate(parts))]
+        if self._rest is not None:
+            both = np.concatenate((self._rest, both))
+        is_base = both["id"] == identifiers["BASE_SAMPLE"]
+        last = np.flatnonzero(is_base)
+        end = last[-1] + 1 if len(last) else 0
+        self._rest, both, is_base = both[end:].copy(), both[:end], is_base[:end]
+        return self._samples(both, is_base)
+
+    def _samples(self, both: Frames, is_base: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
+        base = np.flatnonzero(is_base)
+        before = np.where(base > 0, base - 1, 0)
+        counters = both["data"][:, 1] & 15
+        paired = (base > 0) & ~is_base[before] & (counters[before] == counters[base])
+        lever = codec.decode_columns("LEVER_SAMPLE", both["data"][before])
+        of_base = codec.decode_columns("BASE_SAMPLE", both["data"][base])
+        time_us = self._continued(of_base["time_us"].astype(np.int64))
+        columns = {"time_us": time_us.astype(np.float64)}
+        for name in ("theta", "theta_dot", "tau_m"):
+            columns[name] = np.where(paired & (lever[f"{name}_valid"] != 0.0), lever[name], np.nan)
+        columns["z_ddot"] = np.where(of_base["z_ddot_valid"] != 0.0, of_base["z_ddot"], np.nan)
+        new = np.diff(time_us, prepend=-1 if self._time_us is None else self._time_us) != 0
+        if len(time_us):
+            self._time_us = int(time_us[-1])
+        return {name: values[new] for name, values in columns.items()}
+
+    def _continued(self, time_us: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Beyond 32 bits: less than half their range ahead is forward."""
+        if not len(time_us):
+            return time_us
+        start = int(time_us[0]) if self._time_us is None else self._time_us
+        steps = np.diff(time_us, prepend=start & 0xFFFFFFFF)
+        continued: NDArray[np.int64] = start + np.cumsum((steps + (1 << 31)) % (1 << 32) - (1 << 31))
+        return continued
+
+
+def read_samples(traffic: Traffic) -> dict[str, NDArray[np.float64]]:
+    """All of sample_chunks() together."""
+    chunks = list(sample_chunks(traffic))
+    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}

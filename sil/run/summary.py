@@ -1,0 +1,315 @@
+"""What a run comes to: summary.json, and the verdict in words.
+
+Errors are relative to the truth at the same sample and judged only from `converged_after` seconds after the start and
+after each jump of the truth on; how long the estimates need until then is what the times to 10 % and 5 % tell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from lever_cdkf.host_tools.can.fields import COUNTS
+from lever_cdkf.host_tools.firmware.native import enum_names
+from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
+from lever_cdkf.host_tools.results import whiteness
+from lever_cdkf.host_tools.results.nis import Innovations, freedom
+from lever_cdkf.host_tools.results.trace import Trace
+from numpy.typing import NDArray
+
+from ..scenarios.scenario import Scenario
+from .loop import Recording
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+MOST_TRANSFERS = 50
+"""How often, spread over the run, the transfer function of a truth is looked at for changes."""
+
+WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mismatch", "calibration", "hands_off")
+"""Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How one quantity was estimated; null where there is nothing to judge."""
+
+    rms_percent: float | None
+    bias_percent: float | None
+    coverage_2sigma: float | None
+    """Share of the samples (0 to 1) at which estimate +- 2 sigma holds the truth."""
+    time_to_10_percent_s: list[float | None]
+    """After the start and each jump, until the error stays within 10 % up to the next jump; null: it never does."""
+    time_to_5_percent_s: list[float | None]
+
+
+def build(recording: Recording, trace: Trace) -> dict[str, Any]:
+    """The content of summary.json, but for the wall times; None stands for what there is nothing to say of."""
+    scenario = recording.scenario
+    quality = {quantity.key: _quality(quantity, scenario, trace) for quantity in scenario.judged()}
+    nis = _nis(scenario, trace)
+    count = len(recording.inputs.time)
+    modes = _modes(trace)
+    fault_shares, flagged_share = _faults(scenario, trace)
+    missed = missed_limits(
+        scenario.limits,
+        {name: entry.rms_percent for name, entry in quality.items()},
+        {name: entry.coverage_2sigma for name, entry in quality.items()},
+    )
+    summary: dict[str, Any] = {
+        "scenario": {
+            "name": scenario.name,
+            "title": scenario.title,
+            "description": scenario.description,
+            "seed": scenario.seed,
+            "sample_period_s": scenario.period,
+            "converged_after_s": scenario.converged_after,
+            "changes_s": list(scenario.changes()),
+            "limits": dict(scenario.limits or {}),
+        },
+        "truth": _truth(recording),
+        "estimator": {**scenario.config.choices, "settings": scenario.config.settings},
+        "firmware": _firmware(recording),
+        "parameters": {name: asdict(entry) for name, entry in quality.items()},
+        "nis": nis,
+        "whiteness": _whiteness(scenario, trace),
+        "samples": count,
+        **{name: _last(trace[name]) for name in COUNTS},
+        "unanswered": recording.unanswered,
+        "misplaced": recording.misplaced,
+        "modes_s": modes,
+        "fault_shares": fault_shares,
+        "flagged_share": flagged_share,
+        "missed": missed,
+        "simulated_time_s": count * scenario.period,
+    }
+    summary["passed"] = not (missed or recording.unanswered or recording.misplaced or "fault" in modes)
+    summary["verdict"] = _verdict(summary, quality)
+    return summary
+
+
+def _truth(recording: Recording) -> dict[str, Any]:
+    """The pilot's model, and where that is not the estimator's, theta/z_ddot of it: polynomials of s, highest power
+    first, from each of `time_s` on."""
+    scenario, inputs = recording.scenario, recording.inputs
+    if scenario.pilot.model == scenario.config.choices["model"]:
+        return {"model": scenario.pilot.model}
+    at = np.linspace(0, len(inputs.time) - 1, MOST_TRANSFERS).astype(np.intp)
+    transfer = inputs.truth.transfer(at)
+    rows = np.hstack((transfer.numerator, transfer.denominator))
+    new = np.flatnonzero(np.append(True, np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
+    told = {"numerator": transfer.numerator[new].tolist(), "denominator": transfer.denominator[new].tolist()}
+    return {"model": scenario.pilot.model, "transfer": {"time_s": inputs.time[at[new]].tolist(), **told}}
+
+
+def _firmware(recording: Recording) -> dict[str, Any]:
+    """What the estimator said of itself; null where it did not."""
+    identity = recording.identity
+    same = None if identity.settings_crc is None else identity.settings_crc == recording.scenario.config.settings_crc
+    return {"version": identity.version, "contract": identity.contract, "settings_as_scenario": same}
+
+
+def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
+    truth = trace[quantity.column("true")]
+    error = trace[quantity.column("estimate")] - truth
+    relative, sigma = error / truth, trace[quantity.column("sigma")]
+    judged = judged_samples(scenario, trace["time_s"]) & np.isfinite(relative)
+    reached = [times_to(relative, trace["time_s"], scenario.changes(), within) for within in (0.1, 0.05)]
+    if not judged.any():
+        return Quality(None, None, None, *reached)
+    return Quality(
+        rms_percent=100.0 * float(np.sqrt(np.mean(np.square(relative[judged])))),
+        bias_percent=100.0 * float(np.mean(relative[judged])),
+        coverage_2sigma=float(np.mean(np.abs(error[judged]) <= 2.0 * sigma[judged])),
+        time_to_10_percent_s=reached[0],
+        time_to_5_percent_s=reached[1],
+    )
+
+
+def judged_samples(scenario: Scenario, time: FloatArray) -> BoolArray:
+    """True from `converged_after` seconds after each change on, until the next one."""
+    judged = np.ones(len(time), dtype=np.bool_)
+    for change in scenario.changes():
+        judged &= ~((time >= change) & (time < change + scenario.converged_after))
+    return judged
+
+
+def times_to(relative: FloatArray, time: FloatArray, changes: tuple[float, ...], within: float) -> list[float | None]:
+    """After each change, the time [s] until |relative| stays <= within up to the next change; None if it never does.
+
+    A sample without an estimate (NaN) counts as outside.
+    """
+    times: list[float | None] = []
+    for begin, end in zip(changes, (*changes[1:], math.inf), strict=True):
+        part = np.flatnonzero((time >= begin) & (time < end))
+        outside = np.flatnonzero(~(np.abs(relative[part]) <= within))
+        first = int(outside[-1]) + 1 if len(outside) else 0
+        times.append(round(float(time[part[first]]) - begin, 9) if first < len(part) else None)
+    return times
+
+
+def _nis(scenario: Scenario, trace: Trace) -> dict[str, Any]:
+    """Normalised innovation squared of the judged samples that had a measurement and an answer.
+
+    `inside_95_percent` is the share of samples below their chi-square's 95 % value: 0.95 for a consistent filter.
+    `mean_band_95` is where the mean would lie in 95 % of runs of a consistent filter.
+    """
+    outputs = freedom(trace["theta_measured_rad"], trace["theta_dot_measured_rad_s"])
+    judged = judged_samples(scenario, trace["time_s"])
+    innovations = Innovations()
+    innovations.add(trace["nis"][judged], outputs[judged])
+    return innovations.figures()
+
+
+def _whiteness(scenario: Scenario, trace: Trace) -> dict[str, Any] | None:
+    """Of the judged samples; null where there are too few."""
+    residual = whiteness.residual(trace)
+    if residual is None:
+        return None
+    judged = np.where(judged_samples(scenario, trace["time_s"]), residual, np.nan)
+    measured = whiteness.measure(judged, scenario.period)
+    return None if measured is None else asdict(measured)
+
+
+def _last(column: FloatArray) -> int:
+    known = column[np.isfinite(column)]
+    return int(known[-1]) if len(known) else 0
+
+
+def _modes(trace: Trace) -> dict[str, float]:
+    """Seconds spent in each mode, by name, as far as HEALTH told."""
+    mode, step = trace["mode"], float(trace["time_s"][1] - trace["time_s"][0])
+    samples = {name: int(np.sum(mode == number)) for number, name in enum_names("lever_mode").items()}
+    return {name: round(count * step, 9) for name, count in samples.items() if count}
+
+
+def _faults(scenario: Scenario, trace: Trace) -> tuple[dict[str, float], float | None]:
+    """Shares (0 to 1) of the judged time with each fault that there was, and with any of WARNINGS (null: not known)."""
+    column = trace["faults"][judged_samples(scenario, trace["time_s"])]
+    faults = column[np.isfinite(column)].astype(np.int64)
+    if not len(faults):
+        return {}, None
+    bits = {name: bit for bit, name in enum_names("lever_fault").items()}
+    shares = {name: float(np.mean(faults & bit != 0)) for name, bit in bits.items()}
+    warnings = sum(bits[name] for name in WARNINGS)
+    return {name: share for name, share in shares.items() if share > 0.0}, float(np.mean(faults & warnings != 0))
+
+
+def missed_limits(
+    limits: Mapping[str, float] | None, rms_percent: Mapping[str, float | None], coverage: Mapping[str, float | None]
+) -> list[str]:
+    """The limits of a scenario that were not kept, in words; None is not judged."""
+    missed = []
+    limits = limits or {}
+    for name, rms in rms_percent.items():
+        limit = limits.get(name)
+        if limit is not None and rms is not None and rms > 100.0 * limit:
+            missed.append(f"rms error of {name} {rms:.1f} % (limit {100.0 * limit:g} %)")
+    least = limits.get("coverage")
+    for name, share in coverage.items():
+        if least is not None and share is not None and share < least:
+            missed.append(f"coverage of {name} {100.0 * share:.0f} % (limit {100.0 * least:g} %)")
+    return missed
+
+
+def add_wall_time(summary: dict[str, Any], seconds: float) -> None:
+    """Puts in how long the run took by the wall clock [s]; the only part of a summary that differs between runs."""
+    summary["wall_time_s"] = seconds
+    summary["wall_time_per_simulated_time"] = seconds / summary["simulated_time_s"]
+
+
+def _verdict(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
+    """The run in a few sentences, for somebody who has not seen a Kalman filter before."""
+    return " ".join(
+        sentence
+        for sentence in (
+            _verdict_run(summary),
+            _verdict_truth(summary),
+            _verdict_limits(summary, quality),
+            _verdict_sigma(quality),
+            verdict_nis(summary["nis"]),
+            verdict_whiteness(summary["whiteness"]),
+        )
+        if sentence
+    )
+
+
+def _verdict_run(summary: dict[str, Any]) -> str:
+    troubles = []
+    if summary["unanswered"]:
+        troubles.append(f"{summary['unanswered']} samples got no answer")
+    if summary["misplaced"]:
+        troubles.append(f"{summary['misplaced']} estimates came that belong to other samples")
+    if "fault" in summary["modes_s"]:
+        troubles.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
+    told = f"Trouble: {' and '.join(troubles)}." if troubles else ""
+    if summary["firmware"]["settings_as_scenario"] is False:
+        told = f"{told} The estimator has other settings than the scenario.".lstrip()
+    return told
+
+
+def _verdict_truth(summary: dict[str, Any]) -> str:
+    if summary["truth"]["model"] == summary["estimator"]["model"]:
+        return ""
+    return (
+        f"The pilot ({summary['truth']['model']}) is not of the estimator's kind ({summary['estimator']['model']}): "
+        "only natural frequency and damping ratio can be held against the truth."
+    )
+
+
+def _verdict_limits(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
+    errors = ", ".join(
+        f"{_words(name)} {entry.rms_percent:.1f} %" for name, entry in quality.items() if entry.rms_percent is not None
+    )
+    if not errors:
+        return "Too short to judge: the run ends before the estimates were to have converged."
+    if summary["missed"]:
+        return f"Limits missed: {'; '.join(summary['missed'])}. Rms errors after convergence: {errors}."
+    kept = "All limits kept. " if summary["scenario"]["limits"] else ""
+    return f"{kept}Rms errors after convergence: {errors}."
+
+
+def _verdict_sigma(quality: dict[str, Quality]) -> str:
+    covered = {name: entry.coverage_2sigma for name, entry in quality.items() if entry.coverage_2sigma is not None}
+    if not covered:
+        return ""
+    worst = min(covered, key=lambda name: covered[name])
+    percent = f"{100.0 * covered[worst]:.0f} % of the time"
+    if covered[worst] >= LEAST_COVERAGE:
+        return f"In this run ±2σ covers every truth for at least {percent}."
+    return f"In this run the stated σ of {_words(worst)} is too small: ±2σ covers the truth for {percent}."
+
+
+def verdict_nis(nis: dict[str, Any]) -> str:
+    """What NIS says, in a sentence."""
+    if nis["mean"] is None:
+        return ""
+    ratio = nis["mean"] / nis["expected"]
+    size = "larger than" if ratio > 1.1 else "smaller than" if ratio < 0.9 else "as large as"
+    numbers = f"mean NIS {nis['mean']:.2f}, expected {nis['expected']:.2f}"
+    return f"Innovations are {size} the filter expects ({numbers})."
+
+
+def verdict_whiteness(told: dict[str, Any] | None) -> str:
+    """What the autocorrelation of the residual says, and what it cannot see."""
+    if told is None:
+        return ""
+    size = f"{told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"
+    if told["white"]:
+        last = told["average_s"] * len(told["autocorrelation"])
+        return (
+            f"Residuals of the rate pass the test for whiteness up to a lag of {last:g} s (largest correlation {size})."
+            f" {whiteness.CANNOT_SEE}"
+        )
+    return (
+        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{told['band_95']:.2f}): "
+        "the arm, or a sensor, is not what the model assumes."
+    )
+
+
+def _words(name: str) -> str:
+    """A quantity as it stands in a sentence; symbols stay."""
+    return {quantity.key: quantity.name for quantity in DYNAMICS}.get(name, name)
