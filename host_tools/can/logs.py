@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
-from ..firmware.bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
+from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 
 BLOCK = 1 << 22
 """Bytes of text that are read at once."""

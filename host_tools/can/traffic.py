@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..firmware.bulk import ERROR, EXTENDED, FD, REMOTE, Frames
 from . import codec
+from .bulk import ERROR, EXTENDED, FD, REMOTE, Frames
 from .logs import LogError, Recording
 
 INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")

@@ -126,13 +126,11 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
         raise LeverError(f"{what}: give a LOG, --scenario NAME, or --interface and --channel of a bus, one of them")
     settings = getattr(args, "settings", None)
     if args.scenario is not None:
-        from lever_cdkf.sil.run.live_source import SimulationSource
-        from lever_cdkf.sil.scenarios.scenario import load
+        from ..watch.sources import simulated
 
         if settings is not None:
             raise LeverError("--settings goes with a bus or a log; a scenario has its own settings")
-        scenario = load(args.scenario)
-        return SimulationSource(scenario), scenario.config
+        return simulated(args.scenario)
 
     from ..firmware.settings_file import make_config, read_assignments
     from ..watch.sources import BusSource, LogSource

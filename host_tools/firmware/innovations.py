@@ -6,11 +6,10 @@ Arrays have the dtypes of the C structs: SAMPLE is lever_sample_t of the façade
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..errors import LeverError
 from .config import Config
 from .estimator import Health, health_of
@@ -22,7 +21,6 @@ _one_at_a_time = threading.Lock()  # cffi lets other threads run meanwhile
 FRAME = struct_dtype("lever_frame_t")
 SAMPLE = struct_dtype("lever_sample_t")
 INNOVATION = struct_dtype("sample_innovation_t")
-Array = NDArray[Any]
 
 
 def samples_of(frames: Array) -> tuple[Array, dict[str, str], Health]:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from ..arrays import ComplexArray, FloatArray
 
 BAND = (2.0, 8.0)
 """Where collective bounce lives [Hz]: the mode that answers most in it is the dominant one."""

@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import FloatArray
 from ..can import fields
+from ..can.bulk import RECORDED, SLOTS, Rows
 from ..can.fields import COUNTS
-from ..firmware.bulk import RECORDED, SLOTS, Rows
 from ..firmware.quantities import recorded_name
 from ..results.feedthrough import FEEDTHROUGH
 from ..results.trace import ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
 from .timeline import Timeline
-
-FloatArray = NDArray[np.float64]
 
 Continued = Callable[[str, FloatArray], FloatArray]
 """From the name and values of a field to values that go on from the piece before."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..can import codec
-from ..firmware.bulk import Frames
+from ..can.bulk import Frames
 from ..firmware.config import CHOICES
 from ..firmware.library import enum_names, lib
 

@@ -7,12 +7,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..firmware.quantities import DYNAMICS, quantities, recorded_name
 from ..results.trace import ESTIMATED, Trace
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass

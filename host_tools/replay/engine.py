@@ -13,10 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..can import codec
+from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.logs import Recording
 from ..can.traffic import Traffic
 from ..files import write_text
-from ..firmware.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
 from ..results.trace import Trace

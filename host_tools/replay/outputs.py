@@ -12,10 +12,10 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
+from ..can import bulk
+from ..can.bulk import Frames
 from ..errors import LeverError
 from ..files import make_folder
-from ..firmware import bulk
-from ..firmware.bulk import Frames
 from ..results.trace import Trace, write_csv_rows
 
 Held = list[tuple[list[str], NDArray[np.bool_]]]

@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import FloatArray
 from ..report.bode import LONGEST_STEP, slow_trim
 from ..report.run import COHERENT, Averages, Run, nis_averages
 from ..report.series import Welch
@@ -17,8 +17,6 @@ from ..results.feedthrough import Feedthrough
 from ..results.nis import freedom
 from ..results.trace import Trace
 from .reduction import Ends, Groups, Stretches
-
-FloatArray = NDArray[np.float64]
 
 _CLOSE_UP = 2.0  # [s]
 _NIS_AVERAGE = 0.25  # [s]

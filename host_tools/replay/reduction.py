@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ..arrays import FloatArray
+
 Trace = Mapping[str, FloatArray]
 Reduce = Callable[[FloatArray], FloatArray]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..can import codec
+from ..can.bulk import Frames
 from ..can.traffic import INPUTS
-from ..firmware.bulk import Frames
 
 
 class Repeats:

@@ -6,19 +6,14 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from lever_cdkf.sil.run.summary import verdict_nis, verdict_whiteness
-from lever_cdkf.sil.scenarios.scenario import CONVERGED_AFTER
-from numpy.typing import NDArray
 
 from ..can.fields import COUNTS
 from ..firmware.native import Config, enum_names
 from ..firmware.quantities import quantities
-from ..results import whiteness
+from ..results import nis, whiteness
 from ..results.nis import Innovations, freedom
-from ..results.trace import Trace
+from ..results.trace import CONVERGED_AFTER, Trace
 from .reduction import Groups
-
-FloatArray = NDArray[np.float64]
 
 
 class Figures:
@@ -87,8 +82,8 @@ def verdict(summary: dict[str, Any]) -> str:
     sentences = [
         *_troubles(summary),
         _comparison(summary["comparison"]),
-        verdict_nis(summary["nis"]),
-        verdict_whiteness(summary["whiteness"]),
+        nis.verdict(summary["nis"]),
+        whiteness.verdict(summary["whiteness"]),
     ]
     return " ".join(sentence for sentence in sentences if sentence)
 

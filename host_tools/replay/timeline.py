@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import IntArray
+
 WRAP = 1 << 32
 AGREEMENT = 1_000_000
 """Difference [us] up to which a step of both clocks is the same step."""
 GAP = 1.5
 """Sample periods between two samples from which on samples are missing."""
-
-IntArray = NDArray[np.int64]
 
 
 @dataclass

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .series import Array, packed
+from ..arrays import Array
+from .series import packed
 
 Spec = dict[str, Any]
 ROW_GAP = 22  # [pixels] between two rows

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..firmware import native, quantities
 from ..firmware.quantities import Quantity
 from ..models.lever import Lever
@@ -16,7 +17,7 @@ from ..results import whiteness
 from ..results.coherence import Coherence
 from ..results.feedthrough import Feedthrough
 from .bode import slow_trim
-from .series import Array, jumps, welch
+from .series import jumps, welch
 
 COHERENT = ("z_ddot_measured_m_s2", "theta_measured_rad")
 """Columns of which the coherence is shown."""

@@ -1,12 +1,11 @@
 """Columns made fit for a page: fewer points, spectra, changes, and the bands that chance alone would give."""
 
 import base64
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[Any]  # of floats
+from ..arrays import Array
 
 
 def packed(values: Array) -> dict[str, object]:

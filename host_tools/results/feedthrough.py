@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import FloatArray
 from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES
-
-FloatArray = NDArray[np.float64]
 
 # column of the trace, its message and field
 FEEDTHROUGH = (

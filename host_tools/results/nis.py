@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ..arrays import FloatArray
 
 CHI_SQUARE_95 = {1: 3.841458820694124, 2: -2.0 * math.log(0.05)}
 """Value that chi-square with so many degrees of freedom stays below with a probability of 95 %."""
@@ -48,3 +48,13 @@ class Innovations:
             "mean_band_95": [expected - spread, expected + spread],
             "inside_95_percent": self._inside / self._count,
         }
+
+
+def verdict(nis: dict[str, Any]) -> str:
+    """What NIS says, in a sentence."""
+    if nis["mean"] is None:
+        return ""
+    ratio = nis["mean"] / nis["expected"]
+    size = "larger than" if ratio > 1.1 else "smaller than" if ratio < 0.9 else "as large as"
+    numbers = f"mean NIS {nis['mean']:.2f}, expected {nis['expected']:.2f}"
+    return f"Innovations are {size} the filter expects ({numbers})."

@@ -2,7 +2,7 @@
 
 Frames that come at a divided rate are held until the next one; before the first, where a value was invalid, not
 available or its frame lost, where the estimate may not be used, and where a sample has no answer of its own, there is
-NaN. Made from the frames as they were on the bus, in whole columns.
+NaN.
 
 The columns of the parameters are those of the estimator's model; their truth is there when the pilot is of that model.
 """
@@ -15,19 +15,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-from lever_cdkf.sil.run.buslog import Frames
-from lever_cdkf.sil.run.loop import Recording
 from numpy.typing import NDArray
 
-from ..can import codec, fields
+from ..arrays import FloatArray
 from ..firmware.quantities import DYNAMICS, quantities
-from .feedthrough import FEEDTHROUGH
 
 if TYPE_CHECKING:
     import polars
 
-FloatArray = NDArray[np.float64]
 Trace = dict[str, FloatArray]
+
+CONVERGED_AFTER = 15.0
+"""Time [s] from which on estimates are judged, unless a scenario says otherwise."""
 
 WHOLE = ("mode", "faults", "lost", "corrupt", "late", "restarts")
 """Columns of whole numbers."""
@@ -55,81 +54,12 @@ HEALTH = (
 )
 
 
-def build(recording: Recording, frames: Frames) -> Trace:
-    """The columns of trace.csv, in order."""
-    sample = np.array(recording.sample, dtype=np.int64)
-    count = len(recording.inputs.time)
-    decoded = _Decoded(frames, sample, count, round(recording.scenario.period * 1e6))
-    trace = _truth(recording)
-    for column, message, field in MEASURED:
-        trace[column] = decoded.at_samples(message, field)
-    for column, message, field in ESTIMATED:
-        trace[column] = decoded.at_samples(message, field)
-    model = recording.scenario.config.choices["model"]
-    for column, message, field in (*quantity_fields(model), *FEEDTHROUGH, *HEALTH):
-        trace[column] = decoded.held(message, field)
-    trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
-    return trace
-
-
 def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:
     """Column, message and field of all that the estimator says of the pilot."""
     for quantity in quantities(model):
         values, sigmas = ("PILOT_DYNAMICS",) * 2 if quantity in DYNAMICS else ("PILOT_PARAMETERS", "PILOT_SIGMA")
         yield quantity.column("estimate"), values, quantity.key
         yield quantity.column("sigma"), sigmas, f"{quantity.key}_sigma"
-
-
-def _truth(recording: Recording) -> Trace:
-    inputs = recording.inputs
-    values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}
-    return {
-        "time_s": inputs.time,
-        "theta_true_rad": np.array(recording.theta),
-        "theta_dot_true_rad_s": np.array(recording.theta_dot),
-        "z_ddot_true_m_s2": inputs.z_ddot,
-        "tau_m_true_N_m": np.array(recording.tau_m),
-        "trim_true_rad": inputs.truth.rest,
-        **{quantity.column("true"): values[quantity.key] for quantity in recording.scenario.judged()},
-    }
-
-
-class _Decoded:
-    """The fields of all frames, decoded a message at a time when first asked for."""
-
-    def __init__(self, frames: Frames, sample: NDArray[np.int64], count: int, period_us: int) -> None:
-        self._frames, self._sample, self._count, self._period_us = frames, sample, count, period_us
-        self._messages: dict[str, tuple[NDArray[np.int64], dict[str, FloatArray]]] = {}
-
-    def _message(self, name: str) -> tuple[NDArray[np.int64], dict[str, FloatArray]]:
-        if name not in self._messages:
-            where = self._frames.of(codec.message(name).frame_id)
-            sample, decoded = self._sample[where], fields.columns(name, self._frames.data[where])
-            if "time_low" in decoded:
-                own = fields.belongs(decoded, sample * self._period_us)
-                sample, decoded = sample[own], {field: values[own] for field, values in decoded.items()}
-            self._messages[name] = sample, decoded
-        return self._messages[name]
-
-    def at_samples(self, message: str, field: str) -> FloatArray:
-        """The field at each sample; NaN without a frame or with a cleared validity bit."""
-        sample, decoded = self._message(message)
-        valid = decoded.get(f"{field}_valid", np.ones(len(sample)))
-        column = np.full(self._count, np.nan)
-        column[sample] = np.where(valid == 0.0, np.nan, decoded[field])
-        return column
-
-    def held(self, message: str, field: str) -> FloatArray:
-        """The last value of the field at or before each sample; NaN before the first.
-
-        Counts go on beyond their bits and start from 0, also if the firmware has counted in an earlier run.
-        """
-        sample, decoded = self._message(message)
-        values = decoded[field]
-        if field in fields.COUNTS and len(values):
-            values = np.unwrap(values, period=float(fields.COUNTS[field])) - values[0]
-        last = np.searchsorted(sample, np.arange(self._count), side="right")
-        return np.concatenate(((np.nan,), values))[last]
 
 
 def write_csv(trace: Trace, path: Path) -> None:

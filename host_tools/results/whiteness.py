@@ -14,11 +14,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ..arrays import FloatArray
 
 AVERAGE = 0.02
 """Time over which the residual is averaged [s]."""
@@ -98,3 +98,20 @@ def averages(values: FloatArray, size: int) -> FloatArray:
     total = np.where(known, rows, 0.0).sum(axis=1)
     means: FloatArray = np.where(2 * count >= size, total / np.maximum(count, 1), np.nan)
     return means
+
+
+def verdict(told: dict[str, Any] | None) -> str:
+    """What the autocorrelation of the residual says, and what it cannot see."""
+    if told is None:
+        return ""
+    size = f"{told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"
+    if told["white"]:
+        last = told["average_s"] * len(told["autocorrelation"])
+        return (
+            f"Residuals of the rate pass the test for whiteness up to a lag of {last:g} s (largest correlation {size})."
+            f" {CANNOT_SEE}"
+        )
+    return (
+        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{told['band_95']:.2f}): "
+        "the arm, or a sensor, is not what the model assumes."
+    )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..firmware.innovations import Array
+from ..arrays import Array
 from ..firmware.settings_file import Assignments, make_config
 from ..results import whiteness
 from .likelihood import Likelihood, noise_as_set

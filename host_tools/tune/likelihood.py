@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import LeverError
-from ..firmware.innovations import Array, innovations
+from ..firmware.innovations import innovations
 from ..firmware.settings_file import Assignments, make_config
 from .recording import Recording
 

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Array
 from ..can import codec, logs
 from ..can.traffic import Traffic
 from ..errors import LeverError
 from ..firmware.estimator import Health
-from ..firmware.innovations import FRAME, Array, samples_of
+from ..firmware.innovations import FRAME, samples_of
 
 _SAMPLES = ("LEVER_SAMPLE", "BASE_SAMPLE")
 

@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import FloatArray
 from ..can import codec, fields
 from ..results.coherence import Coherence
-
-FloatArray = NDArray[np.float64]
 
 SPAN = 20.0
 """[s] that the coherence is measured over."""

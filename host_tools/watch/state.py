@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from lever_cdkf.sil.run.live_source import SimulationSource
 
+from ..arrays import FloatArray
 from ..can.fields import COUNTS
 from ..firmware import quantities
 from ..firmware.config import Config, setting
@@ -18,7 +18,7 @@ from ..firmware.library import enum_names
 from . import paired, words
 from .model import STEP, Picture
 from .sources import Source
-from .transfer import FREQUENCIES, SIGMAS, FloatArray, Geometry, Response
+from .transfer import FREQUENCIES, SIGMAS, Geometry, Response
 
 SPAN = 60.0
 """[s] that the page shows."""
@@ -54,7 +54,7 @@ class State:
             self._rows.clear()
             self._map.clear()
             messages.append(self.start())
-        truth = source.truth(FREQUENCIES) if isinstance(source, SimulationSource) else None
+        truth = source.truth(FREQUENCIES)
         response = self._response()
         self._rows.append(self._row({} if truth is None else truth[0]))
         update = self._present()
@@ -72,7 +72,7 @@ class State:
         """What a page is told first."""
         start = {
             "title": self._source.title,
-            "simulated": isinstance(self._source, SimulationSource),
+            "simulated": self._source.simulated,
             "controls": self.controls,
             "model": self._model,
             "choices": {what: list(enum_names(f"lever_{what}").values()) for what in ("model", "estimator")},

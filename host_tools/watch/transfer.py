@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import FloatArray
 from ..firmware.config import Config
 from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES
 from ..models.lever import Lever
 from ..report import bode
 from .model import Feedthrough
-
-FloatArray = NDArray[np.float64]
 
 FREQUENCIES: FloatArray = np.geomspace(0.5, 12.0, 120)
 """[Hz]"""

@@ -14,13 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.host_tools.models.transfer import ComplexArray
 
 from ..plants import lever_plant, mayo_plant, two_dof_plant
 from ..plants.truth import Conditions, Truth
 from .motions import FREQUENCIES, PERIOD, Motion, Recording, arms, excitation, stream
-from .plant import FloatArray, Hardware
+from .plant import Hardware
 
 LOSS = 0.6
 REFLEX_GAIN, REFLEX_DELAY = 0.25, 35e-3

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.models.detrend import Detrend
 from lever_cdkf.host_tools.models.lever import Lever
 from lever_cdkf.host_tools.models.linear import Hand, LinearBlackBox, LinearPhysical
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 
 from . import cdkf
 from .belief import Augmented, Belief, TwoStage
-from .cdkf import Array
 from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
 from .scale import Scale
 

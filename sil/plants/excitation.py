@@ -14,11 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from lever_cdkf.host_tools.arrays import FloatArray
 
 from ..toml_tables import SIGNAL, quantity, read_kind, whole, wholes
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

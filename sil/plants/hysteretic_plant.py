@@ -23,11 +23,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
 from . import lever_plant
-from .truth import Conditions, Dynamics, FloatArray, Truth, dominant_dynamics
+from .truth import Conditions, Dynamics, Truth, dominant_dynamics
 
 REFERENCE = 4.0
 """Where k_p is the stiffness [Hz]."""

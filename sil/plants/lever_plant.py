@@ -25,12 +25,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
 from ..units import GRAVITY
 from . import truth as truths
-from .truth import Conditions, Dynamics, FloatArray
+from .truth import Conditions, Dynamics
 
 Preload = Literal["fixed", "trim"]
 

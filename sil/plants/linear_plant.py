@@ -18,10 +18,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
-from .truth import Conditions, Dynamics, FloatArray, Truth
+from .truth import Conditions, Dynamics, Truth
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
 from .linear_plant import LinearTruth, Plant, System
-from .truth import Conditions, FloatArray
+from .truth import Conditions
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 
 from ..toml_tables import choice, item, quantity, read_kind, read_table, tables
 from . import hysteretic_plant, lever_plant, linear_plant, mayo_plant, reflex_plant, two_dof_plant
 from .trajectories import Constant, Trajectory, read_trajectory
-from .truth import FloatArray, Truth
+from .truth import Truth
 
 _SIDES = {1: "falls to {least:g}; it must stay above 0", -1: "rises to {greatest:g}; it must stay below 0"}
 

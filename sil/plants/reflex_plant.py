@@ -23,11 +23,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
 from . import lever_plant
-from .truth import Conditions, Dynamics, FloatArray, Truth, dominant_dynamics
+from .truth import Conditions, Dynamics, Truth, dominant_dynamics
 
 DELAY = 0.035
 """T where nothing else is said [s]."""

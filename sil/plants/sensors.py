@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from numpy.typing import NDArray
 
 from ..toml_tables import SIGNAL, choice, item, quantity, read_kind, read_table, tables
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 VALUES = ("theta", "theta_dot", "tau_m", "z_ddot")
 FRAMES = ("lever_frame", "base_frame")

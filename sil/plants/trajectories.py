@@ -14,12 +14,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from lever_cdkf.host_tools.arrays import FloatArray
 
 from ..toml_tables import SIGNAL, Place, Reader, item, quantities, quantity, read_kind, read_list, read_quantity
 from . import excitation
-
-FloatArray = NDArray[np.float64]
 
 
 class Trajectory(ABC):

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_SUBSTEP = 0.25e-3
 """Longest substep of an integration [s]; at 4 Hz the frequency is then right to 3e-6."""

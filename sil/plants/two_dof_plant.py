@@ -33,11 +33,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
 from . import lever_plant
-from .truth import Conditions, Dynamics, FloatArray, Truth, dominant_dynamics
+from .truth import Conditions, Dynamics, Truth, dominant_dynamics
 
 TRUNK_MASS, TRUNK_DAMPING, TRUNK_STIFFNESS = 45.0, 1000.0, 36000.0
 """m_t [kg], c_t [N s/m] and k_t [N/m] where nothing else is said."""

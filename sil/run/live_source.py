@@ -7,12 +7,13 @@ import time
 
 import can
 import numpy as np
+from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.models.transfer import ComplexArray
+from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.watch.sources import Source, as_frame
 
-from ..plants.truth import FloatArray, Truth
-from ..scenarios.scenario import Scenario
+from ..plants.truth import Truth
+from ..scenarios.scenario import Scenario, load
 from . import loop
 
 
@@ -20,6 +21,7 @@ class SimulationSource(Source):
     """The pilot of a scenario on his lever. When the scenario is over it begins again, with other random numbers."""
 
     takes_commands = True
+    simulated = True
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__()
@@ -46,8 +48,6 @@ class SimulationSource(Source):
         self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
-        """What is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at
-        the frequencies [Hz]. None before the start."""
         if self._truth is None:
             return None
         start, truth = self._truth
@@ -64,6 +64,12 @@ class SimulationSource(Source):
     def _look_up(self, _done: int, _total: int) -> None:
         if self._stopping.is_set():
             raise _Stopped
+
+
+def open_source(name: str) -> tuple[Source, Config]:
+    """The pilot of a scenario and the configuration of its estimator. Raises ScenarioError."""
+    scenario = load(name)
+    return SimulationSource(scenario), scenario.config
 
 
 class _Stopped(Exception):  # noqa: N818

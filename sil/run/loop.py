@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 import can
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, Commander, refusal, result_of
 from lever_cdkf.host_tools.can.identity import Identity
@@ -25,7 +26,7 @@ from lever_cdkf.host_tools.errors import LeverError
 from numpy.typing import NDArray
 
 from ..plants import excitation, sensors
-from ..plants.truth import Body, Conditions, FloatArray, Truth
+from ..plants.truth import Body, Conditions, Truth
 from ..scenarios.scenario import Scenario
 from .buslog import Frames
 

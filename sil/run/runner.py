@@ -16,6 +16,7 @@ from lever_cdkf.host_tools.results.trace import Trace
 from ..scenarios.scenario import Scenario
 from . import buslog, loop, summary
 from .buslog import Frames
+from .columns import columns_of
 from .loop import Progress
 
 
@@ -48,7 +49,7 @@ def simulate(
         make_folder(out_dir)  # before a run that could then not be kept
     recording = loop.run(scenario, bus, realtime=realtime, progress=progress)
     frames = recording.frames()
-    columns = trace.build(recording, frames)
+    columns = columns_of(recording, frames)
     result = Result(columns, summary.build(recording, columns), frames)
     summary.add_wall_time(result.summary, clock.perf_counter() - start)
     if out_dir is not None:

@@ -15,16 +15,15 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.results.whiteness import CANNOT_SEE
 from lever_cdkf.host_tools.tables import Row, Tables
-from numpy.typing import NDArray
 
 from .summary import missed_limits
 
 _Task = TypeVar("_Task")
 _Done = TypeVar("_Done")
 
-FloatArray = NDArray[np.float64]
 Summary = dict[str, Any]
 """The content of a run's summary.json."""
 Progress = Callable[[int, int, str], None]

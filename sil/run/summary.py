@@ -12,19 +12,16 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.can.fields import COUNTS
 from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
-from lever_cdkf.host_tools.results import whiteness
+from lever_cdkf.host_tools.results import nis, whiteness
 from lever_cdkf.host_tools.results.nis import Innovations, freedom
 from lever_cdkf.host_tools.results.trace import Trace
-from numpy.typing import NDArray
 
 from ..scenarios.scenario import Scenario
 from .loop import Recording
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 MOST_TRANSFERS = 50
 """How often, spread over the run, the transfer function of a truth is looked at for changes."""
@@ -50,7 +47,6 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
     """The content of summary.json, but for the wall times; None stands for what there is nothing to say of."""
     scenario = recording.scenario
     quality = {quantity.key: _quality(quantity, scenario, trace) for quantity in scenario.judged()}
-    nis = _nis(scenario, trace)
     count = len(recording.inputs.time)
     modes = _modes(trace)
     fault_shares, flagged_share = _faults(scenario, trace)
@@ -74,7 +70,7 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
         "estimator": {**scenario.config.choices, "settings": scenario.config.settings},
         "firmware": _firmware(recording),
         "parameters": {name: asdict(entry) for name, entry in quality.items()},
-        "nis": nis,
+        "nis": _nis(scenario, trace),
         "whiteness": _whiteness(scenario, trace),
         "samples": count,
         **{name: _last(trace[name]) for name in COUNTS},
@@ -230,8 +226,8 @@ def _verdict(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
             _verdict_truth(summary),
             _verdict_limits(summary, quality),
             _verdict_sigma(quality),
-            verdict_nis(summary["nis"]),
-            verdict_whiteness(summary["whiteness"]),
+            nis.verdict(summary["nis"]),
+            whiteness.verdict(summary["whiteness"]),
         )
         if sentence
     )
@@ -281,33 +277,6 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
     if covered[worst] >= LEAST_COVERAGE:
         return f"In this run ±2σ covers every truth for at least {percent}."
     return f"In this run the stated σ of {_words(worst)} is too small: ±2σ covers the truth for {percent}."
-
-
-def verdict_nis(nis: dict[str, Any]) -> str:
-    """What NIS says, in a sentence."""
-    if nis["mean"] is None:
-        return ""
-    ratio = nis["mean"] / nis["expected"]
-    size = "larger than" if ratio > 1.1 else "smaller than" if ratio < 0.9 else "as large as"
-    numbers = f"mean NIS {nis['mean']:.2f}, expected {nis['expected']:.2f}"
-    return f"Innovations are {size} the filter expects ({numbers})."
-
-
-def verdict_whiteness(told: dict[str, Any] | None) -> str:
-    """What the autocorrelation of the residual says, and what it cannot see."""
-    if told is None:
-        return ""
-    size = f"{told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"
-    if told["white"]:
-        last = told["average_s"] * len(told["autocorrelation"])
-        return (
-            f"Residuals of the rate pass the test for whiteness up to a lag of {last:g} s (largest correlation {size})."
-            f" {whiteness.CANNOT_SEE}"
-        )
-    return (
-        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{told['band_95']:.2f}): "
-        "the arm, or a sensor, is not what the model assumes."
-    )
 
 
 def _words(name: str) -> str:

@@ -18,13 +18,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
+from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 
 from ..plants import excitation, lever_plant, pilots
 from ..plants.sensors import VALUES, Corruption, Sensor, Sensors
-from ..plants.truth import FloatArray, Truth
+from ..plants.truth import Truth
 from ..toml_tables import (
     SIGNAL,
     Place,
@@ -46,9 +48,6 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-CONVERGED_AFTER = 15.0
-"""Time [s] from which on estimates are judged, unless a scenario says otherwise."""
 
 STREAMS = (
     "process", "theta", "theta_dot", "tau_m", "z_ddot", "m_p", "c_p", "k_p", "trim", "base", "torque", "dropout",

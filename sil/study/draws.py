@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 
-from ..oracle.cdkf import Array
 from ..plants.excitation import Noise
 
 STREAMS = ("base", "dither", "pilot", "process", "output")

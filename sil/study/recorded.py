@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware import quantities
-from lever_cdkf.host_tools.results import trace
 from lever_cdkf.host_tools.results.trace import Trace
 
-from ..oracle.cdkf import Array
 from ..run import loop
+from ..run.columns import columns_of
 from ..scenarios.scenario import Scenario, load
 from ..toml_tables import ScenarioError
 from .data import Batch, Truth
@@ -58,7 +58,7 @@ def recorded(name: str, runs: int, seed: int, duration: float | None = None) -> 
 def _run(scenario: Scenario) -> Trace:
     with LeverBus(f"study {scenario.name}", config=scenario.config) as bus:
         recording = loop.run(scenario, bus)
-    return trace.build(recording, recording.frames())
+    return columns_of(recording, recording.frames())
 
 
 def _columns(traces: list[Trace], names: Sequence[str]) -> Array:

@@ -23,10 +23,9 @@ from pathlib import Path
 
 import can
 import numpy as np
-from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can import bulk, codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.can.logs import Recording
-from lever_cdkf.host_tools.firmware import bulk
 from lever_cdkf.host_tools.tables import Row, print_tables
 from lever_cdkf.sil.run.runner import simulate
 from lever_cdkf.sil.scenarios import scenario

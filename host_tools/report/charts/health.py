@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from ...arrays import Array
 from ...firmware import native
 from ..figure import Figure, Spec, axis, line, time_axis
 from ..run import Run
-from ..series import Array, runs, spread_indices
+from ..series import runs, spread_indices
 
 COUNTS = ("lost", "corrupt", "late")
 LANE_POINTS = 1500  # how finely the bars are drawn

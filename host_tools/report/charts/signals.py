@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...firmware.quantities import DYNAMICS
 from ..figure import Figure, Spec, axis, axis_range, band, dots, frequency_axis, line, time_axis
 from ..run import Run
-from ..series import Array, chi_square_band, envelope, packed, spread_indices
+from ..series import chi_square_band, envelope, packed, spread_indices
 
 DEGREES = 180.0 / np.pi
 STATES = (("theta", "_rad", "angle θ [deg]"), ("theta_dot", "_rad_s", "rate θ̇ [deg/s]"))

@@ -4,13 +4,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...arrays import Array
 from ...firmware.quantities import DYNAMICS
 from ...results.feedthrough import FREQUENCIES as SENT
 from .. import bode
 from ..bode import FREQUENCIES, magnitude_and_phase
 from ..figure import TICKS, Figure, Spec, axis, axis_range, band, frequency_axis, line, time_axis
 from ..run import Run
-from ..series import Array, packed, spread_indices
+from ..series import packed, spread_indices
 
 TIMES = 200
 SLICES = 25

@@ -8,9 +8,9 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.report.figure import Figure, Spec, axis, band, dots, line
 
-from ...oracle.cdkf import Array
 from ..scores import settling_times
 from .campaign import Results
 from .cases import cases

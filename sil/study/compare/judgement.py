@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array, BoolArray
 
-from ...oracle.cdkf import Array
 from ..data import OUTPUTS, PARAMETERS
 from ..matched import KINDS
 from ..scores import Consistency, consistency, honesty, median_and_worst, ratio, ratio_spread, rms, settling_times
 from .campaign import Outcome, Results
-from .cases import BoolArray, Case, References, cases
+from .cases import Case, References, cases
 from .comparison import Differences, corrected, of_errors, of_times
 from .entrants import Entrant, entrants
 

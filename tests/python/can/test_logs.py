@@ -14,9 +14,8 @@ import can
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can import codec, logs
+from lever_cdkf.host_tools.can import bulk, codec, logs
 from lever_cdkf.host_tools.can.logs import Recording
-from lever_cdkf.host_tools.firmware import bulk
 from python.conftest import Session
 
 LINES = """\

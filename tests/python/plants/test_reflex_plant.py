@@ -7,9 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.sil.plants import lever_plant
 from lever_cdkf.sil.plants.reflex_plant import Reflex
-from lever_cdkf.sil.plants.truth import Conditions, FloatArray
+from lever_cdkf.sil.plants.truth import Conditions
 
 PERIOD, TRIM = 1e-3, 0.35
 LEVER = lever_plant.Lever(0.45, 1.2, 0.5, 0.020, 0.5, 5.0, 0.0, 0.0)

@@ -8,12 +8,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.sil.plants import lever_plant
 from lever_cdkf.sil.plants.hysteretic_plant import Hysteretic
 from lever_cdkf.sil.plants.lever_plant import STOP_RATE, Lever, LeverTruth
 from lever_cdkf.sil.plants.linear_plant import Physical
 from lever_cdkf.sil.plants.reflex_plant import Reflex
-from lever_cdkf.sil.plants.truth import Body, Conditions, FloatArray, Truth
+from lever_cdkf.sil.plants.truth import Body, Conditions, Truth
 from lever_cdkf.sil.plants.two_dof_plant import TwoDof
 from scipy import integrate
 

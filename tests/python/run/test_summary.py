@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.host_tools.firmware.quantities import quantities
+from lever_cdkf.host_tools.results import whiteness
 from lever_cdkf.host_tools.results.trace import Trace
 from lever_cdkf.sil.run import loop, summary
 from lever_cdkf.sil.scenarios.scenario import Scenario
@@ -215,13 +216,13 @@ def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(
 
 def test_white_residuals_are_a_test_passed_and_no_proof_of_the_model() -> None:
     told = {"largest": 0.08, "largest_after_s": 0.06, "band_95": 0.04, "average_s": 0.02, "autocorrelation": [0.0] * 25}
-    said = summary.verdict_whiteness(told | {"white": True})
+    said = whiteness.verdict(told | {"white": True})
     assert said.startswith(
         "Residuals of the rate pass the test for whiteness up to a lag of 0.5 s (largest correlation 0.08"
     )
     assert all(unseen in said for unseen in ("friction", "gain", "delay"))
-    assert "coloured (correlation 0.08 after 60 ms; white" in summary.verdict_whiteness(told | {"white": False})
-    assert summary.verdict_whiteness(None) == ""
+    assert "coloured (correlation 0.08 after 60 ms; white" in whiteness.verdict(told | {"white": False})
+    assert whiteness.verdict(None) == ""
 
 
 def test_the_keys_are_those_of_the_contract(recording: loop.Recording) -> None:

@@ -12,6 +12,7 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.results import trace
 from lever_cdkf.sil.run import loop
+from lever_cdkf.sil.run.columns import columns_of
 from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.scenarios.scenario import Scenario
 from python.conftest import PuppetBus, estimate, health
@@ -49,7 +50,7 @@ def answers(sample: int) -> list[tuple[str, dict[str, Any]]]:
 def made(*overrides: str) -> tuple[loop.Recording, trace.Trace]:
     wanted = scenario.load("sensor_dropout", ["duration=0.5 s", *overrides])
     recording = loop.run(wanted, PuppetBus(answers))
-    return recording, trace.build(recording, recording.frames())
+    return recording, columns_of(recording, recording.frames())
 
 
 def test_the_columns_are_those_of_the_contract_in_its_order() -> None:
@@ -71,7 +72,7 @@ def test_parameters_are_those_of_the_estimators_model(
     wanted = scenario.load(model, ["duration=1 s"])
     recording = loop.run(wanted, lever_bus(wanted))
     frames = recording.frames()
-    columns = trace.build(recording, frames)
+    columns = columns_of(recording, frames)
     expected = COLUMNS
     for old, (new, ending) in zip(("m_p_", "c_p_", "k_p_"), parameters.items(), strict=True):
         expected = [f"{new}_{name.split('_')[2]}{ending}" if name.startswith(old) else name for name in expected]
@@ -85,7 +86,7 @@ def test_parameters_are_those_of_the_estimators_model(
 def test_a_pilot_of_another_model_has_no_true_parameters(lever_bus: Callable[[Scenario], LeverBus]) -> None:
     wanted = scenario.load("steady", ["duration=1 s", "estimator.model=linear_black_box", "limits={}"])
     recording = loop.run(wanted, lever_bus(wanted))
-    columns = trace.build(recording, recording.frames())
+    columns = columns_of(recording, recording.frames())
     assert {name for name in columns if "_true" in name} == {
         "theta_true_rad", "theta_dot_true_rad_s", "z_ddot_true_m_s2", "tau_m_true_N_m", "trim_true_rad",
         "natural_frequency_true_Hz", "damping_ratio_true",
@@ -106,7 +107,7 @@ def test_measured_is_what_was_on_the_bus_and_nan_where_it_was_not() -> None:
 def test_estimates_stand_at_their_sample_and_slower_frames_are_held() -> None:
     wanted = scenario.load("steady", ["duration=0.5 s"])
     recording = loop.run(wanted, PuppetBus(answers))
-    columns = trace.build(recording, recording.frames())
+    columns = columns_of(recording, recording.frames())
     sample = np.arange(500)
     assert np.flatnonzero(np.isnan(columns["theta_estimate_rad"])).tolist() == [222, 333]
     there = np.delete(sample, [222, 333])
@@ -132,7 +133,7 @@ def test_counts_start_at_zero_and_go_on_beyond_their_bits() -> None:
 def test_truth_is_linearised_where_the_lever_rests() -> None:
     wanted = scenario.load("re_trim", ["duration=0.5 s", "pilot.trim.start=0.1 s", "pilot.trim.duration=0.2 s"])
     recording = loop.run(wanted, PuppetBus(answers))
-    columns = trace.build(recording, recording.frames())
+    columns = columns_of(recording, recording.frames())
     trim = np.radians(np.interp(np.arange(500), (100, 300), (20, 28)))
     assert columns["trim_true_rad"] == pytest.approx(trim)
     arm, mass = 0.45**2, 0.45**2 * (0.25 * 1.2 + 3.2) + 0.020

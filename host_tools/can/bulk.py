@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..can import codec
-from .estimator import Estimator
-from .library import ffi, load, struct_dtype
+from ..firmware.estimator import Estimator
+from ..firmware.library import ffi, load, struct_dtype
+from . import codec
 
 _lib = load("lever_bulk")
 

@@ -7,12 +7,11 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec, fields
+from lever_cdkf.host_tools.can import bulk, codec, fields
+from lever_cdkf.host_tools.can.bulk import Feeder
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.can.logs import LogError, Recording
 from lever_cdkf.host_tools.can.traffic import Traffic, read_samples
-from lever_cdkf.host_tools.firmware import bulk
-from lever_cdkf.host_tools.firmware.bulk import Feeder
 from lever_cdkf.host_tools.firmware.estimator import Estimator, Health, run_samples
 from python.conftest import Session
 
