@@ -43,17 +43,12 @@ from ..toml_tables import (
     text,
     whole,
 )
+from . import random_streams
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-STREAMS = (
-    "process", "theta", "theta_dot", "tau_m", "z_ddot", "m_p", "c_p", "k_p", "trim", "base", "torque", "dropout",
-    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t", "k_r", "c_r", "disturbance", "fault",
-)  # fmt: skip
-"""Purposes of random numbers; the order is part of what a seed means, so append only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,9 +164,8 @@ class Scenario:
         return np.arange(max(2, round(self.duration / self.period)), dtype=np.float64) * self.period
 
     def stream(self, purpose: str, index: int = 0) -> np.random.Generator:
-        """The random numbers for one purpose (of STREAMS) and item; no other draw shifts them."""
-        key = (STREAMS.index(purpose), index)
-        return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=key)))
+        """The random numbers for one purpose and item; no other draw shifts them."""
+        return random_streams.stream(self.seed, purpose, index)
 
     def streams(self, purpose: str, items: Iterable[object]) -> list[np.random.Generator]:
         """One stream for each of `items`."""

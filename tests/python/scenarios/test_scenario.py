@@ -11,6 +11,7 @@ from lever_cdkf.host_tools.firmware.native import Estimator
 from lever_cdkf.sil.plants import excitation
 from lever_cdkf.sil.run import loop
 from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.sil.scenarios.random_streams import stream
 from lever_cdkf.sil.scenarios.scenario import Scenario
 from lever_cdkf.sil.toml_tables import ScenarioError
 
@@ -134,9 +135,19 @@ def test_one_noise_does_not_shift_another(load: Load) -> None:
                 + '[[sensors.dropout]]\nwhat = "theta"\nshare = "10 %"\n')  # fmt: skip
     assert np.abs(loop.prepare(plain).z_ddot - loop.prepare(more).z_ddot).max() < 0.06
     assert np.array_equal(plain.stream("process").random(5), more.stream("process").random(5))
-    numbers = [plain.stream(purpose, index).random() for purpose in scenario.STREAMS for index in range(3)]
-    assert len(set(numbers)) == len(numbers)
     assert not np.array_equal(load(LEAST + base, "seed=2").stream("base").random(5), plain.stream("base").random(5))
+
+
+def test_each_name_has_a_stream_of_its_own() -> None:
+    """Those that are not numbered too; the first numbers are what numpy's SeedSequence makes of seed and place."""
+    purposes = ("process", "theta", "m_p", "fault", "k_trunk", "k_trunk2", "grip")
+    numbers = [stream(1, purpose, index).random() for purpose in purposes for index in range(3)]
+    assert len(set(numbers)) == len(numbers)
+    assert numbers == [stream(1, purpose, index).random() for purpose in purposes for index in range(3)]
+    assert stream(2, "grip").random() != stream(1, "grip").random()
+    for purpose, place in (("process", 0), ("trim", 8), ("fault", 24)):
+        numpys = np.random.default_rng(np.random.SeedSequence(7, spawn_key=(place, 3)))
+        assert stream(7, purpose, 3).random() == numpys.random()
 
 
 def test_changes_and_dithers_are_listed_in_order_of_time(load: Load) -> None:
