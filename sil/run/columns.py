@@ -6,9 +6,10 @@ Where a frame of the estimator comes at a divided rate, its values are held unti
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.can import codec, fields
 from lever_cdkf.host_tools.results.feedthrough import FEEDTHROUGH
-from lever_cdkf.host_tools.results.trace import ESTIMATED, HEALTH, MEASURED, FloatArray, Trace, quantity_fields
+from lever_cdkf.host_tools.results.trace import ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
 from numpy.typing import NDArray
 
 from .buslog import Frames

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import time as clock
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import can
+from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.files import make_folder, replace_file
 from lever_cdkf.host_tools.results import trace
 from lever_cdkf.host_tools.results.trace import Trace
@@ -31,15 +33,16 @@ class Result:
 
 def simulate(
     scenario: Scenario,
-    bus: can.BusABC,
+    bus: can.BusABC | None = None,
     out_dir: Path | None = None,
     *,
     channel: str = "lever",
     realtime: bool = False,
     progress: Progress | None = None,
 ) -> Result:
-    """Runs `scenario` against the estimator on `bus` and judges it; with `out_dir` also writes bus.log, trace.csv,
-    report.html and summary.json there, each complete or not at all. `channel` is the bus's name in bus.log.
+    """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
+    it; with `out_dir` also writes bus.log, trace.csv, report.html and summary.json there, each complete or not at all.
+    `channel` is the bus's name in bus.log.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
     files but for the wall times are the same either way. Raises LeverError.
@@ -47,7 +50,9 @@ def simulate(
     start = clock.perf_counter()
     if out_dir is not None:
         make_folder(out_dir)  # before a run that could then not be kept
-    recording = loop.run(scenario, bus, realtime=realtime, progress=progress)
+    with ExitStack() as stack:
+        estimator = bus or stack.enter_context(LeverBus(channel, config=scenario.config))
+        recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
     frames = recording.frames()
     columns = columns_of(recording, frames)
     result = Result(columns, summary.build(recording, columns), frames)

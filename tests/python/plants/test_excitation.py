@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.sil.plants import excitation
 from lever_cdkf.sil.toml_tables import Place, ScenarioError
 from scipy import signal
@@ -22,17 +23,17 @@ NORMALISED: list[dict[str, Any]] = [
 ]
 
 
-def made(table: dict[str, Any], seed: int = 0, unit: str = "m/s^2") -> excitation.FloatArray:
+def made(table: dict[str, Any], seed: int = 0, unit: str = "m/s^2") -> FloatArray:
     read = excitation.read_excitation(table, Place("x.toml", "base[0]", unit))
-    samples: excitation.FloatArray = read.samples(TIME, np.random.default_rng(seed))
+    samples: FloatArray = read.samples(TIME, np.random.default_rng(seed))
     return samples
 
 
-def rms(values: excitation.FloatArray) -> float:
+def rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def share_of_power(values: excitation.FloatArray, low: float, high: float) -> float:
+def share_of_power(values: FloatArray, low: float, high: float) -> float:
     frequency, power = signal.welch(values, 1 / PERIOD, nperseg=8192)
     return float(power[(frequency >= low) & (frequency <= high)].sum() / power.sum())
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.sil.plants import trajectories
 from lever_cdkf.sil.toml_tables import Place, ScenarioError
 
@@ -16,7 +17,7 @@ def made(value: Any, unit: str = "N/m") -> trajectories.Trajectory:
     return read
 
 
-def values(value: Any, seed: int = 0) -> trajectories.FloatArray:
+def values(value: Any, seed: int = 0) -> FloatArray:
     return made(value).values(TIME, np.random.default_rng(seed))
 
 
