@@ -22,24 +22,6 @@ PARAMETERS = {
     "linear_black_box": "The three coefficients of a second-order system that moves as the lever does",
     "hand": "Stiffness and damping of the pilot's hand, and the part of the damping that is against space",
 }
-ABOUT_TRUTH = {
-    "lever": "a rigid lever with the arm as mass, damper and spring at its end",
-    "linear_physical": "a mass on a spring and a damper",
-    "linear_black_box": "a linear second-order system",
-    "two_dof": "the arm hangs on a trunk that gives way on its seat, so that two masses swing",
-    "hand": "a hand that follows the cabin as Mayo (1989) measured it on people, by a transfer function",
-    "hysteretic": "an arm whose tissue loses the same share of the energy of a cycle at every frequency, where a "
-    "damper loses more the faster it moves",
-    "reflex": "an arm with a stretch reflex, which pulls against the motion a few hundredths of a second late",
-}
-"""Every model of [pilot]."""
-DYNAMICS = {
-    "two_dof": "The truth is the one of its two modes that answers more between 2 and 8 Hz.",
-    "hand": "The truth is that of the poles of the hand's transfer function.",
-    "hysteretic": "The truth is the mode that answers most between 2 and 8 Hz.",
-    "reflex": "The truth is the mode that answers most between 2 and 8 Hz.",
-}
-"""What the true natural frequency is, where the truth has more than one mode or none of its own."""
 
 
 def about(run: Run) -> list[str]:
@@ -47,7 +29,7 @@ def about(run: Run) -> list[str]:
     told = [ABOUT_MODEL[run.model]] if run.model in ABOUT_MODEL else []
     if run.mismatch is not None:
         told.append(
-            f"<strong>The truth of this run is of another kind:</strong> {ABOUT_TRUTH[run.mismatch]}. The "
+            f"<strong>The truth of this run is of another kind:</strong> {run.about_truth}. The "
             "parameters of the estimator's model have no true values then; what can be compared are natural frequency "
             "and damping ratio, the answer to the floor, and whether the innovations are white."
         )
@@ -75,8 +57,8 @@ def dynamics_caption(run: Run) -> str:
     ]
     if _has_scale(run):
         told.append("Both are usually known better than the three parameters, whose common scale cancels in them.")
-    if run.mismatch in DYNAMICS:
-        told.append(DYNAMICS[run.mismatch])
+    if run.about_true_dynamics:
+        told.append(run.about_true_dynamics)
     return " ".join(told)
 
 

@@ -94,6 +94,16 @@ class Run:
         told: str | None = self.summary.get("truth", {}).get("model")
         return told if told != self.model else None
 
+    @property
+    def about_truth(self) -> str:
+        """What the truth is, where it is not of the estimator's model."""
+        return str(self.summary["truth"]["about"])
+
+    @property
+    def about_true_dynamics(self) -> str:
+        """What its natural frequency is, where that needs saying."""
+        return str(self.summary.get("truth", {}).get("about_dynamics", ""))
+
     @cached_property
     def whiteness(self) -> Mapping[str, Any] | None:
         """As the summary tells, or without one of the whole trace; None where there is nothing to tell from."""

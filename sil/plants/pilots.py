@@ -25,6 +25,10 @@ class Pilot(ABC):
 
     model: ClassVar[str]
     """Key `model` of the table."""
+    about: ClassVar[str]
+    """What a reader of the report is told that it is."""
+    about_dynamics: ClassVar[str] = ""
+    """What its true natural frequency is, where it has more than one mode or none of its own."""
     signs: ClassVar[Mapping[str, int]]
     """The parameters: 1 for one that must stay above 0, -1 below 0, 0 for either."""
 
@@ -98,6 +102,7 @@ class LeverPilot(ArmPilot):
     """The arm of DESIGN section 3 on the lever."""
 
     model = "lever"
+    about = "a rigid lever with the arm as mass, damper and spring at its end"
     hands_off: tuple[HandsOff, ...] = tables(read_table(HandsOff))
 
     def __post_init__(self) -> None:
@@ -125,6 +130,7 @@ class PhysicalPilot(Pilot):
     """Mass, damper and spring."""
 
     model = "linear_physical"
+    about = "a mass on a spring and a damper"
     signs: ClassVar[Mapping[str, int]] = {"m": 1, "c": 1, "k": 1}
     m: Trajectory = item(read_trajectory(), "kg")
     c: Trajectory = item(read_trajectory(), "N s/m")
@@ -141,6 +147,7 @@ class BlackBoxPilot(Pilot):
     """A second-order system, restoring and damped."""
 
     model = "linear_black_box"
+    about = "a linear second-order system"
     signs: ClassVar[Mapping[str, int]] = {"a21": -1, "a22": -1, "b21": 0}
     a21: Trajectory = item(read_trajectory(), "1/s^2")
     a22: Trajectory = item(read_trajectory(), "1/s")
@@ -157,6 +164,8 @@ class TwoDofPilot(ArmPilot):
     """The arm hangs on a trunk that gives way on its seat."""
 
     model = "two_dof"
+    about = "the arm hangs on a trunk that gives way on its seat, so that two masses swing"
+    about_dynamics = "The truth is the one of its two modes that answers more between 2 and 8 Hz."
     signs: ClassVar[Mapping[str, int]] = {"m_p": 1, "c_p": 1, "k_p": 1, "m_t": 1, "c_t": 1, "k_t": 1}
     preload: lever_plant.Preload = choice("trim", default="trim")
     m_t: Trajectory = item(read_trajectory(), "kg", Constant(two_dof_plant.TRUNK_MASS))
@@ -174,6 +183,11 @@ class HystereticPilot(Pilot):
     """The arm with structural damping: its loss factor is the same at every frequency."""
 
     model = "hysteretic"
+    about = (
+        "an arm whose tissue loses the same share of the energy of a cycle at every frequency, where a damper loses "
+        "more the faster it moves"
+    )
+    about_dynamics = "The truth is the mode that answers most between 2 and 8 Hz."
     signs: ClassVar[Mapping[str, int]] = {"m_p": 1, "k_p": 1}
     preload: lever_plant.Preload = choice("trim", default="trim")
     m_p: Trajectory = item(read_trajectory(), "kg")
@@ -191,6 +205,8 @@ class ReflexPilot(ArmPilot):
     """The arm of DESIGN section 3, and a stretch reflex."""
 
     model = "reflex"
+    about = "an arm with a stretch reflex, which pulls against the motion a few hundredths of a second late"
+    about_dynamics = "The truth is the mode that answers most between 2 and 8 Hz."
     signs: ClassVar[Mapping[str, int]] = {"m_p": 1, "c_p": 1, "k_p": 1, "k_r": 0, "c_r": 0}
     preload: lever_plant.Preload = choice("trim", default="trim")
     k_r: Trajectory = item(read_trajectory(), "N/m")
@@ -208,6 +224,8 @@ class MayoPilot(Pilot):
     """A hand as Mayo has measured it."""
 
     model = "hand"
+    about = "a hand that follows the cabin as Mayo (1989) measured it on people, by a transfer function"
+    about_dynamics = "The truth is that of the poles of the hand's transfer function."
     signs: ClassVar[Mapping[str, int]] = {}
     preload: lever_plant.Preload = choice("trim", default="trim")
     somatotype: str = choice(*mayo_plant.HANDS)

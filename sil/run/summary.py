@@ -88,8 +88,8 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
 
 
 def _truth(recording: Recording) -> dict[str, Any]:
-    """The pilot's model, and where that is not the estimator's, theta/z_ddot of it: polynomials of s, highest power
-    first, from each of `time_s` on."""
+    """The pilot's model, and where that is not the estimator's, what it is, and theta/z_ddot of it: polynomials of s,
+    highest power first, from each of `time_s` on."""
     scenario, inputs = recording.scenario, recording.inputs
     if scenario.pilot.model == scenario.config.choices["model"]:
         return {"model": scenario.pilot.model}
@@ -98,7 +98,12 @@ def _truth(recording: Recording) -> dict[str, Any]:
     rows = np.hstack((transfer.numerator, transfer.denominator))
     new = np.flatnonzero(np.append(True, np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
     told = {"numerator": transfer.numerator[new].tolist(), "denominator": transfer.denominator[new].tolist()}
-    return {"model": scenario.pilot.model, "transfer": {"time_s": inputs.time[at[new]].tolist(), **told}}
+    return {
+        "model": scenario.pilot.model,
+        "about": scenario.pilot.about,
+        "about_dynamics": scenario.pilot.about_dynamics,
+        "transfer": {"time_s": inputs.time[at[new]].tolist(), **told},
+    }
 
 
 def _firmware(recording: Recording) -> dict[str, Any]:
