@@ -15,10 +15,10 @@ from ..tables import Row, Tables, add_json_option
 if TYPE_CHECKING:
     from ..firmware.settings_file import Assignments
     from ..tune.calibration import Calibrated, Calibration
-    from ..tune.judgement import Fit
     from ..tune.likelihood import Likelihood
     from ..tune.recording import Recording
     from ..tune.search import Found
+    from ..tune.validation import Fit
 
 _DESCRIPTION = """\
 Finds settings of the estimator from a recorded log: measurement noise (theta_noise, theta_dot_noise), process noise
@@ -83,7 +83,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from ..progress import Progress
-    from ..tune import judgement
+    from ..tune import validation
     from ..tune.calibration import calibrate
     from ..tune.likelihood import Likelihood
     from ..tune.recording import read
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
             _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
         found = search.run(groups(calibrated, args.keep))
         after = {**calibrated, **{entry.name: entry.after for entry in found if entry.after != entry.before}}
-        fits = judgement.fits(likelihood, before, after)
+        fits = validation.fits(likelihood, before, after)
     return _conclude(args, likelihood, before, after, calibration, found, fits)
 
 
@@ -167,20 +167,20 @@ def _conclude(
     """Prints and writes everything; the exit status."""
     from ..files import write_text
     from ..tables import print_tables
-    from ..tune import judgement
+    from ..tune import validation
 
     tables: Tables = {"settings": [_setting_row(entry) for entry in found], "before and after": _fit_rows(fits)}
     if calibration.found:
         tables = {"calibration": [_calibration_row(entry) for entry in calibration.found], **tables}
     changed = sum(entry.after != entry.before for entry in found) + len(calibration.assignments)
-    told = judgement.verdict(fits, changed)
+    told = validation.verdict(fits, changed)
     print_tables(tables, args.json)
     print(f"{_subtitle(args, likelihood)} {told} {calibration.words}".rstrip())
     if args.page is not None:
-        from ..tune.page import build
+        from ..tune.tune_page import build
 
         write_text(args.page, build(_subtitle(args, likelihood), told, tables, calibration.words, found, fits))
-    if judgement.is_worse(fits):
+    if validation.is_worse(fits):
         _note("the new settings do worse on the part held out, so the log changes on the way: no settings are written")
         return 1
     if args.output is not None:
@@ -235,11 +235,11 @@ def _calibration_row(entry: Calibrated) -> Row:
 
 def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
     """A row for each part of the log and way to have the noise."""
-    from ..tune import judgement
+    from ..tune import validation
 
     rows: list[Row] = []
-    for before, after in judgement.pairs(fits):
-        gained = judgement.gain(before, after)
+    for before, after in validation.pairs(fits):
+        gained = validation.gain(before, after)
         seen = {"before": before, "after": after}
         rows.append(
             {

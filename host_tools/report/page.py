@@ -3,7 +3,7 @@
 import html
 from importlib.resources import files
 
-from . import models, words
+from . import models, summary_html
 from .charts import comparison, health, signals, tracking, transfer
 from .document import document
 from .figure import Figure
@@ -48,14 +48,14 @@ def build(run: Run) -> str:
     links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
     body = (
         f'<header><h1>Lever CDKF: {html.escape(title)}</h1><p class="subtitle">{_subtitle(run)}</p></header>'
-        f"{words.verdict(run)}{words.cards(run)}<nav>{links}</nav>{''.join(page.sections)}"
+        f"{summary_html.verdict(run)}{summary_html.cards(run)}<nav>{links}</nav>{''.join(page.sections)}"
         "<footer>Made by <code>lever</code>. Nothing on this page is loaded from elsewhere.</footer>"
     )
     return document(f"Lever CDKF: {title}", body, {key: figure.spec() for key, figure in page.figures.items()})
 
 
 def _subtitle(run: Run) -> str:
-    description = html.escape(run.summary.get("scenario", {}).get("description") or words.recorded(run))
+    description = html.escape(run.summary.get("scenario", {}).get("description") or summary_html.recorded(run))
     length = f"{run.samples:,} samples in {run.end:.0f} s.".replace(",", "\u2009")
     return f"{description} {length}".strip()
 
@@ -114,7 +114,7 @@ def _comparison(page: Page, run: Run) -> None:
             "The log holds estimates already, of the firmware that ran when it was recorded: wide line. Thin line: the "
             "same samples through this firmware, with the settings below. Where only one is seen, they are equal.",
         ),
-        words.comparison_table(run),
+        summary_html.comparison_table(run),
     )
 
 
@@ -203,12 +203,16 @@ def _health(page: Page, run: Run) -> None:
 
 
 def _numbers(page: Page, run: Run) -> None:
-    tables = (words.errors_table(run), words.run_table(run), words.recording_table(run)) if run.summary else ()
+    tables = (
+        (summary_html.errors_table(run), summary_html.run_table(run), summary_html.recording_table(run))
+        if run.summary
+        else ()
+    )
     page.section("numbers", "Numbers", "All numbers", *tables)
     scenario = {key: value for key, value in run.summary.get("scenario", {}).items() if key != "description"}
-    rows = [(html.escape(key), html.escape(value)) for key, value in words.flat(scenario)]
+    rows = [(html.escape(key), html.escape(value)) for key, value in summary_html.flat(scenario)]
     estimator = {key: value for key, value in run.summary.get("estimator", {}).items() if key != "settings"}
-    rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in words.flat(estimator)]
-    made = f"<details><summary>Scenario</summary>{words.table(('', ''), rows)}</details>" if rows else ""
-    settings = f"<details><summary>Settings of the estimator</summary>{words.settings_table(run)}</details>"
+    rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in summary_html.flat(estimator)]
+    made = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
+    settings = f"<details><summary>Settings of the estimator</summary>{summary_html.settings_table(run)}</details>"
     page.section("made", "Settings", "How this run was made", made, settings)

@@ -3,7 +3,7 @@
 sources.py    where frames come from: a bus, a recorded log at its own pace, or a simulation; they wait here, bounded
 model.py      the picture of the estimator that its frames make, with a bounded history
 paired.py     coherence of theta and z̈ as they come
-words.py      modes and faults in words
+status.py     modes and faults in words
 panels.py     the picture as tables of text
 terminal.py   the tables in a terminal, ten times a second
 transfer.py   θ/z̈ of the estimated model with its band

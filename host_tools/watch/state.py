@@ -15,7 +15,7 @@ from ..can.fields import COUNTS
 from ..firmware import quantities
 from ..firmware.config import Config, setting
 from ..firmware.library import enum_names
-from . import paired, words
+from . import paired, status
 from .model import STEP, Picture
 from .sources import Source
 from .transfer import FREQUENCIES, SIGMAS, Geometry, Response
@@ -123,7 +123,7 @@ class State:
     def _present(self) -> dict[str, Any]:
         """How it stands."""
         picture, source = self.picture, self._source
-        level, text = words.condition(picture)
+        level, text = status.condition(picture)
         if source.error is not None:
             level, text = "bad", source.error
         elif source.ended:
@@ -138,7 +138,7 @@ class State:
             "level": level,
             "condition": text,
             "mode": picture.mode,
-            "faults": words.faults(picture),
+            "faults": status.faults(picture),
             "silence": picture.silence(),
             "counts": {name: picture.counts[name] for name in COUNTS},
             "firmware": picture.identity.version,

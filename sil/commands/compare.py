@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     """`lever compare`."""
     from lever_cdkf.host_tools.tables import print_tables
 
-    from ..study.compare import campaign, judgement, table, words
+    from ..study.compare import campaign, evaluation, table, verdicts
     from ..study.compare.cases import Plan
 
     if args.envelope:
@@ -97,20 +97,20 @@ def run(args: argparse.Namespace) -> int:
         make_folder(args.out)  # before a campaign that could then not be kept
     with Progress("compare") as progress:
         results = campaign.run(todo, args.jobs, progress.show)
-    rows = judgement.judge(results)
-    claims = words.claims(rows) if results.plan.is_whole else []
-    verdicts = words.verdicts(rows, *judgement.compare(results, rows))
+    rows = evaluation.judge(results)
+    claims = verdicts.claims(rows) if results.plan.is_whole else []
+    by_case = verdicts.verdicts(rows, *evaluation.compare(results, rows))
     tables = table.tables(rows, claims)
     print_tables(tables, args.json)
-    for case, verdict in verdicts.items():
+    for case, verdict in by_case.items():
         print(f"{case}: {verdict}")
     if args.out is not None:
         from lever_cdkf.host_tools.files import write_text
 
-        from ..study.compare import page
+        from ..study.compare import compare_page
 
         write_text(args.out / "compare.csv", table.csv_text(rows))
-        write_text(args.out / "compare.html", page.build(results, rows, verdicts, claims, tables))
+        write_text(args.out / "compare.html", compare_page.build(results, rows, by_case, claims, tables))
         print(f"Written to {args.out}: compare.html, compare.csv")
     return 0
 

@@ -98,12 +98,12 @@ def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> N
     """The files that were asked for."""
     import json
 
-    from ..envelope import page, table
+    from ..envelope import envelope_page, table
 
     if args.json is not None:
         text = json.dumps({"rows": table.rows(results)}, indent=2, ensure_ascii=False, allow_nan=False)
         write_text(args.json, text + "\n")
-    write_text(args.out / "envelope.html", page.build(results, seeds))
+    write_text(args.out / "envelope.html", envelope_page.build(results, seeds))
     print(f"Written to {args.out}: envelope.html")
 
 

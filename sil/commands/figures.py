@@ -81,7 +81,7 @@ def _make(names: Sequence[str], seed: int, folder: Path) -> list[str]:
     from lever_cdkf.host_tools.files import make_folder, replace_file, write_text
     from lever_cdkf.host_tools.progress import Progress
 
-    from ..study.figures import page, png
+    from ..study.figures import figures_page, png
     from ..study.figures.catalogue import FIGURES
     from ..study.figures.runs import Extent
 
@@ -92,7 +92,7 @@ def _make(names: Sequence[str], seed: int, folder: Path) -> list[str]:
             progress.show(done, len(names))
             figures.append(FIGURES[name](seed, Extent()))
             replace_file(folder / f"{name}.png", partial(_write, png.render(figures[-1])))
-        write_text(folder / _PAGE, page.build(figures))
+        write_text(folder / _PAGE, figures_page.build(figures))
         write_text(folder / _CAPTIONS, _captions(figures))
     return [*(f"{name}.png" for name in names), _PAGE, _CAPTIONS]
 

@@ -10,7 +10,7 @@ from lever_cdkf.host_tools.tables import Row, print_tables, write_json
 
 from ..envelope import conditions
 from ..study.names import known
-from ..study.peers import campaign, words
+from ..study.peers import campaign, tables
 from ..study.peers.filters import PEERS
 
 SEEDS = 8
@@ -36,11 +36,11 @@ def run(args: argparse.Namespace) -> int:
     )
     with Progress("compare") as progress:
         results = campaign.run(todo, args.jobs, progress.show)
-    print_tables(words.tables(results, seeds))
-    for sentence in words.verdicts(results):
+    print_tables(tables.tables(results, seeds))
+    for sentence in tables.verdicts(results):
         print(sentence)
     if args.json is not None:
-        write_json(args.json, {"peers": words.rows(results)})
+        write_json(args.json, {"peers": tables.rows(results)})
         print(f"Written: {args.json}")
     return 0
 

@@ -10,7 +10,7 @@ grip, whose vertical distance is stretched by e = l sin theta - s:
     R = c_p e_dot^2 / 2 + c_l theta_dot^2 / 2 + c_t s_dot^2 / 2              (Rayleigh's dissipation)
 
 Springs are preloaded so that all rests at theta = theta_0, s = 0, whatever the parameters: theta_l = theta_0,
-e_0 = l sin theta_0 + g mu / k_p, s_0 = g (m_t + mu) / k_t. Lagrange's equations (tests/python/sil derives them again):
+e_0 = l sin theta_0 + g mu / k_p, s_0 = g (m_t + mu) / k_t. Lagrange's equations (tests/python/plants has them again):
 
     M theta_ddot + l cos(theta) F + c_l theta_dot + k_l (theta - theta_0) = -l mu cos(theta) z_ddot + tau_m + tau_d
     m_t s_ddot - F + c_t s_dot + k_t s = -m_t z_ddot

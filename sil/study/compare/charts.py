@@ -15,7 +15,7 @@ from ..scores import settling_times
 from .campaign import Results
 from .cases import cases
 from .entrants import entrants
-from .judgement import FREQUENCY, Row, quantities
+from .evaluation import FREQUENCY, Row, quantities
 
 COLOURS = ("estimate", "base", "torque", "good", "quiet", "text")
 _LANE = 22  # [pixels] of one estimator in a figure, for one series; further ones take a third of it

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.native import enum_names
-from lever_cdkf.host_tools.report import picture, words, write_report
+from lever_cdkf.host_tools.report import picture, summary_html, write_report
 from lever_cdkf.host_tools.report.charts.health import FAULT_WORDS
 from lever_cdkf.host_tools.report.run import COHERENT, Run
 from lever_cdkf.sil.run.runner import Result
@@ -122,7 +122,7 @@ def test_the_headline_is_good_only_if_sigma_and_whiteness_are(
 ) -> None:
     entries = {key: entry | {"coverage_2sigma": covered} for key, entry in result.summary["parameters"].items()}
     made = {"passed": passed, "parameters": entries, "whiteness": result.summary["whiteness"] | {"white": white}}
-    assert f'class="verdict {mood}"' in words.verdict(Run(result.trace, result.summary | made))
+    assert f'class="verdict {mood}"' in summary_html.verdict(Run(result.trace, result.summary | made))
 
 
 def test_all_settings_are_shown(page: Reader, result: Result) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from lever_cdkf.host_tools.report.document import document
 from lever_cdkf.host_tools.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.host_tools.report.page import Page
-from lever_cdkf.host_tools.report.words import table
+from lever_cdkf.host_tools.report.summary_html import table
 from lever_cdkf.host_tools.tables import Row
 
 from .campaign import Result

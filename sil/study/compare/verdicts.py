@@ -12,7 +12,7 @@ from scipy.stats import norm
 from .cases import Matched, Stepped, cases
 from .comparison import LEAST_RUNS, LEVEL, Differences
 from .entrants import OURS
-from .judgement import FREQUENCY, UNKNOWN, Five, Row, quantities
+from .evaluation import FREQUENCY, UNKNOWN, Five, Row, quantities
 
 NEAR = 1.03
 """Errors of the firmware may be so many times those of the best baseline."""
@@ -22,7 +22,7 @@ NEAR = 1.03
 
 
 def verdicts(rows: Sequence[Row], errors: Differences, times: Differences) -> dict[str, str]:
-    """A few sentences on each case; differences as of judgement.compare()."""
+    """A few sentences on each case; differences as of evaluation.compare()."""
     return {case: verdict(list(group), errors, times) for case, group in groupby(rows, key=lambda row: row.case)}
 
 

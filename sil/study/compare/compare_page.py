@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 
 from lever_cdkf.host_tools.report.document import document
 from lever_cdkf.host_tools.report.page import Page
-from lever_cdkf.host_tools.report.words import number, table
+from lever_cdkf.host_tools.report.summary_html import number, table
 from lever_cdkf.host_tools.tables import Row as TableRow
 
 from . import charts
 from .campaign import Results
 from .cases import PRIOR, cases
-from .judgement import Row
-from .words import Claim
+from .evaluation import Row
+from .verdicts import Claim
 
 _TITLE = "Lever CDKF: every estimator on the same data"
 

@@ -10,11 +10,11 @@ import numpy as np
 from ..report.document import document
 from ..report.figure import Figure, Spec, axis, band, dots, line
 from ..report.page import Page
-from ..report.words import number, table
+from ..report.summary_html import number, table
 from ..results.whiteness import CANNOT_SEE
 from ..tables import Row
-from .judgement import Fit
 from .search import Found
+from .validation import Fit
 
 _TITLE = "Lever CDKF: settings from a log"
 _COLOURS = {"before": "base", "after": "estimate"}
