@@ -231,8 +231,8 @@ def test_a_log_that_breaks_off_gives_what_it_has(suffix: str, session: Session, 
 STREAM_MB = 200
 COUNTING = """
 import resource, sys
-from lever_cdkf.host_tools.logs import Recording
-from lever_cdkf.host_tools.traffic import Traffic
+from lever_cdkf.host_tools.can.logs import Recording
+from lever_cdkf.host_tools.can.traffic import Traffic
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 traffic = Traffic(Recording([sys.argv[1]]))
 ours = sum(len(frames) for frames in traffic.chunks())

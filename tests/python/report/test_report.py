@@ -345,8 +345,8 @@ def test_a_longer_run_makes_no_larger_page(report: Path, result: Result, tmp_pat
 def test_nothing_slow_is_imported() -> None:
     """Neither scipy nor plotly's Python classes: each takes longer than all the rest."""
     code = """
-import sys, numpy as np, lever_cdkf.sil.report.page
-from lever_cdkf.sil.report import write_report
+import sys, numpy as np, lever_cdkf.host_tools.report.page
+from lever_cdkf.host_tools.report import write_report
 slow = {"scipy", "pandas", "plotly.graph_objs", "plotly.io", "matplotlib", "cantools"} & set(sys.modules)
 sys.exit(f"imports {slow}" if slow else 0)
 """
