@@ -9,26 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..firmware.quantities import DYNAMICS, quantities, recorded_name
+from ..results.summary import Difference
 from ..results.trace import ESTIMATED, Trace
-
-
-@dataclass
-class Difference:
-    """Replayed minus recorded, of one signal; null where the recording has none of it."""
-
-    unit: str
-    samples: int = 0
-    """At which both are known."""
-    identical_samples: int = 0
-    """Equal in every bit on the bus."""
-    bias: float | None = None
-    """Mean difference."""
-    rms: float | None = None
-    largest: float | None = None
-    """The difference that is farthest from 0, with its sign."""
-    largest_at_s: float | None = None
-    rms_in_sigma: float | None = None
-    """Rms of the difference over the replay's standard deviation; null where there is none."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from ..can.traffic import Traffic
 from ..files import write_text
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
+from ..results.summary import SCHEMA, ReplaySummary, of
 from ..results.trace import Trace
 from .columns import Columns, model_numbers
 from .commands_in_log import Commands
@@ -168,6 +169,7 @@ class _Replay:
         compared = None if self._comparison is None else self._comparison.summary()
         choices = self._commands.choices | {"model": self.model}
         summary: dict[str, Any] = {
+            "schema": SCHEMA,
             "recording": self._recording(),
             "estimator": {**choices, "settings": self._options.config.settings},
             "samples": self._timeline.clocks.samples,
@@ -216,7 +218,7 @@ class _Replay:
         for part in (self._bus_log, self._csv, self._mf4):
             if part is not None:
                 part.close()
-        write_page(RecordedRun(self.kept, summary), outputs.path("report.html"))
+        write_page(RecordedRun(self.kept, of(ReplaySummary, summary)), outputs.path("report.html"))
         text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
         write_text(outputs.path(SUMMARY), text + "\n")
         outputs.finish()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from ..report.series import Welch
 from ..results.coherence import Coherence
 from ..results.feedthrough import Feedthrough
 from ..results.nis import freedom
+from ..results.summary import ReplaySummary
 from ..results.trace import Trace
 from .reduction import Ends, Groups, Stretches
 
@@ -57,7 +57,7 @@ class Kept:
 class RecordedRun(Run):
     """A Run of what was kept."""
 
-    def __init__(self, kept: Kept, summary: Mapping[str, Any]) -> None:
+    def __init__(self, kept: Kept, summary: ReplaySummary) -> None:
         super().__init__(kept.stretches.rows(), summary)
         self._kept = kept
 

@@ -70,7 +70,7 @@ class Figures:
         names = enum_names("lever_mode")
         return {
             "estimates": self.estimates(),
-            "nis": self._innovations.figures(),
+            "nis": asdict(self._innovations.figures()),
             "whiteness": None if measured is None else asdict(measured),
             **{count: int(self._last.get(count, 0)) for count in COUNTS},
             "modes_s": {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())},
@@ -79,11 +79,12 @@ class Figures:
 
 def verdict(summary: dict[str, Any]) -> str:
     """The replay in a few sentences."""
+    measured = summary["whiteness"]
     sentences = [
         *_troubles(summary),
         _comparison(summary["comparison"]),
-        nis.verdict(summary["nis"]),
-        whiteness.verdict(summary["whiteness"]),
+        nis.verdict(nis.Nis(**summary["nis"])),
+        whiteness.verdict(whiteness.Whiteness(**measured) if measured else None),
     ]
     return " ".join(sentence for sentence in sentences if sentence)
 

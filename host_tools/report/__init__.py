@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from ..files import write_text
 
 if TYPE_CHECKING:
+    from ..results.summary import Summary
     from .run import Run
 
 
-def write_report(trace: Mapping[str, NDArray[Any]], summary: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
+def write_report(trace: Mapping[str, NDArray[Any]], summary: Summary | None, path: str | os.PathLike[str]) -> None:
     """Writes the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
-    of summary.json, or empty. Raises LeverError when `path` cannot be written."""
+    of summary.json, where there is one. Raises LeverError when `path` cannot be written."""
     from .run import Run  # here, so that importing this package stays quick
 
     write_page(Run(trace, summary), path)

@@ -101,7 +101,7 @@ def whiteness_caption(run: Run) -> str:
     if told is not None:
         found = (
             f" Here the residual passes as white. {whiteness.CANNOT_SEE}"
-            if told["white"]
+            if told.white
             else " Here the residual is coloured: the arm, or a sensor, is not as assumed."
         )
     return (

@@ -43,8 +43,10 @@ def build(run: Run) -> str:
     _signals(page, run)
     _health(page, run)
     _numbers(page, run)
-    scenario = run.summary.get("scenario", {})
-    title = scenario.get("title") or scenario.get("name") or ", ".join(run.recording.get("logs", ())) or "recorded run"
+    scenario = run.simulated.scenario if run.simulated else None
+    title = (
+        (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.get("logs", ())) or "recorded run"
+    )
     links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
     body = (
         f'<header><h1>Lever CDKF: {html.escape(title)}</h1><p class="subtitle">{_subtitle(run)}</p></header>'
@@ -55,7 +57,7 @@ def build(run: Run) -> str:
 
 
 def _subtitle(run: Run) -> str:
-    description = html.escape(run.summary.get("scenario", {}).get("description") or summary_html.recorded(run))
+    description = html.escape((run.simulated and run.simulated.scenario.description) or summary_html.recorded(run))
     length = f"{run.samples:,} samples in {run.end:.0f} s.".replace(",", "\u2009")
     return f"{description} {length}".strip()
 
@@ -209,9 +211,9 @@ def _numbers(page: Page, run: Run) -> None:
         else ()
     )
     page.section("numbers", "Numbers", "All numbers", *tables)
-    scenario = {key: value for key, value in run.summary.get("scenario", {}).items() if key != "description"}
+    scenario = {**vars(run.simulated.scenario), "description": None} if run.simulated else {}
     rows = [(html.escape(key), html.escape(value)) for key, value in summary_html.flat(scenario)]
-    estimator = {key: value for key, value in run.summary.get("estimator", {}).items() if key != "settings"}
+    estimator = {**vars(run.summary.estimator), "settings": None} if run.summary else {}
     rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in summary_html.flat(estimator)]
     made = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
     settings = f"<details><summary>Settings of the estimator</summary>{summary_html.settings_table(run)}</details>"

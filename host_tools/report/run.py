@@ -1,7 +1,6 @@
 """What a run left behind, as the charts read it: columns that may be absent, and what follows from several of them."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -16,6 +15,8 @@ from ..models.transfer import Transfer
 from ..results import whiteness
 from ..results.coherence import Coherence
 from ..results.feedthrough import Feedthrough
+from ..results.summary import ReplaySummary, SimulationSummary, Summary
+from ..results.whiteness import Whiteness
 from .bode import slow_trim
 from .series import jumps, welch
 
@@ -33,11 +34,13 @@ class Averages(NamedTuple):
 
 
 class Run:
-    """A trace (columns of trace.csv) and its summary (summary.json; empty for a replayed log without truth)."""
+    """A trace (columns of trace.csv) and its summary (summary.json), where there is one."""
 
-    def __init__(self, trace: Mapping[str, NDArray[Any]], summary: Mapping[str, Any]) -> None:
+    def __init__(self, trace: Mapping[str, NDArray[Any]], summary: Summary | None) -> None:
         self.trace = trace
         self.summary = summary
+        self.simulated = summary if isinstance(summary, SimulationSummary) else None
+        self.replayed = summary if isinstance(summary, ReplaySummary) else None
         self.time: Array = np.asarray(trace["time_s"], dtype=np.float64)
 
     def column(self, name: str) -> Array | None:
@@ -70,14 +73,12 @@ class Run:
         """The estimator's model: as the summary tells, or without one as the columns do."""
         models = native.enum_names("lever_model").values()
         seen = (model for model in models if quantities.parameters(model)[0].column("estimate") in self.trace)
-        told: str | None = self.summary.get("estimator", {}).get("model")
-        return told or next(seen, native.Config().choices["model"])
+        return self.summary.estimator.model if self.summary else next(seen, native.Config().choices["model"])
 
     @property
     def recording(self) -> Mapping[str, Any]:
         """What the summary tells of the log that was replayed; empty for a simulation."""
-        told: Mapping[str, Any] = self.summary.get("recording", {})
-        return told
+        return self.replayed.recording if self.replayed else {}
 
     @property
     def parameters(self) -> tuple[Quantity, ...]:
@@ -91,36 +92,33 @@ class Run:
     @cached_property
     def mismatch(self) -> str | None:
         """The truth's model where it is another than the estimator's."""
-        told: str | None = self.summary.get("truth", {}).get("model")
-        return told if told != self.model else None
+        return self.simulated.truth.model if self.simulated and self.simulated.truth.model != self.model else None
 
     @property
     def about_truth(self) -> str:
         """What the truth is, where it is not of the estimator's model."""
-        return str(self.summary["truth"]["about"])
+        return (self.simulated and self.simulated.truth.about) or ""
 
     @property
     def about_true_dynamics(self) -> str:
         """What its natural frequency is, where that needs saying."""
-        return str(self.summary.get("truth", {}).get("about_dynamics", ""))
+        return (self.simulated and self.simulated.truth.about_dynamics) or ""
 
     @cached_property
-    def whiteness(self) -> Mapping[str, Any] | None:
+    def whiteness(self) -> Whiteness | None:
         """As the summary tells, or without one of the whole trace; None where there is nothing to tell from."""
-        if "whiteness" in self.summary:
-            told: Mapping[str, Any] | None = self.summary["whiteness"]
-            return told
+        if self.summary is not None:
+            return self.summary.whiteness
         residual = whiteness.residual(self.trace)
-        measured = None if residual is None else whiteness.measure(residual, self.sample_period)
-        return None if measured is None else asdict(measured)
+        return None if residual is None else whiteness.measure(residual, self.sample_period)
 
     def true_transfer(self, time: Array) -> Transfer | None:
         """θ/z̈ of a truth that is not of the estimator's model, at the times [s]; None where the summary has none."""
-        told = self.summary.get("truth", {}).get("transfer")
+        told = self.simulated.truth.transfer if self.simulated else None
         if told is None:
             return None
-        at = np.maximum(np.searchsorted(told["time_s"], time, side="right") - 1, 0)
-        return Transfer(np.array(told["numerator"])[at], np.array(told["denominator"])[at])
+        at = np.maximum(np.searchsorted(told.time_s, time, side="right") - 1, 0)
+        return Transfer(np.array(told.numerator)[at], np.array(told.denominator)[at])
 
     # What takes every sample to tell; a run that has kept fewer overrides these.
 
@@ -209,11 +207,11 @@ class Run:
     def settings(self) -> dict[str, float]:
         """The estimator's settings: the run's own, and the firmware's defaults for what it does not tell."""
         defaults = {row.name: row.default for row in native.settings_table()}
-        return defaults | dict(self.summary.get("estimator", {}).get("settings", {}))
+        return defaults | (self.summary.estimator.settings if self.summary else {})
 
     @cached_property
     def lever(self) -> Lever:
-        return Lever.from_settings(self.settings, self.summary.get("estimator", {}).get("preload", "trim"))
+        return Lever.from_settings(self.settings, self.summary.estimator.preload if self.summary else "trim")
 
 
 def nis_averages(time: Array, nis: Array, outputs: Array, size: int, seconds: float) -> Averages:

@@ -7,6 +7,8 @@ from typing import Any
 
 from ..firmware import native
 from ..firmware.quantities import LEAST_COVERAGE, Quantity
+from ..results.nis import Nis
+from ..results.summary import Quality
 from .run import Run
 
 NOTHING = "–"
@@ -41,16 +43,18 @@ def seconds(values: Sequence[float | None] | None) -> str:
     return shown if values[-1] is None else f"{shown} s"
 
 
-def figures_of(run: Run, quantity: Quantity) -> dict[str, Any]:
-    """The summary's figures of one quantity; empty when it has none."""
-    found: dict[str, Any] = run.summary.get("parameters", {}).get(quantity.key) or {}
-    return found
+def figures_of(run: Run, quantity: Quantity) -> Quality | None:
+    """The summary's figures of one quantity, when it has them."""
+    return run.simulated.parameters.get(quantity.key) if run.simulated else None
 
 
 def verdict(run: Run) -> str:
     """The headline."""
-    text = run.summary.get("verdict") or "A recorded run, with no truth to compare with: what the estimator made of it."
-    mood = {True: "" if _in_doubt(run) else "good", False: "bad", None: ""}[run.summary.get("passed")]
+    if run.summary is None:
+        text, mood = "A recorded run, with no truth to compare with: what the estimator made of it.", ""
+    else:
+        text = run.summary.verdict
+        mood = "bad" if not run.summary.passed else "" if _in_doubt(run) else "good"
     escaped = html.escape(text)
     for quantity in run.parameters:
         escaped = re.sub(rf"\b{quantity.key}\b", quantity.symbol, escaped)
@@ -59,9 +63,9 @@ def verdict(run: Run) -> str:
 
 def _in_doubt(run: Run) -> bool:
     """Whether the stated sigma, or the model, is not right by this run, whatever its limits allow."""
-    covered = [entry.get("coverage_2sigma") for entry in run.summary.get("parameters", {}).values()]
+    covered = [entry.coverage_2sigma for entry in run.simulated.parameters.values()] if run.simulated else []
     too_small = any(share is not None and share < LEAST_COVERAGE for share in covered)
-    return too_small or (run.whiteness or {}).get("white") is False
+    return too_small or (run.whiteness is not None and not run.whiteness.white)
 
 
 def cards(run: Run) -> str:
@@ -78,9 +82,11 @@ def _card(title: str, rows: Iterable[tuple[str, str]], note: str) -> str:
 
 def _judgement_cards(run: Run, judged: list[Quantity]) -> list[str]:
     def rows(key: str, show: Any) -> list[tuple[str, str]]:
-        return [(f"{quantity.symbol} {quantity.name}", show(figures_of(run, quantity).get(key))) for quantity in judged]
+        return [
+            (f"{quantity.symbol} {quantity.name}", show(getattr(figures_of(run, quantity), key))) for quantity in judged
+        ]
 
-    after = run.summary.get("scenario", {}).get("converged_after_s")
+    after = run.simulated.scenario.converged_after_s if run.simulated else None
     since = f", from {number(after)} s after the start and each sudden change on" if after is not None else ""
     return [
         _card(
@@ -131,15 +137,15 @@ def errors_table(run: Run) -> str:
     rows = []
     for quantity in run.quantities:
         if found := figures_of(run, quantity):
-            coverage = found.get("coverage_2sigma")
+            coverage = found.coverage_2sigma
             rows.append(
                 (
                     f"{quantity.symbol} {quantity.name}",
-                    fixed(found.get("rms_percent"), 2),
-                    fixed(found.get("bias_percent"), 2),
+                    fixed(found.rms_percent, 2),
+                    fixed(found.bias_percent, 2),
                     fixed(None if coverage is None else 100.0 * coverage, 1),
-                    _times(found.get("time_to_10_percent_s")),
-                    _times(found.get("time_to_5_percent_s")),
+                    _times(found.time_to_10_percent_s),
+                    _times(found.time_to_5_percent_s),
                 )
             )
     return table(header, rows) if rows else ""
@@ -151,11 +157,14 @@ def _times(values: Sequence[float | None] | None) -> str:
 
 def comparison_table(run: Run) -> str:
     """Replayed minus recorded, signal by signal."""
-    told = run.summary.get("comparison") or {}
+    compared = run.replayed.comparison if run.replayed else None
     header = ("", "unit", "samples", "identical", "mean", "rms", "largest", "at [s]", "rms ÷ σ")
     keys = ("unit", "samples", "identical_samples", "bias", "rms", "largest", "largest_at_s", "rms_in_sigma")
-    signals = told.get("signals", {}).items()
-    return table(header, [(name, *(number(each[key]) for key in keys)) for name, each in signals]) if signals else ""
+    if compared is None:
+        return ""
+    return table(
+        header, [(name, *(number(getattr(each, key)) for key in keys)) for name, each in compared.signals.items()]
+    )
 
 
 def recorded(run: Run) -> str:
@@ -213,16 +222,18 @@ RUN_FIGURES = (
 
 def run_table(run: Run) -> str:
     """Innovations, traffic, time and faults."""
-    nis = run.summary.get("nis") or {}
-    inside = nis.get("inside_95_percent")
+    nis = run.summary.nis if run.summary else Nis()
+    inside = nis.inside_95_percent
     rows = [
-        ("mean normalised innovation squared", number(nis.get("mean")), "1"),
-        ("the same if σ is right", number(nis.get("expected")), "1"),
+        ("mean normalised innovation squared", number(nis.mean), "1"),
+        ("the same if σ is right", number(nis.expected), "1"),
         ("innovations inside their 95 % bound", number(None if inside is None else 100.0 * inside), "%"),
-        ("largest correlation of residuals (white noise: 0)", number((run.whiteness or {}).get("largest")), "1"),
+        ("largest correlation of residuals (white noise: 0)", number(run.whiteness and run.whiteness.largest), "1"),
     ]
-    rows += [(label, number(run.summary.get(key)), unit) for key, label, unit in RUN_FIGURES]
-    shares = {**run.summary.get("fault_shares", {}), "any that warns": run.summary.get("flagged_share")}
+    rows += [(label, number(getattr(run.summary, key, None)), unit) for key, label, unit in RUN_FIGURES]
+    shares: dict[str, float | None] = {}
+    if run.simulated:
+        shares = {**run.simulated.fault_shares, "any that warns": run.simulated.flagged_share}
     rows += [
         (f"of the judged time with fault: {html.escape(name)}", number(None if share is None else 100.0 * share), "%")
         for name, share in shares.items()

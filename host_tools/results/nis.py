@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,18 @@ def freedom(theta_measured: FloatArray, theta_dot_measured: FloatArray) -> NDArr
     """How many outputs each sample had."""
     outputs: NDArray[np.int64] = np.isfinite(theta_measured).astype(np.int64) + np.isfinite(theta_dot_measured)
     return outputs
+
+
+@dataclass(frozen=True)
+class Nis:
+    """Normalised innovation squared, of samples that had a measurement and an answer; None without any."""
+
+    mean: float | None = None
+    expected: float | None = None
+    mean_band_95: list[float] | None = None
+    """Where the mean of a consistent filter lies in 95 % of runs."""
+    inside_95_percent: float | None = None
+    """Share of the samples below their chi-square's 95 % value: 0.95 for a consistent filter."""
 
 
 class Innovations:
@@ -36,25 +48,24 @@ class Innovations:
         self._freedom += float(np.sum(outputs))
         self._inside += int(np.sum(nis <= np.where(outputs == 2, CHI_SQUARE_95[2], CHI_SQUARE_95[1])))
 
-    def figures(self) -> dict[str, Any]:
-        """Mean, expected mean with its band, and the share inside the 95 % bound; null without samples."""
+    def figures(self) -> Nis:
         if not self._count:
-            return {"mean": None, "expected": None, "mean_band_95": None, "inside_95_percent": None}
+            return Nis()
         expected = self._freedom / self._count
         spread = 1.96 * math.sqrt(2.0 * expected / self._count)
-        return {
-            "mean": self._nis / self._count,
-            "expected": expected,
-            "mean_band_95": [expected - spread, expected + spread],
-            "inside_95_percent": self._inside / self._count,
-        }
+        return Nis(
+            mean=self._nis / self._count,
+            expected=expected,
+            mean_band_95=[expected - spread, expected + spread],
+            inside_95_percent=self._inside / self._count,
+        )
 
 
-def verdict(nis: dict[str, Any]) -> str:
+def verdict(nis: Nis) -> str:
     """What NIS says, in a sentence."""
-    if nis["mean"] is None:
+    if nis.mean is None or nis.expected is None:
         return ""
-    ratio = nis["mean"] / nis["expected"]
+    ratio = nis.mean / nis.expected
     size = "larger than" if ratio > 1.1 else "smaller than" if ratio < 0.9 else "as large as"
-    numbers = f"mean NIS {nis['mean']:.2f}, expected {nis['expected']:.2f}"
+    numbers = f"mean NIS {nis.mean:.2f}, expected {nis.expected:.2f}"
     return f"Innovations are {size} the filter expects ({numbers})."

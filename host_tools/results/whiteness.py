@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -100,18 +99,18 @@ def averages(values: FloatArray, size: int) -> FloatArray:
     return means
 
 
-def verdict(told: dict[str, Any] | None) -> str:
+def verdict(measured: Whiteness | None) -> str:
     """What the autocorrelation of the residual says, and what it cannot see."""
-    if told is None:
+    if measured is None:
         return ""
-    size = f"{told['largest']:.2f} after {1000.0 * told['largest_after_s']:.0f} ms"
-    if told["white"]:
-        last = told["average_s"] * len(told["autocorrelation"])
+    size = f"{measured.largest:.2f} after {1000.0 * measured.largest_after_s:.0f} ms"
+    if measured.white:
+        last = measured.average_s * len(measured.autocorrelation)
         return (
             f"Residuals of the rate pass the test for whiteness up to a lag of {last:g} s (largest correlation {size})."
             f" {CANNOT_SEE}"
         )
     return (
-        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{told['band_95']:.2f}): "
+        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{measured.band_95:.2f}): "
         "the arm, or a sensor, is not what the model assumes."
     )

@@ -216,10 +216,10 @@ def _simulate(
     with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
         result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
     print_tables(_tables(result), json_file)
-    print(result.summary["verdict"])
+    print(result.summary.verdict)
     if out is not None:
         print(f"Written to {out}: report.html, summary.json, trace.csv, bus.log")
-    if result.summary["passed"]:
+    if result.summary.passed:
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)
     return 1
@@ -242,8 +242,8 @@ def _tables(result: Result) -> Tables:
 
     summary, trace = result.summary, result.trace
     rows: list[Row] = []
-    for quantity in quantities(summary["estimator"]["model"]):
-        entry, truth = summary["parameters"].get(quantity.key, {}), trace.get(quantity.column("true"))
+    for quantity in quantities(summary.estimator.model):
+        entry, truth = summary.parameters.get(quantity.key), trace.get(quantity.column("true"))
         rows.append(
             {
                 "quantity": quantity.key,
@@ -251,24 +251,24 @@ def _tables(result: Result) -> Tables:
                 "truth at end": None if truth is None else float(truth[-1]),
                 "estimate": float(trace[quantity.column("estimate")][-1]),
                 "sigma": float(trace[quantity.column("sigma")][-1]),
-                "rms error [%]": entry.get("rms_percent"),
-                "bias [%]": entry.get("bias_percent"),
-                "truth within 2 sigma [1]": entry.get("coverage_2sigma"),
-                "time to 10 % [s]": _times(entry.get("time_to_10_percent_s", ())),
-                "time to 5 % [s]": _times(entry.get("time_to_5_percent_s", ())),
+                "rms error [%]": entry.rms_percent if entry else None,
+                "bias [%]": entry.bias_percent if entry else None,
+                "truth within 2 sigma [1]": entry.coverage_2sigma if entry else None,
+                "time to 10 % [s]": _times(entry.time_to_10_percent_s if entry else ()),
+                "time to 5 % [s]": _times(entry.time_to_5_percent_s if entry else ()),
             }
         )
     run_row: Row = {
-        "samples": summary["samples"],
-        **{count: summary[count] for count in ("unanswered", "lost", "corrupt", "late", "restarts")},
-        "mean NIS [1]": summary["nis"]["mean"],
-        "expected NIS [1]": summary["nis"]["expected"],
-        "largest correlation [1]": (summary["whiteness"] or {}).get("largest"),
-        "simulated time [s]": summary["simulated_time_s"],
-        "wall time [s]": summary["wall_time_s"],
-        "firmware": summary["firmware"]["version"],
+        "samples": summary.samples,
+        **{count: getattr(summary, count) for count in ("unanswered", "lost", "corrupt", "late", "restarts")},
+        "mean NIS [1]": summary.nis.mean,
+        "expected NIS [1]": summary.nis.expected,
+        "largest correlation [1]": summary.whiteness.largest if summary.whiteness else None,
+        "simulated time [s]": summary.simulated_time_s,
+        "wall time [s]": summary.wall_time_s,
+        "firmware": summary.firmware.version,
     }
-    return {summary["scenario"]["title"]: rows, "run": [run_row]}
+    return {summary.scenario.title: rows, "run": [run_row]}
 
 
 def _times(times: Sequence[float | None]) -> str:
@@ -279,8 +279,8 @@ def _times(times: Sequence[float | None]) -> str:
 def _reason(result: Result) -> str:
     """Why a run did not pass, in a line."""
     summary = result.summary
-    reasons = [f"{summary['unanswered']} samples without an answer"] if summary["unanswered"] else []
-    if summary["misplaced"]:
-        reasons.append(f"{summary['misplaced']} estimates are of other samples: is the port in --lock-step, and alone?")
-    reasons += ["the estimator was in fault"] if "fault" in summary["modes_s"] else []
-    return "; ".join(reasons + summary["missed"])
+    reasons = [f"{summary.unanswered} samples without an answer"] if summary.unanswered else []
+    if summary.misplaced:
+        reasons.append(f"{summary.misplaced} estimates are of other samples: is the port in --lock-step, and alone?")
+    reasons += ["the estimator was in fault"] if "fault" in summary.modes_s else []
+    return "; ".join(reasons + summary.missed)

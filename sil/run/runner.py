@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import time as clock
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import can
 from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.files import make_folder, replace_file
+from lever_cdkf.host_tools.files import make_folder, replace_file, write_text
 from lever_cdkf.host_tools.results import trace
+from lever_cdkf.host_tools.results.summary import SimulationSummary, text
 from lever_cdkf.host_tools.results.trace import Trace
 
 from ..scenarios.scenario import Scenario
@@ -27,7 +26,7 @@ class Result:
     """What a simulation gives: the columns of trace.csv, the content of summary.json, and every frame on the bus."""
 
     trace: Trace
-    summary: dict[str, Any]
+    summary: SimulationSummary
     frames: Frames
 
 
@@ -55,11 +54,10 @@ def simulate(
         recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
     frames = recording.frames()
     columns = columns_of(recording, frames)
-    result = Result(columns, summary.build(recording, columns), frames)
-    summary.add_wall_time(result.summary, clock.perf_counter() - start)
+    made = summary.build(recording, columns)
     if out_dir is not None:
-        _write(result, out_dir, channel, start)
-    return result
+        _write(Result(columns, made, frames), out_dir, channel, start)
+    return Result(columns, made.timed(clock.perf_counter() - start), frames)
 
 
 def _write(result: Result, folder: Path, channel: str, start: float) -> None:
@@ -70,13 +68,10 @@ def _write(result: Result, folder: Path, channel: str, start: float) -> None:
         with path.open("wb") as file:
             file.writelines(buslog.lines(result.frames, channel))
 
-    def summary_json(path: Path) -> None:
-        text = json.dumps(result.summary, indent=2, ensure_ascii=False, allow_nan=False)
-        path.write_text(text + "\n", encoding="utf-8")
+    def elapsed() -> SimulationSummary:
+        return result.summary.timed(clock.perf_counter() - start)
 
     replace_file(folder / "bus.log", bus_log)
     replace_file(folder / "trace.csv", lambda path: trace.write_csv(result.trace, path))
-    summary.add_wall_time(result.summary, clock.perf_counter() - start)
-    replace_file(folder / "report.html", lambda path: write_report(result.trace, result.summary, path))
-    summary.add_wall_time(result.summary, clock.perf_counter() - start)
-    replace_file(folder / "summary.json", summary_json)
+    replace_file(folder / "report.html", lambda path: write_report(result.trace, elapsed(), path))
+    write_text(folder / "summary.json", text(elapsed()))

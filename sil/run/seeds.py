@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.results.summary import SimulationSummary
 from lever_cdkf.host_tools.results.whiteness import CANNOT_SEE
 from lever_cdkf.host_tools.tables import Row, Tables
 
@@ -24,8 +25,6 @@ from .summary import missed_limits
 _Task = TypeVar("_Task")
 _Done = TypeVar("_Done")
 
-Summary = dict[str, Any]
-"""The content of a run's summary.json."""
 Progress = Callable[[int, int, str], None]
 """Called after each run: how many are done, of how many, and what the last one was."""
 
@@ -43,7 +42,7 @@ class Task:
         return f"{self.scenario}, seed {self.seed}"
 
 
-def run(tasks: Sequence[Task], jobs: int, progress: Progress | None = None) -> list[Summary]:
+def run(tasks: Sequence[Task], jobs: int, progress: Progress | None = None) -> list[SimulationSummary]:
     """The summaries of all runs in the order of `tasks`, from `jobs` processes. Raises LeverError."""
     return in_processes(simulate, tasks, jobs, progress)
 
@@ -69,7 +68,7 @@ def _results(function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: i
         yield from pool.imap(function, tasks)
 
 
-def simulate(task: Task) -> Summary:
+def simulate(task: Task) -> SimulationSummary:
     """The summary of one run. Raises LeverError."""
     from lever_cdkf.host_tools.can.bus import LeverBus
 
@@ -84,61 +83,61 @@ def simulate(task: Task) -> Summary:
 # --- figures of one scenario -----------------------------------------------------------------------------------------
 
 
-def rms(summaries: Sequence[Summary], key: str) -> FloatArray:
+def rms(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
     """Rms error of each run [%]; infinite where a run has none to judge."""
-    values = [summary["parameters"][key]["rms_percent"] for summary in summaries]
+    values = [summary.parameters[key].rms_percent for summary in summaries]
     return np.array([math.inf if value is None else value for value in values])
 
 
-def coverage(summaries: Sequence[Summary], key: str) -> FloatArray:
+def coverage(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
     """Share of the time of each run at which +-2 sigma holds the truth [%]; 0 where there is nothing to judge."""
-    values = [summary["parameters"][key]["coverage_2sigma"] for summary in summaries]
+    values = [summary.parameters[key].coverage_2sigma for summary in summaries]
     return 100.0 * np.array([value or 0.0 for value in values])
 
 
-def times_to_5_percent(summaries: Sequence[Summary], key: str) -> FloatArray:
+def times_to_5_percent(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
     """After the start and each jump, of all runs [s]; infinite where the error never stays within 5 %."""
-    times = [time for summary in summaries for time in summary["parameters"][key]["time_to_5_percent_s"]]
+    times = [time for summary in summaries for time in summary.parameters[key].time_to_5_percent_s]
     return np.array([math.inf if time is None else time for time in times])
 
 
-def judged(summaries: Sequence[Summary]) -> list[str]:
+def judged(summaries: Sequence[SimulationSummary]) -> list[str]:
     """The quantities of which at least one run has an error to judge: none in runs that are too short."""
-    return [key for key in summaries[0]["parameters"] if np.isfinite(rms(summaries, key)).any()]
+    return [key for key in summaries[0].parameters if np.isfinite(rms(summaries, key)).any()]
 
 
-def flagged(summaries: Sequence[Summary]) -> FloatArray:
+def flagged(summaries: Sequence[SimulationSummary]) -> FloatArray:
     """Share of the judged time of each run with a fault that warns [%]."""
-    return 100.0 * np.array([summary["flagged_share"] or 0.0 for summary in summaries])
+    return 100.0 * np.array([summary.flagged_share or 0.0 for summary in summaries])
 
 
-def missed(summaries: Sequence[Summary]) -> list[str]:
+def missed(summaries: Sequence[SimulationSummary]) -> list[str]:
     """The limits that are not kept by the median of the rms errors, and by the coverage over all runs; in words."""
     keys = judged(summaries)
     return missed_limits(
-        summaries[0]["scenario"]["limits"],
+        summaries[0].scenario.limits,
         {key: float(np.median(rms(summaries, key))) for key in keys},
         {key: 0.01 * float(np.mean(coverage(summaries, key))) for key in keys},
     )
 
 
-def troubles(summaries: Sequence[Summary]) -> list[str]:
+def troubles(summaries: Sequence[SimulationSummary]) -> list[str]:
     """What went wrong in runs, whatever their estimates, in words."""
     told = []
     for what, wrong in (
-        ("samples without an answer", [summary["unanswered"] > 0 for summary in summaries]),
-        ("estimates of other samples", [summary["misplaced"] > 0 for summary in summaries]),
-        ("the estimator in fault", ["fault" in summary["modes_s"] for summary in summaries]),
+        ("samples without an answer", [summary.unanswered > 0 for summary in summaries]),
+        ("estimates of other samples", [summary.misplaced > 0 for summary in summaries]),
+        ("the estimator in fault", ["fault" in summary.modes_s for summary in summaries]),
     ):
-        seeds = [str(each["scenario"]["seed"]) for each, bad in zip(summaries, wrong, strict=True) if bad]
+        seeds = [str(each.scenario.seed) for each, bad in zip(summaries, wrong, strict=True) if bad]
         told += [f"{what} with seed {', '.join(seeds)}"] if seeds else []
     return told
 
 
-def verdict(summaries: Sequence[Summary]) -> str:
+def verdict(summaries: Sequence[SimulationSummary]) -> str:
     """The runs in a few sentences."""
     reasons = troubles(summaries) + missed(summaries)
-    kept = "All limits kept." if summaries[0]["scenario"]["limits"] else ""
+    kept = "All limits kept." if summaries[0].scenario.limits else ""
     told = [f"Limits missed: {'; '.join(reasons)}." if reasons else kept]
     covered = {key: float(np.mean(coverage(summaries, key))) for key in judged(summaries)}
     if not covered:
@@ -147,7 +146,7 @@ def verdict(summaries: Sequence[Summary]) -> str:
     told.append(
         f"Over all runs ±2σ covers every truth for at least {covered[least]:.0f} % of the time (least: {least})."
     )
-    tested = [summary["whiteness"]["white"] for summary in summaries if summary["whiteness"] is not None]
+    tested = [summary.whiteness.white for summary in summaries if summary.whiteness is not None]
     if tested:
         told.append(f"Residuals of {sum(tested)} of {len(tested)} runs pass the test for whiteness. {CANNOT_SEE}")
     return " ".join(sentence for sentence in told if sentence)
@@ -156,19 +155,19 @@ def verdict(summaries: Sequence[Summary]) -> str:
 # --- tables ----------------------------------------------------------------------------------------------------------
 
 
-def tables(summaries: Sequence[Summary]) -> Tables:
+def tables(summaries: Sequence[SimulationSummary]) -> Tables:
     """What is printed of the runs of one scenario."""
-    scenario = summaries[0]["scenario"]
-    numbers = [summary["scenario"]["seed"] for summary in summaries]
-    title = f"{scenario['title']} ({len(numbers)} seeds, {numbers[0]} to {numbers[-1]})"
+    scenario = summaries[0].scenario
+    numbers = [summary.scenario.seed for summary in summaries]
+    title = f"{scenario.title} ({len(numbers)} seeds, {numbers[0]} to {numbers[-1]})"
     return {
-        title: [_quantity_row(summaries, key, numbers) for key in summaries[0]["parameters"]],
+        title: [_quantity_row(summaries, key, numbers) for key in summaries[0].parameters],
         "share of the judged time with each fault": _fault_rows(summaries),
         "runs": [_runs_row(summaries)],
     }
 
 
-def _quantity_row(summaries: Sequence[Summary], key: str, numbers: Sequence[int]) -> Row:
+def _quantity_row(summaries: Sequence[SimulationSummary], key: str, numbers: Sequence[int]) -> Row:
     errors, covered = rms(summaries, key), coverage(summaries, key)
     if not np.isfinite(errors).any():
         covered = np.full(len(covered), np.nan)
@@ -187,9 +186,9 @@ def _quantity_row(summaries: Sequence[Summary], key: str, numbers: Sequence[int]
     }
 
 
-def _fault_rows(summaries: Sequence[Summary]) -> list[Row]:
-    names = list(dict.fromkeys(name for summary in summaries for name in summary["fault_shares"]))
-    shares = {name: [100.0 * summary["fault_shares"].get(name, 0.0) for summary in summaries] for name in names}
+def _fault_rows(summaries: Sequence[SimulationSummary]) -> list[Row]:
+    names = list(dict.fromkeys(name for summary in summaries for name in summary.fault_shares))
+    shares = {name: [100.0 * summary.fault_shares.get(name, 0.0) for summary in summaries] for name in names}
     shares["any that warns"] = flagged(summaries).tolist()
     return [
         {
@@ -202,18 +201,18 @@ def _fault_rows(summaries: Sequence[Summary]) -> list[Row]:
     ]
 
 
-def _runs_row(summaries: Sequence[Summary]) -> Row:
-    correlations = [abs(each["whiteness"]["largest"]) for each in summaries if each["whiteness"] is not None]
-    ratios = [each["nis"]["mean"] / each["nis"]["expected"] for each in summaries if each["nis"]["mean"] is not None]
+def _runs_row(summaries: Sequence[SimulationSummary]) -> Row:
+    correlations = [abs(each.whiteness.largest) for each in summaries if each.whiteness is not None]
+    ratios = [each.nis.mean / each.nis.expected for each in summaries if each.nis.mean and each.nis.expected]
     return {
         "runs [1]": len(summaries),
-        "samples a run [1]": summaries[0]["samples"],
+        "samples a run [1]": summaries[0].samples,
         "NIS / expected median [1]": _finite(np.median(ratios)) if ratios else None,
         "NIS / expected largest [1]": _finite(max(ratios, default=math.nan)),
         "correlation median [1]": _finite(np.median(correlations)) if correlations else None,
         "correlation largest [1]": _finite(max(correlations, default=math.nan)),
-        "simulated time [s]": sum(summary["simulated_time_s"] for summary in summaries),
-        "firmware": summaries[0]["firmware"]["version"],
+        "simulated time [s]": sum(summary.simulated_time_s for summary in summaries),
+        "firmware": summaries[0].firmware.version,
     }
 
 

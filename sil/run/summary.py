@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.can.fields import COUNTS
 from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
-from lever_cdkf.host_tools.results import nis, whiteness
-from lever_cdkf.host_tools.results.nis import Innovations, freedom
+from lever_cdkf.host_tools.results import nis, summary, whiteness
+from lever_cdkf.host_tools.results.nis import Innovations, Nis, freedom
+from lever_cdkf.host_tools.results.summary import Estimator, Firmware, Quality, SimulationSummary, TrueTransfer, Truth
 from lever_cdkf.host_tools.results.trace import Trace
+from lever_cdkf.host_tools.results.whiteness import Whiteness
 
 from ..scenarios.scenario import Scenario
 from .loop import Recording
@@ -30,21 +31,8 @@ WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mism
 """Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""
 
 
-@dataclass(frozen=True)
-class Quality:
-    """How one quantity was estimated; null where there is nothing to judge."""
-
-    rms_percent: float | None
-    bias_percent: float | None
-    coverage_2sigma: float | None
-    """Share of the samples (0 to 1) at which estimate +- 2 sigma holds the truth."""
-    time_to_10_percent_s: list[float | None]
-    """After the start and each jump, until the error stays within 10 % up to the next jump; null: it never does."""
-    time_to_5_percent_s: list[float | None]
-
-
-def build(recording: Recording, trace: Trace) -> dict[str, Any]:
-    """The content of summary.json, but for the wall times; None stands for what there is nothing to say of."""
+def build(recording: Recording, trace: Trace) -> SimulationSummary:
+    """The content of summary.json, but for the wall times."""
     scenario = recording.scenario
     quality = {quantity.key: _quality(quantity, scenario, trace) for quantity in scenario.judged()}
     count = len(recording.inputs.time)
@@ -55,62 +43,62 @@ def build(recording: Recording, trace: Trace) -> dict[str, Any]:
         {name: entry.rms_percent for name, entry in quality.items()},
         {name: entry.coverage_2sigma for name, entry in quality.items()},
     )
-    summary: dict[str, Any] = {
-        "scenario": {
-            "name": scenario.name,
-            "title": scenario.title,
-            "description": scenario.description,
-            "seed": scenario.seed,
-            "sample_period_s": scenario.period,
-            "converged_after_s": scenario.converged_after,
-            "changes_s": list(scenario.changes()),
-            "limits": dict(scenario.limits or {}),
-        },
-        "truth": _truth(recording),
-        "estimator": {**scenario.config.choices, "settings": scenario.config.settings},
-        "firmware": _firmware(recording),
-        "parameters": {name: asdict(entry) for name, entry in quality.items()},
-        "nis": _nis(scenario, trace),
-        "whiteness": _whiteness(scenario, trace),
-        "samples": count,
+    found = SimulationSummary(
+        estimator=Estimator(**scenario.config.choices, settings=dict(scenario.config.settings)),
+        samples=count,
         **{name: _last(trace[name]) for name in COUNTS},
-        "unanswered": recording.unanswered,
-        "misplaced": recording.misplaced,
-        "modes_s": modes,
-        "fault_shares": fault_shares,
-        "flagged_share": flagged_share,
-        "missed": missed,
-        "simulated_time_s": count * scenario.period,
-    }
-    summary["passed"] = not (missed or recording.unanswered or recording.misplaced or "fault" in modes)
-    summary["verdict"] = _verdict(summary, quality)
-    return summary
+        nis=_nis(scenario, trace),
+        whiteness=_whiteness(scenario, trace),
+        modes_s=modes,
+        passed=not (missed or recording.unanswered or recording.misplaced or "fault" in modes),
+        verdict="",
+        scenario=_scenario(scenario),
+        truth=_truth(recording),
+        firmware=_firmware(recording),
+        parameters=quality,
+        unanswered=recording.unanswered,
+        misplaced=recording.misplaced,
+        fault_shares=fault_shares,
+        flagged_share=flagged_share,
+        missed=missed,
+        simulated_time_s=count * scenario.period,
+    )
+    return replace(found, verdict=_verdict(found))
 
 
-def _truth(recording: Recording) -> dict[str, Any]:
-    """The pilot's model, and where that is not the estimator's, what it is, and theta/z_ddot of it: polynomials of s,
-    highest power first, from each of `time_s` on."""
+def _scenario(scenario: Scenario) -> summary.Scenario:
+    return summary.Scenario(
+        name=scenario.name,
+        title=scenario.title,
+        description=scenario.description,
+        seed=scenario.seed,
+        sample_period_s=scenario.period,
+        converged_after_s=scenario.converged_after,
+        changes_s=list(scenario.changes()),
+        limits=dict(scenario.limits or {}),
+    )
+
+
+def _truth(recording: Recording) -> Truth:
     scenario, inputs = recording.scenario, recording.inputs
     if scenario.pilot.model == scenario.config.choices["model"]:
-        return {"model": scenario.pilot.model}
+        return Truth(scenario.pilot.model)
     at = np.linspace(0, len(inputs.time) - 1, MOST_TRANSFERS).astype(np.intp)
     transfer = inputs.truth.transfer(at)
     rows = np.hstack((transfer.numerator, transfer.denominator))
     new = np.flatnonzero(np.append(True, np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
-    told = {"numerator": transfer.numerator[new].tolist(), "denominator": transfer.denominator[new].tolist()}
-    return {
-        "model": scenario.pilot.model,
-        "about": scenario.pilot.about,
-        "about_dynamics": scenario.pilot.about_dynamics,
-        "transfer": {"time_s": inputs.time[at[new]].tolist(), **told},
-    }
+    polynomials = TrueTransfer(
+        time_s=inputs.time[at[new]].tolist(),
+        numerator=transfer.numerator[new].tolist(),
+        denominator=transfer.denominator[new].tolist(),
+    )
+    return Truth(scenario.pilot.model, scenario.pilot.about, scenario.pilot.about_dynamics, polynomials)
 
 
-def _firmware(recording: Recording) -> dict[str, Any]:
-    """What the estimator said of itself; null where it did not."""
+def _firmware(recording: Recording) -> Firmware:
     identity = recording.identity
     same = None if identity.settings_crc is None else identity.settings_crc == recording.scenario.config.settings_crc
-    return {"version": identity.version, "contract": identity.contract, "settings_as_scenario": same}
+    return Firmware(identity.version, identity.contract, same)
 
 
 def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
@@ -152,12 +140,8 @@ def times_to(relative: FloatArray, time: FloatArray, changes: tuple[float, ...],
     return times
 
 
-def _nis(scenario: Scenario, trace: Trace) -> dict[str, Any]:
-    """Normalised innovation squared of the judged samples that had a measurement and an answer.
-
-    `inside_95_percent` is the share of samples below their chi-square's 95 % value: 0.95 for a consistent filter.
-    `mean_band_95` is where the mean would lie in 95 % of runs of a consistent filter.
-    """
+def _nis(scenario: Scenario, trace: Trace) -> Nis:
+    """Of the judged samples."""
     outputs = freedom(trace["theta_measured_rad"], trace["theta_dot_measured_rad_s"])
     judged = judged_samples(scenario, trace["time_s"])
     innovations = Innovations()
@@ -165,14 +149,13 @@ def _nis(scenario: Scenario, trace: Trace) -> dict[str, Any]:
     return innovations.figures()
 
 
-def _whiteness(scenario: Scenario, trace: Trace) -> dict[str, Any] | None:
-    """Of the judged samples; null where there are too few."""
+def _whiteness(scenario: Scenario, trace: Trace) -> Whiteness | None:
+    """Of the judged samples; None where there are too few."""
     residual = whiteness.residual(trace)
     if residual is None:
         return None
     judged = np.where(judged_samples(scenario, trace["time_s"]), residual, np.nan)
-    measured = whiteness.measure(judged, scenario.period)
-    return None if measured is None else asdict(measured)
+    return whiteness.measure(judged, scenario.period)
 
 
 def _last(column: FloatArray) -> int:
@@ -216,60 +199,56 @@ def missed_limits(
     return missed
 
 
-def add_wall_time(summary: dict[str, Any], seconds: float) -> None:
-    """Puts in how long the run took by the wall clock [s]; the only part of a summary that differs between runs."""
-    summary["wall_time_s"] = seconds
-    summary["wall_time_per_simulated_time"] = seconds / summary["simulated_time_s"]
-
-
-def _verdict(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
+def _verdict(found: SimulationSummary) -> str:
     """The run in a few sentences, for somebody who has not seen a Kalman filter before."""
     return " ".join(
         sentence
         for sentence in (
-            _verdict_run(summary),
-            _verdict_truth(summary),
-            _verdict_limits(summary, quality),
-            _verdict_sigma(quality),
-            nis.verdict(summary["nis"]),
-            whiteness.verdict(summary["whiteness"]),
+            _verdict_run(found),
+            _verdict_truth(found),
+            _verdict_limits(found),
+            _verdict_sigma(found.parameters),
+            nis.verdict(found.nis),
+            whiteness.verdict(found.whiteness),
         )
         if sentence
     )
 
 
-def _verdict_run(summary: dict[str, Any]) -> str:
+def _verdict_run(found: SimulationSummary) -> str:
     troubles = []
-    if summary["unanswered"]:
-        troubles.append(f"{summary['unanswered']} samples got no answer")
-    if summary["misplaced"]:
-        troubles.append(f"{summary['misplaced']} estimates came that belong to other samples")
-    if "fault" in summary["modes_s"]:
-        troubles.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
+    if found.unanswered:
+        troubles.append(f"{found.unanswered} samples got no answer")
+    if found.misplaced:
+        troubles.append(f"{found.misplaced} estimates came that belong to other samples")
+    if "fault" in found.modes_s:
+        troubles.append(f"the estimator was in fault for {found.modes_s['fault']:g} s")
     told = f"Trouble: {' and '.join(troubles)}." if troubles else ""
-    if summary["firmware"]["settings_as_scenario"] is False:
+    if found.firmware.settings_as_scenario is False:
         told = f"{told} The estimator has other settings than the scenario.".lstrip()
     return told
 
 
-def _verdict_truth(summary: dict[str, Any]) -> str:
-    if summary["truth"]["model"] == summary["estimator"]["model"]:
+def _verdict_truth(found: SimulationSummary) -> str:
+    if found.truth.model == found.estimator.model:
         return ""
     return (
-        f"The pilot ({summary['truth']['model']}) is not of the estimator's kind ({summary['estimator']['model']}): "
+        f"The pilot ({found.truth.model}) is not of the estimator's kind ({found.estimator.model}): "
         "only natural frequency and damping ratio can be held against the truth."
     )
 
 
-def _verdict_limits(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
+def _verdict_limits(found: SimulationSummary) -> str:
     errors = ", ".join(
-        f"{_words(name)} {entry.rms_percent:.1f} %" for name, entry in quality.items() if entry.rms_percent is not None
+        f"{_words(name)} {entry.rms_percent:.1f} %"
+        for name, entry in found.parameters.items()
+        if entry.rms_percent is not None
     )
     if not errors:
         return "Too short to judge: the run ends before the estimates were to have converged."
-    if summary["missed"]:
-        return f"Limits missed: {'; '.join(summary['missed'])}. Rms errors after convergence: {errors}."
-    kept = "All limits kept. " if summary["scenario"]["limits"] else ""
+    if found.missed:
+        return f"Limits missed: {'; '.join(found.missed)}. Rms errors after convergence: {errors}."
+    kept = "All limits kept. " if found.scenario.limits else ""
     return f"{kept}Rms errors after convergence: {errors}."
 
 

@@ -18,7 +18,7 @@ from lever_cdkf.sil.run.runner import simulate
 from lever_cdkf.sil.scenarios import scenario
 from quality import tools
 
-FOLDERS = ("firmware", "host_tools", "lever_cdkf", "sil", "tests")
+FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
 READMES = [tools.ROOT / "README.md", *(file for folder in FOLDERS for file in (tools.ROOT / folder).rglob("README.md"))]
 NOT_RUN = ("cmake", "ctest", "sudo")
 TIME_LIMIT = "120"

@@ -107,12 +107,12 @@ def whiteness(run: Run) -> Figure | None:
     told = run.whiteness
     if told is None:
         return None
-    lag = 1000.0 * told["average_s"] * np.arange(1, len(told["autocorrelation"]) + 1)
-    correlation = np.array(told["autocorrelation"])
+    lag = 1000.0 * told.average_s * np.arange(1, len(told.autocorrelation) + 1)
+    correlation = np.array(told.autocorrelation)
     end = float(lag[-1] + lag[0])
     limits = axis_range([np.append(correlation, (-0.25, 0.25))], slice(None))
     figure = Figure([axis("correlation [1]", range=limits)], axis("lag [ms]", range=[0.0, end]), 260, over_time=False)
-    edges = np.full(2, told["band_95"])
+    edges = np.full(2, told.band_95)
     figure.add(*band(np.array([0.0, end]), -edges, edges, "95 % of white noise", "chance-band"))
     bar: Spec = {
         "type": "bar",

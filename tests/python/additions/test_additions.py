@@ -157,7 +157,7 @@ class Copy:
     def __init__(self, root: Path, folder: Path) -> None:
         self.folder = folder
         package = folder / "lever_cdkf"
-        shutil.copytree(root / "lever_cdkf", package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(root / "api/lever_cdkf", package, ignore=shutil.ignore_patterns("__pycache__"))
         for name in ("host_tools", "sil"):
             shutil.copytree(root / name, package / name, ignore=shutil.ignore_patterns("__pycache__", "c"))
 

@@ -96,7 +96,7 @@ def test_every_model_of_the_truth_has_words(tmp_path: Path) -> None:
 def test_without_a_summary_the_model_is_that_of_the_columns(black_box: tuple[Result, Reader], tmp_path: Path) -> None:
     result, _ = black_box
     trace = {name: column for name, column in result.trace.items() if "_true" not in name}
-    write_report(trace, {}, tmp_path / "replay.html")
+    write_report(trace, None, tmp_path / "replay.html")
     page = read(tmp_path / "replay.html")
     assert len(curves(page, "figure-parameters", "estimate")) == 3
     assert "a21 minus stiffness" in "".join(page.text)

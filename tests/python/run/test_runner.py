@@ -151,8 +151,8 @@ def test_a_late_answer_is_not_taken_for_the_next_samples(short: Scenario) -> Non
     theta = result.trace["theta_estimate_rad"]
     assert math.isnan(theta[100])
     assert theta[101:] == pytest.approx(np.arange(101, 500) * 1e-3, abs=1.01e-4)
-    assert (result.summary["unanswered"], result.summary["misplaced"]) == (1, 1)
-    assert not result.summary["passed"]
+    assert (result.summary.unanswered, result.summary.misplaced) == (1, 1)
+    assert not result.summary.passed
 
 
 def test_estimates_that_are_one_sample_behind_are_told_and_none_is_taken(short: Scenario) -> None:
@@ -241,7 +241,7 @@ def test_a_firmware_in_another_thread_on_another_bus_gives_the_same_frames(lever
         there.shutdown()
         here.shutdown()
     inside = runner.simulate(short, lever_bus(short))
-    assert remote.summary["unanswered"] == 0
+    assert remote.summary.unanswered == 0
     assert b"".join(buslog.lines(remote.frames, "x")) == b"".join(buslog.lines(inside.frames, "x"))
 
 
@@ -275,7 +275,7 @@ def test_a_firmware_behind_a_serial_line_gives_the_same_frames(lever_bus: MakeBu
     thread.join()
     os.close(device)
     inside = runner.simulate(short, lever_bus(short))
-    assert remote.summary["unanswered"] == 0
+    assert remote.summary.unanswered == 0
     assert b"".join(buslog.lines(remote.frames, "x")) == b"".join(buslog.lines(inside.frames, "x"))
 
 
@@ -286,7 +286,7 @@ def test_runs_of_one_seed_on_one_firmware_are_equal(lever_bus: MakeBus) -> None:
     first, *others = (runner.simulate(wanted, bus) for _ in range(3))
     assert np.std(first.trace["dither_N_m"]) > 0.1
     for again in others:
-        assert again.summary["unanswered"] == again.summary["misplaced"] == 0
+        assert again.summary.unanswered == again.summary.misplaced == 0
         for name, column in first.trace.items():
             if name not in ("faults", "late"):  # COMMANDs that were out of sequence are told at the start
                 first_of = 50 if name == "dither_N_m" else 0  # that of the run before fades within 50 ms

@@ -9,24 +9,36 @@ from typing import Any
 
 import pytest
 from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.results.nis import Nis
+from lever_cdkf.host_tools.results.summary import Estimator, Firmware, Quality, Scenario, SimulationSummary, Truth
+from lever_cdkf.host_tools.results.whiteness import Whiteness
 from lever_cdkf.sil.run import seeds
 
 SHORT = ("duration=1 s", "converged_after=0.2 s")
 
 
-def summary(seed: int, rms: float | None, covered: float | None, times: list[float | None], **more: Any) -> Any:
+def summary(
+    seed: int,
+    rms: float | None,
+    covered: float | None,
+    times: list[float | None],
+    unanswered: int = 0,
+    modes_s: dict[str, float] | None = None,
+) -> SimulationSummary:
     """One of a made-up run with one quantity."""
-    entry = {"rms_percent": rms, "bias_percent": 0.0, "coverage_2sigma": covered, "time_to_5_percent_s": times}
-    return {
-        "scenario": {"title": "made", "seed": seed, "limits": {"m_p": 0.05, "coverage": 0.6}},
-        "parameters": {"m_p": entry},
-        "nis": {"mean": 2.0 + 0.1 * seed, "expected": 2.0},
-        "whiteness": {"largest": -0.1 * seed, "white": seed < 2},
-        "fault_shares": {"bound": 0.5} if seed == 2 else {},
-        "flagged_share": 0.5 if seed == 2 else 0.0,
-        "samples": 10, "simulated_time_s": 0.01, "firmware": {"version": "1.0.0"},
-        "unanswered": 0, "misplaced": 0, "modes_s": {}, **more,
-    }  # fmt: skip
+    return SimulationSummary(
+        scenario=Scenario("made", "made", "", seed, 1e-3, 0.0, [0.0], {"m_p": 0.05, "coverage": 0.6}),
+        estimator=Estimator("lever", "trim", "dual", "annealing", {}),
+        truth=Truth("lever"),
+        parameters={"m_p": Quality(rms, 0.0, covered, [], times)},
+        nis=Nis(mean=2.0 + 0.1 * seed, expected=2.0),
+        whiteness=Whiteness(0.02, [], 0.1, -0.1 * seed, 0.02, seed < 2),
+        fault_shares={"bound": 0.5} if seed == 2 else {},
+        flagged_share=0.5 if seed == 2 else 0.0,
+        samples=10, simulated_time_s=0.01, firmware=Firmware("1.0.0", None, None),
+        lost=0, corrupt=0, late=0, restarts=0, misplaced=0, missed=[],
+        passed=True, verdict="", unanswered=unanswered, modes_s=modes_s or {},
+    )  # fmt: skip
 
 
 RUNS = [summary(1, 1.0, 1.0, [2.0, 1.0]), summary(2, 9.0, 0.2, [3.0, None]), summary(3, 3.0, 0.9, [4.0, 0.5])]
@@ -81,14 +93,14 @@ def test_a_run_in_a_process_is_the_single_run(tmp_path: Path, capsys: pytest.Cap
     tasks = [seeds.Task("steady", seed, SHORT) for seed in (5, 6)]
     told: list[tuple[int, int, str]] = []
     apart = seeds.run(tasks, jobs=2, progress=lambda *progress: told.append(progress))
-    assert [each["scenario"]["seed"] for each in apart] == [5, 6]
+    assert [each.scenario.seed for each in apart] == [5, 6]
     assert told == [(1, 2, "steady, seed 5"), (2, 2, "steady, seed 6")]
-    assert apart[0]["parameters"] != apart[1]["parameters"]
+    assert apart[0].parameters != apart[1].parameters
     sets = (f"--set={override}" for override in (*SHORT, "limits={}"))
     assert cli.main(["sim", "steady", "--seed", "5", *sets, "--json", str(tmp_path / "single.json")]) == 0
     single = next(iter(json.loads((tmp_path / "single.json").read_text()).values()))
     errors = {row["quantity"]: row["rms error [%]"] for row in single}
-    assert errors == {key: entry["rms_percent"] for key, entry in apart[0]["parameters"].items()}
+    assert errors == {key: entry.rms_percent for key, entry in apart[0].parameters.items()}
     capsys.readouterr()
 
 

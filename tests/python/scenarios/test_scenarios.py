@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,15 +27,16 @@ def result(name: str) -> runner.Result:
 
 
 def rms(name: str) -> dict[str, float]:
-    return {key: entry["rms_percent"] for key, entry in result(name).summary["parameters"].items()}
+    parameters = result(name).summary.parameters
+    return {key: entry.rms_percent for key, entry in parameters.items() if entry.rms_percent is not None}
 
 
 @pytest.mark.parametrize("name", scenario.names())
 def test_a_scenario_keeps_its_limits(name: str) -> None:
-    summary: dict[str, Any] = result(name).summary
-    assert summary["passed"], summary["verdict"]
-    assert summary["unanswered"] == 0
-    assert (summary["corrupt"], summary["late"]) == (0, 0)
+    summary = result(name).summary
+    assert summary.passed, summary.verdict
+    assert summary.unanswered == 0
+    assert (summary.corrupt, summary.late) == (0, 0)
 
 
 @pytest.mark.parametrize("name", ["steady", "base_dither", "fixed_preload"])
@@ -55,8 +55,8 @@ def test_with_dither_a_changing_pilot_is_tracked_within_10_percent(name: str) ->
 
 def test_without_dither_the_frequency_is_known_and_the_scale_honestly_not() -> None:
     assert rms("base_only")["natural_frequency"] <= 3.0
-    parameters = result("base_only").summary["parameters"]
-    assert min(parameters[key]["coverage_2sigma"] for key in ("m_p", "c_p", "k_p")) >= 0.9
+    parameters = result("base_only").summary.parameters
+    assert min(parameters[key].coverage_2sigma or 0.0 for key in ("m_p", "c_p", "k_p")) >= 0.9
 
 
 def test_the_dither_makes_the_scale_more_certain() -> None:
@@ -83,27 +83,28 @@ def test_poor_excitation_is_reported_and_does_not_make_anyone_certain() -> None:
 
 def test_dropouts_are_counted_and_coasted_through() -> None:
     lost = result("sensor_dropout")
-    assert lost.summary["lost"] > 1000
-    coasting = lost.summary["modes_s"].get("coast", 0.0)
+    assert lost.summary.lost > 1000
+    coasting = lost.summary.modes_s.get("coast", 0.0)
     assert coasting > 0.0
-    assert "fault" not in lost.summary["modes_s"]
+    assert "fault" not in lost.summary.modes_s
 
 
 def test_the_filter_is_consistent_where_its_model_is_right() -> None:
     for name in ("steady", "base_dither", "fixed_preload"):
-        nis = result(name).summary["nis"]
-        assert nis["mean"] == pytest.approx(nis["expected"], rel=0.05)
-        assert nis["inside_95_percent"] == pytest.approx(0.95, abs=0.01)
+        nis = result(name).summary.nis
+        assert nis.mean == pytest.approx(nis.expected, rel=0.05)
+        assert nis.inside_95_percent == pytest.approx(0.95, abs=0.01)
 
 
 @pytest.mark.parametrize("name", sorted(set(scenario.names()) - BROKEN.keys() - {"sensor_dropout"}))  # base unknown
 def test_innovations_are_white_unless_the_pilot_is_of_another_kind(name: str) -> None:
     told = result(name).summary
-    same = told["truth"]["model"] == told["estimator"]["model"]
-    assert told["whiteness"]["white"] is same
-    assert (abs(told["whiteness"]["largest"]) < 0.15) is same
-    assert ("pass the test for whiteness" in told["verdict"]) is same
-    assert ("is not of the estimator's kind" not in told["verdict"]) is same
+    same = told.truth.model == told.estimator.model
+    assert told.whiteness is not None
+    assert told.whiteness.white is same
+    assert (abs(told.whiteness.largest) < 0.15) is same
+    assert ("pass the test for whiteness" in told.verdict) is same
+    assert ("is not of the estimator's kind" not in told.verdict) is same
 
 
 @pytest.mark.parametrize("name", ["two_dof", "mayo_ectomorphic", "mayo_mesomorphic"])
@@ -122,8 +123,10 @@ def test_of_another_kind_of_pilot_the_best_single_mode_is_found(name: str) -> No
     estimate = np.mean(found.trace["natural_frequency_estimate_Hz"][judged])
     assert estimate == pytest.approx(omega / (2.0 * np.pi), rel=0.03)
     assert np.mean(found.trace["damping_ratio_estimate"][judged]) == pytest.approx(-a22 / (2.0 * omega), rel=0.15)
-    assert found.summary["nis"]["mean"] == pytest.approx(found.summary["nis"]["expected"], rel=0.05)
-    assert found.summary["parameters"]["natural_frequency"]["coverage_2sigma"] < 0.5
+    assert found.summary.nis.mean == pytest.approx(found.summary.nis.expected, rel=0.05)
+    covered = found.summary.parameters["natural_frequency"].coverage_2sigma
+    assert covered is not None
+    assert covered < 0.5
 
 
 def test_what_breaks_the_assumptions_is_in_the_run() -> None:
@@ -152,6 +155,6 @@ def test_a_pilot_who_lets_go_has_no_parameters_until_he_is_back() -> None:
 
 
 def test_a_changed_grip_is_found_again_within_seconds() -> None:
-    for found in result("sudden_grip").summary["parameters"]["natural_frequency"]["time_to_10_percent_s"]:
+    for found in result("sudden_grip").summary.parameters["natural_frequency"].time_to_10_percent_s:
         assert found is not None
         assert found < 3.0

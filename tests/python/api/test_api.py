@@ -5,10 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import lever_cdkf
 import numpy as np
 import pytest
-
-import lever_cdkf
 
 PUBLIC = ["Config", "Estimator", "load_scenario", "run_samples", "simulate"]
 
@@ -48,5 +47,5 @@ def test_a_scenario_runs_without_a_bus() -> None:
 
     steady = load_scenario("steady", ["duration=0.5 s", "converged_after=0.1 s", "limits={}"])
     result = simulate(steady)
-    assert result.summary["samples"] == len(result.trace["time_s"]) == 500
-    assert result.summary["unanswered"] == 0
+    assert result.summary.samples == len(result.trace["time_s"]) == 500
+    assert result.summary.unanswered == 0
