@@ -15,7 +15,7 @@ from ..errors import LeverError
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
 
-_SAMPLES = ("LEVER_SAMPLE", "BASE_SAMPLE")
+_SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
 
 
 @dataclass(frozen=True)

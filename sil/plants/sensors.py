@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..toml_tables import SIGNAL, choice, item, quantity, read_kind, read_table, tables
 
-VALUES = ("theta", "theta_dot", "tau_m", "z_ddot")
+VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 FRAMES = ("lever_frame", "base_frame")
 
 
@@ -152,12 +152,13 @@ class Dropout:
 @dataclass(frozen=True)
 class Sensors:
     """All sensors; the defaults are the standard values: 1 mrad and 10 mrad/s of noise, a fair accelerometer and torque
-    sensor."""
+    sensor; no sensor of the grip force."""
 
     theta: Sensor = item(read_table(Sensor), "rad", Sensor(noise=1e-3))
     theta_dot: Sensor = item(read_table(Sensor), "rad/s", Sensor(noise=1e-2))
     z_ddot: Sensor = item(read_table(Sensor), "m/s^2", Sensor(noise=0.01))
     tau_m: Sensor = item(read_table(Sensor), "N m", Sensor(noise=2e-3))
+    grip_force: Sensor | None = item(read_table(Sensor), "N", None)
     dropout: tuple[Dropout, ...] = tables(read_table(Dropout))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 _NUMBERED = (
     "process", "theta", "theta_dot", "tau_m", "z_ddot", "m_p", "c_p", "k_p", "trim", "base", "torque", "dropout",
-    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t", "k_r", "c_r", "disturbance", "fault",
+    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t", "k_r", "c_r", "disturbance", "fault", "grip_force",
 )  # fmt: skip
 """Names whose stream is by their place here, as it was for all once: what a seed means stays. Closed."""
 

@@ -194,6 +194,10 @@ class Scenario:
         for key, excitations in (("torque", self.torque), ("disturbance", self.disturbance)):
             if excitations and not truth.takes_torque:
                 raise ScenarioError(f"{self.file}: {key}: no torque acts on a pilot of model {truth.model}; remove it")
+        if self.sensors.grip_force is not None and not truth.has_grip_force:
+            raise ScenarioError(
+                f"{self.file}: sensors.grip_force: not known of a pilot of model {truth.model}; remove it"
+            )
         judged = {quantity.key for quantity in self.judged()} | {"coverage"}
         for name in self.limits or ():
             if name not in judged:
