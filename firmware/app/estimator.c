@@ -168,8 +168,11 @@ static void average(estimator_t *estimator, float elapsed)
     }
     if (estimator->nis_size != 0u) {
         const float ratio = (estimator->nis_size == 2u) ? (0.5f * estimator->nis) : estimator->nis;
+        const float bounded = (ratio < INNOVATION_MOST) ? ratio : INNOVATION_MOST;
         monitor_add(&estimator->learning.monitor, ratio, elapsed);
-        averages->innovation += share * (((ratio < INNOVATION_MOST) ? ratio : INNOVATION_MOST) - averages->innovation);
+        if (estimator->trim.unsettled <= 0.0f) { /* innovations are those of the filter, not of the levels */
+            averages->innovation += share * (bounded - averages->innovation);
+        }
     }
 }
 

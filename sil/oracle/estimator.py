@@ -268,7 +268,8 @@ class Estimator:
 
     def _average_innovation(self, square: float, duration: float) -> None:
         share = min(duration / self.settings["excitation_time"], 1.0)
-        self.average_nis += share * (square - self.average_nis)
+        if self.unsettled - counted(duration) <= 0.0:
+            self.average_nis += share * (square - self.average_nis)
         self.surprise += min(duration / SURPRISE_TIME, 1.0) * (min(square, SURPRISE_MOST) - self.surprise)
 
     def _average_motion(self, duration: float) -> None:
