@@ -16,6 +16,8 @@ typedef struct hands {
     float impulse;  /* since then, without hands [N m s] */
     float change;   /* mean square of a block's change [rad^2/s^2] */
     float residual; /* mean square of what the lever alone does not explain of it, likewise */
+    float elapsed;  /* since the block began [s] */
+    bool dull;      /* there was not motion enough in all of it */
     bool off;       /* the verdict */
 } hands_t;
 
