@@ -177,7 +177,9 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     }
     cdkf_forget(cdkf, period, joint);
     cdkf_walk(cdkf, period, variance, joint);
-    if (taught || !lesson->excited) {
+    if (learning->changed > 0.0f) {
+        adaptation_start(&adaptation, cdkf); /* the jump is no drift */
+    } else if (taught || !lesson->excited) {
         adaptation_step(&adaptation, period, correction.w, lesson->excited, cdkf);
     } else {
         cdkf->growth = 0.0f; /* what cannot be learnt again is not forgotten */

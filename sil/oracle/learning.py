@@ -72,9 +72,7 @@ class Learning:
         self.ceiling = self.floor * settings["walk_ceiling"] ** 2
         self.greatest_sigma = scale.sigma
         self.bounds = scale.scaled(bounds)
-        self.walk = (self.ceiling if adaptation == "annealing" else self.floor).copy()  # q [1/s]
-        self.drift: Array = np.zeros(3)  # leaky sum of corrections
-        self.growth = self._growth(excited=True)  # [1/s]
+        self._start_walk()
         self.disturbance = 0.0  # process noise of θ̇ besides [rad/s/√s]
         self.trust = seconds(0.0)  # part of the information that counts [1], counted like time
         self.noise = NoiseEstimation(settings)
@@ -122,7 +120,9 @@ class Learning:
         self.belief.forget(self.growth * period)
         self.belief.walk(self.walk * period + self.floor * suddenly)
         self.belief.limit(self.greatest_sigma)
-        if taught or not lesson.excited:
+        if self.changed > 0.0:
+            self._start_walk()  # the jump is no drift
+        elif taught or not lesson.excited:
             self._adapt_walk(correction, period, lesson.excited)
         else:
             self.growth = 0.0  # what cannot be learnt again is not forgotten
@@ -178,6 +178,11 @@ class Learning:
         return Snapshot(self.belief.w.copy(), self.belief.w_factor.copy(), self.trust)
 
     # --- the walk ----------------------------------------------------------------------------------------------------
+
+    def _start_walk(self) -> None:
+        self.walk = (self.ceiling if self.adaptation == "annealing" else self.floor).copy()  # q [1/s]
+        self.drift: Array = np.zeros(3)  # leaky sum of corrections
+        self.growth = self._growth(excited=True)  # [1/s]
 
     def _growth(self, excited: bool) -> float:
         """Forgetting: the covariance grows by 1/λ = 1 + growth dt."""
