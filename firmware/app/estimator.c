@@ -215,6 +215,10 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     const learning_t *learning = &estimator->learning;
     const lesson_t lesson = update_filter(estimator, sample);
     const bool learnt = learning_step(&estimator->learning, &estimator->setup, &estimator->cdkf, &lesson, elapsed);
+    if (estimator->learning.moved) {
+        estimator->learning.moved = false;
+        alignment_begin_grip(estimator, sample);
+    }
     note(estimator, (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
     estimator->trim.unsettled -= elapsed;
     const bool restarted = restart_if_invalid(estimator, sample, learnt);

@@ -28,6 +28,9 @@ typedef struct learning {
     float elapsed;      /* since the parameters learnt last [s] */
     float wait;         /* time until anything is taught: what was before has to die away [s] */
     float changed;      /* time left to report a change [s] */
+    float grip;         /* time left until a new grip is complete; 0: none is under way [s] */
+    bool held_again;    /* it is the first after hands off */
+    bool moved;         /* it is complete, and has moved the lever: levels and state are to begin anew */
     bool bounded;       /* a parameter rested on a bound then */
 } learning_t;
 

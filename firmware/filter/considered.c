@@ -7,6 +7,7 @@
 #define N ((uint32_t)MODEL_STATES)
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define CONSIDERED ((uint32_t)CDKF_CONSIDERED)
+#define CALIBRATION ((uint32_t)CDKF_CALIBRATION)
 
 void considered_start_state(considered_t considered[CDKF_CONSIDERED])
 {
@@ -22,33 +23,45 @@ void considered_start_w(considered_t considered[CDKF_CONSIDERED])
     }
 }
 
-void considered_predict(considered_t considered[CDKF_CONSIDERED], const model_response_t *response, float period,
-    const float error[CDKF_CONSIDERED])
+static inline void predict_one(considered_t *considered, const model_response_t *response, float period, float change)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    float *x = considered->x;
+    response_move(response, period, &x[0], &x[1]);
+    x[0] += 0.5f * (period * change);
+    x[1] += change;
+}
+
+void considered_predict(considered_t considered[CDKF_CONSIDERED], uint32_t count, const model_response_t *response,
+    float period, const float error[CDKF_CONSIDERED])
+{
+    for (uint32_t c = 0u; c < CALIBRATION; c++) {
         const float input = (c <= (uint32_t)CDKF_BASE_DELAY) ? response->base : response->torque;
-        const float change = input * error[c];
-        float *x = considered[c].x;
-        response_move(response, period, &x[0], &x[1]);
-        x[0] += 0.5f * (period * change);
-        x[1] += change;
+        predict_one(&considered[c], response, period, input * error[c]);
+    }
+    if (count > CALIBRATION) {
+        predict_one(&considered[CDKF_STEP], response, period, period * error[CDKF_STEP]);
     }
 }
 
-void considered_correct(considered_t considered[CDKF_CONSIDERED], const gain_t gain[CDKF_OUTPUTS],
+static inline void correct_one(considered_t *of, const gain_t gain[CDKF_OUTPUTS],
     float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        considered_t *of = &considered[c];
-        const float first = gain_correct(&gain[0], of->x[0], &of->x[0], &of->x[1]);
-        const float second = gain_correct(&gain[1], of->x[1], &of->x[0], &of->x[1]);
-        if (learn) {
-            for (uint32_t i = 0u; i < L; i++) {
-                of->cross[i] += (row[0][i] * first) + (row[1][i] * second);
-            }
-            of->vector += (innovation[0].value * first) + (innovation[1].value * second);
-            of->information += (first * first) + (second * second);
+    const float first = gain_correct(&gain[0], of->x[0], &of->x[0], &of->x[1]);
+    const float second = gain_correct(&gain[1], of->x[1], &of->x[0], &of->x[1]);
+    if (learn) {
+        for (uint32_t i = 0u; i < L; i++) {
+            of->cross[i] += (row[0][i] * first) + (row[1][i] * second);
         }
+        of->vector += (innovation[0].value * first) + (innovation[1].value * second);
+        of->information += (first * first) + (second * second);
+    }
+}
+
+void considered_correct(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t gain[CDKF_OUTPUTS],
+    float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
+{
+    for (uint32_t c = 0u; c < count; c++) {
+        correct_one(&considered[c], gain, row, innovation, learn);
     }
 }
 
@@ -74,7 +87,7 @@ score_t considered_score(const considered_t *considered, const information_t *pe
 
 void considered_lift(cdkf_t *cdkf, considered_of_w_t of_w)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         considered_t *considered = &cdkf->considered[c];
         for (uint32_t i = 0u; i < L; i++) {
             of_w[c][i] = factor_dot_three(&cdkf->s[i * L], considered->w);
@@ -88,7 +101,7 @@ void considered_lift(cdkf_t *cdkf, considered_of_w_t of_w)
 void considered_lower(cdkf_t *cdkf, considered_of_w_t of_w)
 {
     const float *s = cdkf->s;
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         considered_t *considered = &cdkf->considered[c];
         float *w = considered->w; /* forward substitution */
         w[0] = of_w[c][0] / s[0];
@@ -100,9 +113,9 @@ void considered_lower(cdkf_t *cdkf, considered_of_w_t of_w)
     }
 }
 
-void considered_learn(considered_t considered[CDKF_CONSIDERED], float trust, const float *u)
+void considered_learn(considered_t considered[CDKF_CONSIDERED], uint32_t count, float trust, const float *u)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < count; c++) {
         considered_t *of = &considered[c];
         for (uint32_t i = 0u; i < L; i++) {
             of->w[i] -= trust * of->cross[i];
@@ -116,7 +129,7 @@ float considered_covariance(const cdkf_t *cdkf, uint32_t i, uint32_t j)
     const float *a = &cdkf->s[i * L];
     const float *b = &cdkf->s[j * L];
     float covariance = factor_dot_three(a, b);
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         const considered_t *considered = &cdkf->considered[c];
         const float sigma = cdkf->considered_sigma[c];
         const float of_a = factor_dot_three(a, considered->w) + ((i < L) ? 0.0f : considered->x[i - L]);

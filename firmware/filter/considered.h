@@ -34,12 +34,12 @@ static inline void response_move(const model_response_t *response, float period,
 void considered_start_state(considered_t considered[CDKF_CONSIDERED]);
 void considered_start_w(considered_t considered[CDKF_CONSIDERED]);
 
-/* Time update: the errors act through the inputs. */
-void considered_predict(considered_t considered[CDKF_CONSIDERED], const model_response_t *response, float period,
-    const float error[CDKF_CONSIDERED]);
+/* Time update: the first `count` errors act, through the inputs or as an acceleration. */
+void considered_predict(considered_t considered[CDKF_CONSIDERED], uint32_t count, const model_response_t *response,
+    float period, const float error[CDKF_CONSIDERED]);
 
 /* Measurement update, after that of the filter: gain, what each output saw of S_ww, innovation. */
-void considered_correct(considered_t considered[CDKF_CONSIDERED], const gain_t gain[CDKF_OUTPUTS],
+void considered_correct(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t gain[CDKF_OUTPUTS],
     float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn);
 
 void considered_drop_pending(considered_t considered[CDKF_CONSIDERED]);
@@ -48,7 +48,7 @@ void considered_drop_pending(considered_t considered[CDKF_CONSIDERED]);
 score_t considered_score(const considered_t *considered, const information_t *pending);
 
 /* The parameters learn: u is the reverse factor of I + information (math/factor.h). */
-void considered_learn(considered_t considered[CDKF_CONSIDERED], float trust, const float *u);
+void considered_learn(considered_t considered[CDKF_CONSIDERED], uint32_t count, float trust, const float *u);
 
 /* Before and after the columns of S change: S_ww w, which is kept in between, and S_xw w + x stay. */
 typedef float considered_of_w_t[CDKF_CONSIDERED][MODEL_PARAMETERS];
