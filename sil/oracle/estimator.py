@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import cdkf
-from .belief import Augmented, Belief, TwoStage
+from .belief import STEP, Augmented, Belief, TwoStage
 from .cdkf import Array
 from .detrend import Detrend
-from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
+from .learning import ADAPTATIONS, STEP_SIGMA, Learning, Lesson, counted, seconds
 from .lever import Lever
 from .linear import Hand, LinearBlackBox, LinearPhysical
 from .scale import Scale
@@ -97,8 +97,9 @@ class Estimator:
         self.belief: Belief = (
             Augmented(w_factor, x, x_factor) if whole else TwoStage(w_factor, x, x_factor, joint=estimator == "joint")
         )
-        self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, adapted=not whole)
-        self.considered_sigma = np.array([settings[f"{name}_sigma"] for name in CONSIDERED])
+        self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, not whole, self.detrended)
+        self.considered_sigma = np.array([*(settings[f"{name}_sigma"] for name in CONSIDERED), 0.0])
+        self.step_input, self.begin_rate = Detrend(), 0.0
         presumed = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], until measured
         self.excitation_square, self.motion_square = presumed, presumed
         self.nis = 0.0
@@ -157,6 +158,9 @@ class Estimator:
             self._average_innovation(self.nis / int(valid.sum()), duration)
             self.learning.add(innovation, valid, lesson)
         self.learning.step(duration, lesson)
+        self.considered_sigma[STEP] = self.learning.step_sigma
+        if self.learning.moved:
+            self._begin_grip(np.where(valid, y, self.belief.x))
         self.unsettled -= counted(duration)
 
     def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
@@ -201,7 +205,9 @@ class Estimator:
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
         slope = (base - last[0]) / dt
-        errors = np.array(((-base, slope, 0.0, 0.0), (0.0, 0.0, -last[1], -stop), (-self.velocity, base, 0.0, 0.0)))
+        errors = np.array(
+            ((-base, slope, 0.0, 0.0, 0.0), (0.0, 0.0, -last[1], -stop, 0.0), (-self.velocity, base, 0.0, 0.0, 0.0))
+        )
         self._predict((z_ddot, 0.5 * (u[1] + last[1]), z_dot), errors, dt)
         self.last_input = u
 
@@ -239,6 +245,23 @@ class Estimator:
             self.belief.start_state(y, np.diag(self.learning.noise.output_noise))
         self._wait_for_levels()
 
+    def _begin_grip(self, x: Array) -> None:
+        """Levels and state begin anew where the lever is, with a step of its acceleration."""
+        self.learning.moved = False
+        if not isinstance(self.belief, TwoStage):
+            return
+        for detrend, value in zip(self.outputs, self.origin + self.ahead + x, strict=True):
+            detrend.begin(float(value))
+        for detrend in self.inputs:
+            detrend.begin(detrend.level)
+        self.step_input.begin(0.0)
+        self.begin_rate = self.outputs[1].level
+        self.origin, self.ahead = np.array([detrend.level for detrend in self.outputs]), np.zeros(2)
+        self.belief.start_state(np.zeros(2), np.diag(self.learning.noise.output_noise))
+        self.belief.begin_step()
+        self.learning.step_sigma = STEP_SIGMA
+        self.last_input, self.velocity = (0.0, 0.0), 0.0
+
     def _wait_for_levels(self) -> None:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
@@ -254,10 +277,15 @@ class Estimator:
         def motion(x: Array, w: Array) -> Array:
             return moved_by(x, w, u)
 
+        step = 0.0
+        if self.learning.step_sigma > 0.0 and isinstance(self.belief, TwoStage):
+            step = self._deviation(self.step_input, 1.0, dt)
+            self.belief.shift(np.array((dt * step * self.begin_rate, 0.0)))
         x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
         with_errors = np.concatenate((np.zeros((3, 1)), errors), axis=1)  # none, then a unit of each
         moved = moved_by(x, w, tuple(np.array(u)[:, np.newaxis] + with_errors))
         push = moved[:, 1:] - moved[:, :1]
+        push[:, STEP] = step * dt * np.array((0.5 * dt, 1.0))
         self.belief.predict(motion, self._process_noise(dt), push)
 
     def _process_noise(self, dt: float) -> Array:
