@@ -170,7 +170,10 @@ def test_the_two_stage_joint_filter_is_the_augmented_one() -> None:
     two_stage, augmented = belief("joint"), belief("augmented")
     most = np.array([0.4, 0.6, 0.2])  # the last one is reached
     for index in range(300):
-        y, push = augmented.x + OUTPUT @ rng.standard_normal(2), 1e-3 * rng.standard_normal((2, 5))
+        y, push = (
+            augmented.x + OUTPUT @ rng.standard_normal(2),
+            np.pad(1e-3 * rng.standard_normal((2, 4)), ((0, 0), (0, 1))),
+        )
         valid = rng.random(2) > 0.2
         nis = []
         for one in (two_stage, augmented):
