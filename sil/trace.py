@@ -9,10 +9,9 @@ The columns of the parameters are those of the estimator's model; their truth is
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from io import BytesIO
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from lever_cdkf.host_tools import codec, fields
@@ -23,14 +22,12 @@ from .feedthrough import FEEDTHROUGH
 from .loop import Recording
 from .quantities import DYNAMICS, quantities
 
-if TYPE_CHECKING:
-    import polars
-
 FloatArray = NDArray[np.float64]
 Trace = dict[str, FloatArray]
 
 WHOLE = ("mode", "faults", "lost", "corrupt", "late", "restarts")
 """Columns of whole numbers."""
+_ROWS_AT_ONCE = 1 << 13  # that are made into text
 
 # column of the trace, its message and field
 MEASURED = (
@@ -134,30 +131,35 @@ class _Decoded:
 
 def write_csv(trace: Trace, path: Path) -> None:
     """trace.csv with six decimals; NaN stands as `NaN`, a whole number that is not known yet as nothing."""
-    _frame(trace).write_csv(path, float_precision=6)
+    with path.open("wb") as file:
+        file.write((",".join(trace) + "\n").encode("ascii"))
+        for first in range(0, len(trace["time_s"]), _ROWS_AT_ONCE):
+            rows = slice(first, first + _ROWS_AT_ONCE)
+            write_csv_rows({name: values[rows] for name, values in trace.items()}, file, [])
 
 
 def write_csv_rows(trace: Trace, file: BinaryIO, held: list[tuple[list[str], NDArray[np.bool_]]]) -> None:
-    """The same rows without the header, in half the time: `held` are neighbouring columns that change only at certain
-    rows; the text of them is made there and repeated."""
-    import polars
-
-    columns: dict[str, object] = dict(trace)
+    """The same rows without the header: `held` are neighbouring columns that change only at certain rows; the text of
+    them is made there and repeated, which takes half the time."""
+    repeated: dict[str, list[str]] = {}
     for names, changed in held:
         changed[0] = True
-        text = BytesIO()
-        _frame({name: trace[name][changed] for name in names}).write_csv(text, include_header=False, float_precision=6)
-        lines = polars.Series(text.getvalue().decode("ascii").splitlines())
-        columns[names[0]] = lines.gather(np.cumsum(changed) - 1)
-        for name in names[1:]:
-            del columns[name]
-    polars.DataFrame(columns).write_csv(file, include_header=False, float_precision=6, quote_style="never")
+        lines = _text({name: _values(name, trace[name][changed]) for name in names}).splitlines()
+        repeated |= dict.fromkeys(names, list[str]())
+        repeated[names[0]] = [lines[row] for row in (np.cumsum(changed) - 1).tolist()]
+    columns = {name: repeated[name] if name in repeated else _values(name, trace[name]) for name in trace}
+    file.write(_text({name: column for name, column in columns.items() if column}).encode("ascii"))
 
 
-def _frame(trace: Trace) -> polars.DataFrame:
-    import polars
+def _values(name: str, values: FloatArray) -> list[float] | list[str]:
+    """A column; whole numbers as text."""
+    if name not in WHOLE:
+        return values.tolist()
+    return ["" if value != value else str(int(value)) for value in values.tolist()]
 
-    columns = {name: polars.Series(values) for name, values in trace.items()}
-    for name in columns.keys() & set(WHOLE):
-        columns[name] = columns[name].fill_nan(None).cast(polars.Int64)
-    return polars.DataFrame(columns)
+
+def _text(columns: Mapping[str, list[float] | list[str]]) -> str:
+    """Lines of numbers and of text made before."""
+    fields = ("%s" if isinstance(column[0], str) else "%.6f" for column in columns.values())
+    line = ",".join(fields) + "\n"
+    return "".join(line % row for row in zip(*columns.values(), strict=True)).replace("nan", "NaN")
