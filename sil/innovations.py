@@ -6,11 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.statistics import NORMAL_95, chi_square_quantile
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-CHI_SQUARE_95 = {1: 3.841458820694124, 2: -2.0 * math.log(0.05)}
+CHI_SQUARE_95 = {freedom: chi_square_quantile(0.95, freedom) for freedom in (1, 2)}
 """Value that chi-square with so many degrees of freedom stays below with a probability of 95 %."""
 
 
@@ -41,7 +42,7 @@ class Innovations:
         if not self._count:
             return {"mean": None, "expected": None, "mean_band_95": None, "inside_95_percent": None}
         expected = self._freedom / self._count
-        spread = 1.96 * math.sqrt(2.0 * expected / self._count)
+        spread = NORMAL_95 * math.sqrt(2.0 * expected / self._count)
         return {
             "mean": self._nis / self._count,
             "expected": expected,

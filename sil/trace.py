@@ -145,7 +145,7 @@ def write_csv_rows(trace: Trace, file: BinaryIO, held: list[tuple[list[str], NDA
     for names, changed in held:
         changed[0] = True
         lines = _text({name: _values(name, trace[name][changed]) for name in names}).splitlines()
-        repeated |= dict.fromkeys(names, list[str]())
+        repeated |= {name: [] for name in names}
         repeated[names[0]] = [lines[row] for row in (np.cumsum(changed) - 1).tolist()]
     columns = {name: repeated[name] if name in repeated else _values(name, trace[name]) for name in trace}
     file.write(_text({name: column for name, column in columns.items() if column}).encode("ascii"))

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from ..excitation import autoregressive
 from ..transfer import BAND as BOUNCE_BAND
 from .plant import FloatArray, Hardware, Lanes, natural_frequency_and_damping
 
@@ -156,7 +156,7 @@ def _disturbance(motion: Motion, seeds: Sequence[int]) -> FloatArray:
     if motion.slow_torque:
         pole = math.exp(-PERIOD / 0.3)
         white = motion.slow_torque * math.sqrt(1.0 - pole**2) * columns("slow torque", seeds, count)
-        torque = torque + lfilter([1.0], [1.0, -pole], white, axis=0)
+        torque = torque + autoregressive(white, pole)
     if motion.tremor:
         torque = torque + band_limited(columns("tremor", seeds, count), (3.0, 5.0), motion.tremor)
     return torque

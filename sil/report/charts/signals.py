@@ -3,11 +3,12 @@
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.statistics import chi_square_band
 
 from ...quantities import DYNAMICS
 from ..figure import Figure, Spec, axis, axis_range, band, dots, frequency_axis, line, time_axis
 from ..run import Run
-from ..series import Array, chi_square_band, envelope, packed, spread_indices
+from ..series import Array, envelope, packed, spread_indices
 
 DEGREES = 180.0 / np.pi
 STATES = (("theta", "_rad", "angle θ [deg]"), ("theta_dot", "_rad_s", "rate θ̇ [deg/s]"))
@@ -91,7 +92,7 @@ def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
         averages.freedom[known],
         averages.total[known] / averages.freedom[known],
     )
-    low, high = chi_square_band(freedom)
+    low, high = np.array([chi_square_band(int(each)) for each in freedom]).T / freedom
     greatest = float(ratio.max())
     scale = {"type": "log"} if greatest > 10.0 else {"range": [0.0, max(2.0, 1.1 * greatest)]}
     figure = Figure([axis("NIS per output [1]", **scale)], time_axis(run.end), 280)
