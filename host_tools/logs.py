@@ -26,6 +26,7 @@ import numpy as np
 
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 from .errors import LeverError
+from .extras import require
 
 BLOCK = 1 << 22
 """Bytes of text that are read at once."""
@@ -211,11 +212,13 @@ def _one_line(error: Exception) -> str:
 
 
 def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
-    """How a file is read, by its name. Raises LogError."""
+    """How a file is read, by its name. Raises LogError, and LeverError where an extra is missing."""
     suffix = Path(path.removesuffix(_COMPRESSED)).suffix.lower()
     if path == "-" or suffix in _CANDUMP or not _is_file(path):
         return Recording._candump
     if suffix in _OTHERS:
+        if suffix == ".mf4":
+            require("mf4")
         return Recording._python_can
     known = ", ".join((*filter(None, _CANDUMP), *_OTHERS))
     raise LogError(f"{path}: {suffix} is no format of CAN logs that is known: {known}, each also with {_COMPRESSED}")

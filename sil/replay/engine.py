@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
+from lever_cdkf.host_tools.extras import missing
 from lever_cdkf.host_tools.files import write_text
 from lever_cdkf.host_tools.library import enum_names
 from lever_cdkf.host_tools.logs import Recording
@@ -56,7 +57,8 @@ def replay(
     logs: Iterable[str | Path], options: Options, out_dir: Path | None = None, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
-    trace.csv, signals.mf4, report.html and summary.json there, all or none. Raises LeverError."""
+    trace.csv, signals.mf4, report.html and summary.json there, all or none; signals.mf4 with the extra `mf4`,
+    report.html with `report`. Raises LeverError."""
     traffic = Traffic(Recording(logs), options.channel)
     with ExitStack() as stack:
         outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir))
@@ -158,7 +160,8 @@ class _Replay:
         if self._outputs is not None:
             self._sinks.append(self.kept)
             self._csv = TraceCsv(self._outputs.path("trace.csv"))
-            self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
+            if not missing("mf4"):
+                self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
         return Columns(self._timeline, self.model, with_recorded)
 
     # --- what comes of it ---------------------------------------------------------------------------------------------
@@ -216,7 +219,8 @@ class _Replay:
         for part in (self._bus_log, self._csv, self._mf4):
             if part is not None:
                 part.close()
-        write_page(RecordedRun(self.kept, summary), outputs.path("report.html"))
+        if not missing("report"):
+            write_page(RecordedRun(self.kept, summary), outputs.path("report.html"))
         text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
         write_text(outputs.path(SUMMARY), text + "\n")
         outputs.finish()

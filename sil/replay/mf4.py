@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools import codec
-from lever_cdkf.host_tools.later import allow
+from lever_cdkf.host_tools.extras import require
 from numpy.typing import NDArray
 
 from ..feedthrough import FEEDTHROUGH
@@ -58,7 +58,7 @@ class Mf4:
 
     def __init__(self, path: Path, model: str, start_us: int, with_recorded: bool) -> None:
         """`start_us`: absolute time of the first sample [us since 1970], as far as the recording knows it."""
-        allow()
+        require("mf4")
         from asammdf import MDF
 
         self._path = path

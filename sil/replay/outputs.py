@@ -58,11 +58,15 @@ class Outputs:
         return self._unfinished / name
 
     def finish(self) -> None:
-        """Puts the files into their place. Raises LeverError."""
+        """Puts the files into their place, and takes away those of an earlier replay that this one has not. Raises
+        LeverError."""
         with writing(self._folder):
             (self._folder / SUMMARY).unlink(missing_ok=True)
             for name in FILES:
-                os.replace(self.path(name), self._folder / name)
+                if self.path(name).exists():
+                    os.replace(self.path(name), self._folder / name)
+                else:
+                    (self._folder / name).unlink(missing_ok=True)
 
 
 class BusLog:

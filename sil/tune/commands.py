@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -83,6 +84,10 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    require("tune")
+    if args.page is not None:
+        require("report")
+
     from lever_cdkf.host_tools.progress import Progress
 
     from . import judgement
