@@ -153,9 +153,8 @@ def write_csv_rows(trace: Trace, file: BinaryIO, held: list[tuple[list[str], NDA
 
 def _values(name: str, values: FloatArray) -> list[float] | list[str]:
     """A column; whole numbers as text."""
-    if name not in WHOLE:
-        return values.tolist()
-    return ["" if value != value else str(int(value)) for value in values.tolist()]
+    numbers: list[float] = values.tolist()
+    return ["" if number != number else str(int(number)) for number in numbers] if name in WHOLE else numbers
 
 
 def _text(columns: Mapping[str, list[float] | list[str]]) -> str:

@@ -64,7 +64,7 @@ def test_the_wheel_works(installed: Path, tmp_path: Path) -> None:
     where = "import lever_cdkf.sil as sil, lever_cdkf.host_tools as tools; print(*sil.__path__, *tools.__path__)"
     paths = subprocess.run([python, "-c", where], capture_output=True, text=True, check=True, cwd=tmp_path).stdout
     assert paths.split() == [str(installed / "lever_cdkf" / name) for name in ("sil", "host_tools")]
-    lever = [python, "-m", "lever_cdkf.host_tools.cli"]
+    lever: list[str | Path] = [python, "-m", "lever_cdkf.host_tools.cli"]
     short = ("--set", "duration=3 s", "--set", "limits={}")
     tools.assert_silent([*lever, "sim", "steady", *short, "--out", "sim"], cwd=tmp_path)
     tools.assert_silent([*lever, "replay", "sim/bus.log", "-o", "replay"], cwd=tmp_path)
