@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -19,8 +20,10 @@ else:
 
 pytestmark = pytest.mark.usefixtures("installed")
 
-Lever = Callable[..., subprocess.CompletedProcess[str]]
-Without = Callable[[str], Lever]
+Python = Callable[..., subprocess.CompletedProcess[str]]
+Without = Callable[..., Python]
+
+LEVER = ("-m", "lever_cdkf.host_tools.cli")
 
 _BLOCKER = """
 import sys
@@ -36,20 +39,20 @@ sys.meta_path.insert(0, Blocker())
 
 @pytest.fixture
 def without(tmp_path: Path) -> Without:
-    """without(*extras): the command `lever` of an installation that has none of their packages."""
+    """without(*extras): Python in an installation that has none of their packages."""
 
-    def make(*extras: str) -> Lever:
+    def make(*extras: str) -> Python:
         packages = {package for extra in extras for package in PACKAGES[extra]}
         (tmp_path / "sitecustomize.py").write_text(_BLOCKER.format(packages=packages))
         environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
 
-        def lever(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-            command = [sys.executable, "-m", "lever_cdkf.host_tools.cli", *map(str, arguments)]
+        def python(*arguments: str) -> subprocess.CompletedProcess[str]:
+            command = [sys.executable, *arguments]
             return subprocess.run(
                 command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path, timeout=120
             )
 
-        return lever
+        return python
 
     return make
 
@@ -88,7 +91,7 @@ def packages(extras: dict[str, list[str]], extra: str) -> list[str]:
 )
 def test_a_missing_extra(without: Without, extra: str, arguments: str, tmp_path: Path) -> None:
     (tmp_path / "session.mf4").write_text("a log")
-    done = without(extra)(*arguments.split())
+    done = without(extra)(*LEVER, *arguments.split())
     assert (done.returncode, done.stdout) == (2, "")
     names = " and ".join(PACKAGES[extra])
     assert done.stderr == f'lever: error: this needs {names}: pip install "lever-cdkf[{extra}]"\n'
@@ -96,7 +99,7 @@ def test_a_missing_extra(without: Without, extra: str, arguments: str, tmp_path:
 
 def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path) -> None:
     """Files that need an extra are left out, and those of an earlier run do not stay."""
-    lever = without(*PACKAGES)
+    lever = partial(without(*PACKAGES), *LEVER)
     for command in (
         ["--help"],
         ["settings"],
@@ -123,3 +126,20 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
     assert (done.returncode, done.stderr) == (0, "")
     done = lever("record", "--interface", "lever", "--channel", "x", "--duration", "0.5", "-o", "record.log")
     assert done.returncode == 0, done.stderr
+
+
+def test_importing_python_can_loads_nothing_of_this_package(without: Without) -> None:
+    """The plug-in is known by name until a bus is opened; asammdf, which python-can itself loads, is an extra."""
+    code = "import sys, can; assert 'lever' in can.VALID_INTERFACES; print(*sys.modules)"
+    modules = {name.partition(".")[0] for name in without("mf4")("-c", code).stdout.split()}
+    assert "can" in modules
+    assert not modules & {"lever_cdkf", "numpy", "cffi", "cantools", "rich"}
+
+
+def test_commands_do_not_load_asammdf_for_nothing(without: Without) -> None:
+    code = (
+        "import sys; from lever_cdkf.host_tools import cli\n"
+        "cli.main(['sim', 'steady', '--set', 'duration=1 s', '--set', 'limits={}'])\n"
+        "print('can' in sys.modules, 'asammdf' in sys.modules)"
+    )
+    assert without()("-c", code).stdout.splitlines()[-1] == "True False"
