@@ -1,4 +1,4 @@
-"""Whole recordings at once, through the C of c/bulk.h: candump's text, and frames through an estimator.
+"""Whole recordings at once, through the C of c/bulk.h: candump's text, frames through an estimator, tables as text.
 
 Frames are numpy arrays of dtype FRAME, rows (a sample and all that belongs to it) of dtype ROW; the fields are those of
 bulk_frame_t and bulk_row_t in c/bulk.h, which says what they mean.
@@ -6,7 +6,7 @@ bulk_frame_t and bulk_row_t in c/bulk.h, which says what they mean.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,6 +93,16 @@ def format_lines(frames: Frames, bus: str) -> NDArray[np.uint8]:
     text = np.empty(len(frames) * _LONGEST_WRITTEN, np.uint8)
     source = ffi.from_buffer("bulk_frame_t[]", np.ascontiguousarray(frames))
     size = _lib.bulk_format(source, len(frames), bus.encode(), ffi.from_buffer("char[]", text))
+    return text[:size]
+
+
+def format_table(columns: Mapping[str, NDArray[np.float64]], whole: Collection[str]) -> NDArray[np.uint8]:
+    """Rows of numbers as lines of CSV, to be written as bytes: six decimals; in columns that are `whole` none, and
+    nothing for NaN."""
+    numbers = np.stack(list(columns.values()), axis=1, dtype=np.float64)
+    text = np.empty(numbers.size * int(_lib.BULK_NUMBER), np.uint8)
+    source, target = ffi.from_buffer("double[]", numbers), ffi.from_buffer("char[]", text)
+    size = _lib.bulk_format_table(source, *numbers.shape, bytes(name in whole for name in columns), target)
     return text[:size]
 
 

@@ -9,12 +9,12 @@ The columns of the parameters are those of the estimator's model; their truth is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from lever_cdkf.host_tools import codec, fields
+from lever_cdkf.host_tools import bulk, codec, fields
 from numpy.typing import NDArray
 
 from .buslog import Frames
@@ -132,33 +132,17 @@ class _Decoded:
 def write_csv(trace: Trace, path: Path) -> None:
     """trace.csv with six decimals; NaN stands as `NaN`, a whole number that is not known yet as nothing."""
     with path.open("wb") as file:
-        file.write((",".join(trace) + "\n").encode("ascii"))
-        for first in range(0, len(trace["time_s"]), _ROWS_AT_ONCE):
-            rows = slice(first, first + _ROWS_AT_ONCE)
-            write_csv_rows({name: values[rows] for name, values in trace.items()}, file, [])
+        write_csv_header(trace, file)
+        write_csv_rows(trace, file)
 
 
-def write_csv_rows(trace: Trace, file: BinaryIO, held: list[tuple[list[str], NDArray[np.bool_]]]) -> None:
-    """The same rows without the header: `held` are neighbouring columns that change only at certain rows; the text of
-    them is made there and repeated, which takes half the time."""
-    repeated: dict[str, list[str]] = {}
-    for names, changed in held:
-        changed[0] = True
-        lines = _text({name: _values(name, trace[name][changed]) for name in names}).splitlines()
-        repeated |= {name: [] for name in names}
-        repeated[names[0]] = [lines[row] for row in (np.cumsum(changed) - 1).tolist()]
-    columns = {name: repeated[name] if name in repeated else _values(name, trace[name]) for name in trace}
-    file.write(_text({name: column for name, column in columns.items() if column}).encode("ascii"))
+def write_csv_header(trace: Trace, file: BinaryIO) -> None:
+    """The names of the columns."""
+    file.write((",".join(trace) + "\n").encode("ascii"))
 
 
-def _values(name: str, values: FloatArray) -> list[float] | list[str]:
-    """A column; whole numbers as text."""
-    numbers: list[float] = values.tolist()
-    return ["" if number != number else str(int(number)) for number in numbers] if name in WHOLE else numbers
-
-
-def _text(columns: Mapping[str, list[float] | list[str]]) -> str:
-    """Lines of numbers and of text made before."""
-    fields = ("%s" if isinstance(column[0], str) else "%.6f" for column in columns.values())
-    line = ",".join(fields) + "\n"
-    return "".join(line % row for row in zip(*columns.values(), strict=True)).replace("nan", "NaN")
+def write_csv_rows(trace: Trace, file: BinaryIO) -> None:
+    """A line for each sample."""
+    for first in range(0, len(trace["time_s"]), _ROWS_AT_ONCE):
+        part = {name: values[first : first + _ROWS_AT_ONCE] for name, values in trace.items()}
+        file.write(bulk.format_table(part, WHOLE).data)

@@ -136,8 +136,6 @@ class _Replay:
         trace = self._columns.of(rows)
         for sink in self._sinks:
             sink.add(trace)
-        if self._csv is not None:
-            self._csv.add(trace, self._columns.held(rows))
         if self._mf4 is not None:
             published = (rows["fresh"] >> SLOTS["PILOT_PARAMETERS"]) & 1 != 0
             recorded = (rows["fresh"] >> RECORDED["PILOT_PARAMETERS"]) & 1 != 0
@@ -160,6 +158,7 @@ class _Replay:
         if self._outputs is not None:
             self._sinks.append(self.kept)
             self._csv = TraceCsv(self._outputs.path("trace.csv"))
+            self._sinks.append(self._csv)
             if not missing("mf4"):
                 self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
         return Columns(self._timeline, self.model, with_recorded)

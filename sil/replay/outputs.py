@@ -9,17 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-import numpy as np
 from lever_cdkf.host_tools import bulk
 from lever_cdkf.host_tools.bulk import Frames
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import make_folder
-from numpy.typing import NDArray
 
-from ..trace import Trace, write_csv_rows
-
-Held = list[tuple[list[str], NDArray[np.bool_]]]
-"""Neighbouring columns of a trace, and the rows at which any of them may change."""
+from ..trace import Trace, write_csv_header, write_csv_rows
 
 SUMMARY = "summary.json"
 """The last file to be in its place: where it is, the others are of the same replay."""
@@ -95,12 +90,12 @@ class TraceCsv:
         with writing(path):
             self._file = path.open("wb")
 
-    def add(self, trace: Trace, held: Held) -> None:
+    def add(self, trace: Trace) -> None:
         """Further rows."""
         with writing(self._path):
             if not self._started:
-                self._file.write((",".join(trace) + "\n").encode("ascii"))
-            write_csv_rows(trace, self._file, held)
+                write_csv_header(trace, self._file)
+            write_csv_rows(trace, self._file)
         self._started = True
 
     def close(self) -> None:
