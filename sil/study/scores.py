@@ -11,10 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.statistics import chi_square_band
 from scipy.stats import bootstrap
 
-from ..oracle.cdkf import Array
 from .data import Batch, Estimates
 
 # --- errors ----------------------------------------------------------------------------------------------------------

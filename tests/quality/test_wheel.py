@@ -11,7 +11,11 @@ from pathlib import Path
 import pytest
 from quality import tools
 
-PACKAGES = ("host_tools", "sil")
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations")
 _SDIST = "import sys; from scikit_build_core.build import build_sdist; build_sdist(sys.argv[1])"
 
@@ -40,18 +44,18 @@ def test_the_source_distribution_has_what_builds_the_package(sdist: Path) -> Non
     assert not {name.parts[0] for name in names} & {"tests", "build", ".ci"}
 
 
+def files_of(folder: Path) -> set[Path]:
+    return {file.relative_to(folder) for file in folder.rglob("*") if file.is_file() and file.suffix != ".pyc"}
+
+
 def test_the_wheel_has_every_file_of_the_tree_and_the_libraries(installed: Path) -> None:
-    package = installed / "lever_cdkf"
-    files = {file.relative_to(package) for file in package.rglob("*") if file.is_file() and file.suffix != ".pyc"}
-    native = {file.name for file in files if file.parent == Path("host_tools/_native")}
+    files = {each for each in files_of(installed) if each.parts[0] == "lever_cdkf"}
+    native = {file.name for file in files if file.parent == Path("lever_cdkf/host_tools/_native")}
     libraries = {name for name in NATIVE if any(name in file for file in native)}
     assert libraries == set(NATIVE), native
-    tree = {
-        file.relative_to(tools.ROOT)
-        for folder in PACKAGES
-        for file in (tools.ROOT / folder).rglob("*")
-        if file.is_file() and file.suffix != ".pyc"
-    }
+    settings = tomllib.loads((tools.ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["scikit-build"]
+    packages = settings["wheel"]["packages"].items()
+    tree = {Path(package) / file for package, folder in packages for file in files_of(tools.ROOT / folder)}
     assert {file for file in files if file.name not in native} == tree
 
 

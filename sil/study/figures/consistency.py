@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.statistics import chi_square_band
 
-from ...oracle.cdkf import Array
 from ..data import PARAMETERS
 from ..firmware import Firmware
 from ..matched import Condition, matched
