@@ -7,7 +7,6 @@ from importlib.resources import files
 from string import Template
 
 from ..extras import require
-
 from .figure import Spec
 
 
