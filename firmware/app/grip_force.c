@@ -55,7 +55,7 @@ static void look(const grip_force_t *grip, const setup_t *setup, const model_ste
     const model_constants_t *constants = &setup->constants;
     const float torque = step->period / constants->inertia;
     const float base = -(constants->length * constants->mass_moment) * step->trim_cosine;
-    seen->change = alone + (torque * (constants->length * force));
+    seen->change = (alone + (step->period * (constants->length * force))) / constants->inertia;
     seen->noise = (torque * constants->length) * noise_of(grip, setup->settings, step->period);
     seen->torque = torque;
     seen->own[0] = torque * constants->stiffness;

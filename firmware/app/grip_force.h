@@ -35,7 +35,7 @@ typedef struct grip_force {
 void grip_force_start(grip_force_t *grip);
 
 /* The force of a sample, `period` seconds after the last one; NULL: missing. Returns true when the force over the step
- * is known, and then fills in what the filter takes, but for `learn`. `alone`: the change of theta_dot without hands
+ * is known, and then fills in what the filter takes, but for `learn`. `alone`: the impulse without hands
  * (hands_predict); `error` as for cdkf_time_update(). */
 bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
     const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen);

@@ -25,7 +25,7 @@ float hands_predict(
     const float impulse = drive - (step->period * own);
     hands->drive += drive;
     hands->impulse += impulse;
-    return impulse / constants->inertia;
+    return impulse;
 }
 
 void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts)

@@ -29,7 +29,7 @@ typedef struct hands {
 void hands_start(hands_t *hands);
 
 /* A step of the model, from the state x = [theta, theta_dot] on (deviations from the trim in preload trim). Returns the
- * change of theta_dot without hands [rad/s]. */
+ * impulse without hands [N m s]. */
 float hands_predict(
     hands_t *hands, const model_constants_t *constants, const model_step_t *step, const float x[MODEL_STATES]);
 

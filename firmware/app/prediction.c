@@ -43,7 +43,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
     const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
     float error[CDKF_CONSIDERED];
-    cdkf_grip_t grip = {.learn = estimator_may_learn(estimator)};
+    cdkf_grip_t grip;
     trim_set_origin(trim);
     model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
@@ -69,6 +69,9 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     }
     const bool gripped =
         grip_force_step(&learning->force, setup, trim, unknown ? NULL : force, &step, alone, error, &grip);
+    if (gripped) {
+        grip.learn = estimator_may_learn(estimator);
+    }
     cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error, gripped ? &grip : NULL);
     estimator->z_ddot = next_z_ddot;
     estimator->tau_m = next_tau_m;

@@ -48,33 +48,17 @@ static void predict_mean_and_parameter_columns(cdkf_t *cdkf, const model_respons
     cdkf->x[1] += mean;
 }
 
-/* S_xx: its own columns; the walk q of theta_dot, integrated by theta, q^2 [T^3/3, T^2/2; T^2/2, T] (van Loan 1978);
- * second differences along the parameters, in the same direction [T/2; 1]; and a walk of theta itself. Conditioned on
- * what the grip force has seen, if it has. */
-static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period, grip_seen_t *seen)
+/* S_xx: its own columns; process noise, and second differences along the parameters in the direction [T/2; 1] of its
+ * first column; what theta has beside it. */
+static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period)
 {
-    const float walk = cdkf->process_noise[1] + cdkf->disturbance;
-    const float variance = walk * walk * period;
-    const float own = cdkf->process_noise[0] * cdkf->process_noise[0] * period;
-    float square = 0.0f;
-    for (uint32_t j = 0u; j < L; j++) {
-        square += response->second_difference[j] * response->second_difference[j];
-    }
-    const float second = (SIGMA_SECOND * SIGMA_SECOND) * square;
-    const float angle = sqrtf((variance * (period * period * 0.0833333333f)) + own);
-    const float rate = sqrtf(seen->taken ? variance : (variance + second));
-    float theta[GRIP_COLUMNS + 1] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, angle, 0.0f, 0.0f};
-    float theta_dot[GRIP_COLUMNS + 1] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f, 0.0f, 0.0f};
+    const step_noise_t noise = step_noise(cdkf, response, period);
+    const float rate = sqrtf(noise.variance + noise.second);
+    float theta[4] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, noise.angle};
+    float theta_dot[4] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);
-    if (seen->taken) {
-        theta_dot[4] = sqrtf(second);
-        theta[4] = 0.5f * period * theta_dot[4];
-        grip_condition(seen, theta, theta_dot);
-        factor_tria_two(theta, theta_dot, (uint32_t)GRIP_COLUMNS + 1u, cdkf->s_xx);
-    } else {
-        factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
-    }
+    factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
 }
 
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
@@ -82,7 +66,8 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
 {
     model_points_t points;
     model_response_t response;
-    grip_seen_t seen = {.taken = (grip != NULL)};
+    grip_seen_t seen;
+    bool taken = false;
     points.coefficients = cdkf->points;
     points.x[0] = cdkf->x[0];
     points.x[1] = cdkf->x[1];
@@ -95,10 +80,14 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
         grip_see(cdkf, &response, error, grip, step->period, &seen);
     }
     predict_mean_and_parameter_columns(cdkf, &response, step->period);
-    predict_state_columns(cdkf, &response, step->period, &seen);
+    if (grip != NULL) {
+        taken = grip_predict_state_columns(cdkf, &response, step->period, &seen);
+    } else {
+        predict_state_columns(cdkf, &response, step->period);
+    }
     considered_predict(cdkf->considered, cdkf->acting, &response, step->period, error);
     response_move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
-    if (seen.taken) {
+    if (taken) {
         grip_take(cdkf, grip, &seen);
     }
 }

@@ -23,15 +23,22 @@ void considered_start_w(considered_t considered[CDKF_CONSIDERED])
     }
 }
 
+static inline void predict_one(considered_t *considered, const model_response_t *response, float period, float change)
+{
+    float *x = considered->x;
+    response_move(response, period, &x[0], &x[1]);
+    x[0] += 0.5f * (period * change);
+    x[1] += change;
+}
+
 void considered_predict(considered_t considered[CDKF_CONSIDERED], uint32_t count, const model_response_t *response,
     float period, const float error[CDKF_CONSIDERED])
 {
-    for (uint32_t c = 0u; c < count; c++) {
-        const float change = considered_input(response, period, c) * error[c];
-        float *x = considered[c].x;
-        response_move(response, period, &x[0], &x[1]);
-        x[0] += 0.5f * (period * change);
-        x[1] += change;
+    for (uint32_t c = 0u; c < CALIBRATION; c++) {
+        predict_one(&considered[c], response, period, considered_input(response, period, c) * error[c]);
+    }
+    if (count > CALIBRATION) {
+        predict_one(&considered[CDKF_STEP], response, period, period * error[CDKF_STEP]);
     }
 }
 

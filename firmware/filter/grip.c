@@ -1,9 +1,8 @@
 #include "filter/grip.h"
 
-#include "math/factor.h"
-
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define SPIKE 8.0f /* standard deviations */
+#define COLUMNS 5u /* of S-_xx: its own, the walk of theta_dot, second differences, theta beside it */
 
 void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float error[CDKF_CONSIDERED],
     const cdkf_grip_t *grip, float period, grip_seen_t *seen)
@@ -31,32 +30,45 @@ void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float 
     seen->noise = grip->noise;
 }
 
-void grip_condition(grip_seen_t *seen, float theta[GRIP_COLUMNS + 1], float theta_dot[GRIP_COLUMNS + 1])
+/* Gain of the force on COLUMNS columns of the state, of which it sees `column`; false when the force is too far off. */
+static bool weigh(grip_seen_t *seen, const float *theta, const float *theta_dot, const float column[COLUMNS])
 {
-    const float column[GRIP_COLUMNS] = {
-        seen->column[0], seen->column[1], seen->walk * theta_dot[2], 0.0f, theta_dot[4]};
-    const float noise = seen->noise;
-    float variance = noise * noise;
+    float variance = seen->noise * seen->noise;
     float k[MODEL_STATES] = {0.0f, 0.0f};
-    for (uint32_t j = 0u; j < (uint32_t)GRIP_COLUMNS; j++) {
+    for (uint32_t j = 0u; j < COLUMNS; j++) {
         variance += column[j] * column[j];
         k[0] += theta[j] * column[j];
         k[1] += theta_dot[j] * column[j];
     }
+    const float inverse = 1.0f / sqrtf(variance);
+    seen->gain.inverse = inverse;
+    seen->gain.k[0] = k[0] * (inverse * inverse);
+    seen->gain.k[1] = k[1] * (inverse * inverse);
     const float spread = variance + factor_dot_three(seen->row, seen->row);
-    seen->taken = ((seen->innovation * seen->innovation) < ((SPIKE * SPIKE) * spread));
-    if (seen->taken) {
-        const float inverse = 1.0f / sqrtf(variance);
-        seen->gain.inverse = inverse;
-        seen->gain.k[0] = k[0] * (inverse * inverse);
-        seen->gain.k[1] = k[1] * (inverse * inverse);
-        for (uint32_t j = 0u; j < (uint32_t)GRIP_COLUMNS; j++) {
+    return (seen->innovation * seen->innovation) < ((SPIKE * SPIKE) * spread);
+}
+
+bool grip_predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period, grip_seen_t *seen)
+{
+    const step_noise_t noise = step_noise(cdkf, response, period);
+    const float rate = sqrtf(noise.variance);
+    const float second = sqrtf(noise.second);
+    const float column[COLUMNS] = {seen->column[0], seen->column[1], seen->walk * rate, second, 0.0f};
+    float theta[COLUMNS + 1u] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, noise.angle, 0.0f};
+    float theta_dot[COLUMNS + 1u] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, second, 0.0f, 0.0f};
+    response_move(response, period, &theta[0], &theta_dot[0]);
+    response_move(response, period, &theta[1], &theta_dot[1]);
+    const bool taken = weigh(seen, theta, theta_dot, column);
+    if (taken) {
+        for (uint32_t j = 0u; j < COLUMNS; j++) {
             theta[j] -= seen->gain.k[0] * column[j];
             theta_dot[j] -= seen->gain.k[1] * column[j];
         }
-        theta[GRIP_COLUMNS] = seen->gain.k[0] * noise;
-        theta_dot[GRIP_COLUMNS] = seen->gain.k[1] * noise;
+        theta[COLUMNS] = seen->gain.k[0] * seen->noise;
+        theta_dot[COLUMNS] = seen->gain.k[1] * seen->noise;
     }
+    factor_tria_two(theta, theta_dot, COLUMNS + 1u, cdkf->s_xx);
+    return taken;
 }
 
 void grip_take(cdkf_t *cdkf, const cdkf_grip_t *grip, const grip_seen_t *seen)

@@ -264,4 +264,5 @@ class Plant:
         own = lever.own_inertia * (self.theta_dot - begin_dot) / period
         own += resistance(lever, (self.theta - begin) / period)[0] + lever.lever_stiffness * (middle - lever_angle)
         own += own_moment * (acceleration / len(drive) + self._weight) * math.cos(middle)
-        return (own - motor - (kick + push) / period) / lever.lever_length
+        force: float = (own - motor - (kick + push) / period) / lever.lever_length
+        return force

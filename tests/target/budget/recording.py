@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.firmware.library import struct_dtype
 from lever_cdkf.sil.run import loop
 from lever_cdkf.sil.scenarios.scenario import Scenario, load
 from numpy.typing import NDArray
@@ -22,11 +23,8 @@ SCENARIOS = Path(__file__).with_name("scenarios")
 MODELS = ("lever", "linear_physical", "linear_black_box")
 """The recordings there are, in the order of the façade's enum."""
 
-SAMPLE = np.dtype(
-    [("time_us", "<u4"), *((name, "<f4") for name in ("theta", "theta_dot", "tau_m", "z_ddot"))]
-    + [(f"{name}_valid", "?") for name in ("theta", "theta_dot", "tau_m", "z_ddot")]
-)
-"""lever_sample_t on a 32-bit machine."""
+SAMPLE = struct_dtype("lever_sample_t")
+"""It has no pointers, so it is the same on a 32-bit machine."""
 FRAME = np.dtype([("identifier", "<u2"), ("data", "u1", 8)])
 
 
