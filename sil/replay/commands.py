@@ -39,7 +39,8 @@ examples:
   lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
   candump -L can0 | lever replay - -o out/live
 
-Exit status: 0 when the log was replayed; 1 when the estimator was in fault, with one line on standard error.
+Exit status: 0 when the log was replayed; 1 when the estimator was in fault or published no estimate, with one line on
+standard error.
 """
 
 
@@ -71,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
     from .engine import replay
     from .outputs import FILES
+    from .summary import failure
 
     options = _options(args)
     with Progress("replay") as progress:
@@ -80,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         print(f"Written to {args.out}: {', '.join(FILES)}")
     if not summary["passed"]:
-        print("lever: replay: the estimator was in fault", file=sys.stderr)
+        print(f"lever: replay: {failure(summary)}", file=sys.stderr)
     return 0 if summary["passed"] else 1
 
 
@@ -139,6 +141,7 @@ def _recording_row(summary: dict[str, Any]) -> Row:
         "duration [s]": recording["duration_s"],
         "frames": recording["frames"],
         "frames left out": left_out or "none",
+        "refused": recording["refused"],
         "samples": summary["samples"],
         **{count: summary[count] for count in ("lost", "corrupt", "late", "restarts")},
         "repeated frames": recording["repeated"],

@@ -27,7 +27,7 @@ from .mf4 import Mf4
 from .outputs import SUMMARY, BusLog, Outputs, TraceCsv
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
-from .summary import Figures, verdict
+from .summary import Figures, failure, verdict
 from .timeline import Timeline
 
 Progress = Callable[[int, int], None]
@@ -167,14 +167,19 @@ class _Replay:
         """The content of summary.json."""
         compared = None if self._comparison is None else self._comparison.summary()
         choices = self._commands.choices | {"model": self.model}
+        health = self._feeder.estimator.health()
         summary: dict[str, Any] = {
             "recording": self._recording(),
             "estimator": {**choices, "settings": self._options.config.settings},
             "samples": self._timeline.clocks.samples,
             **self.figures.summary(),
+            "lost": health.lost,
+            "corrupt": health.corrupt,
+            "late": health.late,
+            "restarts": health.recoveries,
             "comparison": compared,
         }
-        summary["passed"] = "fault" not in summary["modes_s"]
+        summary["passed"] = not failure(summary)
         summary["verdict"] = verdict(summary)
         return summary
 

@@ -11,7 +11,7 @@ from lever_cdkf.host_tools import codec, logs
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.estimator import Health
 from lever_cdkf.host_tools.innovations import FRAME, Array, samples_of
-from lever_cdkf.host_tools.traffic import Traffic
+from lever_cdkf.host_tools.traffic import Traffic, why_refused
 
 _SAMPLES = ("LEVER_SAMPLE", "BASE_SAMPLE")
 
@@ -90,7 +90,8 @@ def _recording(frames: Array, bus: str, log: str) -> Recording:
         received[field] = frames[field]
     samples, choices, health = samples_of(received)
     if len(samples) < 2:
-        raise LeverError(f"{log}: none of its samples is accepted: {health.corrupt} frames are corrupt (E2E)")
+        why = why_refused(health.corrupt, health.late) or "it holds no more"
+        raise LeverError(f"{log}: too few samples to tune on, {len(samples)}: {why}")
     return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, choices, health)
 
 
