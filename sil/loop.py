@@ -20,7 +20,7 @@ import can
 import numpy as np
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, Commander, refusal, result_of
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from lever_cdkf.host_tools.identity import Identity
 from numpy.typing import NDArray
 
@@ -128,7 +128,7 @@ def run(
     """Runs `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock.
 
     `commander`: of whoever else sends COMMAND on this bus. Raises NoAnswerError when nobody answers, RefusedError when
-    the estimator refuses a COMMAND, and LeverError when it speaks another contract.
+    the estimator refuses a COMMAND, and LeverError when it speaks another contract or has other settings.
     """
     recording = Recording(scenario, prepare(scenario))
     _loop(recording, _Link(bus, recording, commander or Commander()), realtime, progress)
@@ -230,8 +230,19 @@ class _Link:
             if identifier == self._identity:
                 recording.identity.take(codec.decode(identifier, data)[1])
                 recording.identity.check(f"the estimator on {self._bus.channel_info}")
+                self._check_settings()
             return identifier, data
         return None
+
+    def _check_settings(self) -> None:
+        """Settings come by no frame: another process has its own. Raises SettingsError when they are not the
+        scenario's."""
+        scenario, says = self._recording.scenario, self._recording.identity.settings_crc
+        if says not in (None, scenario.config.settings_crc):
+            raise SettingsError(
+                f"the estimator on {self._bus.channel_info} has other settings than the scenario: start it with those "
+                "that this command prints with --settings, or give its own here with --settings FILE"
+            )
 
     def _miss(self, sample: int) -> None:
         self._recording.unanswered += 1

@@ -232,6 +232,7 @@ def _verdict(summary: dict[str, Any], quality: dict[str, Quality]) -> str:
             _verdict_sigma(quality),
             verdict_nis(summary["nis"]),
             verdict_whiteness(summary["whiteness"]),
+            _verdict_settings(summary),
         )
         if sentence
     )
@@ -245,10 +246,14 @@ def _verdict_run(summary: dict[str, Any]) -> str:
         troubles.append(f"{summary['misplaced']} estimates came that belong to other samples")
     if "fault" in summary["modes_s"]:
         troubles.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
-    told = f"Trouble: {' and '.join(troubles)}." if troubles else ""
-    if summary["firmware"]["settings_as_scenario"] is False:
-        told = f"{told} The estimator has other settings than the scenario.".lstrip()
-    return told
+    return f"Trouble: {' and '.join(troubles)}." if troubles else ""
+
+
+def _verdict_settings(summary: dict[str, Any]) -> str:
+    """A run on other settings is refused; one of less than a second may not learn which they are."""
+    if summary["firmware"]["settings_as_scenario"] is not None:
+        return ""
+    return "The estimator has not said which settings it has (IDENTITY): those of the scenario are assumed."
 
 
 def _verdict_truth(summary: dict[str, Any]) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from lever_cdkf.sil import buslog, commands, loop, runner, scenario
 from lever_cdkf.sil.scenario import Scenario
 
@@ -190,6 +190,17 @@ def test_an_estimator_of_another_contract_is_an_error_in_one_line(short: Scenari
 
     with pytest.raises(LeverError, match=r"the estimator on puppet speaks contract 7 of lever.dbc, this program 2: "):
         loop.run(short, PuppetBus(other))
+
+
+def test_an_estimator_with_other_settings_than_the_scenario_is_refused_and_nothing_written(tmp_path: Path) -> None:
+    """As on a bus, where the firmware is another process, which has its settings from elsewhere."""
+    wanted = scenario.load("steady", ["duration=2 s", "settings.k_p=1300 N/m"])
+    with can.Bus(interface="lever", channel="lever") as bus, pytest.raises(SettingsError) as caught:
+        runner.simulate(wanted, bus, tmp_path / "out")
+    assert str(caught.value).startswith(f"the estimator on {bus.channel_info} has other settings than the scenario: ")
+    assert list((tmp_path / "out").iterdir()) == []
+    with LeverBus("lever", settings={"k_p": 1300.0}) as bus:
+        assert runner.simulate(wanted, bus).summary["firmware"]["settings_as_scenario"] is True
 
 
 def test_other_nodes_frames_are_no_answers(short: Scenario) -> None:
