@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import can
-from lever_cdkf.host_tools.files import make_folder, replace_file
+from lever_cdkf.host_tools.files import Outputs, make_folder, write_text, writing
 
 from . import buslog, loop, summary, trace
 from .buslog import Frames
@@ -37,7 +37,7 @@ def simulate(
     progress: Progress | None = None,
 ) -> Result:
     """Runs `scenario` against the estimator on `bus` and judges it; with `out_dir` also writes bus.log, trace.csv,
-    report.html and summary.json there, each complete or not at all. `channel` is the bus's name in bus.log.
+    report.html and summary.json there, all or none. `channel` is the bus's name in bus.log.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
     files but for the wall times are the same either way. Raises LeverError.
@@ -59,17 +59,16 @@ def _write(result: Result, folder: Path, channel: str, start: float) -> None:
     """Writes the files; summary.json comes last, so that its wall time is of everything."""
     from .report import write_report
 
-    def bus_log(path: Path) -> None:
-        with path.open("wb") as file:
+    with Outputs(folder) as outputs:
+        bus_log = outputs.path("bus.log")
+        with writing(bus_log), bus_log.open("wb") as file:
             file.writelines(buslog.lines(result.frames, channel))
-
-    def summary_json(path: Path) -> None:
+        trace_csv = outputs.path("trace.csv")
+        with writing(trace_csv):
+            trace.write_csv(result.trace, trace_csv)
+        summary.add_wall_time(result.summary, clock.perf_counter() - start)
+        write_report(result.trace, result.summary, outputs.path("report.html"))
+        summary.add_wall_time(result.summary, clock.perf_counter() - start)
         text = json.dumps(result.summary, indent=2, ensure_ascii=False, allow_nan=False)
-        path.write_text(text + "\n", encoding="utf-8")
-
-    replace_file(folder / "bus.log", bus_log)
-    replace_file(folder / "trace.csv", lambda path: trace.write_csv(result.trace, path))
-    summary.add_wall_time(result.summary, clock.perf_counter() - start)
-    replace_file(folder / "report.html", lambda path: write_report(result.trace, result.summary, path))
-    summary.add_wall_time(result.summary, clock.perf_counter() - start)
-    replace_file(folder / "summary.json", summary_json)
+        write_text(outputs.path("summary.json"), text + "\n")
+        outputs.finish()

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.host_tools.files import check_not_input
 from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from .summary import failure
 
     options = _options(args)
+    check_not_input(args.json, args.logs)
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
     print_tables(_tables(summary), args.json)

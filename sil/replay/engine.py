@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from lever_cdkf.host_tools import codec
 from lever_cdkf.host_tools.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
-from lever_cdkf.host_tools.files import write_text
+from lever_cdkf.host_tools.files import Outputs, write_text
 from lever_cdkf.host_tools.library import enum_names
 from lever_cdkf.host_tools.logs import Recording
 from lever_cdkf.host_tools.native import Config, Estimator
@@ -24,7 +24,7 @@ from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
 from .mf4 import Mf4
-from .outputs import SUMMARY, BusLog, Outputs, TraceCsv
+from .outputs import SUMMARY, BusLog, TraceCsv
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
 from .summary import Figures, failure, verdict
@@ -56,10 +56,12 @@ def replay(
     logs: Iterable[str | Path], options: Options, out_dir: Path | None = None, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
-    trace.csv, signals.mf4, report.html and summary.json there, all or none. Raises LeverError."""
+    trace.csv, signals.mf4, report.html and summary.json there, all or none. Raises LeverError, also rather than
+    write over a log."""
+    logs = list(logs)
     traffic = Traffic(Recording(logs), options.channel)
     with ExitStack() as stack:
-        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir))
+        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs))
         made = _Replay(traffic, options, outputs)
         made.run(progress)
         summary = made.summary()

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.files import writing
 from lever_cdkf.host_tools.later import allow
 from numpy.typing import NDArray
 
 from ..feedthrough import FEEDTHROUGH
 from ..quantities import quantities, recorded_name
 from ..trace import ESTIMATED, HEALTH, MEASURED, Trace
-from .outputs import writing
 
 Signals = list[tuple[str, str, str]]
 """Column of the trace, name and unit in the file."""

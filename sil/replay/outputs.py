@@ -1,19 +1,13 @@
-"""The files of a replay, written as it goes on into a hidden folder; none is in its place before all are whole."""
+"""The files of a replay, written as it goes on."""
 
 from __future__ import annotations
 
-import os
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 from lever_cdkf.host_tools import bulk
 from lever_cdkf.host_tools.bulk import Frames
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import make_folder
+from lever_cdkf.host_tools.files import writing
 from numpy.typing import NDArray
 
 from ..trace import Trace, write_csv_rows
@@ -24,45 +18,6 @@ Held = list[tuple[list[str], NDArray[np.bool_]]]
 SUMMARY = "summary.json"
 """The last file to be in its place: where it is, the others are of the same replay."""
 FILES = ("bus.log", "trace.csv", "signals.mf4", "report.html", SUMMARY)
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Raises LeverError, which names `path`, for an OSError inside."""
-    try:
-        yield
-    except OSError as error:
-        raise LeverError(f"cannot write {path}: {error.strerror or error}") from None
-
-
-class Outputs:
-    """A context manager; without finish() it leaves nothing behind."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._unfinished = folder / f".replay.{os.getpid()}.tmp"
-
-    def __enter__(self) -> Outputs:
-        make_folder(self._folder)
-        with writing(self._folder):
-            self._unfinished.mkdir()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        shutil.rmtree(self._unfinished, ignore_errors=True)
-
-    def path(self, name: str) -> Path:
-        """Where to write the file `name`."""
-        return self._unfinished / name
-
-    def finish(self) -> None:
-        """Puts the files into their place. Raises LeverError."""
-        with writing(self._folder):
-            (self._folder / SUMMARY).unlink(missing_ok=True)
-            for name in FILES:
-                os.replace(self.path(name), self._folder / name)
 
 
 class BusLog:

@@ -105,12 +105,14 @@ def run(args: argparse.Namespace) -> int:
     for case, verdict in verdicts.items():
         print(f"{case}: {verdict}")
     if args.out is not None:
-        from lever_cdkf.host_tools.files import write_text
+        from lever_cdkf.host_tools.files import Outputs, write_text
 
         from .compare import page
 
-        write_text(args.out / "compare.csv", table.csv_text(rows))
-        write_text(args.out / "compare.html", page.build(results, rows, verdicts, claims, tables))
+        with Outputs(args.out) as outputs:
+            write_text(outputs.path("compare.csv"), table.csv_text(rows))
+            write_text(outputs.path("compare.html"), page.build(results, rows, verdicts, claims, tables))
+            outputs.finish()
         print(f"Written to {args.out}: compare.html, compare.csv")
     return 0
 
