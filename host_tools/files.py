@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
+from . import interrupts
 from .errors import LeverError
 
 LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
@@ -106,6 +107,7 @@ class Outputs:
 
     def finish(self) -> None:
         """Puts the files into their place; the last one asked for is there only when all are. Raises LeverError."""
+        interrupts.check()
         with writing(self._folder):
             (self._folder / self._names[-1]).unlink(missing_ok=True)
             for name in self._names:
