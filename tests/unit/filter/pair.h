@@ -174,7 +174,7 @@ static inline void pair_predict(pair_t *pair, float period)
         .z_ddot = (float)(30.0 * random_normal(&pair->source)),
         .tau_m = (float)(30.0 * random_normal(&pair->source)),
         .trim = (float)(30.0 * random_normal(&pair->source))};
-    cdkf_time_update(&pair->cdkf, &pair_model, NULL, &pair->step, pair_no_error);
+    cdkf_time_update(&pair->cdkf, &pair_model, NULL, &pair->step, pair_no_error, NULL);
     kalman_predict(&pair->reference, pair_transition(&pair->step), pair_process_noise(&pair->cdkf, (double)period));
 }
 

@@ -59,7 +59,7 @@ static void test_curvature_along_a_parameter_has_the_moments_of_a_gaussian(void)
     cdkf->process_noise[1] = 0.0f;
     const matrix_t before = pair_covariance(cdkf);
     const model_step_t step = {.period = (float)period};
-    cdkf_time_update(cdkf, &model, NULL, &step, pair_no_error);
+    cdkf_time_update(cdkf, &model, NULL, &step, pair_no_error, NULL);
     const matrix_t after = pair_covariance(cdkf);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, 2.0 * 0.16, (double)cdkf->x[1]);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, 0.1 + (0.5 * period * 0.32), (double)cdkf->x[0]);

@@ -144,7 +144,7 @@ static void test_the_invariant_holds_at_extreme_ratios_of_noise(void)
                 cdkf->x[1] + (cdkf->output_noise[1] * (float)random_normal(&pair.source))};
             innovation_t innovation[CDKF_OUTPUTS];
             correction_t correction;
-            cdkf_time_update(cdkf, &pair_model, NULL, &step, pair_no_error);
+            cdkf_time_update(cdkf, &pair_model, NULL, &step, pair_no_error, NULL);
             cdkf_measurement_update(cdkf, y, validities[(sample / 7u) % 4u], true, innovation);
             TEST_ASSERT_TRUE(cdkf_state_is_valid(cdkf));
             if ((sample % 10u) == 9u) {

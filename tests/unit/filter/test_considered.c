@@ -71,7 +71,7 @@ static void run_sample(const bool valid[N])
         innovation_t innovation[CDKF_OUTPUTS];
         move_truth(c, step, error);
         const float y[N] = {(float)truth[c][0], (float)truth[c][1]};
-        cdkf_time_update(&filter[c], &pair_model, NULL, &step, error);
+        cdkf_time_update(&filter[c], &pair_model, NULL, &step, error, NULL);
         cdkf_measurement_update(&filter[c], y, valid, true, innovation);
     }
 }

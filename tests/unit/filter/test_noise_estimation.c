@@ -58,7 +58,7 @@ static uint32_t run(uint32_t samples, bool theta_valid, bool theta_dot_valid)
         truth[1] += change + (PROCESS_NOISE * sqrt((double)PAIR_PERIOD) * random_normal(&source));
         const float y[2] = {(float)(truth[0] + (output_scale * THETA_NOISE * random_normal(&source))),
             (float)(truth[1] + (output_scale * THETA_DOT_NOISE * random_normal(&source)))};
-        cdkf_time_update(&cdkf, &pair_model, NULL, &step, pair_no_error);
+        cdkf_time_update(&cdkf, &pair_model, NULL, &step, pair_no_error, NULL);
         cdkf_measurement_update(&cdkf, y, valid, false, innovation);
         noise_estimation_add(&noise, innovation, valid);
         far_too_small += noise_estimation_step(&noise, &cdkf, &setting, PAIR_PERIOD) ? 1u : 0u;
