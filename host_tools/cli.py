@@ -63,7 +63,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             args = _parser().parse_args(argv)
             with interrupts.heard():
                 status: int = args.run(args)
-                interrupts.check()
         except SystemExit as stop:  # --help and --version
             status = int(stop.code or 0)
         sys.stdout.flush()

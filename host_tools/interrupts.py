@@ -29,14 +29,18 @@ def heard() -> Iterator[None]:
     if not is_ours or threading.current_thread() is not threading.main_thread():
         yield
         return
-    forget()
     signal.signal(signal.SIGINT, _hear)
     sys.unraisablehook = lambda lost: None if lost.exc_type is KeyboardInterrupt else hook(lost)
     try:
         yield
+        check()
+    except Exception:
+        check()  # what fails after a lost one fails because of it
+        raise
     finally:
         signal.signal(signal.SIGINT, before)
         sys.unraisablehook = hook
+        forget()
 
 
 def _hear(_number: int, _frame: object) -> None:

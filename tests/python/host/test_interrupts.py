@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from lever_cdkf.host_tools import cli, interrupts
+from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import Outputs
 from lever_cdkf.host_tools.progress import Progress
 
@@ -89,6 +90,19 @@ def test_a_lost_one_is_found_before_files_are_put_into_place(
 
     assert act(run) == 130
     assert list(tmp_path.iterdir()) == []
+
+
+@lost
+def test_what_fails_after_a_lost_one_is_not_told(
+    lose: Callable[[], None], act: Act, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def run() -> None:
+        lose()
+        raise LeverError("half of it is not there")
+
+    assert act(run) == 130
+    assert capfd.readouterr() == ("", "")
+    interrupts.check()
 
 
 def test_it_is_silent_while_the_command_is_still_being_read() -> None:
