@@ -225,17 +225,17 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
             self.server.pages.discard(self)
 
     async def on_message(self, message: str | bytes) -> None:
-        """The next one is not read before this one is done with."""
+        """The next one is not read before this one is answered."""
         try:
             if not self.server.state.controls:
                 raise LeverError("this page only shows: no commands")
             command = command_of(json.loads(message), self.server.config)
             self._count_command(_now())
             await self.server.command(command)
+            answer: dict[str, object] = {"sent": command}
         except (LeverError, ValueError) as error:
-            self.tell(json.dumps({"refused": str(error)}))
-            return
-        self.tell(json.dumps({"sent": command}))
+            answer = {"refused": str(error)}
+        await self._send(json.dumps(answer))
 
     def _count_command(self, now: float) -> None:
         """So that no page can fill the bus. Raises LeverError."""
