@@ -141,8 +141,8 @@ typedef struct lever_sample {
     float tau_m;      /* motor torque on the lever [N m]; when not valid, what was asked for is used */
     float
         z_ddot; /* base vertical acceleration, up positive, without gravity [m/s^2]; when not valid, the last is held */
-    float grip_force; /* of the hand on the lever, across it, positive where it raises theta [N]; used by the model
-                         lever, not needed */
+    float grip_force; /* of the hand on the lever, across it, positive where it raises theta: mean since the last sample
+                         [N]; used by the model lever, not needed */
     bool theta_valid;
     bool theta_dot_valid;
     bool tau_m_valid;

@@ -19,6 +19,9 @@ FRAME_SAMPLE: int = lib.LEVER_FRAME_SAMPLE
 FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
 """What FEEDTHROUGH is sent for on the bus, one after the other [Hz]."""
 
+SAMPLE_VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
+"""What a sample may hold besides its time, each with a flag: lever_sample_t."""
+
 _MODES = enum_names("lever_mode")
 
 
@@ -121,15 +124,16 @@ class Estimator:
         theta_dot: float | None = None,
         tau_m: float | None = None,
         z_ddot: float | None = None,
+        grip_force: float | None = None,
     ) -> str:
         """Takes a sample and returns the mode after it.
 
         Time [µs] (wrapped to 32 bits here), lever angle [rad] and rate [rad/s], motor torque [N m], vertical
-        acceleration of the base [m/s²]; None is missing or invalid.
+        acceleration of the base [m/s²], force of the hand on the lever [N]; None is missing or invalid.
         """
         sample = self._sample
         sample.time_us = time_us & 0xFFFFFFFF
-        for name, value in (("theta", theta), ("theta_dot", theta_dot), ("tau_m", tau_m), ("z_ddot", z_ddot)):
+        for name, value in zip(SAMPLE_VALUES, (theta, theta_dot, tau_m, z_ddot, grip_force), strict=True):
             setattr(sample, name, 0.0 if value is None else value)
             setattr(sample, f"{name}_valid", value is not None)
         return _MODES[lib.lever_update(self.pointer, sample)]
@@ -210,8 +214,8 @@ def run_samples(
     """Feeds N samples to a fresh estimator and returns what it says after each, or after those with the indices `at`.
 
     samples: columns of N numbers (arrays, lists, of pandas, of polars): time_us [µs] (whole numbers, wrapped here),
-    theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s²], as in lever_sample_t; bool columns theta_valid … may say
-    what is valid, without them what is neither NaN nor null is. One that is missing is never valid. What is plainly in
+    theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s²], grip_force [N]; bool columns theta_valid … may say what
+    is valid, without them what is neither NaN nor null is. One that is missing is never valid. What is plainly in
     another unit, such as milliseconds or degrees, is a LeverError.
 
     Returned: each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma,

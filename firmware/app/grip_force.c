@@ -69,18 +69,15 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
     const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen)
 {
     const float period = step->period;
-    const float since = grip->missing + period; /* the force before */
     receive(grip, setup, trim, force, period);
     const bool known = (force != NULL) && grip->right && !grip->wrong;
     if (grip->seen) {
         const float now = trim_input(trim, 3u, grip->raw, period);
-        const float middle = now - ((0.5f * (period / since)) * (now - grip->last)); /* of the step */
-        grip->impulse += (period * setup->constants.length) * middle;
+        grip->impulse += (period * setup->constants.length) * now;
         grip->square += share_of(period, MEMORY) * ((now * now) - grip->square);
         grip->settling -= (grip->settling > 0.0f) ? period : 0.0f;
-        grip->last = (force != NULL) ? now : grip->last;
         if (known) {
-            look(grip, setup, step, middle, alone, error, seen);
+            look(grip, setup, step, now, alone, error, seen);
         }
     }
     return known;

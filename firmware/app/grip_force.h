@@ -18,10 +18,9 @@
 
 typedef struct grip_force {
     float raw;      /* the last valid one, compensated for gain and bias [N] */
-    float last;     /* the same without its slow part in preload trim */
     float missing;  /* time since then [s] */
     float settling; /* time until its slow part is known [s] */
-    float square;   /* mean square of `last` [N^2] */
+    float square;   /* mean square of the same without its slow part [N^2] */
     float impulse;  /* of the force since the beginning of the block [N m s] */
     float measured; /* mean product of that and the block's drive (hands.h), */
     float expected; /* and of what the lever's motion says of the hand: the ratio is the sensor's gain error */
