@@ -60,17 +60,20 @@ static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response
     for (uint32_t j = 0u; j < L; j++) {
         square += response->second_difference[j] * response->second_difference[j];
     }
-    const float rate = sqrtf(variance + ((SIGMA_SECOND * SIGMA_SECOND) * square));
+    const float second = (SIGMA_SECOND * SIGMA_SECOND) * square;
     const float angle = sqrtf((variance * (period * period * 0.0833333333f)) + own);
-    float theta[GRIP_COLUMNS + 1] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, angle, 0.0f};
-    float theta_dot[GRIP_COLUMNS + 1] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f, 0.0f};
+    const float rate = sqrtf(seen->taken ? variance : (variance + second));
+    float theta[GRIP_COLUMNS + 1] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, angle, 0.0f, 0.0f};
+    float theta_dot[GRIP_COLUMNS + 1] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f, 0.0f, 0.0f};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);
     if (seen->taken) {
-        grip_condition(seen, rate, theta, theta_dot);
+        theta_dot[4] = sqrtf(second);
+        theta[4] = 0.5f * period * theta_dot[4];
+        grip_condition(seen, theta, theta_dot);
         factor_tria_two(theta, theta_dot, (uint32_t)GRIP_COLUMNS + 1u, cdkf->s_xx);
     } else {
-        factor_tria_two(theta, theta_dot, (uint32_t)GRIP_COLUMNS, cdkf->s_xx);
+        factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
     }
 }
 

@@ -31,9 +31,10 @@ void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float 
     seen->noise = grip->noise;
 }
 
-void grip_condition(grip_seen_t *seen, float walk, float theta[GRIP_COLUMNS + 1], float theta_dot[GRIP_COLUMNS + 1])
+void grip_condition(grip_seen_t *seen, float theta[GRIP_COLUMNS + 1], float theta_dot[GRIP_COLUMNS + 1])
 {
-    const float column[GRIP_COLUMNS] = {seen->column[0], seen->column[1], seen->walk * walk, 0.0f};
+    const float column[GRIP_COLUMNS] = {
+        seen->column[0], seen->column[1], seen->walk * theta_dot[2], 0.0f, theta_dot[4]};
     const float noise = seen->noise;
     float variance = noise * noise;
     float k[MODEL_STATES] = {0.0f, 0.0f};

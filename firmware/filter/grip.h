@@ -8,7 +8,8 @@
 #include "filter/cdkf.h"
 #include "filter/considered.h"
 
-enum { GRIP_COLUMNS = 4 }; /* of S-_xx before it is compressed: its own, the walk of theta_dot, that of theta */
+/* Columns of S-_xx before it is compressed: its own, the walk of theta_dot, that of theta, second differences. */
+enum { GRIP_COLUMNS = 5 };
 
 typedef struct grip_seen {
     float row[MODEL_PARAMETERS]; /* of the columns of S_xw and S_ww, */
@@ -26,8 +27,8 @@ typedef struct grip_seen {
 void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float error[CDKF_CONSIDERED],
     const cdkf_grip_t *grip, grip_seen_t *seen);
 
-/* Conditions the columns of the state, of which the third is the walk of theta_dot, on the force: it adds one. */
-void grip_condition(grip_seen_t *seen, float walk, float theta[GRIP_COLUMNS + 1], float theta_dot[GRIP_COLUMNS + 1]);
+/* Conditions the columns of the state on the force: it adds one. */
+void grip_condition(grip_seen_t *seen, float theta[GRIP_COLUMNS + 1], float theta_dot[GRIP_COLUMNS + 1]);
 
 /* Corrects the rest of the belief. */
 void grip_take(cdkf_t *cdkf, const cdkf_grip_t *grip, const grip_seen_t *seen);
