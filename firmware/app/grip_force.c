@@ -43,7 +43,7 @@ static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, cons
 static float noise_of(const grip_force_t *grip, const lever_settings_t *s, float period)
 {
     const float gain = s->grip_force_gain_sigma;
-    const float walk = (s->m_p_walk > WALK_LEAST) ? s->m_p_walk : WALK_LEAST;
+    const float walk = (s->k_p_walk > WALK_LEAST) ? s->k_p_walk : WALK_LEAST;
     const float relative = (gain * gain) / walk; /* root of the density */
     return sqrtf((s->grip_force_noise * s->grip_force_noise) + (grip->square * ((relative * relative) / period)));
 }

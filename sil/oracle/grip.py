@@ -97,7 +97,7 @@ class Grip:
     def noise(self, dt: float) -> float:
         """Standard deviation of the force. A constant gain error counts as white noise, of the density at which
         walking parameters are as certain as it is."""
-        walk = max(self.settings["m_p_walk"], WALK_LEAST)
+        walk = max(self.settings["k_p_walk"], WALK_LEAST)
         density = self.settings["grip_force_gain_sigma"] ** 4 / walk**2
         return math.sqrt(self.settings["grip_force_noise"] ** 2 + self.square * density / dt)
 
