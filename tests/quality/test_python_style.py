@@ -9,7 +9,7 @@ import pytest
 from quality import tools
 
 RUFF = tools.python_tool("ruff")
-FOLDERS = ("firmware", "host_tools", "sil", "tests")
+FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
 
 
 def test_layout() -> None:
@@ -25,9 +25,10 @@ def package_tree(build_dir: Path) -> Path:
     """The packages under the names by which they are imported, as the wheel has them (pyproject.toml)."""
     package = build_dir / "package_tree/lever_cdkf"
     package.mkdir(parents=True, exist_ok=True)
-    for folder in ("host_tools", "sil"):
-        (package / folder).unlink(missing_ok=True)
-        (package / folder).symlink_to(tools.ROOT / folder)
+    for part in ("host_tools", "sil", "api/lever_cdkf/__init__.py"):
+        link = package / Path(part).name
+        link.unlink(missing_ok=True)
+        link.symlink_to(tools.ROOT / part)
     return package.parent
 
 

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.replay.outputs import FILES
+from lever_cdkf.host_tools.replay.outputs import FILES
 from processes import LEVER, small_files
-
-from .conftest import Session
+from python.conftest import Session
 
 
 @pytest.mark.parametrize("size", [10_000, 500_000, 1_000_000, 2_500_000], ids=lambda size: f"{size} bytes")
