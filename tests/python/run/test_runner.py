@@ -213,7 +213,7 @@ def test_an_estimator_with_other_settings_than_the_scenario_is_refused_and_nothi
     assert str(caught.value).startswith(f"the estimator on {bus.channel_info} has other settings than the scenario: ")
     assert list((tmp_path / "out").iterdir()) == []
     with LeverBus("lever", settings={"k_p": 1300.0}) as bus:
-        assert runner.simulate(wanted, bus).summary["firmware"]["settings_as_scenario"] is True
+        assert runner.simulate(wanted, bus).summary.firmware.settings_as_scenario is True
 
 
 def test_other_nodes_frames_are_no_answers(short: Scenario) -> None:
