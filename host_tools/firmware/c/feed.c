@@ -6,7 +6,14 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { LEVER_SLOT = 0, BASE_SLOT = 1, GRIP_SLOT = 2, ANSWER_SLOT = 3, RECORDED_SLOT = ANSWER_SLOT + BULK_ANSWERS, FRAME_BYTES = 8 };
+enum {
+    LEVER_SLOT = 0,
+    BASE_SLOT = 1,
+    GRIP_SLOT = 2,
+    ANSWER_SLOT = 3,
+    RECORDED_SLOT = ANSWER_SLOT + BULK_ANSWERS,
+    FRAME_BYTES = 8
+};
 
 #define COUNTER_MASK 15u
 
