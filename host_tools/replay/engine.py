@@ -170,17 +170,12 @@ class _Replay:
         """The content of summary.json."""
         compared = None if self._comparison is None else self._comparison.summary()
         choices = self._commands.choices | {"model": self.model}
-        health = self._feeder.estimator.health()
         summary: dict[str, Any] = {
             "schema": SCHEMA,
             "recording": self._recording(),
             "estimator": {**choices, "settings": self._options.config.settings},
             "samples": self._timeline.clocks.samples,
-            **self.figures.summary(),
-            "lost": health.lost,
-            "corrupt": health.corrupt,
-            "late": health.late,
-            "restarts": health.recoveries,
+            **self.figures.summary(self._feeder.estimator.health()),
             "comparison": compared,
         }
         summary["passed"] = not failure(summary)

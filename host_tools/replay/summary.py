@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..can.traffic import why_refused
-from ..firmware.native import Config, enum_names
+from ..firmware.native import Config, Health, enum_names
 from ..firmware.quantities import quantities
 from ..results import nis, whiteness
 from ..results.nis import Innovations, freedom
@@ -63,8 +63,8 @@ class Figures:
             }
         return told
 
-    def summary(self) -> dict[str, Any]:
-        """The part of summary.json that is about all samples."""
+    def summary(self, health: Health) -> dict[str, Any]:
+        """The part of summary.json that is about all samples; `health` is the estimator's at the end."""
         residuals = self._residuals.all()
         measured = None if residuals is None else whiteness.of_averages(residuals[0], self._average_s)
         names = enum_names("lever_mode")
@@ -72,6 +72,10 @@ class Figures:
             "estimates": self.estimates(),
             "nis": asdict(self._innovations.figures()),
             "whiteness": None if measured is None else asdict(measured),
+            "lost": health.lost,
+            "corrupt": health.corrupt,
+            "late": health.late,
+            "restarts": health.recoveries,
             "modes_s": {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())},
         }
 
