@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from . import interrupts
 from .errors import LeverError
-from .later import allow, put_off
+from .extras import hide_mf4, reveal_mf4
 from .start import INTERRUPTED
 
 COMMANDS = "lever_cdkf.commands"
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command line and returns its exit status: 0 only when all went well."""
     if not _has_streams():
         return 2
-    put_off(sys.argv[1:] if argv is None else argv)
+    hide_mf4(sys.argv[1:] if argv is None else argv)
     try:
         try:
             args = _parser().parse_args(argv)
@@ -78,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"lever: error: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     finally:
-        allow()
+        reveal_mf4()
 
 
 def _has_streams() -> bool:

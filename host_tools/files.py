@@ -10,6 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
+from lever_cdkf import host_tools
+
 from . import interrupts
 from .errors import LeverError
 
@@ -18,9 +20,9 @@ LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
 
 
 def native_file(name: str) -> Path:
-    """The path of `name` (shared library, its declarations, lever.dbc), which installing has put beside this module."""
+    """The path of `name` (shared library, its declarations, lever.dbc), which installing has put into `_native`."""
     folders = [Path(folder) for folder in os.environ.get(LIBRARY_DIR, "").split(os.pathsep) if folder]
-    folders.append(Path(__file__).resolve().parent / "_native")
+    folders += [Path(folder) / "_native" for folder in host_tools.__path__]  # two, if the install is editable
     for folder in folders:
         if (folder / name).is_file():
             return folder / name
@@ -78,9 +80,11 @@ class Outputs:
     """The files of a command in a folder: written into a hidden one in it, and put into place together when all are
     whole. A context manager; without finish() it leaves what was there before, and nothing else."""
 
-    def __init__(self, folder: Path, inputs: Iterable[str | os.PathLike[str]] = ()) -> None:
-        """`inputs` of the command are not written over."""
+    def __init__(self, folder: Path, inputs: Iterable[str | os.PathLike[str]] = (), names: Iterable[str] = ()) -> None:
+        """`inputs` of the command are not written over; of `names`, finish() takes away what is of an earlier run and
+        not made now."""
         self._folder = folder
+        self._may_be_there = tuple(names)
         self._unfinished = folder
         self._inputs = list(inputs)
         self._names: list[str] = []
@@ -110,5 +114,7 @@ class Outputs:
         interrupts.check()
         with writing(self._folder):
             (self._folder / self._names[-1]).unlink(missing_ok=True)
+            for name in set(self._may_be_there) - set(self._names):
+                (self._folder / name).unlink(missing_ok=True)
             for name in self._names:
                 os.replace(self._unfinished / name, self._folder / name)

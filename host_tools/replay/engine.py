@@ -16,6 +16,7 @@ from ..can import codec
 from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.logs import Recording
 from ..can.traffic import Traffic
+from ..extras import missing
 from ..files import Outputs, write_text
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
@@ -25,7 +26,7 @@ from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
 from .mf4 import Mf4
-from .outputs import SUMMARY, BusLog, TraceCsv
+from .outputs import FILES, SUMMARY, BusLog, TraceCsv
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
 from .summary import Figures, failure, verdict
@@ -57,12 +58,12 @@ def replay(
     logs: Iterable[str | Path], options: Options, out_dir: Path | None = None, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
-    trace.csv, signals.mf4, report.html and summary.json there, all or none. Raises LeverError, also rather than
-    write over a log."""
+    trace.csv, signals.mf4, report.html and summary.json there, all or none; signals.mf4 with the extra `mf4`,
+    report.html with `report`. Raises LeverError, also rather than write over a log."""
     logs = list(logs)
     traffic = Traffic(Recording(logs), options.channel)
     with ExitStack() as stack:
-        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs))
+        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs, FILES))
         made = _Replay(traffic, options, outputs)
         made.run(progress)
         summary = made.summary()
@@ -137,8 +138,6 @@ class _Replay:
         trace = self._columns.of(rows)
         for sink in self._sinks:
             sink.add(trace)
-        if self._csv is not None:
-            self._csv.add(trace, self._columns.held(rows))
         if self._mf4 is not None:
             published = (rows["fresh"] >> SLOTS["PILOT_PARAMETERS"]) & 1 != 0
             recorded = (rows["fresh"] >> RECORDED["PILOT_PARAMETERS"]) & 1 != 0
@@ -161,7 +160,9 @@ class _Replay:
         if self._outputs is not None:
             self._sinks.append(self.kept)
             self._csv = TraceCsv(self._outputs.path("trace.csv"))
-            self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
+            self._sinks.append(self._csv)
+            if not missing("mf4"):
+                self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
         return Columns(self._timeline, self.model, with_recorded)
 
     # --- what comes of it ---------------------------------------------------------------------------------------------
@@ -220,7 +221,8 @@ class _Replay:
         for part in (self._bus_log, self._csv, self._mf4):
             if part is not None:
                 part.close()
-        write_page(RecordedRun(self.kept, of(ReplaySummary, summary)), outputs.path("report.html"))
+        if not missing("report"):
+            write_page(RecordedRun(self.kept, of(ReplaySummary, summary)), outputs.path("report.html"))
         text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
         write_text(outputs.path(SUMMARY), text + "\n")
         outputs.finish()

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..can import bulk
 from ..can.bulk import Frames
 from ..files import writing
-from ..results.trace import Trace, write_csv_rows
-
-Held = list[tuple[list[str], NDArray[np.bool_]]]
-"""Neighbouring columns of a trace, and the rows at which any of them may change."""
+from ..results.trace import Trace, write_csv_header, write_csv_rows
 
 SUMMARY = "summary.json"
 """The last file to be in its place: where it is, the others are of the same replay."""
@@ -46,12 +40,12 @@ class TraceCsv:
         with writing(path):
             self._file = path.open("wb")
 
-    def add(self, trace: Trace, held: Held) -> None:
+    def add(self, trace: Trace) -> None:
         """Further rows."""
         with writing(self._path):
             if not self._started:
-                self._file.write((",".join(trace) + "\n").encode("ascii"))
-            write_csv_rows(trace, self._file, held)
+                write_csv_header(trace, self._file)
+            write_csv_rows(trace, self._file)
         self._started = True
 
     def close(self) -> None:

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.host_tools.extras import require
+
 _PAGE, _CAPTIONS = "figures.html", "captions.md"
 
 if TYPE_CHECKING:
@@ -57,6 +59,8 @@ def seed(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
+    require("study")
+
     from ..study.figures.catalogue import chosen
 
     if args.list:

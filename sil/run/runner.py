@@ -9,6 +9,7 @@ from pathlib import Path
 
 import can
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.extras import missing
 from lever_cdkf.host_tools.files import Outputs, make_folder, write_text, writing
 from lever_cdkf.host_tools.results import trace
 from lever_cdkf.host_tools.results.summary import SimulationSummary, text
@@ -40,8 +41,8 @@ def simulate(
     progress: Progress | None = None,
 ) -> Result:
     """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
-    it; with `out_dir` also writes bus.log, trace.csv, report.html and summary.json there, all or none.
-    `channel` is the bus's name in bus.log.
+    it; with `out_dir` also writes bus.log, trace.csv, report.html (with the extra `report`) and summary.json there,
+    all or none. `channel` is the bus's name in bus.log.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
     files but for the wall times are the same either way. Raises LeverError.
@@ -67,13 +68,14 @@ def _write(result: Result, folder: Path, channel: str, start: float) -> None:
     def elapsed() -> SimulationSummary:
         return result.summary.timed(clock.perf_counter() - start)
 
-    with Outputs(folder) as outputs:
+    with Outputs(folder, names=("report.html",)) as outputs:
         bus_log = outputs.path("bus.log")
         with writing(bus_log), bus_log.open("wb") as file:
             file.writelines(buslog.lines(result.frames, channel))
         trace_csv = outputs.path("trace.csv")
         with writing(trace_csv):
             trace.write_csv(result.trace, trace_csv)
-        write_report(result.trace, elapsed(), outputs.path("report.html"))
+        if not missing("report"):
+            write_report(result.trace, elapsed(), outputs.path("report.html"))
         write_text(outputs.path("summary.json"), text(elapsed()))
         outputs.finish()

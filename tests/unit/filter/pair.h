@@ -71,7 +71,7 @@ static const model_t pair_model = {.name = "linear",
     .prepare = pair_prepare,
     .respond = pair_respond};
 
-static const float pair_no_error[CDKF_CONSIDERED] = {0.0f, 0.0f, 0.0f, 0.0f};
+static const float pair_no_error[CDKF_CONSIDERED] = {0.0f};
 
 static const prior_t pair_prior = {.guess = {0.0f, 0.0f, 0.0f}, .sigma = {0.4f, 0.6f, 0.5f}};
 

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-enum { L = MODEL_PARAMETERS, N = MODEL_STATES, C = CDKF_CONSIDERED, REPEATS = 100, SAMPLES = 10, BLOCKS = 40 };
+enum { L = MODEL_PARAMETERS, N = MODEL_STATES, C = CDKF_CALIBRATION, REPEATS = 100, SAMPLES = 10, BLOCKS = 40 };
 
 #define ERROR 0.05 /* units of each considered error */
 
@@ -61,7 +61,7 @@ static void move_truth(uint32_t c, model_step_t step, const float error[C])
 /* One sample, without noise, into all. */
 static void run_sample(const bool valid[N])
 {
-    float error[C];
+    float error[CDKF_CONSIDERED] = {0.0f};
     const model_step_t step = {.period = PAIR_PERIOD,
         .z_ddot = (float)(30.0 * random_normal(&pair.source)),
         .tau_m = (float)(30.0 * random_normal(&pair.source)),
@@ -148,7 +148,7 @@ static void test_the_score_of_an_error_estimates_it(void)
             run_sample(valid);
         }
         for (uint32_t c = 0u; c < (uint32_t)C; c++) {
-            score_t score[C];
+            score_t score[CDKF_CONSIDERED];
             cdkf_constant_scores(&filter[c], score);
             const double wanted = ERROR * (double)score[c].information;
             TEST_ASSERT_DOUBLE_WITHIN((0.05 * wanted) + 1.0e-5, wanted, (double)score[c].vector);
@@ -157,7 +157,7 @@ static void test_the_score_of_an_error_estimates_it(void)
             TEST_ASSERT_DOUBLE_WITHIN(1.0e-5 + (1.0e-3 * wanted), 0.0, (double)score[c].vector);
         }
         if (block == 0u) { /* nothing has been learnt with it: it is as if it had come about now */
-            score_t score[C];
+            score_t score[CDKF_CONSIDERED];
             const score_t sudden = cdkf_sudden_score(&filter[CDKF_BASE_GAIN]);
             cdkf_constant_scores(&filter[CDKF_BASE_GAIN], score);
             TEST_ASSERT_EQUAL_MEMORY(&score[CDKF_BASE_GAIN], &sudden, sizeof sudden);
@@ -179,7 +179,7 @@ static void test_the_sudden_score_leaves_out_what_the_parameters_have_learnt(voi
     filter[CDKF_BASE_GAIN].considered[CDKF_BASE_GAIN].w[1] = 5.0f;
     const score_t after = cdkf_sudden_score(&filter[CDKF_BASE_GAIN]);
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
-    score_t score[C];
+    score_t score[CDKF_CONSIDERED];
     cdkf_constant_scores(&filter[CDKF_BASE_GAIN], score);
     TEST_ASSERT_TRUE(score[CDKF_BASE_GAIN].information != before.information);
     cdkf_drop_pending(&filter[CDKF_BASE_GAIN]);
