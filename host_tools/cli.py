@@ -9,8 +9,10 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from . import interrupts
 from .errors import LeverError
 from .extras import hide_mf4, reveal_mf4
+from .start import INTERRUPTED
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has
@@ -53,17 +55,20 @@ class Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command line and returns its exit status: 0 only when all went well."""
+    if not _has_streams():
+        return 2
     hide_mf4(sys.argv[1:] if argv is None else argv)
     try:
         try:
             args = _parser().parse_args(argv)
-            status: int = args.run(args)
+            with interrupts.heard():
+                status: int = args.run(args)
         except SystemExit as stop:  # --help and --version
             status = int(stop.code or 0)
         sys.stdout.flush()
         return status
     except KeyboardInterrupt:
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:  # the reader, such as `head`, has what it wants; nothing is left to say at exit either
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
@@ -74,6 +79,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     finally:
         reveal_mf4()
+
+
+def _has_streams() -> bool:
+    """Standard error and input that are closed are as /dev/null; without a standard output nothing is worth running."""
+    for name, mode in (("stdin", "r"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  for the life of the process
+    if sys.stdout is None:
+        print("lever: error: standard output is closed: send it to a file or to /dev/null", file=sys.stderr)
+    return sys.stdout is not None
 
 
 def _expected() -> tuple[type[Exception], ...]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from contextlib import suppress
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import TracebackType
 
 from lever_cdkf import host_tools
 
+from . import interrupts
 from .errors import LeverError
 
 LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
@@ -56,13 +60,61 @@ def make_folder(folder: Path) -> None:
         raise LeverError(f"cannot make the folder {folder}: {error.strerror}") from None
 
 
-def replace_file(path: Path, write: Callable[[Path], None]) -> None:
-    """Has `write` write a file so that `path` holds either all of it or what it held before. Raises LeverError."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Raises LeverError, which names `path`, for an OSError inside."""
     try:
-        write(temporary)
-        os.replace(temporary, path)
+        yield
     except OSError as error:
         raise LeverError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+
+
+def check_not_input(path: str | os.PathLike[str] | None, inputs: Iterable[str | os.PathLike[str]]) -> None:
+    """Raises LeverError when writing to `path` would overwrite one of `inputs`."""
+    with suppress(OSError):  # one of them is not there
+        if path is not None and any(os.path.samefile(path, each) for each in inputs if os.path.exists(each)):
+            raise LeverError(f"cannot write {path}: it is an input: choose another folder or name")
+
+
+class Outputs:
+    """The files of a command in a folder: written into a hidden one in it, and put into place together when all are
+    whole. A context manager; without finish() it leaves what was there before, and nothing else."""
+
+    def __init__(self, folder: Path, inputs: Iterable[str | os.PathLike[str]] = (), names: Iterable[str] = ()) -> None:
+        """`inputs` of the command are not written over; of `names`, finish() takes away what is of an earlier run and
+        not made now."""
+        self._folder = folder
+        self._may_be_there = tuple(names)
+        self._unfinished = folder
+        self._inputs = list(inputs)
+        self._names: list[str] = []
+
+    def __enter__(self) -> Outputs:
+        make_folder(self._folder)
+        with writing(self._folder):
+            self._unfinished = Path(tempfile.mkdtemp(".tmp", ".lever.", self._folder))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        shutil.rmtree(self._unfinished, ignore_errors=True)
+
+    def path(self, name: str) -> Path:
+        """Where to write the file `name`. Raises LeverError when in its place is an input, or a folder."""
+        final = self._folder / name
+        check_not_input(final, self._inputs)
+        if final.is_dir():
+            raise LeverError(f"cannot write {final}: it is a folder")
+        self._names.append(name)
+        return self._unfinished / name
+
+    def finish(self) -> None:
+        """Puts the files into their place; the last one asked for is there only when all are. Raises LeverError."""
+        interrupts.check()
+        with writing(self._folder):
+            (self._folder / self._names[-1]).unlink(missing_ok=True)
+            for name in set(self._may_be_there) - set(self._names):
+                (self._folder / name).unlink(missing_ok=True)
+            for name in self._names:
+                os.replace(self._unfinished / name, self._folder / name)

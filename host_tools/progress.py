@@ -6,6 +6,8 @@ import sys
 import time
 from typing import Any
 
+from . import interrupts
+
 PATIENCE = 2.0
 """[s] before anything is said."""
 _BETWEEN_LINES = 30.0  # [s] where nobody looks
@@ -28,7 +30,8 @@ class Progress:
             self._bar.stop()
 
     def show(self, done: int, total: int, what: str = "") -> None:
-        """So much of `total` is done; `what` says what the last of it was."""
+        """So much of `total` is done; `what` says what the last of it was. Here a lost Ctrl-C is found."""
+        interrupts.check()
         now = time.monotonic()
         if now - self._start < PATIENCE:
             return

@@ -1,12 +1,15 @@
 """Lever CDKF from Python. These names stay; modules below may move.
 
-Each is imported when it is first used, so that `import lever_cdkf` costs nothing.
+Each is imported when it is first used, so that `import lever_cdkf` costs nothing: nor does typing, before the command
+`lever` can catch Ctrl-C.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
+TYPE_CHECKING = False  # typing's, to every type checker
 if TYPE_CHECKING:
+    from typing import Any
+
     from .host_tools.firmware.native import Config, Estimator, run_samples
     from .sil.run.runner import simulate
     from .sil.scenarios.scenario import load as load_scenario
@@ -26,6 +29,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
     module, attribute = _HOMES[name]
     value = getattr(importlib.import_module(module), attribute)
     globals()[name] = value

@@ -7,7 +7,8 @@ What is sent goes into an estimator of the firmware at once, and its answers can
 - Time is the firmware's, not the clock's: frames carry, in seconds, the sample time of the last BASE_SAMPLE that was
   accepted (0 before), continued beyond the 32 bits of time_us and never going back. Logs are therefore reproducible.
 - recv() does not wait for what cannot come: if only the calling thread has sent so far, every answer is already there,
-  and with none left it returns None at once, whatever the timeout. Other threads wait as usual.
+  and with none left it returns None at once, whatever the timeout, and `for message in bus` ends. Other threads wait as
+  usual.
 - A motor command is as old as the last sample: nobody calls lever_idle() here, since no clock runs.
 - Extended, remote and error frames pass and are not for the firmware, as on a real bus; CAN FD does not exist here.
 - At most `rx_queue_size` frames wait to be received; then the oldest are dropped, with one warning in the log.
@@ -19,7 +20,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -128,6 +129,11 @@ class LeverBus(BusABC):
                     return None
             if message is not None and (self._filters is None or self._matches_filters(message)):
                 return message
+
+    def __iter__(self) -> Iterator[Message]:
+        """What recv() returns, until it returns None: who has sent alone gets every answer, and an end."""
+        while (message := self.recv()) is not None:
+            yield message
 
     def flush_tx_buffer(self) -> None:
         """Does nothing: what was sent has arrived."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +15,13 @@ if TYPE_CHECKING:
 _DEFAULTS: Mapping[str, Mapping[str, Any]] = {"slcan": {"bitrate": 1_000_000, "sleep_after_open": 0.0}}
 """Unless told otherwise: the bit rate of lever.dbc, and no two seconds for an Arduino to reset in."""
 _IN_PROCESS = ("lever", "virtual")
+_PACKAGES = {"udp_multicast": "msgpack", "gs_usb": "gs_usb"}
+"""That an interface imports and python-can does not bring along."""
 
 
 def add_bus_options(parser: argparse.ArgumentParser) -> None:
     """--interface, --channel, --bitrate and --bus-option, for open_bus() and chosen_options()."""
-    parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …")
+    parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser …")
     parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
     parser.add_argument("--bitrate", metavar="RATE", type=int, help="[bit/s] for interfaces that set it")
     parser.add_argument(
@@ -58,13 +61,16 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) ->
 
     from .protocol_ahead import read_ahead
 
+    package = _PACKAGES.get(interface)
+    if package is not None and importlib.util.find_spec(package) is None:
+        raise LeverError(f"interface {interface} needs the Python package {package}: pip install {package}")
     given = {**_DEFAULTS.get(interface, {}), **options}
     if channel is not None:
         given["channel"] = read_ahead(channel) if interface == "slcan" else channel
     where = interface if channel is None else f"{interface} channel {channel}"
     try:
         bus = can.Bus(interface=interface, **given)
-    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
+    except Exception as error:  # without its driver, an interface may come up with any, NameError among them
         raise LeverError(f"cannot open {where}: {error}; is it there and up?") from None
     if bus.channel_info == can.BusABC.channel_info:  # slcan does not say what it is
         bus.channel_info = where

@@ -25,6 +25,14 @@ _WORDS = {
 }
 
 
+def why_refused(corrupt: int, late: int) -> str:
+    """Why an estimator has refused frames, by its counts of them; empty when it has refused none."""
+    reasons = [f"{corrupt:,} corrupt (CRC, length or value)"] if corrupt else []
+    if late:
+        reasons.append(f"{late:,} repeated or out of sequence (does the sender count each message from 0 to 15?)")
+    return ", ".join(reasons)
+
+
 class Traffic:
     """Picks the frames; the counts are of what has been read so far."""
 

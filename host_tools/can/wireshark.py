@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..files import make_folder, write_text
+from ..files import Outputs, write_text
 from .codec import database
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ _SIZES = (8, 16, 32, 64)
 def write_profile(folder: Path) -> None:
     """Writes the profile into a folder, such as ~/.config/wireshark/profiles/lever. Raises LeverError."""
     messages = database().messages
-    make_folder(folder)
     tables: dict[str, Iterable[Row]] = {
         "Signal_PDU_identifiers": ((_hex(message.frame_id), message.name) for message in messages),
         "Signal_PDU_signal_list": (row for message in messages for row in _signals(message)),
@@ -37,8 +36,10 @@ def write_profile(folder: Path) -> None:
             (_hex(message.frame_id), _hex(_ANY_BUS), _hex(message.frame_id)) for message in messages
         ),
     }
-    for name, rows in tables.items():
-        write_text(folder / name, "".join(",".join(f'"{cell}"' for cell in row) + "\n" for row in rows))
+    with Outputs(folder) as outputs:
+        for name, rows in tables.items():
+            write_text(outputs.path(name), "".join(",".join(f'"{cell}"' for cell in row) + "\n" for row in rows))
+        outputs.finish()
 
 
 def _hex(number: int) -> str:

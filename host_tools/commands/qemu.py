@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from typing import Any, NoReturn
 
+from .. import interrupts
 from ..errors import LeverError
 
 _CHANNEL = "{channel}"
@@ -20,7 +21,7 @@ is an SLCAN adapter with the estimator behind it. Waits until it answers and pri
 ends. In COMMAND, {channel} stands for the channel.
 
 The image has the default settings. Of a scenario it takes what a COMMAND message tells it (model, preload, estimator,
-adaptation, dither), not what stands under [settings] there.
+adaptation, dither); one with other [settings] is refused, unless --set "settings={}" leaves them out.
 """
 _EPILOG = """\
 examples:
@@ -71,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
             while True:
                 time.sleep(3600.0)
         except KeyboardInterrupt:
+            interrupts.forget()
             return 0
 
 

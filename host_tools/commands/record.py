@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..can.buses import add_bus_options, chosen_options, open_bus
+from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options, open_bus
 from ..errors import LeverError
 from ..tables import Row, add_json_option
 
@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))
     if args.interface is None:
         raise LeverError("record what? give a bus such as --interface socketcan --channel can0")
+    check_others_can_be_heard(args.interface)
     with open_bus(args.interface, args.channel, chosen_options(args)) as bus, _stopping() as stopped:
         recorder = Recorder(bus, out, args.channel or args.interface)
         print(f"recording {bus.channel_info} into {out}; Ctrl-C ends", file=sys.stderr)

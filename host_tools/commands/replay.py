@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..extras import warn_of_left_out
+from ..files import check_not_input
 from ..tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -40,7 +41,8 @@ examples:
   lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
   candump -L can0 | lever replay - -o out/live
 
-Exit status: 0 when the log was replayed; 1 when the estimator was in fault, with one line on standard error.
+Exit status: 0 when the log was replayed; 1 when the estimator was in fault or published no estimate, with one line on
+standard error.
 """
 
 
@@ -70,9 +72,11 @@ def run(args: argparse.Namespace) -> int:
     from ..progress import Progress
     from ..replay.engine import replay
     from ..replay.outputs import FILES
+    from ..replay.summary import failure
     from ..tables import print_tables
 
     options = _options(args)
+    check_not_input(args.json, args.logs)
     if args.out is not None:
         warn_of_left_out(FILES)
     with Progress("replay") as progress:
@@ -82,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         print(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
     if not summary["passed"]:
-        print("lever: replay: the estimator was in fault", file=sys.stderr)
+        print(f"lever: replay: {failure(summary)}", file=sys.stderr)
     return 0 if summary["passed"] else 1
 
 
@@ -140,6 +144,7 @@ def _recording_row(summary: dict[str, Any]) -> Row:
         "duration [s]": recording["duration_s"],
         "frames": recording["frames"],
         "frames left out": left_out or "none",
+        "refused": recording["refused"],
         "samples": summary["samples"],
         **{count: summary[count] for count in ("lost", "corrupt", "late", "restarts")},
         "repeated frames": recording["repeated"],

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import LeverError
 from ..extras import require
+from ..files import check_not_input
 from ..tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -120,6 +121,8 @@ def _settings(args: argparse.Namespace) -> Assignments:
     for path in (args.output, args.page):  # before a search whose result could then not be kept
         if path is not None and not path.parent.is_dir():
             raise LeverError(f"cannot write {path}: there is no folder {path.parent}")
+    for path in (args.output, args.page, args.json):
+        check_not_input(path, args.log)
     if args.start < 0.0 or not args.length > 0.0:
         raise LeverError(f"--start {args.start:g} --length {args.length:g}: seconds, and length must be more than 0")
     assignments = read_assignments(args.settings) if args.settings is not None else {}

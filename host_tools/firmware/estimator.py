@@ -209,29 +209,27 @@ class Estimator:
 
 
 def run_samples(
-    config: Config | None, samples: Mapping[str, NDArray[Any]], at: NDArray[np.int64] | None = None
+    config: Config | None, samples: Mapping[str, Any], at: NDArray[np.int64] | None = None
 ) -> dict[str, NDArray[Any]]:
     """Feeds N samples to a fresh estimator and returns what it says after each, or after those with the indices `at`.
 
-    samples: arrays of N: time_us (whole numbers, wrapped here), theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot
-    [m/s²], grip_force [N]; bool arrays theta_valid … may say what is valid, without them what is not NaN is. One that
-    is missing is never valid. Returned: each field of lever_estimate_t in single precision (N by 3 for parameter,
-    parameter_sigma, parameter_correlation), mode and faults as the numbers of the façade's enums, and how often the
-    filter was restarted so far (recoveries).
+    samples: columns of N numbers (arrays, lists, of pandas, of polars): time_us [µs] (whole numbers, wrapped here),
+    theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s²], grip_force [N]; bool columns theta_valid … may say what
+    is valid, without them what is neither NaN nor null is. One that is missing is never valid. What is plainly in
+    another unit, such as milliseconds or degrees, is a LeverError.
+
+    Returned: each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma,
+    parameter_correlation), mode and faults as the numbers of the façade's enums, and how often the filter was restarted
+    so far (recoveries).
     """
     import numpy as np
 
+    from .samples import sample_array
+
+    config = config or Config()
     estimator = Estimator(config)
-    count = len(samples["time_us"])
-    taken = np.zeros(count, struct_dtype("lever_sample_t"))
-    taken["time_us"] = np.asarray(samples["time_us"]).astype(np.int64)  # to 32 bits: wraps
-    for name in SAMPLE_VALUES:
-        if name in samples:
-            taken[name] = samples[name]
-            taken[f"{name}_valid"] = samples.get(f"{name}_valid", ~np.isnan(samples[name]))
-    unknown = set(samples) - set(taken.dtype.names or ())
-    if unknown:
-        raise LeverError(f"unknown columns of samples: {', '.join(sorted(unknown))}")
+    taken = sample_array(samples, config.settings["sample_period"])
+    count = len(taken)
     asked = np.arange(count) if at is None else np.asarray(at)
     if (len(asked) and not 0 <= asked[0] <= asked[-1] < count) or (np.diff(asked) <= 0).any():
         raise LeverError(f"at: the indices must rise from 0 to at most {count - 1}")

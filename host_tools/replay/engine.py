@@ -17,7 +17,7 @@ from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.logs import Recording
 from ..can.traffic import Traffic
 from ..extras import missing
-from ..files import write_text
+from ..files import Outputs, write_text
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
 from ..results.summary import SCHEMA, ReplaySummary, of
@@ -26,10 +26,10 @@ from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
 from .mf4 import Mf4
-from .outputs import SUMMARY, BusLog, Outputs, TraceCsv
+from .outputs import FILES, SUMMARY, BusLog, TraceCsv
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
-from .summary import Figures, verdict
+from .summary import Figures, failure, verdict
 from .timeline import Timeline
 
 Progress = Callable[[int, int], None]
@@ -59,10 +59,11 @@ def replay(
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
     trace.csv, signals.mf4, report.html and summary.json there, all or none; signals.mf4 with the extra `mf4`,
-    report.html with `report`. Raises LeverError."""
+    report.html with `report`. Raises LeverError, also rather than write over a log."""
+    logs = list(logs)
     traffic = Traffic(Recording(logs), options.channel)
     with ExitStack() as stack:
-        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir))
+        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs, FILES))
         made = _Replay(traffic, options, outputs)
         made.run(progress)
         summary = made.summary()
@@ -175,10 +176,10 @@ class _Replay:
             "recording": self._recording(),
             "estimator": {**choices, "settings": self._options.config.settings},
             "samples": self._timeline.clocks.samples,
-            **self.figures.summary(),
+            **self.figures.summary(self._feeder.estimator.health()),
             "comparison": compared,
         }
-        summary["passed"] = "fault" not in summary["modes_s"]
+        summary["passed"] = not failure(summary)
         summary["verdict"] = verdict(summary)
         return summary
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from ..can import codec
 from ..extras import require
+from ..files import writing
 from ..firmware.quantities import quantities, recorded_name
 from ..results.feedthrough import FEEDTHROUGH
 from ..results.trace import ESTIMATED, HEALTH, MEASURED, Trace
-from .outputs import writing
 
 Signals = list[tuple[str, str, str]]
 """Column of the trace, name and unit in the file."""

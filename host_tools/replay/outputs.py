@@ -1,66 +1,17 @@
-"""The files of a replay, written as it goes on into a hidden folder; none is in its place before all are whole."""
+"""The files of a replay, written as it goes on."""
 
 from __future__ import annotations
 
-import os
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 
 from ..can import bulk
 from ..can.bulk import Frames
-from ..errors import LeverError
-from ..files import make_folder
+from ..files import writing
 from ..results.trace import Trace, write_csv_header, write_csv_rows
 
 SUMMARY = "summary.json"
 """The last file to be in its place: where it is, the others are of the same replay."""
 FILES = ("bus.log", "trace.csv", "signals.mf4", "report.html", SUMMARY)
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Raises LeverError, which names `path`, for an OSError inside."""
-    try:
-        yield
-    except OSError as error:
-        raise LeverError(f"cannot write {path}: {error.strerror or error}") from None
-
-
-class Outputs:
-    """A context manager; without finish() it leaves nothing behind."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._unfinished = folder / f".replay.{os.getpid()}.tmp"
-
-    def __enter__(self) -> Outputs:
-        make_folder(self._folder)
-        with writing(self._folder):
-            self._unfinished.mkdir()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        shutil.rmtree(self._unfinished, ignore_errors=True)
-
-    def path(self, name: str) -> Path:
-        """Where to write the file `name`."""
-        return self._unfinished / name
-
-    def finish(self) -> None:
-        """Puts the files into their place, and takes away those of an earlier replay that this one has not. Raises
-        LeverError."""
-        with writing(self._folder):
-            (self._folder / SUMMARY).unlink(missing_ok=True)
-            for name in FILES:
-                if self.path(name).exists():
-                    os.replace(self.path(name), self._folder / name)
-                else:
-                    (self._folder / name).unlink(missing_ok=True)
 
 
 class BusLog:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..can.fields import COUNTS
-from ..firmware.native import Config, enum_names
+from ..can.traffic import why_refused
+from ..firmware.native import Config, Health, enum_names
 from ..firmware.quantities import quantities
 from ..results import nis, whiteness
 from ..results.nis import Innovations, freedom
@@ -42,7 +42,7 @@ class Figures:
         for mode, count in zip(modes.tolist(), counts.tolist(), strict=True):
             self._modes[int(mode)] = self._modes.get(int(mode), 0) + count
         columns = [each.column(kind) for each in self._quantities for kind in ("estimate", "sigma")]
-        for name in (*columns, *COUNTS):
+        for name in columns:
             known = trace[name][np.isfinite(trace[name])]
             if len(known):
                 self._last[name] = float(known[-1])
@@ -63,8 +63,8 @@ class Figures:
             }
         return told
 
-    def summary(self) -> dict[str, Any]:
-        """The part of summary.json that is about all samples."""
+    def summary(self, health: Health) -> dict[str, Any]:
+        """The part of summary.json that is about all samples; `health` is the estimator's at the end."""
         residuals = self._residuals.all()
         measured = None if residuals is None else whiteness.of_averages(residuals[0], self._average_s)
         names = enum_names("lever_mode")
@@ -72,9 +72,23 @@ class Figures:
             "estimates": self.estimates(),
             "nis": asdict(self._innovations.figures()),
             "whiteness": None if measured is None else asdict(measured),
-            **{count: int(self._last.get(count, 0)) for count in COUNTS},
+            "lost": health.lost,
+            "corrupt": health.corrupt,
+            "late": health.late,
+            "restarts": health.recoveries,
             "modes_s": {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())},
         }
+
+
+def failure(summary: dict[str, Any]) -> str:
+    """Why a replay did not pass, in a line; empty when it did."""
+    reasons = []
+    if "fault" in summary["modes_s"]:
+        reasons.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
+    if all(estimate["last"] is None for estimate in summary["estimates"].values()):
+        accepted, refused = summary["samples"], summary["recording"]["refused"]
+        reasons.append(f"no estimate was published: samples accepted: {accepted:,}, frames refused: {refused:,}")
+    return " and ".join(reasons)
 
 
 def verdict(summary: dict[str, Any]) -> str:
@@ -96,8 +110,11 @@ def _comparison(told: dict[str, Any] | None) -> str:
 def _troubles(summary: dict[str, Any]) -> list[str]:
     """What the reader has to know before believing the rest."""
     told, recording = [], summary["recording"]
-    if "fault" in summary["modes_s"]:
-        told.append(f"Trouble: the estimator was in fault for {summary['modes_s']['fault']:g} s.")
+    if failure(summary):
+        told.append(f"Trouble: {failure(summary)}.")
+    if recording["refused"]:
+        why = why_refused(summary["corrupt"], summary["late"])
+        told.append(f"{recording['refused']:,} frames were refused: {why}.")
     if recording["ends_early"]:
         told.append(f"The log is not whole: {'; '.join(recording['ends_early'])}.")
     if recording["damaged_lines"]:
@@ -109,13 +126,19 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
         told.append(f"The sender's clock started over {recording['clock_restarts']} times.")
     if recording["model_changes"]:
         told.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
+    step, period = recording["typical_step_s"], summary["estimator"]["settings"]["sample_period"]
+    if step and not 0.7 < step / period < 1.4:
+        told.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
+    return told + _recorded_estimates(recording)
+
+
+def _recorded_estimates(recording: dict[str, Any]) -> list[str]:
+    """Why estimates in the log are not compared with the new ones."""
+    told = []
     if recording["answers_of_other_contract"]:
         told.append(
             "The estimates in the log are of another contract, or none that it tells (IDENTITY): they are not compared."
         )
     if recording["misplaced_answers"]:
         told.append(f"{recording['misplaced_answers']} recorded estimates do not belong to the sample before them.")
-    step, period = recording["typical_step_s"], summary["estimator"]["settings"]["sample_period"]
-    if step and not 0.7 < step / period < 1.4:
-        told.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
     return told

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..can import codec, logs
-from ..can.traffic import Traffic
+from ..can.traffic import Traffic, why_refused
 from ..errors import LeverError
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
@@ -92,7 +92,8 @@ def _recording(frames: Array, bus: str, log: str) -> Recording:
         received[field] = frames[field]
     samples, choices, health = samples_of(received)
     if len(samples) < 2:
-        raise LeverError(f"{log}: none of its samples is accepted: {health.corrupt} frames are corrupt (E2E)")
+        why = why_refused(health.corrupt, health.late) or "it holds no more"
+        raise LeverError(f"{log}: too few samples to tune on, {len(samples)}: {why}")
     return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, choices, health)
 
 

@@ -16,7 +16,12 @@ import logging
 import signal
 import socket
 import sys
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from importlib.resources import files
 from typing import Any
 from urllib.parse import urlsplit
@@ -53,6 +58,8 @@ _HEADERS = {
     "Cache-Control": "no-store",
 }
 _LARGEST_MESSAGE = 512  # [bytes] from a page
+_now = time.monotonic
+_MOST_COMMANDS = 20  # a second, of a page
 _MOST_BEHIND = 50  # messages a page may fail to take in a row before it is let go; it connects again
 
 
@@ -63,6 +70,8 @@ class Server:
         """Takes the port. Raises LeverError."""
         self.source, self.config, self.host = source, config, host
         self.state = State(source, config, read_only=read_only)
+        self._sender = ThreadPoolExecutor(1, "lever commands")
+        self._upkeep: asyncio.Future[None] | None = None
         self.socket = _bind(host, port)
         self.port: int = self.socket.getsockname()[1]
         self.pages: set[Channel] = set()
@@ -93,20 +102,32 @@ class Server:
             for page in list(self.pages):
                 page.close(1001, "the server ends")
             await web.close_all_connections()
-            with suppress(LeverError):
-                self.source.end_dither()
+            await self._in_turn(partial(self._keep_dither, False))
+            self._sender.shutdown()
             self.source.stop()
 
     def advance(self) -> None:
         """Tells all pages what is new. Dither goes on as long as there is a page that shows it."""
         messages = self.state.advance()
+        if self._upkeep is None or self._upkeep.done():
+            self._upkeep = self._in_turn(partial(self._keep_dither, bool(self.pages)))
+        for page in list(self.pages):
+            page.update(messages)
+
+    async def command(self, command: Mapping[str, str | float]) -> None:
+        """Sends a COMMAND. Raises LeverError."""
+        await self._in_turn(partial(self.source.command, command))
+
+    def _in_turn(self, send: Callable[[], None]) -> asyncio.Future[None]:
+        """Sends in a thread, where a bus that is full is waited for: the pages are not."""
+        return asyncio.get_running_loop().run_in_executor(self._sender, send)
+
+    def _keep_dither(self, is_shown: bool) -> None:
         with suppress(LeverError):  # a bus that fails says so in the source's error
-            if self.pages:
+            if is_shown:
                 self.source.keep_alive()
             else:
                 self.source.end_dither()
-        for page in list(self.pages):
-            page.update(messages)
 
     def is_host(self, header: str) -> bool:
         """Whether the Host header names this server; a port may be another one, because of tunnels."""
@@ -159,6 +180,10 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
     _behind = 0
     _sending: asyncio.Future[None] | None = None
 
+    def initialize(self, server: Server) -> None:
+        super().initialize(server)
+        self._commanded: deque[float] = deque(maxlen=_MOST_COMMANDS)  # when [s]
+
     def prepare(self) -> None:
         super().prepare()
         origin = self.request.headers.get("Origin")
@@ -199,16 +224,24 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
         except tornado.websocket.WebSocketClosedError:
             self.server.pages.discard(self)
 
-    def on_message(self, message: str | bytes) -> None:
+    async def on_message(self, message: str | bytes) -> None:
+        """The next one is not read before this one is answered."""
         try:
             if not self.server.state.controls:
                 raise LeverError("this page only shows: no commands")
             command = command_of(json.loads(message), self.server.config)
-            self.server.source.command(command)
+            self._count_command(_now())
+            await self.server.command(command)
+            answer: dict[str, object] = {"sent": command}
         except (LeverError, ValueError) as error:
-            self.tell(json.dumps({"refused": str(error)}))
-            return
-        self.tell(json.dumps({"sent": command}))
+            answer = {"refused": str(error)}
+        await self._send(json.dumps(answer))
+
+    def _count_command(self, now: float) -> None:
+        """So that no page can fill the bus. Raises LeverError."""
+        if len(self._commanded) == _MOST_COMMANDS and now - self._commanded[0] < 1.0:
+            raise LeverError(f"a page may send {_MOST_COMMANDS} commands a second: wait a moment")
+        self._commanded.append(now)
 
 
 def serve(

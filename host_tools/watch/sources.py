@@ -60,6 +60,7 @@ class Source(ABC):
         """Why not, when something went wrong."""
         self._waiting: deque[Frame] = deque(maxlen=MOST_WAITING)
         self._start = time.monotonic()
+        self._switch_interval: float | None = None  # of before start()
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="lever frames", daemon=True)
         self._commander = Commander()
@@ -81,7 +82,9 @@ class Source(ABC):
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join(timeout=3.0)
+        if self._switch_interval is not None:
             sys.setswitchinterval(self._switch_interval)
+            self._switch_interval = None
 
     @property
     def now(self) -> float:
@@ -168,7 +171,7 @@ class BusSource(Source):
 
         try:
             self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data), timeout=0.5)
-        except can.CanError as error:
+        except (can.CanError, OSError) as error:
             raise LeverError(f"{self.title} did not take the command: {error}") from None
         self._put((identifier, data))
 

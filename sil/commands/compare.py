@@ -108,12 +108,15 @@ def run(args: argparse.Namespace) -> int:
     for case, verdict in by_case.items():
         print(f"{case}: {verdict}")
     if args.out is not None:
-        from lever_cdkf.host_tools.files import write_text
+        from lever_cdkf.host_tools.files import Outputs, write_text
 
         from ..study.compare import compare_page
 
-        write_text(args.out / "compare.csv", table.csv_text(rows))
-        write_text(args.out / "compare.html", compare_page.build(results, rows, by_case, claims, tables))
+        with Outputs(args.out) as outputs:
+            write_text(outputs.path("compare.csv"), table.csv_text(rows))
+            page = compare_page.build(results, rows, by_case, claims, tables)
+            write_text(outputs.path("compare.html"), page)
+            outputs.finish()
         print(f"Written to {args.out}: compare.html, compare.csv")
     return 0
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,28 +80,26 @@ def _list() -> int:
 
 
 def _make(names: Sequence[str], seed: int, folder: Path) -> list[str]:
-    """Makes the figures and writes the files, each complete or not at all; returns their names. Raises LeverError."""
-    from lever_cdkf.host_tools.files import make_folder, replace_file, write_text
+    """Makes the figures and writes the files, all or none; returns their names. Raises LeverError."""
+    from lever_cdkf.host_tools.files import Outputs, write_text, writing
     from lever_cdkf.host_tools.progress import Progress
 
     from ..study.figures import figures_page, png
     from ..study.figures.catalogue import FIGURES
     from ..study.figures.runs import Extent
 
-    make_folder(folder)  # before figures that could then not be kept
     figures: list[Figure] = []
-    with Progress("figures") as progress:
+    with Outputs(folder) as outputs, Progress("figures") as progress:
         for done, name in enumerate(names):
             progress.show(done, len(names))
             figures.append(FIGURES[name](seed, Extent()))
-            replace_file(folder / f"{name}.png", partial(_write, png.render(figures[-1])))
-        write_text(folder / _PAGE, figures_page.build(figures))
-        write_text(folder / _CAPTIONS, _captions(figures))
+            print_file = outputs.path(f"{name}.png")
+            with writing(print_file):
+                print_file.write_bytes(png.render(figures[-1]))
+        write_text(outputs.path(_PAGE), figures_page.build(figures))
+        write_text(outputs.path(_CAPTIONS), _captions(figures))
+        outputs.finish()
     return [*(f"{name}.png" for name in names), _PAGE, _CAPTIONS]
-
-
-def _write(content: bytes, path: Path) -> None:
-    path.write_bytes(content)
 
 
 def _captions(figures: Sequence[Figure]) -> str:

@@ -22,7 +22,7 @@ from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, Commander, refusal, result_of
 from lever_cdkf.host_tools.can.identity import Identity
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from numpy.typing import NDArray
 
 from ..plants import excitation, sensors
@@ -40,6 +40,9 @@ FIRST_TIMEOUT = 2.0
 MOST_UNANSWERED = 20
 """Samples without an answer in a row, after which nobody is taken to be there."""
 
+REST = 5.0
+"""Sample time [s] after which nothing is left of an earlier torque: twenty time constants of the torque gate's rms."""
+
 _PROGRESS_EVERY = 500
 
 
@@ -49,6 +52,10 @@ class NoAnswerError(LeverError):
 
 class RefusedError(LeverError):
     """The estimator refuses a COMMAND of the run."""
+
+
+class _UnrestedError(Exception):
+    """A run has ended so recently that its torque, or the sequence of its COMMANDs, reaches into this one."""
 
 
 @dataclass(frozen=True)
@@ -128,19 +135,47 @@ def run(
     commander: Commander | None = None,
 ) -> Recording:
     """Runs `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock.
+    One that comes from another run rests for REST first, off the record, so that one seed is one run on it, too.
 
     `commander`: of whoever else sends COMMAND on this bus. Raises NoAnswerError when nobody answers, RefusedError when
-    the estimator refuses a COMMAND, and LeverError when it speaks another contract.
+    the estimator refuses a COMMAND, and LeverError when it speaks another contract or has other settings.
     """
-    recording = Recording(scenario, prepare(scenario))
-    _loop(recording, _Link(bus, recording, commander or Commander()), realtime, progress)
+    inputs, alone = prepare(scenario), commander is None
+    commander = commander or Commander()
+    recording = Recording(scenario, inputs)
+    try:
+        _loop(recording, _Link(bus, recording, commander, must_rest=alone), realtime, progress)
+    except _UnrestedError:
+        resting = Recording(scenario, inputs)
+        _rest(_Link(bus, resting, commander), scenario, float(inputs.truth.rest[0]))
+        recording = Recording(scenario, inputs, identity=resting.identity)
+        _loop(recording, _Link(bus, recording, commander), realtime, progress)
     return recording
+
+
+def _rest(link: _Link, scenario: Scenario, theta: float) -> None:
+    """Samples of a lever at rest, until the estimator, after a reset, is as a fresh one: up to a HEALTH, which clears
+    the faults that it has gathered."""
+    send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
+    encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    period_us = round(scenario.period * 1e6)
+    link.command(0, {"request": "reset", "dither_rms": 0.0})
+    for sample in range(round(2.0 * REST / scenario.period)):
+        send_lever(sample, encode_lever(sample, theta, 0.0, 0.0))
+        send_base(sample, encode_base(sample, 0.0, sample * period_us))
+        link.answer(sample)
+        if sample * scenario.period >= REST and link.has_health:
+            break
 
 
 class _Link:
     """The estimator at the other end of the bus; records every frame both ways."""
 
-    def __init__(self, bus: can.BusABC, recording: Recording, commander: Commander) -> None:
+    def __init__(self, bus: can.BusABC, recording: Recording, commander: Commander, *, must_rest: bool = False) -> None:
+        """`must_rest`: what an earlier run has left is an _UnrestedError."""
+        self.has_health = False
+        """Whether the last answer had a HEALTH in it."""
+        self._must_rest = must_rest
         self._bus = bus
         self._recording = recording
         self._commander = commander
@@ -149,11 +184,10 @@ class _Link:
         self._motor = codec.message("MOTOR_COMMAND").frame_id
         self._acknowledgement = codec.message("COMMAND_ACK").frame_id
         self._identity = codec.message("IDENTITY").frame_id
+        self._health = codec.message("HEALTH").frame_id
         self._torque = _signed_field("MOTOR_COMMAND", "torque")
         self._motor_time = codec.raw_field("MOTOR_COMMAND", "time_low")
         self._estimate_time = codec.raw_field("STATE_ESTIMATE", "time_low")
-        self._gate_open = codec.raw_field("MOTOR_COMMAND", "valid")
-        self._motor_started = False
         self._unanswered_in_a_row = 0
         incoming = [message for message in codec.database().messages if message.senders == ["ESTIMATOR"]]
         self._incoming = frozenset(message.frame_id for message in incoming)
@@ -182,6 +216,8 @@ class _Link:
             result = self._acknowledged(sample, counter)
             if result != SEQUENCE:
                 break
+            if self._must_rest and not sample:
+                raise _UnrestedError
         if result not in (ACCEPTED, None):
             raise RefusedError(f"{self._bus.channel_info}: {refusal(str(result))}")
 
@@ -200,17 +236,20 @@ class _Link:
         return None
 
     def answer(self, sample: int) -> float:
-        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for.
-        What still fades of an earlier run's, before the gate opens for the first time, is none of this one."""
+        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for."""
         time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
         torque = 0.0
+        self.has_health = False
         while (frame := self._take(sample, timeout)) is not None:
             identifier, data = frame
             if identifier == self._motor:
                 if self._motor_time(data) == time_low:
-                    self._motor_started = self._motor_started or self._gate_open(data) != 0
-                    torque = self._torque(data) if self._motor_started else 0.0
+                    torque = self._torque(data)
+                    if torque != 0.0 and self._must_rest and not sample:
+                        raise _UnrestedError
+            elif identifier == self._health:
+                self.has_health = True
             elif identifier == self._estimate:
                 if self._estimate_time(data) == time_low:
                     self._unanswered_in_a_row = 0
@@ -232,8 +271,19 @@ class _Link:
             if identifier == self._identity:
                 recording.identity.take(codec.decode(identifier, data)[1])
                 recording.identity.check(f"the estimator on {self._bus.channel_info}")
+                self._check_settings()
             return identifier, data
         return None
+
+    def _check_settings(self) -> None:
+        """Settings come by no frame: another process has its own. Raises SettingsError when they are not the
+        scenario's."""
+        scenario, says = self._recording.scenario, self._recording.identity.settings_crc
+        if says not in (None, scenario.config.settings_crc):
+            raise SettingsError(
+                f"the estimator on {self._bus.channel_info} has other settings than the scenario: start it with those "
+                "that this command prints with --settings, or give its own here with --settings FILE"
+            )
 
     def _miss(self, sample: int) -> None:
         self._recording.unanswered += 1

@@ -8,13 +8,12 @@ leave no files.
 from __future__ import annotations
 
 import math
-import multiprocessing
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from lever_cdkf.host_tools import interrupts
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.results.summary import SimulationSummary
 from lever_cdkf.host_tools.results.whiteness import CANNOT_SEE
@@ -63,8 +62,7 @@ def _results(function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: i
     if jobs == 1 or len(tasks) == 1:
         yield from map(function, tasks)
         return
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(min(jobs, len(tasks)), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    with interrupts.worker_pool(min(jobs, len(tasks))) as pool:
         yield from pool.imap(function, tasks)
 
 

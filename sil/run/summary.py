@@ -210,6 +210,7 @@ def _verdict(found: SimulationSummary) -> str:
             _verdict_sigma(found.parameters),
             nis.verdict(found.nis),
             whiteness.verdict(found.whiteness),
+            _verdict_settings(found),
         )
         if sentence
     )
@@ -223,10 +224,14 @@ def _verdict_run(found: SimulationSummary) -> str:
         troubles.append(f"{found.misplaced} estimates came that belong to other samples")
     if "fault" in found.modes_s:
         troubles.append(f"the estimator was in fault for {found.modes_s['fault']:g} s")
-    told = f"Trouble: {' and '.join(troubles)}." if troubles else ""
-    if found.firmware.settings_as_scenario is False:
-        told = f"{told} The estimator has other settings than the scenario.".lstrip()
-    return told
+    return f"Trouble: {' and '.join(troubles)}." if troubles else ""
+
+
+def _verdict_settings(found: SimulationSummary) -> str:
+    """A run on other settings is refused; one of less than a second may not learn which they are."""
+    if found.firmware.settings_as_scenario is not None:
+        return ""
+    return "The estimator has not said which settings it has (IDENTITY): those of the scenario are assumed."
 
 
 def _verdict_truth(found: SimulationSummary) -> str:

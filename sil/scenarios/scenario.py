@@ -241,14 +241,21 @@ def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
             f"no scenario {name_or_path!r}; there are {', '.join(names())}, or give a path to a .toml file"
         )
     try:
+        scenario = dataclasses.replace(_read(content, file, overrides), name=name, file=file)
+    except RecursionError:
+        raise ScenarioError(f"{file}: its tables or lists, or those of --set, are nested too deeply") from None
+    scenario.check()
+    return scenario
+
+
+def _read(content: bytes, file: str, overrides: Iterable[str]) -> Scenario:
+    try:
         values = tomllib.loads(content.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # also of text that is not UTF-8, and of a whole number with too many digits
         raise ScenarioError(f"{file}: not TOML: {error}") from None
     for override in overrides:
         _override(values, override)
-    scenario = dataclasses.replace(read(Scenario, values, Place(file)), name=name, file=file)
-    scenario.check()
-    return scenario
+    return read(Scenario, values, Place(file))
 
 
 def _override(values: dict[str, Any], override: str) -> None:

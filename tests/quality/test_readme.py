@@ -7,7 +7,9 @@ that begin with cmake or ctest (they are what runs this) and sudo (not a test's 
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -66,6 +68,27 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with LeverBus("vcan0", config=steady.config) as bus:
         simulate(steady, bus, folder, channel="vcan0")
     return folder / "bus.log"
+
+
+def test_whatever_a_page_has_been_built_with_makes_lever_can() -> None:
+    """The process build/lever_can, which the pages then start: by the presets and targets that they name, and by what
+    these depend on in setup/CMakeLists.txt."""
+    presets = json.loads((tools.ROOT / "CMakePresets.json").read_text())["buildPresets"]
+    wanted: set[str] = set()
+    pages = [*READMES, tools.ROOT / "sil/SIL.md", tools.ROOT / "firmware/port/FLASH.md"]
+    for text in (page.read_text(encoding="utf-8") for page in pages):
+        if "lever_can" in text:
+            wanted |= set(re.findall(r"cmake --build build --target (venv)", text))
+            named = re.findall(r"cmake --workflow --preset ([\w-]+)", text)
+            wanted |= {target for each in presets if each["name"] in named for target in each.get("targets", ())}
+    assert wanted >= {"venv", "demo", "compare", "envelope", "budget"}
+    lines = re.findall(r"add_dependencies\(([\w -]+)\)", (tools.ROOT / "tests/setup/CMakeLists.txt").read_text())
+    needs = {target: found for target, *found in map(str.split, lines)}
+    for target in wanted - {"stm32f4"}:  # comes with budget
+        reached = {target}
+        while more := {other for each in reached for other in needs.get(each, ())} - reached:
+            reached |= more
+        assert "lever_can" in reached, target
 
 
 @pytest.mark.parametrize("script", blocks("sh"))

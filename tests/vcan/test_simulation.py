@@ -89,6 +89,7 @@ def test_the_estimates_are_those_of_a_run_in_one_process(runs: Runs) -> None:
 
 def test_a_process_that_has_run_before_serves_the_next_run(start: rig.Starter, interface: str, tmp_path: Path) -> None:
     process = start("--settings", settings_file("fixed_preload", tmp_path))
-    for _ in range(2):
-        lever_sim("fixed_preload", "--interface=socketcan", f"--channel={interface}")
-    assert process.stop()["samples"] == 2 * 1000
+    for out in ("one", "two"):
+        lever_sim("fixed_preload", "--interface=socketcan", f"--channel={interface}", f"--out={tmp_path / out}")
+    assert (tmp_path / "one/trace.csv").read_bytes() == (tmp_path / "two/trace.csv").read_bytes()
+    assert process.stop()["samples"] > 2 * 1000 + 5000  # it rests for 5 s of samples in between

@@ -6,14 +6,13 @@ the batch of a case once and keeps it until the next.
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
 import time as clock
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from lever_cdkf.host_tools import interrupts
 from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
@@ -102,8 +101,7 @@ def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, Outcome | Refe
     if jobs == 1 or len(todo) == 1:
         yield from map(do, todo)
         return
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(min(jobs, len(todo)), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    with interrupts.worker_pool(min(jobs, len(todo))) as pool:
         yield from pool.imap_unordered(do, todo)
 
 

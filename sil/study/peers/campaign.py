@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools import interrupts
 from lever_cdkf.host_tools.arrays import Array
 
 from ...envelope import conditions
@@ -73,8 +72,7 @@ def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, list[Result]]]
     if jobs == 1 or len(todo) == 1:
         yield from map(do, todo)
         return
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(min(jobs, len(todo)), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    with interrupts.worker_pool(min(jobs, len(todo))) as pool:
         yield from pool.imap_unordered(do, todo)
 
 

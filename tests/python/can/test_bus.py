@@ -118,6 +118,19 @@ def test_who_has_sent_never_waits(make_bus: MakeBus, samples: Samples, exchange:
     assert time.monotonic() - start < 5.0
 
 
+def test_a_loop_over_the_bus_gets_every_answer_and_ends(
+    make_bus: MakeBus, samples: Samples, message: ToMessage
+) -> None:
+    """That of can.BusABC would ask for ever for what recv() says will not come."""
+    bus, twin = make_bus("x"), make_bus("x")
+    for pair in samples(0, 20):
+        for frame in pair:
+            bus.send(message(frame))
+            twin.send(message(frame))
+    assert seen(list(bus)) == seen(list(iter(lambda: twin.recv(0.0), None)))
+    assert list(bus) == []
+
+
 def test_another_thread_waits_for_the_answer(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
     bus = make_bus("x")
     received: list[can.Message | None] = []

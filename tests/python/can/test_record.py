@@ -18,7 +18,6 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can.recorder import Recorder
 from python.conftest import Session
 
-LEVER = str(Path(sys.executable).with_name("lever"))
 CHANNEL = "recorded"
 
 
@@ -45,6 +44,12 @@ def send() -> Iterator[Callable[[list[can.Message]], None]]:
     yield later
     for thread in threads:
         thread.join()
+
+
+@pytest.fixture(autouse=True)
+def _heard_in_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """python-can's virtual bus, whose other end is a thread of the test, stands for a real one."""
+    monkeypatch.setattr("lever_cdkf.host_tools.can.buses._IN_PROCESS", ())
 
 
 def record(path: Path, seconds: float = 1.5) -> int:
@@ -100,6 +105,8 @@ def test_a_full_disk_leaves_a_partial_log_and_one_line(session: Session, tmp_pat
     program = (
         "import sys, threading, time, can\n"
         "from lever_cdkf.host_tools import cli\n"
+        "from lever_cdkf.host_tools.can import buses\n"
+        "buses._IN_PROCESS = ()\n"
         f"frames = list(can.LogReader({str(session.log)!r}))[:3000]\n"
         "def send():\n"
         f"    with can.Bus(interface='virtual', channel={CHANNEL!r}) as bus:\n"
@@ -125,7 +132,14 @@ def test_a_full_disk_leaves_a_partial_log_and_one_line(session: Session, tmp_pat
 
 
 def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
-    command = [LEVER, "record", "--interface", "virtual", "--channel", CHANNEL, "-o", "a.log"]
+    program = (
+        "import sys\n"
+        "from lever_cdkf.host_tools import cli\n"
+        "from lever_cdkf.host_tools.can import buses\n"
+        "buses._IN_PROCESS = ()\n"
+        f"sys.exit(cli.main(['record', '--interface=virtual', '--channel={CHANNEL}', '-o', 'a.log']))\n"
+    )
+    command = [sys.executable, "-c", program]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         end = time.monotonic() + 30.0
         while not (tmp_path / "a.log.partial").exists():
@@ -136,6 +150,16 @@ def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
     assert process.returncode == 0, errors
     assert "a.log: 0 frames, 0 lost" in output
     assert os.listdir(tmp_path) == ["a.log"]
+
+
+@pytest.mark.parametrize("interface", ["lever", "virtual"])
+def test_a_bus_on_which_nobody_else_is_is_refused(
+    interface: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.undo()
+    assert cli.main(["record", "--interface", interface, "--channel", "x", "-o", str(tmp_path / "a.log")]) == 2
+    assert f"lever: error: interface {interface} is inside one process, " in capsys.readouterr().err
+    assert os.listdir(tmp_path) == []
 
 
 def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

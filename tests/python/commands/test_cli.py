@@ -18,6 +18,7 @@ from lever_cdkf.host_tools.commands import dbc, settings
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import native_file
 from lever_cdkf.host_tools.firmware.native import settings_table
+from processes import LEVER as LEVER_SCRIPT
 
 LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
 
@@ -212,6 +213,24 @@ def test_reader_that_has_enough(installed: str) -> None:
     shell = f"{' '.join(LEVER)} dbc | true; echo ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("1\n", "")
+
+
+@pytest.mark.parametrize("arguments", [["sim", "--list"], ["settings"], ["--help"], ["replay", "-"]], ids=" ".join)
+def test_a_closed_standard_output_is_one_line(arguments: list[str]) -> None:
+    done = subprocess.run(
+        ["bash", "-c", 'exec "$@" >&-', "-", LEVER_SCRIPT, *arguments], capture_output=True, text=True, check=False
+    )
+    said = "lever: error: standard output is closed: send it to a file or to /dev/null\n"
+    assert (done.returncode, done.stderr) == (2, said)
+
+
+def test_a_closed_standard_input_or_error_is_an_empty_one() -> None:
+    command = ["bash", "-c", 'exec "$@" <&-', "-", LEVER_SCRIPT, "replay", "-"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "lever: error: -: holds no CAN frame\n")
+    command = ["bash", "-c", 'exec "$@" 2>&-', "-", LEVER_SCRIPT, "replay", "none.log"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "")
 
 
 # --- how commands are found ------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars
 import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
@@ -290,8 +291,59 @@ def test_run_samples_with_flags() -> None:
     np.testing.assert_array_equal(columns["faults"] & lib.LEVER_FAULT_THETA != 0, ~samples["theta_valid"])
     assert np.all(columns["faults"] & lib.LEVER_FAULT_TORQUE)
     assert native.run_samples(None, {"time_us": np.empty(0)})["theta"].shape == (0,)
-    with pytest.raises(LeverError, match="unknown columns of samples: tau"):
-        native.run_samples(None, {**samples, "tau": samples["theta"]})
+
+
+@pytest.mark.parametrize("column", [list, polars.Series, lambda values: values.astype(np.float32)])
+def test_run_samples_takes_any_column_of_numbers(column: Any) -> None:
+    samples = recording(200)
+    given = {name: column(values) if name != "time_us" else values for name, values in samples.items()}
+    if column is polars.Series:
+        given = dict(polars.DataFrame(samples).with_columns(polars.col("theta").fill_nan(None)).to_dict())
+    columns, expected = native.run_samples(None, given), native.run_samples(None, samples)
+    np.testing.assert_array_equal(columns["parameter"], expected["parameter"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"time_us": np.arange(200) * 1e-3}, "time_us is 0.001 at index 1; it must be whole numbers, of microseconds"),
+        (
+            {"time_us": np.arange(200)},
+            "time_us goes on by 1 a sample, and sample_period is 1000 µs: is it in microseco",
+        ),
+        ({"time_us": np.arange(200) * 10**6}, "time_us goes on by 1e+06 a sample, and sample_period is 1000 µs: is it"),
+        ({"time_us": np.zeros(200)}, "time_us goes on by 0 a sample"),
+        ({"time_us": np.full(200, np.nan)}, "time_us is nan at index 0"),
+        (
+            {"theta": np.degrees(recording(200)["theta"])},
+            "theta is beyond ±3.14 rad in 100 % of them: is it in degrees",
+        ),
+        ({"theta_dot": np.degrees(recording(200)["theta_dot"])}, "theta_dot is beyond ±20 rad/s in "),
+        ({"z_ddot": np.zeros(199)}, "samples: z_ddot has 199 values, time_us has 200"),
+        ({"theta_valid": np.ones(3, np.bool_)}, "samples: theta_valid has 3 values, time_us has 200"),
+        ({"z_ddot": np.zeros((200, 1))}, "samples: z_ddot has 2 dimensions; it must be one column"),
+        ({"theta": polars.Series(["0.3"] * 200)}, "samples: theta is no column of numbers"),
+        ({"tau": np.zeros(200)}, "unknown columns of samples: tau; they may be time_us, theta, "),
+    ],
+)
+def test_run_samples_says_what_is_wrong_with_them(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(LeverError, match=re.escape(message)) as caught:
+        native.run_samples(None, recording(200) | wrong)
+    assert "\n" not in str(caught.value)
+
+
+def test_run_samples_takes_columns_not_tables() -> None:
+    with pytest.raises(LeverError, match="samples are a DataFrame: give its columns, as "):
+        native.run_samples(None, polars.DataFrame(recording(200)))  # type: ignore[arg-type]
+    with pytest.raises(LeverError, match="samples have no column time_us"):
+        native.run_samples(None, {"theta": np.zeros(3)})
+
+
+def test_run_samples_takes_outliers_for_what_they_are() -> None:
+    """A spike is the firmware's to judge, not another unit."""
+    samples = recording(1000)
+    samples["theta"][500:505] = 20.0
+    assert native.run_samples(None, samples)["theta"].shape == (1000,)
 
 
 # --- loading ---------------------------------------------------------------------------------------------------------

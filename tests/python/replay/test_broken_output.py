@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
-import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.replay.outputs import FILES
+from processes import LEVER, small_files
 from python.conftest import Session
-
-LEVER = str(Path(sys.executable).with_name("lever"))
-
-
-def small_files(size: int) -> Callable[[], None]:
-    """For a process that may write no file larger than `size` bytes: like a full disk, wherever it writes."""
-
-    def limit() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-    return limit
 
 
 @pytest.mark.parametrize("size", [10_000, 500_000, 1_000_000, 2_500_000], ids=lambda size: f"{size} bytes")
@@ -51,7 +37,7 @@ def test_ctrl_c_leaves_nothing(session: Session, tmp_path: Path) -> None:
         file.write(session.log.read_bytes())
         file.flush()
         end = time.monotonic() + 30.0
-        while not list(out.glob(".replay.*/bus.log")):
+        while not list(out.glob(".lever.*/bus.log")):
             assert time.monotonic() < end
             time.sleep(0.02)
         assert not any((out / name).exists() for name in FILES)
@@ -66,3 +52,33 @@ def test_a_folder_that_cannot_be_made_is_one_line(
     (tmp_path / "file").touch()
     assert cli.main(["replay", str(session.log), "-o", str(tmp_path / "file/out")]) == 2
     assert "cannot make the folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["replay", "d/bus.log", "-o", "d"],
+        ["replay", "link.log", "-o", "d"],
+        ["replay", "d/bus.log", "--json", "d/bus.log"],
+        ["tune", "d/bus.log", "-o", "d/bus.log"],
+        ["tune", "d/bus.log", "--page", "link.log"],
+    ],
+    ids=" ".join,
+)
+def test_a_log_is_not_written_over_by_what_is_made_of_it(
+    arguments: list[str],
+    session: Session,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("d").mkdir()
+    Path("d/bus.log").write_bytes(session.log.read_bytes())
+    Path("link.log").symlink_to("d/bus.log")
+    assert cli.main(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.err.endswith(": it is an input: choose another folder or name\n")
+    assert (shown.out, shown.err.count("\n")) == ("", 1)
+    assert os.listdir("d") == ["bus.log"]
+    assert Path("d/bus.log").read_bytes() == session.log.read_bytes()

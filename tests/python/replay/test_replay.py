@@ -130,7 +130,8 @@ def test_other_traffic_and_doubled_frames_change_no_estimate(session: Session, t
     assert told["repeated"] == len(messy) - 4 * count - told["damaged_lines"] - left_out["error"] > 50
     assert told["other_buses_with_samples"] == ["can7"]
     assert told["refused"] == told["repeated"]
-    assert 0 <= told["refused"] - summary["late"] <= 1  # what HEALTH said last
+    assert told["refused"] == summary["late"]
+    assert f"{told['refused']} frames were refused: {summary['late']} repeated or out of sequence" in summary["verdict"]
     parameters = [(i, d) for i, d in estimates(tmp_path / "out/bus.log") if i in ("210", "211", "212", "213")]
     assert parameters == [(i, d) for i, d in estimates(session.log) if i in ("210", "211", "212", "213")]
 
@@ -242,6 +243,34 @@ def test_recorded_estimates_of_other_samples_are_told_and_not_compared(session: 
     assert "5999 recorded estimates do not belong to the sample before them." in summary["verdict"]
     assert summary["comparison"]["signals"]["theta"]["samples"] == 0
     assert summary["comparison"]["signals"]["k_p"]["samples"] > 5000
+
+
+def test_a_sender_that_never_counts_fails_and_is_told_why(
+    session: Session, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """E2E counters that stand: after its first, every frame of a message is a repetition."""
+    log, out = tmp_path / "never.log", tmp_path / "out"
+    with log.open("w") as file:
+        for line in session.lines:
+            time, bus, frame, _ = line.split()
+            identifier, data = int(frame[:3], 16), bytes.fromhex(frame[4:])
+            if identifier in (0x110, 0x111):
+                name, fields = codec.decode(identifier, data)
+                content = {key: value for key, value in fields.items() if key not in ("crc", "counter")}
+                file.write(f"{time} {bus} {frame[:4]}{codec.encode(name, 3, content).hex().upper()}\n")
+    assert cli.main(["replay", str(log), "-o", str(out)]) == 1
+    shown = capsys.readouterr()
+    why = "no estimate was published: samples accepted: 1, frames refused: 11,998"
+    assert shown.err == f"lever: replay: {why}\n"
+    assert "11,998 repeated or out of sequence (does the sender count each message from 0 to 15?)." in shown.out
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["passed"], summary["samples"], summary["late"]) == (False, 1, 11998)
+    assert why in summary["verdict"]
+    header, row = (
+        next(line for line in shown.out.splitlines() if line.split()[:1] == [word]).split() for word in ("bus", "lever")
+    )
+    assert "refused" in header
+    assert "11998" in row
 
 
 def test_settings_that_the_firmware_refuses_are_one_line(

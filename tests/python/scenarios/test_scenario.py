@@ -225,11 +225,19 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
         (LEAST + "[sensors]\ntheta = { noise = '1 m' }", "sensors.theta.noise: '1 m' has unit 'm'; allowed: rad, mrad"),
         (LEAST + "[base]\nkind = 'sine'", "base: must be a list"),
         ("title =", "made.toml: not TOML"),
+        (f"seed = {'9' * 5000}", "made.toml: not TOML"),
     ],
 )
 def test_what_is_wrong_is_refused_with_file_key_and_remedy(load: Load, text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load(text)
+
+
+@pytest.mark.parametrize("value", ["[" * 3000 + "]" * 3000, "{a=" * 3000 + "1" + "}" * 3000], ids=["list", "table"])
+def test_what_is_nested_too_deeply_is_refused(load: Load, value: str) -> None:
+    for text, overrides in ((f"title = {value}", ()), (LEAST, (f"title={value}",))):
+        with pytest.raises(ScenarioError, match=r"made.toml: its tables or lists, .* are nested too deeply"):
+            load(text, *overrides)
 
 
 @pytest.mark.parametrize(

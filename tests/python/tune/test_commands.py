@@ -141,14 +141,16 @@ def test_choices_are_those_of_the_log(tmp_path: Path, lever: Run) -> None:
     assert read_assignments(out)["model"] == "lever"
 
 
-def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0") -> None:
-    """candump's format: a lever that swings a little, with noise."""
+def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0", counts: bool = True) -> None:
+    """candump's format: a lever that swings a little, with noise; `counts`: the E2E counters do."""
     lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
     noise = np.random.default_rng(1).standard_normal((count, 3)) * (1e-3, 1e-2, 1.0)
     with path.open("w", encoding="ascii") as log:
         for k, (theta, theta_dot, z_ddot) in enumerate(noise.tolist()):
             time = k * period_us
-            lines = (0x110, lever_sample(k, 0.35 + theta, theta_dot, 0.0)), (0x111, base_sample(k, z_ddot, time))
+            counter = k if counts else 3
+            lever = lever_sample(counter, 0.35 + theta, theta_dot, 0.0)
+            lines = (0x110, lever), (0x111, base_sample(counter, z_ddot, time))
             for identifier, data in lines:
                 log.write(f"({time / 1e6:.6f}) {bus} {identifier:03X}#{data.hex().upper()}\n")
 
@@ -181,6 +183,15 @@ def test_what_is_wrong_is_said_in_a_line(
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert line in err
     assert not output.exists()
+
+
+def test_a_sender_that_never_counts_is_told(tmp_path: Path, lever: Run) -> None:
+    write_log(tmp_path / "x.log", 2000, counts=False)
+    status, out, err = lever("tune", tmp_path / "x.log", "-o", tmp_path / "x.settings")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    why = "3,998 repeated or out of sequence (does the sender count each message from 0 to 15?)"
+    assert err.endswith(f"x.log: too few samples to tune on, 1: {why}\n")
+    assert not (tmp_path / "x.settings").exists()
 
 
 def test_two_buses_are_to_be_chosen_from(tmp_path: Path, lever: Run) -> None:

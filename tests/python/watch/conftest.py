@@ -37,7 +37,7 @@ class Flight:
             self.send(0x110, self._lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase)))
             self.send(0x111, self._base(k, 0.8 * math.sin(phase + 1.0), 1000 * k))
         self.sample += count
-        return list(iter(self.bus.recv, None))
+        return list(iter(lambda: self.bus.recv(0.0), None))
 
     def frames(self, count: int) -> list[Frame]:
         return [as_frame(message) for message in self.messages(count)]

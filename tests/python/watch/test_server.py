@@ -314,6 +314,51 @@ def test_dither_is_kept_alive_as_long_as_a_page_is_open(on_server: Callable[...,
     assert not any(kept)
 
 
+def test_a_full_bus_keeps_nobody_waiting_but_who_asked(on_server: Callable[..., FlightSource]) -> None:
+    full = threading.Event()
+    full.set()
+
+    async def story(server: Server) -> None:
+        room, send = threading.Event(), server.source._transmit
+
+        def transmit(identifier: int, data: bytes) -> None:
+            full.clear()
+            assert room.wait(20.0)
+            send(identifier, data)
+
+        server.source._transmit = transmit  # type: ignore[method-assign]
+        async with Visitor(server) as asking, Visitor(server) as watching:
+            await asking.ask('{"request": "freeze"}')
+            while full.is_set():
+                await watching.hear("update")
+            for visitor in (asking, watching):
+                for _ in range(3):
+                    await visitor.hear("update")
+            room.set()
+            assert await asking.hear("sent") == {"request": "freeze"}
+
+    on_server(story)
+
+
+def test_a_page_cannot_fill_the_bus(on_server: Callable[..., FlightSource], monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("lever_cdkf.host_tools.watch.server._now", lambda: clock[0])
+
+    async def story(server: Server) -> None:
+        async with Visitor(server) as flooding, Visitor(server) as other:
+            for _ in range(100):
+                await flooding.ask('{"request": "run"}')
+            refused = [await flooding.hear("refused") for _ in range(80)]
+            assert set(refused) == {"a page may send 20 commands a second: wait a moment"}
+            await other.ask('{"request": "freeze"}')
+            assert await other.hear("sent") == {"request": "freeze"}
+            clock[0] = 1.0
+            await flooding.ask('{"request": "run"}')
+            assert await flooding.hear("sent") == {"request": "run"}
+
+    assert len(on_server(story).commanded) == 22
+
+
 def test_a_command_that_the_estimator_refuses_is_told(on_server: Callable[..., FlightSource], flight: Flight) -> None:
     async def story(server: Server) -> None:
         async with Visitor(server) as visitor:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -111,6 +112,24 @@ def test_a_bus_that_is_not_there(interface: str, channel: str | None, text: str)
         BusSource(interface, channel)
 
 
+def test_an_interface_that_lacks_a_package_says_which(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "msgpack", None)
+    with pytest.raises(LeverError) as caught:
+        BusSource("udp_multicast", "239.74.163.2")
+    assert str(caught.value) == "interface udp_multicast needs the Python package msgpack: pip install msgpack"
+
+
+def test_an_interface_that_breaks_down_is_an_error_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As kvaser does without its driver."""
+
+    def broken(**_: object) -> can.BusABC:
+        raise NameError("name 'canGetNumberOfChannels' is not defined")
+
+    monkeypatch.setattr(can, "Bus", broken)
+    with pytest.raises(LeverError, match="cannot open kvaser channel 0: name 'canGetNumberOfChannels' is not defined"):
+        BusSource("kvaser", "0")
+
+
 def test_a_command_goes_out_protected_and_is_shown(other_end: can.BusABC, on_bus: BusSource) -> None:
     on_bus.command({"request": "freeze"})
     on_bus.command({"dither_rms": 0.3})
@@ -134,6 +153,7 @@ def test_a_log_is_played_at_its_pace(log: Path, flight: Flight) -> None:
         assert time.monotonic() - begin < 10.0
         time.sleep(0.01)
     assert time.monotonic() - begin >= 0.59
+    source.stop()
     assert source.error is None
     frames, picture = source.drain(), Picture()
     with can.LogReader(log) as reader:
@@ -142,6 +162,19 @@ def test_a_log_is_played_at_its_pace(log: Path, flight: Flight) -> None:
         ]
     picture.take(frames, 0.6)
     assert picture.parameters()[0].value == pytest.approx(flight.bus.estimator.estimate().parameter[0], rel=0.01)
+
+
+def test_the_interpreter_is_left_as_it_was(log: Path) -> None:
+    """Threads take turns more often while a source runs; also when it has ended by itself before it is stopped."""
+    before = sys.getswitchinterval()
+    source = LogSource(str(log))
+    source.start()
+    assert sys.getswitchinterval() < before
+    source._thread.join(10.0)
+    assert source.ended
+    for _ in range(2):
+        source.stop()
+        assert sys.getswitchinterval() == before
 
 
 def test_a_log_is_read_at_once_with_the_same_result(log: Path) -> None:

@@ -1,0 +1,79 @@
+"""Ctrl-C ends a command in silence, with exit status 130, whenever it comes.
+
+KeyboardInterrupt alone does not do that: it is lost when it is raised while an object is deleted, or in a library that
+catches everything. So it is remembered as well, and looked for now and then, and before files are put into place.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from .start import exit_at_once
+
+if TYPE_CHECKING:
+    from multiprocessing.pool import Pool
+
+_came = False
+
+
+@contextmanager
+def heard() -> Iterator[None]:
+    """Inside, Ctrl-C is a KeyboardInterrupt that check() knows of; not where it is ignored or somebody else's."""
+    before, hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    is_ours = before in (signal.default_int_handler, exit_at_once)
+    if not is_ours or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, _hear)
+    sys.unraisablehook = lambda lost: None if lost.exc_type is KeyboardInterrupt else hook(lost)
+    try:
+        yield
+        check()
+    except Exception:
+        check()  # what fails after a lost one fails because of it
+        raise
+    finally:
+        signal.signal(signal.SIGINT, before)
+        sys.unraisablehook = hook
+        forget()
+
+
+def _hear(_number: int, _frame: object) -> None:
+    global _came
+    _came = True
+    raise KeyboardInterrupt
+
+
+def check() -> None:
+    """Raises the KeyboardInterrupt that has come, if it was lost."""
+    if _came:
+        raise KeyboardInterrupt
+
+
+def forget() -> None:
+    """Ctrl-C has done what it should."""
+    global _came
+    _came = False
+
+
+def worker_pool(processes: int) -> Pool:
+    """Processes that leave Ctrl-C to this one, from their first moment on."""
+    import multiprocessing
+
+    ignore: Any = (signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    context = multiprocessing.get_context("spawn")
+    if sys.platform == "win32":
+        return context.Pool(processes, *ignore)
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # else the pool starts it, which lets the signal through again
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # is passed on to processes
+    try:
+        return context.Pool(processes, *ignore)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

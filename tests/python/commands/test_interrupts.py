@@ -1,0 +1,148 @@
+"""Ctrl-C: always exit status 130 and silence, also where Python loses its KeyboardInterrupt or has hardly begun."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from lever_cdkf.host_tools import cli, interrupts
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.files import Outputs
+from lever_cdkf.host_tools.progress import Progress
+
+Act = Callable[[Callable[[], None]], int]
+
+
+def lost_in_a_deletion() -> None:
+    class Deleted:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGINT)
+
+    Deleted()
+
+
+def lost_in_a_library() -> None:
+    with suppress(BaseException):  # as asammdf does
+        signal.raise_signal(signal.SIGINT)
+
+
+lost = pytest.mark.parametrize("lose", [lost_in_a_deletion, lost_in_a_library])
+
+
+@pytest.fixture
+def act(monkeypatch: pytest.MonkeyPatch) -> Act:
+    """act(run): the exit status of a command that is `run`."""
+
+    def command(run: Callable[[], None]) -> int:
+        def status(_: argparse.Namespace) -> int:
+            run()
+            return 0
+
+        module = SimpleNamespace(add_parser=lambda parsers: parsers.add_parser("act"), run=status)
+        entry: Any = SimpleNamespace(value="here", load=lambda: module)
+        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [entry])
+        return cli.main(["act"])
+
+    return command
+
+
+@lost
+def test_a_lost_one_is_found_at_the_end(lose: Callable[[], None], act: Act, capfd: pytest.CaptureFixture[str]) -> None:
+    before = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    assert act(lose) == 130
+    assert capfd.readouterr() == ("", "")
+    assert (signal.getsignal(signal.SIGINT), sys.unraisablehook) == before
+    assert act(lambda: None) == 0
+
+
+@lost
+def test_a_lost_one_is_found_where_progress_is_shown(lose: Callable[[], None], act: Act) -> None:
+    reached = []
+
+    def run() -> None:
+        with Progress("act") as progress:
+            lose()
+            progress.show(0, 1)
+            reached.append(True)
+
+    assert act(run) == 130
+    assert not reached
+
+
+@lost
+def test_a_lost_one_is_found_before_files_are_put_into_place(
+    lose: Callable[[], None], act: Act, tmp_path: Path
+) -> None:
+    def run() -> None:
+        with Outputs(tmp_path) as outputs:
+            outputs.path("a").write_text("text")
+            lose()
+            outputs.finish()
+
+    assert act(run) == 130
+    assert list(tmp_path.iterdir()) == []
+
+
+@lost
+def test_what_fails_after_a_lost_one_is_not_told(
+    lose: Callable[[], None], act: Act, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def run() -> None:
+        lose()
+        raise LeverError("half of it is not there")
+
+    assert act(run) == 130
+    assert capfd.readouterr() == ("", "")
+    interrupts.check()
+
+
+def test_it_is_silent_while_the_command_is_still_being_read() -> None:
+    """Ctrl-C while `lever` imports what it needs."""
+    program = (
+        "import signal, sys\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'argparse': signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "from lever_cdkf.host_tools.start import main\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+def test_it_stays_ignored_where_it_is() -> None:
+    """As by nohup, and in the background of a shell."""
+    program = (
+        "import signal\n"
+        "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "from lever_cdkf.host_tools import start\n"
+        "from lever_cdkf.host_tools.commands import dbc\n"
+        "run = dbc.run\n"
+        "dbc.run = lambda args: (signal.raise_signal(signal.SIGINT), run(args))[1]\n"
+        "import sys; sys.argv = ['lever', 'dbc', '--path']\n"
+        "sys.exit(start.main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_script_starts_where_it_is_caught() -> None:
+    (script,) = importlib.metadata.entry_points(group="console_scripts", name="lever")
+    assert script.value == "lever_cdkf.host_tools.start:main"
+
+
+def test_worker_processes_leave_it_to_their_parent_from_the_start() -> None:
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    with interrupts.worker_pool(2) as pool:
+        assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == mask
+        assert signal.SIGINT in pool.apply(signal.pthread_sigmask, (signal.SIG_BLOCK, ()))
