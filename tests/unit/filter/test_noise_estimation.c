@@ -120,8 +120,7 @@ static void test_never_leaves_its_range(void)
 /* Fewer than twenty samples of an output say nothing of it. */
 static void test_an_output_that_is_missing_keeps_its_noise(void)
 {
-    const innovation_t innovation[CDKF_OUTPUTS] = {
-        {.value = 2.0f, .inverse_variance = 1.0f, .noise_variance = 0.5f},
+    const innovation_t innovation[CDKF_OUTPUTS] = {{.value = 2.0f, .inverse_variance = 1.0f, .noise_variance = 0.5f},
         {.value = 2.0f, .inverse_variance = 1.0f, .noise_variance = 0.5f}};
     add(innovation, 19u);
     valid[1] = false;
