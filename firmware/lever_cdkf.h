@@ -117,7 +117,7 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1600 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1680 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];
@@ -138,13 +138,16 @@ typedef struct lever_sample {
     uint32_t time_us; /* sample time [us], wraps at 2^32 */
     float theta;      /* lever angle from the floor [rad] */
     float theta_dot;  /* lever rate [rad/s] */
-    float tau_m;      /* motor torque on the lever [N m]; when not valid, 0 is used */
+    float tau_m;      /* motor torque on the lever [N m]; when not valid, what was asked for is used */
     float
         z_ddot; /* base vertical acceleration, up positive, without gravity [m/s^2]; when not valid, the last is held */
+    float grip_force; /* of the hand on the lever, across it, positive where it raises theta: mean since the last sample
+                         [N]; used by the model lever, not needed */
     bool theta_valid;
     bool theta_dot_valid;
     bool tau_m_valid;
     bool z_ddot_valid;
+    bool grip_force_valid;
 } lever_sample_t;
 
 enum lever_mode {
@@ -252,7 +255,7 @@ enum lever_fault {
     LEVER_FAULT_DUPLICATE = 8192,   /* another estimator has spoken on this bus within the last two seconds */
     LEVER_FAULT_SETTLING = 16384,   /* nothing is learnt: the levels of the signals have not settled yet */
     LEVER_FAULT_MISMATCH = 32768,   /* innovations are not white: something moves the lever that the model lacks */
-    LEVER_FAULT_CALIBRATION = 65536, /* the mass that the torque shows is not the one that the base shows */
+    LEVER_FAULT_CALIBRATION = 65536, /* torque, base and grip force do not agree on the pilot */
     LEVER_FAULT_HANDS_OFF = 131072   /* nobody holds the lever; nothing is learnt */
 };
 
@@ -328,8 +331,8 @@ enum lever_frame_result {
     LEVER_FRAME_REFUSED = 3  /* ours, but corrupt, repeated, late, not understood or not accepted; counted */
 };
 
-/* Takes a received frame. BASE_SAMPLE completes the sample of its counter, with or without its LEVER_SAMPLE, so send
- * LEVER_SAMPLE first. */
+/* Takes a received frame. BASE_SAMPLE completes the sample of its counter, with or without its LEVER_SAMPLE and
+ * GRIP_SAMPLE, so send these first. */
 enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *frame);
 
 /* lever_update() with the sample that lever_on_frame() has completed; without one it does nothing. Returns the mode. */

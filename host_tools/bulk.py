@@ -37,7 +37,7 @@ ANSWERS = (
     "MOTOR_COMMAND",
 )
 """The messages of the estimator that rows hold, in the order of their slots."""
-SLOTS = {name: slot for slot, name in enumerate(("LEVER_SAMPLE", "BASE_SAMPLE", *ANSWERS))}
+SLOTS = {name: slot for slot, name in enumerate(("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", *ANSWERS))}
 """Slot of each message in a row."""
 RECORDED = {name: len(SLOTS) + slot for slot, name in enumerate(ANSWERS)}
 """Slot of each answer as the recording has it."""
@@ -104,6 +104,7 @@ class Feeder:
         self._feeder = ffi.new("bulk_feeder_t *")
         self._feeder.lever_id = codec.message("LEVER_SAMPLE").frame_id
         self._feeder.base_id = codec.message("BASE_SAMPLE").frame_id
+        self._feeder.grip_id = codec.message("GRIP_SAMPLE").frame_id
         self._feeder.command_id = codec.message("COMMAND").frame_id
         self._feeder.answer_id = [codec.message(name).frame_id for name in ANSWERS]
         self._out = np.empty(frames_at_once, FRAME)

@@ -19,6 +19,9 @@ FRAME_SAMPLE: int = lib.LEVER_FRAME_SAMPLE
 FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
 """What FEEDTHROUGH is sent for on the bus, one after the other [Hz]."""
 
+SAMPLE_VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
+"""What a sample may hold besides its time, each with a flag: lever_sample_t."""
+
 _MODES = enum_names("lever_mode")
 
 
@@ -121,15 +124,16 @@ class Estimator:
         theta_dot: float | None = None,
         tau_m: float | None = None,
         z_ddot: float | None = None,
+        grip_force: float | None = None,
     ) -> str:
         """Takes a sample and returns the mode after it.
 
         Time [µs] (wrapped to 32 bits here), lever angle [rad] and rate [rad/s], motor torque [N m], vertical
-        acceleration of the base [m/s²]; None is missing or invalid.
+        acceleration of the base [m/s²], force of the hand on the lever [N]; None is missing or invalid.
         """
         sample = self._sample
         sample.time_us = time_us & 0xFFFFFFFF
-        for name, value in (("theta", theta), ("theta_dot", theta_dot), ("tau_m", tau_m), ("z_ddot", z_ddot)):
+        for name, value in zip(SAMPLE_VALUES, (theta, theta_dot, tau_m, z_ddot, grip_force), strict=True):
             setattr(sample, name, 0.0 if value is None else value)
             setattr(sample, f"{name}_valid", value is not None)
         return _MODES[lib.lever_update(self.pointer, sample)]
@@ -210,10 +214,10 @@ def run_samples(
     """Feeds N samples to a fresh estimator and returns what it says after each, or after those with the indices `at`.
 
     samples: arrays of N: time_us (whole numbers, wrapped here), theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot
-    [m/s²]; bool arrays theta_valid … may say what is valid, without them what is not NaN is. One that is missing is
-    never valid. Returned: each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma,
-    parameter_correlation), mode and faults as the numbers of the façade's enums, and how
-    often the filter was restarted so far (recoveries).
+    [m/s²], grip_force [N]; bool arrays theta_valid … may say what is valid, without them what is not NaN is. One that
+    is missing is never valid. Returned: each field of lever_estimate_t in single precision (N by 3 for parameter,
+    parameter_sigma, parameter_correlation), mode and faults as the numbers of the façade's enums, and how often the
+    filter was restarted so far (recoveries).
     """
     import numpy as np
 
@@ -221,7 +225,7 @@ def run_samples(
     count = len(samples["time_us"])
     taken = np.zeros(count, struct_dtype("lever_sample_t"))
     taken["time_us"] = np.asarray(samples["time_us"]).astype(np.int64)  # to 32 bits: wraps
-    for name in ("theta", "theta_dot", "tau_m", "z_ddot"):
+    for name in SAMPLE_VALUES:
         if name in samples:
             taken[name] = samples[name]
             taken[f"{name}_valid"] = samples.get(f"{name}_valid", ~np.isnan(samples[name]))

@@ -11,7 +11,7 @@ from . import codec
 from .bulk import ERROR, EXTENDED, FD, REMOTE, Frames
 from .logs import LogError, Recording
 
-INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")
+INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")
 """What the estimator takes."""
 
 _KEPT_BEFORE_SAMPLES = 1000  # commands that a recording may have long before its first sample
@@ -151,7 +151,8 @@ class Traffic:
 
 def sample_chunks(traffic: Traffic) -> Iterator[dict[str, NDArray[np.float64]]]:
     """The samples, as run_samples() takes them, a chunk at a time: time_us (continued beyond 32 bits), theta [rad],
-    theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2]; NaN where a value is invalid or its LEVER_SAMPLE is missing.
+    theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2], grip_force [N]; NaN where a value is invalid or its LEVER_SAMPLE or
+    GRIP_SAMPLE is missing.
 
     Corrupt frames are left out, and samples with the time of the one before. Raises LogError.
     """
@@ -163,14 +164,14 @@ def sample_chunks(traffic: Traffic) -> Iterator[dict[str, NDArray[np.float64]]]:
 
 
 class _Pairing:
-    """LEVER_SAMPLE and BASE_SAMPLE by their counters, across chunks."""
+    """BASE_SAMPLE with the LEVER_SAMPLE and GRIP_SAMPLE of its counter, across chunks."""
 
     def __init__(self) -> None:
         self._rest: Frames | None = None
         self._time_us: int | None = None
 
     def add(self, frames: Frames) -> dict[str, NDArray[np.float64]]:
-        identifiers = {name: codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE")}
+        identifiers = {name: codec.message(name).frame_id for name in ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")}
         parts = []
         for name, identifier in identifiers.items():
             where = np.flatnonzero((frames["id"] == identifier) & (frames["length"] == 8))
@@ -182,24 +183,34 @@ class _Pairing:
         last = np.flatnonzero(is_base)
         end = last[-1] + 1 if len(last) else 0
         self._rest, both, is_base = both[end:].copy(), both[:end], is_base[:end]
-        return self._samples(both, is_base)
+        return self._samples(both, np.flatnonzero(is_base))
 
-    def _samples(self, both: Frames, is_base: NDArray[np.bool_]) -> dict[str, NDArray[np.float64]]:
-        base = np.flatnonzero(is_base)
-        before = np.where(base > 0, base - 1, 0)
-        counters = both["data"][:, 1] & 15
-        paired = (base > 0) & ~is_base[before] & (counters[before] == counters[base])
-        lever = codec.decode_columns("LEVER_SAMPLE", both["data"][before])
+    def _samples(self, both: Frames, base: NDArray[np.intp]) -> dict[str, NDArray[np.float64]]:
         of_base = codec.decode_columns("BASE_SAMPLE", both["data"][base])
         time_us = self._continued(of_base["time_us"].astype(np.int64))
         columns = {"time_us": time_us.astype(np.float64)}
-        for name in ("theta", "theta_dot", "tau_m"):
-            columns[name] = np.where(paired & (lever[f"{name}_valid"] != 0.0), lever[name], np.nan)
+        for message, names in (("LEVER_SAMPLE", ("theta", "theta_dot", "tau_m")), ("GRIP_SAMPLE", ("grip_force",))):
+            before, paired = self._before(both, base, codec.message(message).frame_id)
+            decoded = codec.decode_columns(message, both["data"][before])
+            for name in names:
+                columns[name] = np.where(paired & (decoded[f"{name}_valid"] != 0.0), decoded[name], np.nan)
         columns["z_ddot"] = np.where(of_base["z_ddot_valid"] != 0.0, of_base["z_ddot"], np.nan)
         new = np.diff(time_us, prepend=-1 if self._time_us is None else self._time_us) != 0
         if len(time_us):
             self._time_us = int(time_us[-1])
         return {name: values[new] for name, values in columns.items()}
+
+    @staticmethod
+    def _before(both: Frames, base: NDArray[np.intp], identifier: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """The last frame with that identifier before each BASE_SAMPLE, and whether it belongs to it."""
+        there = np.flatnonzero(both["id"] == identifier)
+        if not len(there):
+            return np.zeros_like(base), np.zeros(len(base), np.bool_)
+        place = np.searchsorted(there, base) - 1
+        before = there[np.maximum(place, 0)]
+        counters = both["data"][:, 1] & 15
+        after_last = before > np.concatenate(([-1], base[:-1]))
+        return before, (place >= 0) & after_last & (counters[before] == counters[base])
 
     def _continued(self, time_us: NDArray[np.int64]) -> NDArray[np.int64]:
         """Beyond 32 bits: less than half their range ahead is forward."""

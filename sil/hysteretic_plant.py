@@ -126,6 +126,7 @@ class Plant:
         self.theta = float(truth.trim[0])
         self.theta_dot = 0.0
         self.tau_m = 0.0
+        self.grip_force = math.nan
         self._lever, self._power = truth.lever, Power.of(truth.loss_factor)
         self._step = conditions.step
         self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)

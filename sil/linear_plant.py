@@ -13,6 +13,7 @@ Integration: as in plant.py, the linearly implicit midpoint rule on the same sub
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -126,6 +127,7 @@ class Plant:
         self.theta = float(system.rest[0])
         self.theta_dot = 0.0
         self.tau_m = 0.0
+        self.grip_force = math.nan
         self._step = conditions.step
         self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
         self._rows = _rows(system, conditions)

@@ -79,6 +79,7 @@ class Recording:
     theta: list[float] = field(default_factory=list)
     theta_dot: list[float] = field(default_factory=list)
     tau_m: list[float] = field(default_factory=list)
+    grip_force: list[float] = field(default_factory=list)
     unanswered: int = 0
     misplaced: int = 0
     """Estimates that belong to another sample than the one that was to be answered."""
@@ -87,7 +88,7 @@ class Recording:
     def frames(self) -> Frames:
         """All frames, with the time of their sample."""
         identifier = np.array(self.identifier, dtype=np.uint16)
-        outgoing = [codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")]
+        outgoing = [codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")]
         period_us = round(self.scenario.period * 1e6)
         return Frames(
             np.array(self.sample, dtype=np.int64) * period_us,
@@ -259,7 +260,8 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
     encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
     thetas, theta_dots, torques = recording.theta, recording.theta_dot, recording.tau_m
-    measure = _lever_sensors(recording)
+    measure = [_reader_of(recording, name) for name in ("theta", "theta_dot", "tau_m")]
+    send_grip = _grip_sender(recording, link)
     no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
     base = np.where(inputs.missing["z_ddot"], np.nan, inputs.z_ddot_measured).tolist()
     period_us = round(scenario.period * 1e6)
@@ -271,9 +273,11 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
         torques.append(body.tau_m)
         if sample in commands:
             link.command(sample, commands[sample])
-        theta, theta_dot, torque = measure(sample)
+        recording.grip_force.append(body.grip_force)
         if not no_lever[sample]:
-            send_lever(sample, encode_lever(sample, theta, theta_dot, torque))
+            send_lever(sample, encode_lever(sample, *(read(sample) for read in measure)))
+        if send_grip is not None:
+            send_grip(sample)
         if not no_base[sample]:
             send_base(sample, encode_base(sample, base[sample], sample * period_us))
             command = link.answer(sample)
@@ -314,19 +318,23 @@ def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec
     return commands
 
 
-def _lever_sensors(recording: Recording) -> Callable[[int], tuple[float, float, float]]:
-    """The readings of theta, theta_dot and tau_m at a sample, from the history up to it; NaN when invalid."""
+def _reader_of(recording: Recording, name: str) -> Callable[[int], float]:
+    """The reading of a signal of the lever at a sample, from the history up to it; NaN when invalid."""
     scenario, inputs = recording.scenario, recording.inputs
-    readers = []
-    for name in ("theta", "theta_dot", "tau_m"):
-        sensor: sensors.Sensor = getattr(scenario.sensors, name)
-        offsets = sensor.offsets(len(inputs.time), scenario.stream(name))
-        corruption = scenario.corruption(name, inputs.time)
-        corruption.offset[inputs.missing[name]] = np.nan
-        reader = _reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period)
-        readers.append(_corrupted(reader, corruption))
-    theta, theta_dot, tau_m = readers
-    return lambda sample: (theta(sample), theta_dot(sample), tau_m(sample))
+    sensor: sensors.Sensor = getattr(scenario.sensors, name)
+    offsets = sensor.offsets(len(inputs.time), scenario.stream(name))
+    corruption = scenario.corruption(name, inputs.time)
+    corruption.offset[inputs.missing[name]] = np.nan
+    reader = _reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period)
+    return _corrupted(reader, corruption)
+
+
+def _grip_sender(recording: Recording, link: _Link) -> Callable[[int], None] | None:
+    """Sends the GRIP_SAMPLE of a sample; None without that sensor."""
+    if recording.scenario.sensors.grip_force is None:
+        return None
+    read, send, encode = _reader_of(recording, "grip_force"), link.sender("GRIP_SAMPLE"), codec.encoder("GRIP_SAMPLE")
+    return lambda sample: send(sample, encode(sample, read(sample)))
 
 
 def _reader(

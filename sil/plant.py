@@ -146,6 +146,7 @@ class LeverTruth(truths.Truth):
     """This lever with its pilot, as a run needs them."""
 
     model = "lever"
+    has_grip_force = True
     lever: Lever
     pilot: Truth
     preload: Preload
@@ -185,7 +186,7 @@ class LeverTruth(truths.Truth):
         return Plant(self.lever, self.pilot, self.preload, conditions)
 
 
-# One sample period, prepared: M, l mu, l^2 c_p, l^2 k_p, preload's torque, theta_l, [(z_ddot, impulse), ...]
+# One sample period, prepared: M, l mu, l^2 c_p, l^2 k_p, preload's torque, theta_l, [(z_ddot, kick, push), ...]
 _Row = tuple[float, float, float, float, float, float, list[list[float]]]
 
 
@@ -196,17 +197,23 @@ def _rows(lever: Lever, truth: Truth, kind: Preload, conditions: Conditions) -> 
     columns = (mass, moment(lever, truth), arm * truth.c_p, arm * truth.k_p, hold, lever_angle)
     for block in conditions.blocks():
         at = block.periods
-        drive = np.stack((block.z_ddot, mass[at, None] * block.kick + block.push), axis=2).tolist()
+        drive = np.stack((block.z_ddot, mass[at, None] * block.kick, block.push), axis=2).tolist()
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
 class Plant:
-    """Lever, arm and motor: a truth.Body, which starts at rest at the equilibrium."""
+    """Lever, arm and motor: a truth.Body, which starts at rest at the equilibrium.
+
+    The grip force is what the lever's own equation of motion, over the last period, leaves to the hand; process noise
+    and disturbance act on the lever.
+    """
 
     def __init__(self, lever: Lever, truth: Truth, kind: Preload, conditions: Conditions) -> None:
         self.theta = float(equilibrium(lever, truth, kind)[0])
         self.theta_dot = 0.0
         self.tau_m = 0.0
+        self.grip_force = 0.0
+        self._weight = GRAVITY if kind == "fixed" else 0.0  # in preload trim a balance carries the lever
         self._lever = lever
         self._step = conditions.step
         self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
@@ -221,21 +228,39 @@ class Plant:
         own_stiffness, held = lever.lever_stiffness, command + reflex
         sin, cos = math.sin, math.cos
         half = 0.5 * step
-        for acceleration, impulse in drive:
+        begin, begin_dot, motors = theta, theta_dot, 0.0
+        for acceleration, kick, push in drive:
             middle = theta + half * theta_dot
             cosine = cos(middle)
             resisting, slope = resistance(lever, theta_dot)
             damping = arm_damping * cosine * cosine
+            motor = torque * lag_middle
+            motors += motor
             force = (
                 held
-                + torque * lag_middle
+                + motor
                 - (moment * acceleration + arm_stiffness * sin(middle) - hold) * cosine
                 - own_stiffness * (middle - lever_angle)
                 - damping * theta_dot
                 - resisting
             )
-            change = (step * force + impulse) / (mass + half * (damping + slope))
+            change = (step * force + (kick + push)) / (mass + half * (damping + slope))
             theta += step * (theta_dot + 0.5 * change)
             theta_dot += change
             torque *= lag
         self.theta, self.theta_dot, self.tau_m = theta, theta_dot, command + torque
+        self.grip_force = self._force_on_lever(begin, begin_dot, drive, lever_angle, command + motors / len(drive))
+
+    def _force_on_lever(
+        self, begin: float, begin_dot: float, drive: list[list[float]], lever_angle: float, motor: float
+    ) -> float:
+        """Mean force of the hand [N] since the lever was at `begin` with the rate `begin_dot`, to second order in the
+        period."""
+        lever, period = self._lever, self._step * len(drive)
+        middle = 0.5 * (begin + self.theta)
+        acceleration, kick, push = (sum(column) for column in zip(*drive, strict=True))
+        own_moment = lever.lever_length * lever.lever_mass_position * lever.lever_mass
+        own = lever.own_inertia * (self.theta_dot - begin_dot) / period
+        own += resistance(lever, (self.theta - begin) / period)[0] + lever.lever_stiffness * (middle - lever_angle)
+        own += own_moment * (acceleration / len(drive) + self._weight) * math.cos(middle)
+        return (own - motor - (kick + push) / period) / lever.lever_length

@@ -39,6 +39,7 @@ class Reflex(Truth):
     """The lever, and the pilot at every sample: arrays of equal length [kg, N s/m, N/m, N/m, N s/m, rad]."""
 
     model = "reflex"
+    has_grip_force = True
     lever: plant.Lever
     delay: float
     """[s]"""

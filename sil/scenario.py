@@ -51,7 +51,7 @@ CONVERGED_AFTER = 15.0
 
 STREAMS = (
     "process", "theta", "theta_dot", "tau_m", "z_ddot", "m_p", "c_p", "k_p", "trim", "base", "torque", "dropout",
-    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t", "k_r", "c_r", "disturbance", "fault",
+    "m", "c", "k", "a21", "a22", "b21", "m_t", "c_t", "k_t", "k_r", "c_r", "disturbance", "fault", "grip_force",
 )  # fmt: skip
 """Purposes of random numbers; the order is part of what a seed means, so append only."""
 
@@ -200,6 +200,10 @@ class Scenario:
         for key, excitations in (("torque", self.torque), ("disturbance", self.disturbance)):
             if excitations and not truth.takes_torque:
                 raise ScenarioError(f"{self.file}: {key}: no torque acts on a pilot of model {truth.model}; remove it")
+        if self.sensors.grip_force is not None and not truth.has_grip_force:
+            raise ScenarioError(
+                f"{self.file}: sensors.grip_force: not known of a pilot of model {truth.model}; remove it"
+            )
         judged = {quantity.key for quantity in self.judged()} | {"coverage"}
         for name in self.limits or ():
             if name not in judged:

@@ -20,7 +20,7 @@ from .reading import SIGNAL, choice, item, quantity, read_kind, read_table, tabl
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-VALUES = ("theta", "theta_dot", "tau_m", "z_ddot")
+VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 FRAMES = ("lever_frame", "base_frame")
 
 
@@ -154,12 +154,13 @@ class Dropout:
 @dataclass(frozen=True)
 class Sensors:
     """All sensors; the defaults are the standard values: 1 mrad and 10 mrad/s of noise, a fair accelerometer and torque
-    sensor."""
+    sensor; no sensor of the grip force."""
 
     theta: Sensor = item(read_table(Sensor), "rad", Sensor(noise=1e-3))
     theta_dot: Sensor = item(read_table(Sensor), "rad/s", Sensor(noise=1e-2))
     z_ddot: Sensor = item(read_table(Sensor), "m/s^2", Sensor(noise=0.01))
     tau_m: Sensor = item(read_table(Sensor), "N m", Sensor(noise=2e-3))
+    grip_force: Sensor | None = item(read_table(Sensor), "N", None)
     dropout: tuple[Dropout, ...] = tables(read_table(Dropout))
 
 

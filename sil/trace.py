@@ -38,6 +38,7 @@ MEASURED = (
     ("theta_dot_measured_rad_s", "LEVER_SAMPLE", "theta_dot"),
     ("z_ddot_measured_m_s2", "BASE_SAMPLE", "z_ddot"),
     ("tau_m_measured_N_m", "LEVER_SAMPLE", "tau_m"),
+    ("grip_force_measured_N", "GRIP_SAMPLE", "grip_force"),
 )
 ESTIMATED = (
     ("theta_estimate_rad", "STATE_ESTIMATE", "theta"),

@@ -114,6 +114,9 @@ class Body(Protocol):
     """[rad/s]"""
     tau_m: float
     """Motor torque that acts [N m]."""
+    grip_force: float
+    """Of the hand on the lever, across it, positive where it raises theta: mean since the last sample [N]; NaN where it
+    is not modelled."""
 
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""
@@ -126,6 +129,8 @@ class Truth(ABC):
     """Key `model` of [pilot]; a model of the firmware has the same name."""
     takes_torque: ClassVar[bool] = True
     """Whether a torque, of the motor or a disturbance, means something to it."""
+    has_grip_force: ClassVar[bool] = False
+    """Whether its body knows the force of the hand on the lever."""
 
     @property
     @abstractmethod

@@ -121,6 +121,7 @@ class Plant:
         self.theta = float(truth.trim[0])
         self.theta_dot = 0.0
         self.tau_m = 0.0
+        self.grip_force = math.nan
         self.s = 0.0
         self.s_dot = 0.0
         self._lever = truth.lever

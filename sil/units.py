@@ -28,6 +28,7 @@ _SPELLINGS: dict[str, dict[str, float]] = {
     "rad": {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": _DEG},
     "rad/s": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEG},
     "m/s^2": {"m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
+    "N": {"N": 1.0, "kN": 1e3},
     "N m": {"N m": 1.0, "mN m": 1e-3},
     "N m/s": {"N m/s": 1.0},
     "N s/m": {"N s/m": 1.0},

@@ -14,6 +14,8 @@ typedef struct checked {
     bool base;    /* the base acceleration is valid */
     float z_ddot; /* compensated for gain and delay of the sensor */
     float tau_m;
+    float grip_force; /* [N] */
+    bool gripped;     /* it is valid */
 } checked_t;
 
 /* Begins with this sample. Excitation is presumed until it has been measured, so that annealing is not cut short. */

@@ -113,6 +113,8 @@ static checked_t check(estimator_t *estimator, const lever_sample_t *sample, flo
     checked.valid[0] = theta && monitor_is_alive(monitor, MONITOR_THETA, sample->theta);
     checked.valid[1] = theta_dot && monitor_is_alive(monitor, MONITOR_THETA_DOT, sample->theta_dot);
     checked.base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
+    checked.gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
+    checked.grip_force = sample->grip_force;
     checked.tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
     checked.z_ddot = checked.base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked.z_ddot;
@@ -154,6 +156,18 @@ static bool is_excited(const estimator_t *estimator)
     return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= (0.25f * least));
 }
 
+/* The levels have settled, and the base acceleration is known. */
+static bool is_settled(const estimator_t *estimator)
+{
+    return (estimator->trim.unsettled < (0.5f * estimator->setup.settings->sample_period)) &&
+           (estimator->base_missing <= 0.0f);
+}
+
+bool estimator_may_learn(const estimator_t *estimator)
+{
+    return !estimator->frozen && is_settled(estimator) && is_excited(estimator);
+}
+
 static void average(estimator_t *estimator, float elapsed)
 {
     const float time = estimator->setup.settings->excitation_time;
@@ -188,12 +202,9 @@ static enum lever_mode mode_of(const estimator_t *estimator, bool measured)
 /* Measurement update of the filter; returns what may be learnt from the sample. */
 static lesson_t update_filter(estimator_t *estimator, const checked_t *sample)
 {
-    const lever_settings_t *settings = estimator->setup.settings;
-    const bool settled = (estimator->trim.unsettled < (0.5f * settings->sample_period));
     const bool measured = sample->valid[0] || sample->valid[1];
-    const lesson_t lesson = {.walks = !estimator->frozen,
-        .measured = settled && measured && (estimator->base_missing <= 0.0f),
-        .excited = is_excited(estimator)};
+    const lesson_t lesson = {
+        .walks = !estimator->frozen, .measured = measured && is_settled(estimator), .excited = is_excited(estimator)};
     innovation_t innovation[CDKF_OUTPUTS];
     cdkf_measurement_update(
         &estimator->cdkf, sample->y, sample->valid, lesson.walks && lesson.measured && lesson.excited, innovation);
@@ -221,7 +232,7 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     note(estimator, learning->changed > 0.0f, LEVER_FAULT_CHANGE);
     note(estimator, estimator->averages.innovation > INNOVATION_TOLERATED, LEVER_FAULT_INNOVATION);
     note(estimator, learning->whiteness.coloured, LEVER_FAULT_MISMATCH);
-    note(estimator, learning->calibration.wrong, LEVER_FAULT_CALIBRATION);
+    note(estimator, learning->calibration.wrong || learning->grip.wrong, LEVER_FAULT_CALIBRATION);
     note(estimator, learning->hands.off, LEVER_FAULT_HANDS_OFF);
     note(estimator, restarted, LEVER_FAULT_RECOVERED);
     estimator->mode = mode_of(estimator, sample->valid[0] || sample->valid[1]);

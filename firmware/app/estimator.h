@@ -73,6 +73,9 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
 bool estimator_command(estimator_t *estimator, const lever_command_t *command);
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate);
 
+/* Samples teach the parameters now, as far as it depends on inputs, motion and commands. */
+bool estimator_may_learn(const estimator_t *estimator);
+
 /* State i of the estimate as the sensors see it: theta [rad], theta_dot [rad/s]. */
 float estimator_state(const estimator_t *estimator, uint32_t i);
 

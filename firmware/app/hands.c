@@ -13,18 +13,27 @@ void hands_start(hands_t *hands)
     hands->residual = 1.0f;
 }
 
-void hands_predict(
+float hands_predict(
     hands_t *hands, const model_constants_t *constants, const model_step_t *step, const float x[MODEL_STATES])
 {
-    const float base = (constants->length * constants->mass_moment) * (step->trim_cosine * step->z_ddot);
-    const float own = (constants->damping * x[1]) + (constants->stiffness * x[0]);
-    hands->impulse += step->period * ((step->tau_m - base) - own);
+    const float acceleration = constants->trim ? step->z_ddot : (step->z_ddot + MODEL_GRAVITY);
+    const float rest = constants->trim ? 0.0f : constants->lever_preload_angle;
+    const float base = (constants->length * constants->mass_moment) * (step->trim_cosine * acceleration);
+    const float own = (constants->damping * x[1]) + (constants->stiffness * (x[0] - rest));
+    const float drive = step->period * (step->tau_m - base);
+    const float impulse = drive - (step->period * own);
+    hands->drive += drive;
+    hands->impulse += impulse;
+    return impulse / constants->inertia;
 }
 
 void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts)
 {
     const float change = theta_dot - hands->begin;
     const float residual = change - (hands->impulse / constants->inertia);
+    hands->of_hand = residual * constants->inertia;
+    hands->driven = hands->drive;
+    hands->drive = 0.0f;
     hands->begin = theta_dot;
     hands->impulse = 0.0f;
     if (counts) {

@@ -14,15 +14,19 @@
 typedef struct hands {
     float begin;    /* theta_dot at the beginning of the block [rad/s] */
     float impulse;  /* since then, without hands [N m s] */
+    float drive;    /* its part that is torque and base */
     float change;   /* mean square of a block's change [rad^2/s^2] */
     float residual; /* mean square of what the lever alone does not explain of it, likewise */
+    float of_hand;  /* what the lever alone does not explain of the last block: the hand's impulse [N m s] */
+    float driven;   /* drive of the last block */
     bool off;       /* the verdict */
 } hands_t;
 
 void hands_start(hands_t *hands);
 
-/* A step of the model, from the state x = [theta, theta_dot] (deviations from the trim) on. */
-void hands_predict(
+/* A step of the model, from the state x = [theta, theta_dot] on (deviations from the trim in preload trim). Returns the
+ * change of theta_dot without hands [rad/s]. */
+float hands_predict(
     hands_t *hands, const model_constants_t *constants, const model_step_t *step, const float x[MODEL_STATES]);
 
 /* The end of a block of `period` seconds at theta_dot; `counts`: there was motion enough. */

@@ -29,6 +29,7 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
     calibration_start(&learning->calibration);
     monitor_start(&learning->monitor);
     hands_start(&learning->hands);
+    grip_force_start(&learning->grip);
     keep_only(learning, cdkf);
     learning->elapsed = 0.0f;
     learning->wait = 0.0f;
@@ -111,8 +112,9 @@ static bool judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     const score_t sudden = cdkf_sudden_score(cdkf);
     score_t constant[CDKF_CONSIDERED];
     cdkf_constant_scores(cdkf, constant);
-    hands_step(&learning->hands, &setup->constants, cdkf->x[1], period,
-        counts && (setup->model == (uint8_t)LEVER_MODEL_LEVER));
+    const bool on_lever = counts && (setup->model == (uint8_t)LEVER_MODEL_LEVER);
+    hands_step(&learning->hands, &setup->constants, cdkf->x[1], period, on_lever);
+    const bool force_wrong = grip_force_judge(&learning->grip, setup, &learning->hands, period, on_lever);
     const bool known = (learning->kept[1].trust >= 1.0f) || learning->monitor.base_wrong;
     bool base_wrong = false;
     if (known && !learning->hands.off) {
@@ -120,7 +122,7 @@ static bool judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     } else {
         monitor_trust_base(&learning->monitor);
     }
-    const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong;
+    const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong || force_wrong;
     if (fails || (held && learning->hands.off)) {
         whiteness_start(&learning->whiteness);
         take_back(learning, cdkf);

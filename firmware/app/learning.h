@@ -5,6 +5,7 @@
 #ifndef APP_LEARNING_H
 #define APP_LEARNING_H
 
+#include "app/grip_force.h"
 #include "app/hands.h"
 #include "app/monitor.h"
 #include "app/setup.h"
@@ -23,6 +24,7 @@ typedef struct learning {
     calibration_t calibration;
     monitor_t monitor;
     hands_t hands;
+    grip_force_t grip;
     snapshot_t kept[2]; /* the belief one and two KEEP_PERIODs ago, to be taken back */
     float kept_ago;     /* time since the first [s] */
     float elapsed;      /* since the parameters learnt last [s] */

@@ -34,7 +34,9 @@ static void start_session(link_t *link)
 {
     e2e_receiver_init(&link->lever_receiver, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, tolerance);
     e2e_receiver_init(&link->base_receiver, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, tolerance);
+    e2e_receiver_init(&link->grip_receiver, (uint8_t)MESSAGE_GRIP_SAMPLE_DATA_ID, tolerance);
     link->has_lever_sample = false;
+    link->has_grip_sample = false;
     link->set_us = LONG_AGO_US;
     link->parts = (uint8_t)PARTS;
 }
@@ -77,12 +79,20 @@ static enum lever_frame_result on_lever_sample(link_t *link, const lever_frame_t
     return LEVER_FRAME_TAKEN;
 }
 
-/* Completes the sample with the LEVER_SAMPLE of the same counter, if it has come. */
+static enum lever_frame_result on_grip_sample(link_t *link, const lever_frame_t *frame)
+{
+    link->has_grip_sample = message_grip_sample_decode(&link->grip_sample, frame);
+    link->grip_counter = e2e_counter(frame);
+    return LEVER_FRAME_TAKEN;
+}
+
+/* Completes the sample with the LEVER_SAMPLE and GRIP_SAMPLE of the same counter, as far as they have come. */
 static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
 {
     message_base_sample_t base;
     (void)message_base_sample_decode(&base, frame);
     const bool paired = link->has_lever_sample && (link->lever_counter == e2e_counter(frame));
+    const bool gripped = link->has_grip_sample && (link->grip_counter == e2e_counter(frame));
     const message_lever_sample_t *lever = &link->lever_sample;
     lever_sample_t *sample = &link->sample;
     sample->time_us = base.time_us;
@@ -94,8 +104,11 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     sample->theta_valid = paired && lever->theta_valid;
     sample->theta_dot_valid = paired && lever->theta_dot_valid;
     sample->tau_m_valid = paired && lever->tau_m_valid;
+    sample->grip_force = link->grip_sample.grip_force;
+    sample->grip_force_valid = gripped && link->grip_sample.grip_force_valid;
     estimator->lost += paired ? 0u : 1u;
     link->has_lever_sample = false;
+    link->has_grip_sample = false;
     link->has_sample = true;
     return LEVER_FRAME_SAMPLE;
 }
@@ -184,6 +197,10 @@ enum lever_frame_result link_on_frame(lever_t *lever, const lever_frame_t *frame
     } else if (frame->id == (uint32_t)MESSAGE_BASE_SAMPLE_ID) {
         if (accept(&link->base_receiver, estimator, frame)) {
             result = on_base_sample(link, estimator, frame);
+        }
+    } else if (frame->id == (uint32_t)MESSAGE_GRIP_SAMPLE_ID) {
+        if (accept(&link->grip_receiver, estimator, frame)) {
+            result = on_grip_sample(link, frame);
         }
     } else if (frame->id == (uint32_t)MESSAGE_COMMAND_ID) {
         result = on_command(lever, frame);

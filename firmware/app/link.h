@@ -28,10 +28,14 @@ enum link_output {
 typedef struct link {
     e2e_receiver_t lever_receiver;
     e2e_receiver_t base_receiver;
+    e2e_receiver_t grip_receiver;
     e2e_receiver_t command_receiver;
     message_lever_sample_t lever_sample; /* waiting for its BASE_SAMPLE */
+    message_grip_sample_t grip_sample;   /* likewise */
     uint8_t lever_counter;
+    uint8_t grip_counter;
     bool has_lever_sample;
+    bool has_grip_sample;
     bool has_sample;
     lever_sample_t sample; /* complete, waiting for lever_step() */
     uint32_t period_us;    /* of a sample, nominal */

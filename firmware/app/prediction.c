@@ -1,6 +1,7 @@
 #include "app/prediction.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #define MISSING 10.0f     /* process noise for a base acceleration that is missing, in those that are set, */
 #define WRONG 3.0f        /* and for a wrong one, so that it is noticed when it is right again */
@@ -29,8 +30,8 @@ static void considered_errors(const estimator_t *estimator, float z_ddot, float 
 }
 
 /* One step of the model, with the mean of the inputs at both ends. A base that cannot be used is unknown: then the
- * state has the process noise for it. */
-static void predict(estimator_t *estimator, float z_ddot, float tau_m, float period)
+ * state has the process noise for it. `force`: of the hand, NULL where it is missing. */
+static void predict(estimator_t *estimator, float z_ddot, float tau_m, const float *force, float period)
 {
     trim_t *trim = &estimator->trim;
     cdkf_t *cdkf = &estimator->cdkf;
@@ -42,6 +43,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
     const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
     float error[CDKF_CONSIDERED];
+    cdkf_grip_t grip = {.learn = estimator_may_learn(estimator)};
     trim_set_origin(trim);
     model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
@@ -53,14 +55,16 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, float per
     if (setup->model_in_use->uses_base_motion) {
         base_motion_step(&estimator->base_motion, &setup->constants, &step);
     }
-    hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
+    const float alone = hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
     if (unknown) {
         step.z_ddot = 0.0f;
         step.seat_dot = 0.0f;
         cdkf->disturbance = (learning->monitor.base_wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);
-    cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error);
+    const bool gripped =
+        grip_force_step(&learning->grip, setup, trim, unknown ? NULL : force, &step, alone, error, &grip);
+    cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error, gripped ? &grip : NULL);
     estimator->z_ddot = next_z_ddot;
     estimator->tau_m = next_tau_m;
 }
@@ -84,7 +88,7 @@ static void cross_gap(
     for (uint32_t i = 1u; i < substeps; i++) {
         const float share = part * (float)i;
         predict(estimator, last->z_ddot + (share * (sample->z_ddot - last->z_ddot)),
-            last->tau_m + (share * (sample->tau_m - last->tau_m)), period);
+            last->tau_m + (share * (sample->tau_m - last->tau_m)), NULL, period);
         (void)subtract_trim(estimator, unused, missing, period);
     }
 }
@@ -125,7 +129,7 @@ void prediction_advance(
         cross_gap(estimator, sample, last, period, substeps);
     }
     follow_base(estimator, sample->base, elapsed);
-    predict(estimator, sample->z_ddot, sample->tau_m, period);
+    predict(estimator, sample->z_ddot, sample->tau_m, sample->gripped ? &sample->grip_force : NULL, period);
     refuse_spikes(estimator, sample, elapsed);
     if (subtract_trim(estimator, sample->y, sample->valid, period)) {
         alignment_end_outage(estimator, sample);

@@ -9,12 +9,12 @@
  *     can
  *     decide only a value within 0.004 counts of a tie.
  *   - A value that is NaN or does not fit its signal is sent as "not available": a smaller one would be wrong, and a
- *     standard deviation confident. In LEVER_SAMPLE and BASE_SAMPLE its flag says so, too.
+ *     standard deviation confident. In the samples its flag says so, too.
  *   - Codes, flags and counts too large for their field are refused: the nearest code would mean something else.
  *   - An input whose flag is false is not read, and sent as 0. ..._decode() returns true, or false and leaves the
  *     message untouched when identifier or length is not the message's, or its model or page not known. Each value is
  *     the float nearest to the DBC's decimal value, so encoding it gives the same bits again; one that is not available
- *     is NaN, and in LEVER_SAMPLE and BASE_SAMPLE its flag false. Codes are not judged here.
+ *     is NaN, and in the samples its flag false. Codes are not judged here.
  *
  * Cost on a Cortex-M4F at -Os: at most 250 instructions to encode and 200 to decode a message.
  */
@@ -31,6 +31,7 @@ enum { MESSAGE_CONTRACT = 2 }; /* VERSION of the DBC */
 enum message_id {
     MESSAGE_LEVER_SAMPLE_ID = 0x110,
     MESSAGE_BASE_SAMPLE_ID = 0x111,
+    MESSAGE_GRIP_SAMPLE_ID = 0x112,
     MESSAGE_COMMAND_ID = 0x120,
     MESSAGE_STATE_ESTIMATE_ID = 0x210,
     MESSAGE_PILOT_PARAMETERS_ID = 0x211,
@@ -60,7 +61,8 @@ enum message_data_id {
     MESSAGE_IDENTITY_DATA_ID = 161,
     MESSAGE_COMMAND_ACK_DATA_ID = 177,
     MESSAGE_LINK_HEALTH_DATA_ID = 193,
-    MESSAGE_FEEDTHROUGH_DATA_ID = 209
+    MESSAGE_FEEDTHROUGH_DATA_ID = 209,
+    MESSAGE_GRIP_SAMPLE_DATA_ID = 225
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -85,6 +87,14 @@ typedef struct message_base_sample {
 
 bool message_base_sample_encode(lever_frame_t *frame, const message_base_sample_t *message);
 bool message_base_sample_decode(message_base_sample_t *message, const lever_frame_t *frame);
+
+typedef struct message_grip_sample {
+    float grip_force; /* [N] */
+    bool grip_force_valid;
+} message_grip_sample_t;
+
+bool message_grip_sample_encode(lever_frame_t *frame, const message_grip_sample_t *message);
+bool message_grip_sample_decode(message_grip_sample_t *message, const lever_frame_t *frame);
 
 typedef lever_command_t
     message_command_t; /* what lever_command() takes; a dither_rms beyond 65.534 is sent, and comes, as

@@ -75,6 +75,29 @@ bool message_base_sample_decode(message_base_sample_t *message, const lever_fram
     return fits;
 }
 
+/* --- GRIP_SAMPLE ------------------------------------------------------------------------------------------------- */
+
+static const quantity_t sample_grip_force = SIGNED(16u, 65535u, 50.0f);
+
+bool message_grip_sample_encode(lever_frame_t *frame, const message_grip_sample_t *message)
+{
+    uint64_t payload = bit_at(message->grip_force_valid, 12u);
+    payload |= message->grip_force_valid ? layout_bits(&sample_grip_force, message->grip_force) : 0u;
+    layout_write(frame, (uint32_t)MESSAGE_GRIP_SAMPLE_ID, payload);
+    return true;
+}
+
+bool message_grip_sample_decode(message_grip_sample_t *message, const lever_frame_t *frame)
+{
+    const bool fits = layout_is(frame, (uint32_t)MESSAGE_GRIP_SAMPLE_ID);
+    if (fits) {
+        const uint64_t payload = layout_read(frame);
+        message->grip_force = layout_value(payload, &sample_grip_force);
+        message->grip_force_valid = has_bit(payload, 12u) && is_available(message->grip_force);
+    }
+    return fits;
+}
+
 /* --- STATE_ESTIMATE ---------------------------------------------------------------------------------------------- */
 
 static const quantity_t state_innovation = UNSIGNED(13u, 255u, 8.0f);

@@ -1,6 +1,7 @@
 #include "filter/cdkf.h"
 
 #include "filter/considered.h"
+#include "filter/grip.h"
 #include "math/factor.h"
 
 #include <string.h>
@@ -48,8 +49,9 @@ static void predict_mean_and_parameter_columns(cdkf_t *cdkf, const model_respons
 }
 
 /* S_xx: its own columns; the walk q of theta_dot, integrated by theta, q^2 [T^3/3, T^2/2; T^2/2, T] (van Loan 1978);
- * second differences along the parameters, in the same direction [T/2; 1]; and a walk of theta itself. */
-static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period)
+ * second differences along the parameters, in the same direction [T/2; 1]; and a walk of theta itself. Conditioned on
+ * what the grip force has seen, if it has. */
+static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period, grip_seen_t *seen)
 {
     const float walk = cdkf->process_noise[1] + cdkf->disturbance;
     const float variance = walk * walk * period;
@@ -58,20 +60,29 @@ static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response
     for (uint32_t j = 0u; j < L; j++) {
         square += response->second_difference[j] * response->second_difference[j];
     }
-    const float rate = sqrtf(variance + ((SIGMA_SECOND * SIGMA_SECOND) * square));
+    const float second = (SIGMA_SECOND * SIGMA_SECOND) * square;
     const float angle = sqrtf((variance * (period * period * 0.0833333333f)) + own);
-    float theta[4] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, angle};
-    float theta_dot[4] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f};
+    const float rate = sqrtf(seen->taken ? variance : (variance + second));
+    float theta[GRIP_COLUMNS + 1] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, angle, 0.0f, 0.0f};
+    float theta_dot[GRIP_COLUMNS + 1] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f, 0.0f, 0.0f};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);
-    factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
+    if (seen->taken) {
+        theta_dot[4] = sqrtf(second);
+        theta[4] = 0.5f * period * theta_dot[4];
+        grip_condition(seen, theta, theta_dot);
+        factor_tria_two(theta, theta_dot, (uint32_t)GRIP_COLUMNS + 1u, cdkf->s_xx);
+    } else {
+        factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
+    }
 }
 
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
-    const float error[CDKF_CONSIDERED])
+    const float error[CDKF_CONSIDERED], const cdkf_grip_t *grip)
 {
     model_points_t points;
     model_response_t response;
+    grip_seen_t seen = {.taken = (grip != NULL)};
     points.coefficients = cdkf->points;
     points.x[0] = cdkf->x[0];
     points.x[1] = cdkf->x[1];
@@ -80,10 +91,16 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
         points.offset[j][1] = SIGMA_OFFSET * cdkf->s[((L + 1u) * L) + j];
     }
     model->respond(constants, step, &points, &response);
+    if (grip != NULL) {
+        grip_see(cdkf, &response, error, grip, &seen);
+    }
     predict_mean_and_parameter_columns(cdkf, &response, step->period);
-    predict_state_columns(cdkf, &response, step->period);
+    predict_state_columns(cdkf, &response, step->period, &seen);
     considered_predict(cdkf->considered, &response, step->period, error);
     response_move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
+    if (seen.taken) {
+        grip_take(cdkf, grip, &seen);
+    }
 }
 
 /* --- measurement update ------------------------------------------------------------------------------------------ */
@@ -145,16 +162,6 @@ static inline gain_t take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, 
     return gain;
 }
 
-static inline void add_information(information_t *pending, const float row[MODEL_PARAMETERS], float nu)
-{
-    for (uint32_t i = 0u; i < L; i++) {
-        pending->vector[i] += row[i] * nu;
-        for (uint32_t j = i; j < L; j++) {
-            pending->matrix[(i * L) + j] += row[i] * row[j];
-        }
-    }
-}
-
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS])
 {
@@ -166,8 +173,8 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
     cdkf->response[0] += step[0]; /* from now on it includes the response to this correction */
     cdkf->response[1] += step[1];
     if (learn) {
-        add_information(&cdkf->pending, row[0], innovation[0].value);
-        add_information(&cdkf->pending, row[1], innovation[1].value);
+        information_add(&cdkf->pending, row[0], innovation[0].value);
+        information_add(&cdkf->pending, row[1], innovation[1].value);
     }
     considered_correct(cdkf->considered, gain, row, innovation, learn);
     /* w makes both uncertain together: I + R R^T = L D L^T, and the second innovation is then given the first */

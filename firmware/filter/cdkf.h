@@ -66,6 +66,17 @@ typedef struct information {
     float vector[MODEL_PARAMETERS];                    /* the matrix times the correction */
 } information_t;
 
+/* Adds an innovation `nu` that sees row times the columns of S_ww, both in units of its standard deviation. */
+static inline void information_add(information_t *information, const float row[MODEL_PARAMETERS], float nu)
+{
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        information->vector[i] += row[i] * nu;
+        for (uint32_t j = i; j < (uint32_t)MODEL_PARAMETERS; j++) {
+            information->matrix[(i * (uint32_t)MODEL_PARAMETERS) + j] += row[i] * row[j];
+        }
+    }
+}
+
 typedef struct cdkf {
     float w[MODEL_PARAMETERS]; /* scaled parameters (model/scaling.h) */
     float x[MODEL_STATES];     /* theta [rad], theta_dot [rad/s] */
@@ -106,10 +117,23 @@ void cdkf_start_state(cdkf_t *cdkf, const float x[MODEL_STATES], const float sig
 /* Drops what has not been learnt yet. */
 void cdkf_drop_pending(cdkf_t *cdkf);
 
+/* The grip force as a third output: the change of theta_dot over a step that the lever alone makes of it, of known
+ * torque and of the base. What the hand does that the model lacks moves the lever through this force, so the process
+ * noise of the step is part of what is measured. */
+typedef struct cdkf_grip {
+    float change;                 /* [rad/s] */
+    float noise;                  /* its standard deviation [rad/s] */
+    float torque;                 /* of it to a torque on the lever [rad/s / N m] */
+    float own[MODEL_STATES];      /* the part of it that the lever's own spring and damper take: - d change / d x */
+    float error[CDKF_CONSIDERED]; /* what a unit of each considered error adds to it */
+    bool learn;                   /* as in cdkf_measurement_update() */
+} cdkf_grip_t;
+
 /* Lines 2 to 5: one step of the model. The parameters stand still. `error`: what a unit of each considered error takes
- * from the inputs, [m/s^2] per unit for those of the base, [N m] per unit for the others. */
+ * from the inputs, [m/s^2] per unit for those of the base, [N m] per unit for the others. `grip` is NULL where the
+ * force is not measured; a force beyond 8 standard deviations is not taken. */
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
-    const float error[CDKF_CONSIDERED]);
+    const float error[CDKF_CONSIDERED], const cdkf_grip_t *grip);
 
 /* Lines 6 to 10 for the outputs that are valid, one scalar at a time; y in the units of the state. With `learn` what
  * the sample says of w is added to the pending information. An output that is not valid has the innovation 0. */

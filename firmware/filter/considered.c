@@ -26,8 +26,7 @@ void considered_predict(considered_t considered[CDKF_CONSIDERED], const model_re
     const float error[CDKF_CONSIDERED])
 {
     for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        const float input = (c <= (uint32_t)CDKF_BASE_DELAY) ? response->base : response->torque;
-        const float change = input * error[c];
+        const float change = considered_input(response, c) * error[c];
         float *x = considered[c].x;
         response_move(response, period, &x[0], &x[1]);
         x[0] += 0.5f * (period * change);
@@ -48,6 +47,22 @@ void considered_correct(considered_t considered[CDKF_CONSIDERED], const gain_t g
             }
             of->vector += (innovation[0].value * first) + (innovation[1].value * second);
             of->information += (first * first) + (second * second);
+        }
+    }
+}
+
+void considered_correct_by(considered_t considered[CDKF_CONSIDERED], const gain_t *gain,
+    const float seen[CDKF_CONSIDERED], const float row[MODEL_PARAMETERS], float nu, bool learn)
+{
+    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+        considered_t *of = &considered[c];
+        const float share = gain_correct(gain, seen[c], &of->x[0], &of->x[1]);
+        if (learn) {
+            for (uint32_t i = 0u; i < L; i++) {
+                of->cross[i] += row[i] * share;
+            }
+            of->vector += nu * share;
+            of->information += share * share;
         }
     }
 }

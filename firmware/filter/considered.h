@@ -30,6 +30,12 @@ static inline void response_move(const model_response_t *response, float period,
     *theta_dot += change;
 }
 
+/* Of the input through which error c acts. */
+static inline float considered_input(const model_response_t *response, uint32_t c)
+{
+    return (c <= (uint32_t)CDKF_BASE_DELAY) ? response->base : response->torque;
+}
+
 /* The state, or the parameters, start anew: no error of theirs is made by the considered ones. */
 void considered_start_state(considered_t considered[CDKF_CONSIDERED]);
 void considered_start_w(considered_t considered[CDKF_CONSIDERED]);
@@ -41,6 +47,10 @@ void considered_predict(considered_t considered[CDKF_CONSIDERED], const model_re
 /* Measurement update, after that of the filter: gain, what each output saw of S_ww, innovation. */
 void considered_correct(considered_t considered[CDKF_CONSIDERED], const gain_t gain[CDKF_OUTPUTS],
     float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn);
+
+/* By one more output that sees `seen` of each, not yet divided by S_y; `row` and `nu` are. */
+void considered_correct_by(considered_t considered[CDKF_CONSIDERED], const gain_t *gain,
+    const float seen[CDKF_CONSIDERED], const float row[MODEL_PARAMETERS], float nu, bool learn);
 
 void considered_drop_pending(considered_t considered[CDKF_CONSIDERED]);
 

@@ -73,6 +73,13 @@ float trim_input(trim_t *trim, uint32_t i, float value, float period)
     return pass(trim, &trim->input[i], value, period);
 }
 
+void trim_start_input(trim_t *trim, uint32_t i, float value)
+{
+    level_t *level = &trim->input[i];
+    (void)memset(level, 0, sizeof *level);
+    level->section[0].level = value;
+}
+
 bool trim_is_waiting(const trim_t *trim, uint32_t i)
 {
     return trim->missing[i] > TRIM_OUTAGE;

@@ -42,7 +42,7 @@ float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t 
 
 #define TRIM_OUTAGE 0.0205f /* a signal missing for longer is out [s]; not a whole number of periods */
 
-enum { TRIM_INPUTS = 3, TRIM_SECTIONS = 3 };
+enum { TRIM_INPUTS = 4, TRIM_SECTIONS = 3 };
 
 /* A signal's slow part. */
 typedef struct level {
@@ -51,7 +51,7 @@ typedef struct level {
 
 typedef struct trim {
     level_t output[MODEL_STATES]; /* theta, whose level is the trim angle [rad], and theta_dot */
-    level_t input[TRIM_INPUTS];   /* z_ddot, tau_m, friction of a newton metre */
+    level_t input[TRIM_INPUTS];   /* z_ddot, tau_m, friction of a newton metre, grip force */
     float origin[MODEL_STATES];   /* of the state: the levels in preload trim, otherwise 0 */
     float missing[MODEL_STATES];  /* time since the last sample of each output [s] */
     float last[MODEL_STATES];     /* value of that sample */
@@ -68,8 +68,11 @@ void trim_start(trim_t *trim, float angle, float corner, bool deviations);
 /* The trim angle [rad]. */
 float trim_angle(const trim_t *trim);
 
-/* Input i (0 z_ddot, 1 tau_m, 2 friction) after `period` seconds: its deviation in preload trim. */
+/* Input i (0 z_ddot, 1 tau_m, 2 friction, 3 grip force) after `period` seconds: its deviation in preload trim. */
 float trim_input(trim_t *trim, uint32_t i, float value, float period);
+
+/* Input i starts at a level that is `value`. */
+void trim_start_input(trim_t *trim, uint32_t i, float value);
 
 /* Sets the origin of the state to the levels: before a prediction. */
 void trim_set_origin(trim_t *trim);

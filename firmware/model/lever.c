@@ -22,8 +22,6 @@
 
 #include <math.h>
 
-#define GRAVITY 9.80665f /* [m/s^2] */
-
 /* The coefficients. */
 enum {
     INERTIA,  /* M [kg m^2] */
@@ -107,7 +105,7 @@ static void respond(const model_constants_t *constants, const model_step_t *step
 {
     const shared_t shared = {.period = step->period,
         .half = 0.5f * step->period,
-        .acceleration = constants->trim ? step->z_ddot : (step->z_ddot + GRAVITY),
+        .acceleration = constants->trim ? step->z_ddot : (step->z_ddot + MODEL_GRAVITY),
         .rest_sine = constants->trim ? step->trim_sine : constants->arm_preload_sine,
         .damping = constants->damping};
     const float rest = constants->trim ? step->trim : constants->lever_preload_angle;
@@ -152,7 +150,7 @@ static model_dynamics_t dynamics(
 {
     const float *c = coefficients->c;
     const float squared = step->trim_cosine * step->trim_cosine;
-    const float weight = GRAVITY * c[FORCING];
+    const float weight = MODEL_GRAVITY * c[FORCING];
     const float geometric =
         constants->trim ? 0.0f : ((c[STIFFNESS] * (constants->arm_preload_sine - step->trim_sine)) - weight);
     const float stiffness = (c[STIFFNESS] * squared) + (geometric * step->trim_sine) + constants->stiffness;

@@ -14,6 +14,7 @@
 #include <stdint.h>
 
 #define MODEL_INVERSE_TURN 0.159154943f /* 1 / (2 pi) */
+#define MODEL_GRAVITY 9.80665f          /* [m/s^2] */
 #define MODEL_THETA_MOST 25.0f          /* no angle beyond is plausible: a few turns [rad] */
 
 enum {

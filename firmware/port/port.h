@@ -56,6 +56,7 @@ enum port_limits {
 
 /* Identifiers (can/messages.h) that a receive filter must let through: the inputs, and IDENTITY, by which the estimator
  * notices another one on its bus. */
-#define PORT_INPUTS {MESSAGE_LEVER_SAMPLE_ID, MESSAGE_BASE_SAMPLE_ID, MESSAGE_COMMAND_ID, MESSAGE_IDENTITY_ID}
+#define PORT_INPUTS                                                                                                    \
+    {MESSAGE_LEVER_SAMPLE_ID, MESSAGE_BASE_SAMPLE_ID, MESSAGE_GRIP_SAMPLE_ID, MESSAGE_COMMAND_ID, MESSAGE_IDENTITY_ID}
 
 #endif

@@ -35,7 +35,7 @@ enum bulk_limits {
     BULK_LINE = 512,    /* longest line of text */
     BULK_OUT_ROOM = 16, /* frames that one frame can become in bulk_feed(), at most */
     BULK_ANSWERS = 8,   /* messages of the estimator that rows hold */
-    BULK_SLOTS = 18     /* 2 messages of a sample, the answers, and the same answers as they were recorded */
+    BULK_SLOTS = 19     /* 3 messages of a sample, the answers, and the same answers as they were recorded */
 };
 
 /* Names of the buses in the order of their first frame. */
@@ -65,7 +65,7 @@ uint64_t bulk_format(const bulk_frame_t *frames, uint64_t count, const char *bus
 
 /* --- the estimator --------------------------------------------------------------------------------------------- */
 
-/* A sample and all that belongs to it. Slot 0 is LEVER_SAMPLE, 1 BASE_SAMPLE, 2.. the answers in the order of
+/* A sample and all that belongs to it. Slot 0 is LEVER_SAMPLE, 1 BASE_SAMPLE, 2 GRIP_SAMPLE, 3.. the answers in the order of
  * bulk_feeder_t.answer_id, and after them the same messages as the recording has them. */
 typedef struct bulk_row {
     int64_t time_us;             /* recorded time of its BASE_SAMPLE [us] */
@@ -77,11 +77,14 @@ typedef struct bulk_row {
 typedef struct bulk_feeder {
     uint32_t lever_id; /* LEVER_SAMPLE */
     uint32_t base_id;  /* BASE_SAMPLE */
+    uint32_t grip_id;  /* GRIP_SAMPLE */
     uint32_t command_id;
     uint32_t answer_id[BULK_ANSWERS];
     uint8_t has_row;   /* whether `row` waits for what the recording still has of its sample */
     uint8_t has_lever; /* whether a LEVER_SAMPLE waits for its BASE_SAMPLE */
+    uint8_t has_grip;  /* likewise */
     uint8_t lever_data[8];
+    uint8_t grip_data[8];
     bulk_row_t row;
     uint64_t refused; /* frames that the estimator did not accept */
 } bulk_feeder_t;
@@ -94,7 +97,7 @@ typedef struct bulk_fed {
 
 /* Feeds classic data frames of one bus to the estimator in their order, until they or the room in `out` or `rows` end.
  * `out` gets what was fed, each frame followed by its answers, which have its recorded time; `rows` gets the samples
- * that are complete: the last one stays in the feeder until the next comes. Only the three inputs are fed, no recorded
+ * that are complete: the last one stays in the feeder until the next comes. Only the four inputs are fed, no recorded
  * answers. */
 void bulk_feed(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *frames, uint64_t count,
     bulk_frame_t *out, uint64_t out_room, bulk_row_t *rows, uint64_t row_room, bulk_fed_t *fed);

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { LEVER_SLOT = 0, BASE_SLOT = 1, ANSWER_SLOT = 2, RECORDED_SLOT = ANSWER_SLOT + BULK_ANSWERS, FRAME_BYTES = 8 };
+enum { LEVER_SLOT = 0, BASE_SLOT = 1, GRIP_SLOT = 2, ANSWER_SLOT = 3, RECORDED_SLOT = ANSWER_SLOT + BULK_ANSWERS, FRAME_BYTES = 8 };
 
 #define COUNTER_MASK 15u
 
@@ -27,18 +27,27 @@ static void put_slot(bulk_row_t *row, uint32_t slot, const uint8_t data[FRAME_BY
     row->known |= 1u << slot;
 }
 
-/* The row of a new sample: with its LEVER_SAMPLE if that came before it with the same counter, as the estimator
- * pairs. */
+static bool have_same_counter(const uint8_t *a, const uint8_t *b)
+{
+    return ((a[1] ^ b[1]) & COUNTER_MASK) == 0u;
+}
+
+/* The row of a new sample: with its LEVER_SAMPLE and GRIP_SAMPLE if they came before it with the same counter, as the
+ * estimator pairs. */
 static void start_row(bulk_feeder_t *feeder, const bulk_frame_t *base)
 {
     bulk_row_t *row = &feeder->row;
     row->time_us = base->time_us;
     row->fresh = 0u;
     put_slot(row, BASE_SLOT, base->data);
-    if ((feeder->has_lever != 0u) && (((feeder->lever_data[1] ^ base->data[1]) & COUNTER_MASK) == 0u)) {
+    if ((feeder->has_lever != 0u) && have_same_counter(feeder->lever_data, base->data)) {
         put_slot(row, LEVER_SLOT, feeder->lever_data);
     }
+    if ((feeder->has_grip != 0u) && have_same_counter(feeder->grip_data, base->data)) {
+        put_slot(row, GRIP_SLOT, feeder->grip_data);
+    }
     feeder->has_lever = 0u;
+    feeder->has_grip = 0u;
     feeder->has_row = 1u;
 }
 
@@ -68,7 +77,8 @@ static uint64_t fetch(
  * bus. */
 static bool is_input(const bulk_feeder_t *feeder, const bulk_frame_t *frame)
 {
-    return (frame->id == feeder->lever_id) || (frame->id == feeder->base_id) || (frame->id == feeder->command_id);
+    return (frame->id == feeder->lever_id) || (frame->id == feeder->base_id) || (frame->id == feeder->grip_id) ||
+           (frame->id == feeder->command_id);
 }
 
 /* An answer in the recording belongs to the sample before it. */
@@ -100,6 +110,9 @@ static void feed_one(bulk_feeder_t *feeder, struct lever *lever, const bulk_fram
     } else if ((result == LEVER_FRAME_TAKEN) && (frame->id == feeder->lever_id)) {
         (void)memcpy(feeder->lever_data, frame->data, sizeof feeder->lever_data);
         feeder->has_lever = 1u;
+    } else if ((result == LEVER_FRAME_TAKEN) && (frame->id == feeder->grip_id)) {
+        (void)memcpy(feeder->grip_data, frame->data, sizeof feeder->grip_data);
+        feeder->has_grip = 1u;
     } else {
         feeder->refused += (result == LEVER_FRAME_REFUSED) ? 1u : 0u;
     }

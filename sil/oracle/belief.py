@@ -26,6 +26,9 @@ change of the samples takes through the filter, with the filter's gain as it is.
     predict   e⁻ = F e + G, F the transition of [w; x] by first differences, G the push of a unit of b
     update    e = (I - K H) e⁻;  pending: the score's, s_e += (H V⁻)ᵀ (S_y S_yᵀ)⁻¹ H e_x⁻
     learn     e_w -= c P_w s_e;  e_x -= c V P_w s_e
+
+A force may be measured over the step: an output of the state before and after it. It sees the process noise of the
+step, so it is taken with the prediction: as above, with the columns of S⁻ before they are made triangular.
 """
 
 from abc import ABC, abstractmethod
@@ -45,6 +48,20 @@ Motion = Callable[[Array, Array], Array]
 CONSIDERED = 4
 """Calibration errors: of the gain and the delay of z̈, the gain of τ_m, friction."""
 UNMOVED = np.zeros((2, CONSIDERED))
+FAR = 8.0
+"""Standard deviations beyond which a force is not taken."""
+
+
+@dataclass(frozen=True)
+class Force:
+    """A force that was measured over a step."""
+
+    value: float  # [N]
+    noise: float  # standard deviation
+    output: Callable[[Array, Array], Array]  # of states (2, N) before and after the step: expected forces (N,)
+    kick: float  # of the force by what process noise adds to θ̇, beside the output [N / (rad/s)]
+    push: Array  # of the force by a unit of each considered error, beside the output (CONSIDERED,)
+    learn: bool
 
 
 @dataclass(frozen=True)
@@ -93,7 +110,7 @@ class Belief(ABC):
         """The state starts anew, independent of the parameters; pending information is dropped."""
 
     @abstractmethod
-    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED) -> None:
+    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED, force: Force | None = None) -> None:
         """Time update; process noise of the state with the factor (2, k); a unit of each considered error moves the
         true state by a column of `push` besides."""
 
@@ -185,19 +202,51 @@ class TwoStage(Belief):
         self.score: Array = np.zeros_like(self._w)
         self.score_errors: Array = np.zeros_like(self.w_errors)
 
-    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED) -> None:
+    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED, force: Force | None = None) -> None:
         n = len(self._x)
-        states = motion(cdkf.draw(self._x, self.x_factor), self._w[:, np.newaxis])
+        alone = cdkf.draw(self._x, self.x_factor)
+        states = motion(alone, self._w[:, np.newaxis])
         pairs = cdkf.draw(np.concatenate((self._x, self._w)), np.concatenate((self.v @ self._w_factor, self._w_factor)))
+        with_w = motion(pairs[:n], pairs[n:])
+        if force is not None:  # goes along as a third row
+            states = np.vstack((states, force.output(alone, states)))
+            with_w = np.vstack((with_w, force.output(pairs[:n], with_w)))
+            nothing = np.zeros((n, 1))
+            constant = force.output(nothing, nothing)
+            push = np.vstack((push, force.output(nothing, push) - constant + force.push))
+            noise = np.vstack((noise, force.output(nothing, noise) - constant + force.kick * noise[1]))
         mean, first, second = cdkf.differences(states)
-        mean_of_pairs, t, second_of_pairs = cdkf.differences(motion(pairs[:n], pairs[n:]))
+        mean_of_pairs, t, second_of_pairs = cdkf.differences(with_w)
         transition = np.linalg.solve(self.x_factor.T, first.T).T  # of the state, w given
         own_errors = self.x_errors - self.v @ self.w_errors
-        self._x = mean + mean_of_pairs - states[:, 0]
-        self.x_factor = cdkf.tria(np.concatenate((first, second, second_of_pairs, noise), axis=1))
-        self.v = np.linalg.solve(self._w_factor.T, t.T).T
-        self.x_errors = self.v @ self.w_errors + transition @ own_errors + push
-        self.response = transition @ self.response
+        x = mean + mean_of_pairs - states[:, 0]
+        columns = np.concatenate((first, second, second_of_pairs, noise), axis=1)
+        v = np.linalg.solve(self._w_factor.T, t.T).T
+        errors = v @ self.w_errors + transition @ own_errors + push
+        response = transition @ self.response
+        self._x, self.v, self.x_errors, self.response = x[:n], v[:n], errors[:n], response[:n]
+        if force is not None:
+            columns = self._take(force, x[n], columns, v[n], errors[n], response[n])
+        self.x_factor = cdkf.tria(columns)
+
+    def _take(self, force: Force, expected: float, columns: Array, v: Array, errors: Array, response: float) -> Array:
+        """The belief given a force, of which its last row of `columns`, v, errors and response are. Returns the columns
+        of the state."""
+        state, seen = columns[:-1], columns[-1]
+        innovation, variance = force.value - expected, float(seen @ seen) + force.noise**2
+        by_parameters = v @ self._w_factor
+        if innovation**2 > FAR**2 * (variance + by_parameters @ by_parameters):
+            return state
+        gain = state @ seen / variance
+        self._x = self._x + gain * innovation
+        self.v = self.v - np.outer(gain, v)
+        self.x_errors = self.x_errors - np.outer(gain, errors)
+        self.response = self.response - gain * response + gain * innovation
+        if force.learn:
+            self.information = self.information + np.outer(v, v) / variance
+            self.score = self.score + v * innovation / variance
+            self.score_errors = self.score_errors + np.outer(v, errors) / variance
+        return np.column_stack((state - np.outer(gain, seen), gain * force.noise))
 
     def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> Innovation:
         state = cdkf.measure(self._x, self.x_factor, lambda x: x[valid], noise[np.ix_(valid, valid)])
@@ -311,7 +360,7 @@ class Augmented(Belief):
         self.factor = np.zeros_like(self.factor)
         self.factor[:n, :n], self.factor[n:, n:] = w_factor, x_factor
 
-    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED) -> None:
+    def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED, force: Force | None = None) -> None:
         n = self.parameters
         points = cdkf.draw(self.z, self.factor)
         stepped = np.concatenate((points[:n], motion(points[n:], points[:n])))

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import cdkf
-from .belief import Augmented, Belief, TwoStage
+from .belief import Augmented, Belief, Force, TwoStage
 from .cdkf import Array
 from .detrend import Detrend
+from .grip import Grip
 from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
 from .lever import Lever
 from .linear import Hand, LinearBlackBox, LinearPhysical
@@ -66,8 +67,8 @@ class Estimator:
     """The square-root CDKF for state and parameters. `settings` are those of firmware/lever_settings.def, by name.
 
     `estimator`: "dual" or "joint", as in the firmware; "augmented", the textbook's joint filter, which learns from
-    every sample at once, without caution, and has no change detection and noise estimation. `bounds` (3, 2) are the
-    model's least and greatest parameters in physical units.
+    every sample at once, without caution, and has no change detection, noise estimation and grip force. `bounds` (3, 2)
+    are the model's least and greatest parameters in physical units.
     """
 
     def __init__(
@@ -97,6 +98,9 @@ class Estimator:
         self.belief: Belief = (
             Augmented(w_factor, x, x_factor) if whole else TwoStage(w_factor, x, x_factor, joint=estimator == "joint")
         )
+        self.grip: Grip | None = None
+        if isinstance(self.model, Lever) and not whole:
+            self.grip = Grip(self.model, settings, self.detrended)
         self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, adapted=not whole)
         self.considered_sigma = np.array([settings[f"{name}_sigma"] for name in CONSIDERED])
         presumed = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], until measured
@@ -118,10 +122,16 @@ class Estimator:
     # --- one sample ------------------------------------------------------------------------------------------------
 
     def step(
-        self, time: float, y: Array, valid: NDArray[np.bool_], u: tuple[float, float], base_valid: bool = True
+        self,
+        time: float,
+        y: Array,
+        valid: NDArray[np.bool_],
+        u: tuple[float, float],
+        base_valid: bool = True,
+        force: float | None = None,
     ) -> None:
-        """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) as
-        the sensors show them."""
+        """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) and
+        the grip force [N] as the sensors show them."""
         duration = time - self.time
         substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
         dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
@@ -131,7 +141,8 @@ class Estimator:
                 self._follow_base(base_valid, duration)
             share = i / substeps
             last = self.last_raw
-            self._advance((last[0] + share * (inputs[0] - last[0]), last[1] + share * (inputs[1] - last[1])), dt)
+            between = (last[0] + share * (inputs[0] - last[0]), last[1] + share * (inputs[1] - last[1]))
+            self._advance(between, force if i == substeps else None, dt)
             if i < substeps:
                 self._subtract_trim(y, none_valid, dt)
         self.time, self.last_raw = time, inputs
@@ -144,10 +155,8 @@ class Estimator:
 
     def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Measurement update, and learning when it is due."""
-        settled = bool(self.unsettled < 0.5 * self.settings["sample_period"])
-        least = self.settings["excitation_least"] ** 2
-        excited = self.excitation_square >= least and self.motion_square >= 0.25 * least
-        measured = settled and bool(valid.any()) and bool(self.base_missing <= 0.0)
+        excited = self._is_excited()
+        measured = self._is_settled() and bool(valid.any()) and bool(self.base_missing <= 0.0)
         lesson = Lesson(measured, excited, self.surprise)
         self.nis = 0.0
         if valid.any():
@@ -156,8 +165,20 @@ class Estimator:
             self.nis = innovation.normalised_square
             self._average_innovation(self.nis / int(valid.sum()), duration)
             self.learning.add(innovation, valid, lesson)
-        self.learning.step(duration, lesson)
+        rate = float(self.belief.x[1])
+        if self.grip is None:
+            self.learning.step(duration, lesson)
+        else:
+            grip = self.grip
+            self.learning.step(duration, lesson, lambda period: grip.end_block(rate, period, measured and excited))
         self.unsettled -= counted(duration)
+
+    def _is_settled(self) -> bool:
+        return bool(self.unsettled < 0.5 * self.settings["sample_period"])
+
+    def _is_excited(self) -> bool:
+        least = self.settings["excitation_least"] ** 2
+        return bool(self.excitation_square >= least and self.motion_square >= 0.25 * least)
 
     def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
         """Outputs far from what is expected, until they have been for SPIKE_TIME. After an outage nothing is."""
@@ -185,7 +206,7 @@ class Estimator:
             self._wait_for_levels()
         self.base_missing = seconds(0.0) if valid else self.base_missing + counted(duration)
 
-    def _advance(self, raw: tuple[float, float], dt: float) -> None:
+    def _advance(self, raw: tuple[float, float], force: float | None, dt: float) -> None:
         """One prediction, with the mean of the inputs at both ends. A base that is not known is noise."""
         rate = float(self.origin[1] + self.belief.x[1])
         stop = self._deviation(self.inputs[2], rate / (abs(rate) + STOP_RATE), dt)
@@ -194,16 +215,29 @@ class Estimator:
         if self.detrended:
             self.origin = np.array([detrend.level for detrend in self.outputs])
         z_ddot = 0.5 * (base + last[0])
-        z_dot = self.velocity + 0.5 * dt * z_ddot
+        mean, z_dot = (z_ddot, 0.5 * (u[1] + last[1])), self.velocity + 0.5 * dt * z_ddot
         self.velocity = VELOCITY_KEPT * z_dot + 0.5 * dt * z_ddot
         if self.base_missing > 0.0:
-            z_ddot, z_dot = 0.0, 0.0
+            z_ddot, z_dot, force = 0.0, 0.0, None
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
         slope = (base - last[0]) / dt
         errors = np.array(((-base, slope, 0.0, 0.0), (0.0, 0.0, -last[1], -stop), (-self.velocity, base, 0.0, 0.0)))
-        self._predict((z_ddot, 0.5 * (u[1] + last[1]), z_dot), errors, dt)
+        self._predict((z_ddot, mean[1], z_dot), errors, dt, self._force(force, mean, errors, dt))
         self.last_input = u
+
+    def _force(self, measured: float | None, u: tuple[float, float], errors: Array, dt: float) -> Force | None:
+        """The grip force as the belief takes it. What moves the lever besides acts on it, not on the hand."""
+        grip = self.grip
+        seen = None if grip is None else grip.step(measured, self.belief.x, u, errors[:2], self.trim, dt)
+        if grip is None or seen is None:
+            return None
+        angle = np.array((self.trim if self.detrended else 0.0, 0.0))
+        x, p = self.belief.x + angle, self.scale.physical(self.belief.w)
+        pushed, unpushed = (self.model.step(x, p, (u[0], torque, 0.0), self.trim, dt)[1] for torque in (1.0, 0.0))
+        kick = -1.0 / (float(pushed - unpushed) * grip.lever.length)
+        learn = bool(self._is_settled() and self._is_excited() and self.base_missing <= 0.0)
+        return Force(seen[0], grip.noise(dt), lambda a, b: grip.expected(a, b, dt), kick, seen[1], learn)
 
     def _deviation(self, detrend: Detrend, value: float, dt: float) -> float:
         deviation = detrend.step(value, self.settings["trim_corner"], dt)
@@ -242,7 +276,7 @@ class Estimator:
     def _wait_for_levels(self) -> None:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
-    def _predict(self, u: tuple[float, ...], errors: Array, dt: float) -> None:
+    def _predict(self, u: tuple[float, ...], errors: Array, dt: float, force: Force | None) -> None:
         """The trim is where it was at the last sample. `errors` (3, 4): of the inputs, per unit of each considered."""
         trim = self.outputs[0].level
         angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
@@ -258,7 +292,7 @@ class Estimator:
         with_errors = np.concatenate((np.zeros((3, 1)), errors), axis=1)  # none, then a unit of each
         moved = moved_by(x, w, tuple(np.array(u)[:, np.newaxis] + with_errors))
         push = moved[:, 1:] - moved[:, :1]
-        self.belief.predict(motion, self._process_noise(dt), push)
+        self.belief.predict(motion, self._process_noise(dt), push, force)
 
     def _process_noise(self, dt: float) -> Array:
         """Factor (2, 3) of an integrated random walk of θ̇ (its covariance: van Loan 1978) plus a random walk of θ."""
@@ -355,15 +389,17 @@ def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, ever
     """Steps through the samples from index `first` on; estimates after every `every`th of them, an array a column.
 
     `samples`: time_s, theta, theta_dot, z_ddot, tau_m and theta_valid, theta_dot_valid, z_ddot_valid, each of shape
-    (N,); an invalid tau_m must already be 0.
+    (N,); an invalid tau_m must already be 0. grip_force [N] may be missing, or NaN.
     """
     rows = []
     y = np.column_stack((samples["theta"], samples["theta_dot"]))
     valid = np.column_stack((samples["theta_valid"], samples["theta_dot_valid"])).astype(bool)
     base_valid = samples["z_ddot_valid"].astype(bool).tolist()
     time, base, torque = (samples[name].tolist() for name in ("time_s", "z_ddot", "tau_m"))
+    forces = samples.get("grip_force", np.full(len(time), math.nan)).tolist()
     for index in range(first, len(time)):
-        estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index])
+        force = None if math.isnan(forces[index]) else forces[index]
+        estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index], force)
         if (index - first) % every == 0:
             x = (estimator.origin + estimator.ahead + estimator.belief.x, estimator.state_deviations())
             others = (*estimator.parameters(), *estimator.dynamics(), (estimator.trim, estimator.nis))

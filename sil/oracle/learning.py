@@ -5,7 +5,7 @@ ends one depends on the rounding of the sum.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,11 +93,15 @@ class Learning:
         if self.adapted and lesson.measured and lesson.excited:
             self.noise.add(innovation, valid)
 
-    def step(self, duration: float, lesson: Lesson) -> None:
-        """The parameters learn once every learn_period; a sample that is half a sample_period early is on time."""
+    def step(self, duration: float, lesson: Lesson, before: Callable[[float], None] = lambda period: None) -> None:
+        """The parameters learn once every learn_period; a sample that is half a sample_period early is on time.
+
+        `before` is called before they do, with the time since they did [s].
+        """
         self.elapsed += duration
         self.counted += counted(duration)
         if self.counted > seconds(self.settings["learn_period"]) - seconds(0.5 * self.settings["sample_period"]):
+            before(self.elapsed)
             self._end_block(self.elapsed, self.counted, lesson)
             self.elapsed, self.counted = 0.0, seconds(0.0)
 

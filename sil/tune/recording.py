@@ -13,7 +13,7 @@ from lever_cdkf.host_tools.estimator import Health
 from lever_cdkf.host_tools.innovations import FRAME, Array, samples_of
 from lever_cdkf.host_tools.traffic import Traffic
 
-_SAMPLES = ("LEVER_SAMPLE", "BASE_SAMPLE")
+_SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
 
 
 @dataclass(frozen=True)

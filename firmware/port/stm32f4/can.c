@@ -50,7 +50,7 @@ static void start_pins(void)
     pin_to_peripheral(&gpiob, PIN_TRANSMIT, FUNCTION_CAN);
 }
 
-/* RM0090 32.7.4: a bank of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames
+/* RM0090 32.7.4: banks of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames
  * match. */
 static uint32_t filter_word(uint32_t id, uint32_t next_id)
 {
@@ -59,16 +59,18 @@ static uint32_t filter_word(uint32_t id, uint32_t next_id)
 
 static void start_filter(void)
 {
-    static const uint32_t inputs[4] = PORT_INPUTS;
+    static const uint32_t inputs[5] = PORT_INPUTS;
 
     can1.FMR |= CAN_FMR_FINIT;
     can1.FA1R = 0u;
-    can1.FM1R = BIT(0); /* bank 0: a list ... */
-    can1.FS1R = 0u;     /* ... of 16-bit identifiers ... */
-    can1.FFA1R = 0u;    /* ... into FIFO 0 */
+    can1.FM1R = BIT(0) | BIT(1); /* banks 0 and 1: lists ... */
+    can1.FS1R = 0u;              /* ... of 16-bit identifiers ... */
+    can1.FFA1R = 0u;             /* ... into FIFO 0 */
     can1.FR[0][0] = filter_word(inputs[0], inputs[1]);
     can1.FR[0][1] = filter_word(inputs[2], inputs[3]);
-    can1.FA1R = BIT(0);
+    can1.FR[1][0] = filter_word(inputs[4], inputs[4]);
+    can1.FR[1][1] = filter_word(inputs[4], inputs[4]);
+    can1.FA1R = BIT(0) | BIT(1);
     can1.FMR &= ~(uint32_t)CAN_FMR_FINIT;
 }
 

@@ -56,6 +56,12 @@ def band_limited(rng: np.random.Generator, count: int, rms: float) -> Array:
     return limited
 
 
+def grip_force(before: Array, after: Array, z_ddot: float, tau_m: float) -> float:
+    """Of the hand of such a lever [N], but for what is constant: 0.081 kg m^2, 0.27 kg m, 0.5 N m s/rad, 5 N m/rad."""
+    own = 0.08075 * (after[1] - before[1]) / 1e-3 + 0.5 * before[1] + 5.0 * before[0]
+    return float((own + 0.27 * np.cos(before[0]) * z_ddot - tau_m)[0]) / 0.45
+
+
 @functools.cache
 def recorded(model: str, preload: str, seconds: float) -> dict[str, Array]:
     """A pilot who stiffens by 60 % near the end. Before: a spike of each output; sensors that drop out, one, both, the
@@ -69,11 +75,12 @@ def recorded(model: str, preload: str, seconds: float) -> dict[str, Array]:
     z_ddot, tau_m = band_limited(rng, count, 0.98), band_limited(rng, count, TORQUE[model])
     plant = model_of(Config().settings | PRELOADED, model, preload)
     x, trim, z_dot = np.array([[0.35], [0.0]]), 0.35, 1e-3 * np.cumsum(z_ddot)
-    truth = np.empty((count, 2))
+    truth, of_hand = np.empty((count, 2)), np.empty(count)
     disturbance = 0.05 * np.sqrt(1e-3) * rng.standard_normal(count)
     for k in range(count):
         p = PILOTS[model] * (1.0 if k < 0.9 * count else 1.6)
-        x = plant.step(x, p, (z_ddot[k], tau_m[k], z_dot[k]), trim, 1e-3)
+        before, x = x, plant.step(x, p, (z_ddot[k], tau_m[k], z_dot[k]), trim, 1e-3)
+        of_hand[k] = grip_force(before, x, z_ddot[k], tau_m[k])
         x[1] += disturbance[k]
         truth[k] = x[:, 0]
     truth[round(0.36 * count), 0] += 0.3
@@ -90,6 +97,7 @@ def recorded(model: str, preload: str, seconds: float) -> dict[str, Array]:
         "tau_m": single(tau_m),
         "theta_valid": (part < 0.40) | (part > 0.43),
         "theta_dot_valid": (part < 0.42) | (part > 0.45),
+        "grip_force": single(np.where(np.arange(count) % 10 == 3, np.nan, of_hand + 0.3 * rng.standard_normal(count))),
         "z_ddot_valid": (part < 0.50) | ((part > 0.52) & (np.arange(count) // 4 != round(0.57 * count) // 4)),
     }
     return {name: values[sent] for name, values in samples.items()}
@@ -107,11 +115,20 @@ class Case:
     seconds: float = 5.0
     form: str = ""  # of the oracle, where it is not named like the estimator
     settings: tuple[tuple[str, float], ...] = ()
+    force: bool = False  # with the grip force
     flags: tuple[str, ...] = ()  # that the firmware must raise, besides those of missing samples
 
     def __str__(self) -> str:
         choices = (self.model, self.form or self.estimator, self.preload, self.adaptation)
-        return "-".join((*choices, f"{self.block}", f"{self.seconds:g}s", *(name for name, _ in self.settings[:1])))
+        return "-".join(
+            (
+                *choices,
+                f"{self.block}",
+                f"{self.seconds:g}s",
+                *(name for name, _ in self.settings[:1]),
+                *("force",) * self.force,
+            )
+        )
 
 
 BOTH = ("dual", "joint")
@@ -124,6 +141,9 @@ CASES = (
     *(Case(estimator=e, adaptation=a) for e, a in (("dual", "annealing"), ("joint", "forgetting"))),
     Case(adaptation="robbins_monro", seconds=10.0, block=20, flags=("change",)),
     Case(estimator="joint", adaptation="robbins_monro", seconds=10.0, settings=CALIBRATED),
+    Case(seconds=10.0, force=True),
+    Case(estimator="joint", preload="fixed", seconds=10.0, force=True),
+    Case(model="hand", force=True),
     Case(adaptation="robbins_monro", seconds=10.0, settings=QUIET, flags=("change", "innovation")),
 )
 
@@ -142,6 +162,8 @@ def test_float_agrees_with_double(case: Case) -> None:
     samples = recorded(case.model, case.preload, case.seconds)
     settings = PRELOADED | {"learn_period": 1e-3 * case.block} | dict(case.settings)
     settings |= UNADAPTED if case.form == "augmented" else {}
+    if not case.force:
+        samples = {name: values for name, values in samples.items() if name != "grip_force"}
     config = Config(case.model, case.preload, case.estimator, case.adaptation, settings)
     firmware = run_samples(config, samples)
     inputs = {name: np.asarray(values, float) for name, values in samples.items()}
@@ -161,3 +183,16 @@ def test_float_agrees_with_double(case: Case) -> None:
         assert np.abs((got[name] - expected[name]) / sigma).max() < within.get(name, PARAMETERS_WITHIN), name
         assert got[f"{name}_sigma"] == pytest.approx(sigma, rel=SIGMA_WITHIN), name
     assert firmware["nis"][rows] == pytest.approx(expected["nis"], rel=NIS_WITHIN, abs=NIS_WITHIN)
+
+
+def test_a_grip_force_is_used_when_it_agrees_and_changes_nothing_when_it_does_not() -> None:
+    samples = recorded("lever", "trim", 10.0)
+    without = {name: values for name, values in samples.items() if name != "grip_force"}
+    expected, right = run_samples(Config(), without), run_samples(Config(), samples)
+    assert right["natural_frequency_sigma"][-1] < 0.9 * expected["natural_frequency_sigma"][-1]
+    calibration = next(bit for bit, name in enum_names("lever_fault").items() if name == "calibration")
+    for wrong in (1.5 * samples["grip_force"], -samples["grip_force"], 0.0 * samples["grip_force"]):
+        got = run_samples(Config(), samples | {"grip_force": wrong})
+        assert got["faults"][-1] & calibration
+        for name in ("theta", "parameter", "parameter_sigma", "natural_frequency"):
+            np.testing.assert_array_equal(got[name], expected[name])

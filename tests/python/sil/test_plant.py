@@ -241,3 +241,26 @@ def test_a_plant_ends_with_its_data() -> None:
     lever.advance(0.0)
     with pytest.raises(StopIteration):
         lever.advance(0.0)
+
+
+@pytest.mark.parametrize("kind", ["trim", "fixed"])
+def test_the_grip_force_is_what_the_arm_does(kind: Preload) -> None:
+    """By the arm's side of the equation of motion, from the motion alone; noise and disturbance act on the lever."""
+    count = 4000
+    time = PERIOD * np.arange(count)
+    z_ddot, push = 1.2 * np.sin(2.0 * np.pi * 4.0 * time), 0.5 * np.sin(2.0 * np.pi * 0.7 * time)
+    lever, truth = dataclasses.replace(LEVER, lever_friction=0.2), held(count=count)
+    moving = Plant(
+        lever, truth, kind, Conditions(z_ddot, PERIOD, 0.05, 2e-3, np.random.default_rng(1), disturbance=push)
+    )
+    theta, theta_dot, force = np.empty((3, count))
+    for k in range(count):
+        theta[k], theta_dot[k], force[k] = moving.theta, moving.theta_dot, moving.grip_force
+        if k + 1 < count:
+            moving.advance(0.3 * math.sin(2.0 * math.pi * 3.0 * time[k]))
+    angle, rate, base = (0.5 * (values[1:] + values[:-1]) for values in (theta, theta_dot, z_ddot))
+    length, m_p, c_p, k_p = lever.lever_length, truth.m_p[0], truth.c_p[0], truth.k_p[0]
+    rest = 0.35 if kind == "trim" else lever.arm_preload_angle
+    arm = m_p * (length * np.diff(theta_dot) / PERIOD + (base + GRAVITY * (kind == "fixed")) * np.cos(angle))
+    arm += length * np.cos(angle) * (c_p * np.cos(angle) * rate + k_p * (np.sin(angle) - math.sin(rest)))
+    assert np.abs(force[1:] + arm).max() < 1e-2 * np.abs(arm).max()

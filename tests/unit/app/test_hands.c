@@ -50,7 +50,7 @@ static uint32_t run(uint32_t blocks, bool counts)
                 .z_ddot = (float)(0.5 * (z_ddot + simulation.z_ddot)),
                 .tau_m = (float)(0.5 * (tau_m + simulation.tau_m)),
                 .trim_cosine = (float)cos(simulation.plant.trim)};
-            hands_predict(&hands, &constants, &step, x);
+            (void)hands_predict(&hands, &constants, &step, x);
         }
         hands_step(&hands, &constants, (float)simulation.theta_dot, (float)SAMPLES * PERIOD, counts);
         off += hands.off ? 1u : 0u;

@@ -232,7 +232,8 @@ static void test_foreign_frames_are_ignored_without_a_trace(void)
     for (uint32_t id = 0u; id <= 0x7FFu; id++) {
         const lever_frame_t frame = {.id = id, .length = 8u};
         if ((id != (uint32_t)MESSAGE_LEVER_SAMPLE_ID) && (id != (uint32_t)MESSAGE_BASE_SAMPLE_ID) &&
-            (id != (uint32_t)MESSAGE_COMMAND_ID) && (id != (uint32_t)MESSAGE_IDENTITY_ID)) {
+            (id != (uint32_t)MESSAGE_GRIP_SAMPLE_ID) && (id != (uint32_t)MESSAGE_COMMAND_ID) &&
+            (id != (uint32_t)MESSAGE_IDENTITY_ID)) {
             TEST_ASSERT_EQUAL(LEVER_FRAME_IGNORED, lever_on_frame(lever, &frame));
         }
     }

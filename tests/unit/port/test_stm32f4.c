@@ -106,9 +106,11 @@ static void filter_lets_the_inputs_through(void)
 {
     can_start(&full);
     TEST_ASSERT_EQUAL_HEX32(0x22202200u, can1.FR[0][0]); /* 0x111, 0x110 */
-    TEST_ASSERT_EQUAL_HEX32(0x42E02400u, can1.FR[0][1]); /* 0x217, 0x120 */
-    TEST_ASSERT_EQUAL_HEX32(1u, can1.FM1R);
-    TEST_ASSERT_EQUAL_HEX32(1u, can1.FA1R);
+    TEST_ASSERT_EQUAL_HEX32(0x24002240u, can1.FR[0][1]); /* 0x120, 0x112 */
+    TEST_ASSERT_EQUAL_HEX32(0x42E042E0u, can1.FR[1][0]); /* 0x217, as often as there is room */
+    TEST_ASSERT_EQUAL_HEX32(0x42E042E0u, can1.FR[1][1]);
+    TEST_ASSERT_EQUAL_HEX32(3u, can1.FM1R);
+    TEST_ASSERT_EQUAL_HEX32(3u, can1.FA1R);
     TEST_ASSERT_EQUAL_HEX32(0u, can1.FS1R | can1.FFA1R | (can1.FMR & 1u));
 }
 

@@ -1,0 +1,112 @@
+#include "app/grip_force.h"
+
+#include "math/share.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MEMORY 10.0f     /* of the comparison, and of the mean square [s] */
+#define LEAST 2.0f       /* before the comparison says that it is wrong [s] */
+#define TOLERATED 0.2f   /* what the lever's own equation may be off */
+#define SURE 2.0f        /* standard deviations of the comparison */
+#define WALK_LEAST 1e-3f /* q [1/sqrt(s)] */
+
+void grip_force_start(grip_force_t *grip)
+{
+    (void)memset(grip, 0, sizeof *grip);
+}
+
+/* Takes a valid force, or notes that it is missing. After an outage its level is a guess. */
+static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force, float period)
+{
+    if (force != NULL) {
+        const bool starts = !grip->seen || (grip->missing > TRIM_OUTAGE);
+        grip->raw = (*force - setup->settings->grip_force_bias) / setup->settings->grip_force_gain;
+        grip->seen = true;
+        grip->missing = 0.0f;
+        if (starts) {
+            trim_start_input(trim, 3u, grip->raw);
+            grip->settling = trim->deviations ? trim->settling_time : 0.0f;
+            grip->compared = 0.0f;
+            grip->right = false;
+            grip->measured = 0.0f;
+            grip->expected = 0.0f;
+            grip->drive_square = 0.0f;
+            grip->difference_square = 0.0f;
+        }
+    } else {
+        grip->missing += period;
+    }
+}
+
+/* Standard deviation of a force over a step, its gain error included. */
+static float noise_of(const grip_force_t *grip, const lever_settings_t *s, float period)
+{
+    const float gain = s->grip_force_gain_sigma;
+    const float walk = (s->k_p_walk > WALK_LEAST) ? s->k_p_walk : WALK_LEAST;
+    const float relative = (gain * gain) / walk; /* root of the density */
+    return sqrtf((s->grip_force_noise * s->grip_force_noise) + (grip->square * ((relative * relative) / period)));
+}
+
+/* What the filter takes of a mean force over a step. */
+static void look(const grip_force_t *grip, const setup_t *setup, const model_step_t *step, float force, float alone,
+    const float error[CDKF_CONSIDERED], cdkf_grip_t *seen)
+{
+    const model_constants_t *constants = &setup->constants;
+    const float torque = step->period / constants->inertia;
+    const float base = -(constants->length * constants->mass_moment) * step->trim_cosine;
+    seen->change = alone + (torque * (constants->length * force));
+    seen->noise = (torque * constants->length) * noise_of(grip, setup->settings, step->period);
+    seen->torque = torque;
+    seen->own[0] = torque * constants->stiffness;
+    seen->own[1] = torque * constants->damping;
+    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+        seen->error[c] = (torque * ((c <= (uint32_t)CDKF_BASE_DELAY) ? base : 1.0f)) * error[c];
+    }
+}
+
+bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
+    const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen)
+{
+    const float period = step->period;
+    receive(grip, setup, trim, force, period);
+    const bool known = (force != NULL) && grip->right && !grip->wrong;
+    if (grip->seen) {
+        const float now = trim_input(trim, 3u, grip->raw, period);
+        grip->impulse += (period * setup->constants.length) * now;
+        grip->square += share_of(period, MEMORY) * ((now * now) - grip->square);
+        grip->settling -= (grip->settling > 0.0f) ? period : 0.0f;
+        if (known) {
+            look(grip, setup, step, now, alone, error, seen);
+        }
+    }
+    return known;
+}
+
+/* Compares the impulses that sensor and motion say of the hand. Both are multiplied by the drive, which no noise is in:
+ * torque that nobody knows moves lever and force differently. */
+static void compare(grip_force_t *grip, const lever_settings_t *s, const hands_t *hands, float period)
+{
+    grip->compared += (grip->compared < MEMORY) ? period : 0.0f;
+    const float share = period / grip->compared; /* a mean first, and then one with exponential forgetting */
+    const float difference = grip->impulse - hands->of_hand;
+    grip->measured += share * ((grip->impulse * hands->driven) - grip->measured);
+    grip->expected += share * ((hands->of_hand * hands->driven) - grip->expected);
+    grip->drive_square += share * ((hands->driven * hands->driven) - grip->drive_square);
+    grip->difference_square += share * ((difference * difference) - grip->difference_square);
+    const float limit = ((2.0f * s->grip_force_gain_sigma) + TOLERATED) * fabsf(grip->expected);
+    const float off = fabsf(grip->measured - grip->expected);
+    const float sure = SURE * sqrtf(grip->drive_square * (grip->difference_square * share));
+    grip->right = ((off + sure) < limit);
+    grip->wrong = grip->wrong || ((off > (limit + sure)) && (grip->compared > LEAST));
+}
+
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands, float period, bool counts)
+{
+    const bool used = grip->right && !grip->wrong;
+    if (counts && grip->seen && (grip->missing < TRIM_OUTAGE) && (grip->settling <= 0.0f)) {
+        compare(grip, setup->settings, hands, period);
+    }
+    grip->impulse = 0.0f;
+    return used && grip->wrong;
+}

@@ -1,0 +1,47 @@
+/* The optional sensor of the force between hand and lever. With base motion alone it tells what nothing else does: the
+ * common scale of mass, damping and stiffness.
+ *
+ * The force is used when it has agreed for a while with what the lever's own equation of motion says of the hand
+ * (app/hands.h). Its gain error, which is constant, is treated as white noise of the density at which a filter of
+ * parameters that walk by q becomes as certain as the gain is, sigma: density = sigma^4 / q^2. So the force never makes
+ * them more certain than its gain, and one whose gain is not known does nothing.
+ */
+#ifndef APP_GRIP_FORCE_H
+#define APP_GRIP_FORCE_H
+
+#include "app/hands.h"
+#include "app/setup.h"
+#include "filter/cdkf.h"
+#include "filter/trim.h"
+
+#include <stdbool.h>
+
+typedef struct grip_force {
+    float raw;      /* the last valid one, compensated for gain and bias [N] */
+    float missing;  /* time since then [s] */
+    float settling; /* time until its slow part is known [s] */
+    float square;   /* mean square of the same without its slow part [N^2] */
+    float impulse;  /* of the force since the beginning of the block [N m s] */
+    float measured; /* mean product of that and the block's drive (hands.h), */
+    float expected; /* and of what the lever's motion says of the hand: the ratio is the sensor's gain error */
+    float drive_square;
+    float difference_square; /* of the latter two, and of the drive: how certain that is */
+    float compared;          /* time for which both have been compared, up to the memory of the means [s] */
+    bool seen;               /* a force has come */
+    bool right;              /* its gain is certain to be what the settings say, about */
+    bool wrong;              /* its gain is not what the settings say; until a reset */
+} grip_force_t;
+
+void grip_force_start(grip_force_t *grip);
+
+/* The force of a sample, `period` seconds after the last one; NULL: missing. Returns true when the force over the step
+ * is known, and then fills in what the filter takes, but for `learn`. `alone`: the change of theta_dot without hands
+ * (hands_predict); `error` as for cdkf_time_update(). */
+bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
+    const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen);
+
+/* The end of a block of `period` seconds; `counts`: the lever moved, and all else was measured. Returns true when the
+ * force has just been found wrong. */
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands, float period, bool counts);
+
+#endif
