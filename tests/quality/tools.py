@@ -26,7 +26,7 @@ def core_flags(build_dir: Path) -> list[str]:
     """What the build compiles the core with, but for optimisation; firmware/ is where it looks for headers."""
     entries = json.loads((build_dir / "compile_commands.json").read_text(encoding="utf-8"))
     commands = [shlex.split(entry["command"]) for entry in entries if entry["file"] == str(FIRMWARE / "filter/cdkf.c")]
-    command = next(words for words in commands if "firmware/CMakeFiles/lever_cdkf.dir" in words[words.index("-o") + 1])
+    command = next(words for words in commands if "CMakeFiles/lever_cdkf.dir/" in words[words.index("-o") + 1])
     return [word for word in command[1 : command.index("-o")] if not word.startswith(("-O", "-g"))]
 
 
