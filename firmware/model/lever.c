@@ -7,7 +7,7 @@
  *
  * Lagrangian with the arm as mass, damper and spring acting vertically at the grip. The equation as
  * published prints m_l + m_p in the gravity and forcing terms and loses sin theta_a and theta_l; this is the form that
- * follows from the energies (tests/python/sil derives it again).
+ * follows from the energies (tests/python/plants derives it again).
  *
  * Preload fixed: theta_a and theta_l are given. Preload trim: theta_l = theta_0 and sin theta_a = sin theta_0 +
  * g mu / (k_p l), so that gravity cancels and the arm's spring rests at the trim angle theta_0.

@@ -52,13 +52,13 @@ def run(args: argparse.Namespace) -> int:
         print(native_file("lever.dbc"))
         return 0
     if args.wireshark is not None:
-        from ..wireshark import write_profile
+        from ..can.wireshark import write_profile
 
         write_profile(args.wireshark)
         print(f"Written to {args.wireshark}: for wireshark -C {args.wireshark.name} if that is where its profiles are")
         return 0
 
-    from ..codec import database
+    from ..can.codec import database
 
     messages = database().messages
     signals = [_signal_row(message, signal) for message in messages for signal in message.signals]
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _message_row(message: Message) -> Row:
-    from ..codec import data_ids
+    from ..can.codec import data_ids
 
     return {
         "message": message.name,

@@ -100,7 +100,7 @@ TOOLS = {"openocd": openocd, "pyocd": pyocd}
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..firmware_image import flash_contents
+    from ..board.firmware_image import flash_contents
 
     image = args.image or _default_image()
     size = len(flash_contents(image))

@@ -55,7 +55,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..qemu import one_processor, running
+    from ..board.qemu import one_processor, running
 
     command = args.command[1:] if args.command[:1] == ["--"] else args.command
     if command and not any(_CHANNEL in word for word in command):

@@ -11,12 +11,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..buses import add_bus_options, chosen_options, open_bus
+from ..can.buses import add_bus_options, chosen_options, open_bus
 from ..errors import LeverError
 from ..tables import Row, add_json_option
 
 if TYPE_CHECKING:
-    from ..recorder import Recorder
+    from ..can.recorder import Recorder
 
 _DESCRIPTION = """\
 Records everything on a CAN bus, through any interface of python-can, into a log in the format of candump -L, for
@@ -46,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..recorder import Recorder
+    from ..can.recorder import Recorder
     from ..tables import print_tables
 
     out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))

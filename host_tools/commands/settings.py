@@ -42,7 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..settings_file import format_config, make_config, parse_assignment, read_assignments
+    from ..firmware.settings_file import format_config, make_config, parse_assignment, read_assignments
     from ..tables import print_tables, write_json
 
     assignments = read_assignments(args.settings) if args.settings is not None else {}
@@ -59,8 +59,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _rows() -> list[Row]:
-    from ..config import Config, settings_table
-    from ..library import enum_names
+    from ..firmware.config import Config, settings_table
+    from ..firmware.library import enum_names
 
     choices: list[Row] = [
         {

@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import codec, fields
-from ..commander import ACCEPTED, refusal, result_of
-from ..config import model_parameters
-from ..estimator import FEEDTHROUGH_FREQUENCIES, fault_names
-from ..identity import Identity
-from ..library import enum_names
+from ..can import codec, fields
+from ..can.commander import ACCEPTED, refusal, result_of
+from ..can.identity import Identity
+from ..can.message_counts import Traffic
+from ..firmware.config import model_parameters
+from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES, fault_names
+from ..firmware.library import enum_names
 from .paired import Measured, Paired
-from .traffic import Traffic
 
 Frame = tuple[int, bytes | bytearray]
 """Identifier and data. Not the identifier of a classic data frame: FOREIGN and ERROR."""

@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import codec, fields
-from ..coherence import Coherence
-
-FloatArray = NDArray[np.float64]
+from ..arrays import FloatArray
+from ..can import codec, fields
+from ..results.coherence import Coherence
 
 SPAN = 20.0
 """[s] that the coherence is measured over."""

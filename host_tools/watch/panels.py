@@ -11,7 +11,7 @@ from rich.console import JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
-from . import words
+from . import status
 from .model import STEP, Estimated, Picture
 from .paired import Measured
 from .sources import Source
@@ -47,7 +47,7 @@ def condition(picture: Picture, source: Source) -> Text:
         return Text(f"● {source.error}", style=_COLOURS["bad"], no_wrap=True, overflow="ellipsis")
     if source.ended:
         return Text("● the end: nothing more will come", style=_COLOURS["watch"], no_wrap=True)
-    level, text = words.condition(picture)
+    level, text = status.condition(picture)
     return Text(f"● {text}", style=_COLOURS[level], no_wrap=True, overflow="ellipsis")
 
 
@@ -127,7 +127,7 @@ def health(picture: Picture, source: Source) -> Table:
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
-    told = words.faults(picture)
+    told = status.faults(picture)
     style = "yellow" if told else "green"
     counts = picture.counts
     table.add_row("mode", Text(picture.mode or NOTHING, style="bold"))

@@ -6,24 +6,28 @@ the view takes them at its own rate. The view may therefore be as slow as it lik
 
 from __future__ import annotations
 
+import importlib.metadata
 import socket
 import sys
 import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from .. import codec
-from ..buses import open_bus
-from ..commander import KEEP_ALIVE, Commander
+from ..can import codec
+from ..can.buses import open_bus
+from ..can.commander import KEEP_ALIVE, Commander
 from ..errors import LeverError
 from .model import ERROR, FOREIGN, STEP, Frame, Picture
 
 if TYPE_CHECKING:
     import can
+
+    from ..arrays import ComplexArray, FloatArray
+    from ..firmware.config import Config
 
 MOST_WAITING = 65536
 """Frames: eight seconds of a full bus of 1 Mbit/s."""
@@ -34,12 +38,18 @@ _SWITCH_INTERVAL = 5e-4  # [s] after which drawing gives way to receiving; Pytho
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
 
 
+SIMULATIONS = "lever_cdkf.simulations"
+"""Entry point group with one function, which makes a source and its estimator's configuration of a scenario."""
+
+
 class Source(ABC):
     """Frames from a thread that run() is, between start() and stop()."""
 
     title = ""
     """What is watched, for people."""
     takes_commands = False
+    simulated = False
+    """Whether truth() knows what the estimator is to find."""
 
     def __init__(self) -> None:
         self.dropped = 0
@@ -102,6 +112,11 @@ class Source(ABC):
         if self._dithers:
             self.command({"dither_rms": 0.0})
 
+    def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
+        """What is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at
+        the frequencies [Hz]. None where that is not known."""
+        return None
+
     def _transmit(self, identifier: int, data: bytes) -> None:
         """Sends a frame, where commands are taken. Raises LeverError."""
         raise NotImplementedError
@@ -143,6 +158,11 @@ class BusSource(Source):
         super().stop()
         self._bus.shutdown()
 
+    def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
+        """What is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at
+        the frequencies [Hz]. None where that is not known."""
+        return None
+
     def _transmit(self, identifier: int, data: bytes) -> None:
         import can
 
@@ -158,7 +178,7 @@ class LogSource(Source):
 
     def __init__(self, path: str, channel: str | None = None) -> None:
         """Opens the log. Raises LeverError."""
-        from ..logs import Recording
+        from ..can.logs import Recording
 
         super().__init__()
         self.title = path
@@ -187,7 +207,7 @@ class LogSource(Source):
 
     def _frames(self) -> Iterator[tuple[float, Frame]]:
         """Each frame with the time after the one before it [s]; a clock that went back or jumped far counts as 0."""
-        from ..bulk import ERROR as ERROR_FRAME
+        from ..can.bulk import ERROR as ERROR_FRAME
 
         last: int | None = None
         for chunk in self._log.chunks():
@@ -227,3 +247,11 @@ def as_frame(message: can.Message) -> Frame:
     if message.is_extended_id or message.is_remote_frame or message.is_fd:
         return FOREIGN, b""
     return message.arbitration_id, message.data
+
+
+def simulated(scenario: str) -> tuple[Source, Config]:
+    """The pilot of a scenario in real time, by the name or the path of the scenario. Raises LeverError."""
+    for entry in importlib.metadata.entry_points(group=SIMULATIONS):
+        open_source: Callable[[str], tuple[Source, Config]] = entry.load()
+        return open_source(scenario)
+    raise LeverError("no simulation is installed here: give a bus or a log")

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from lever_cdkf.host_tools.config import Config
 from lever_cdkf.host_tools.errors import SettingsError
+from lever_cdkf.host_tools.firmware.config import Config
 
 from . import firmware, pilots, plant
 from .condition import ClosedLoop, Condition, Limit

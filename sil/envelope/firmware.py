@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.config import Config
-from lever_cdkf.host_tools.estimator import Estimator
-from lever_cdkf.host_tools.library import ffi, lib, struct_dtype
+from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.estimator import Estimator
+from lever_cdkf.host_tools.firmware.library import ffi, lib, struct_dtype
 from numpy.typing import NDArray
 
 from .condition import ClosedLoop
 from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, stream, truth
-from .plant import FloatArray, Plant
+from .plant import Plant
 from .sensors import NOISE
 
 PARAMETERS = ("m_p", "c_p", "k_p")

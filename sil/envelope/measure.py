@@ -9,14 +9,12 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.library import lib
+from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
+from lever_cdkf.host_tools.firmware.library import lib
 from numpy.typing import NDArray
 
 from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from .motions import Recording
-from .plant import FloatArray
-
-BoolArray = NDArray[np.bool_]
 
 FLAGS = ("THETA", "THETA_DOT", "BASE", "INNOVATION", "BOUND", "MISMATCH", "CALIBRATION", "HANDS_OFF")
 """Faults that say "do not trust this". CHANGE alone does not."""

@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.models.transfer import BAND as BOUNCE_BAND
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ..transfer import BAND as BOUNCE_BAND
-from .plant import FloatArray, Hardware, Lanes, natural_frequency_and_damping
+from .plant import Hardware, Lanes, natural_frequency_and_damping
 
 PERIOD = 1e-3
 """Between two samples [s]."""

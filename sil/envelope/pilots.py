@@ -14,13 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from lever_cdkf.host_tools.config import settings_table
+from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
+from lever_cdkf.host_tools.firmware.config import settings_table
 
-from .. import mayo_plant, plant, two_dof_plant
-from ..transfer import ComplexArray
-from ..truth import Conditions, Truth
+from ..plants import lever_plant, mayo_plant, two_dof_plant
+from ..plants.truth import Conditions, Truth
 from .motions import FREQUENCIES, PERIOD, Motion, Recording, arms, excitation, stream
-from .plant import FloatArray, Hardware
+from .plant import Hardware
 
 LOSS = 0.6
 REFLEX_GAIN, REFLEX_DELAY = 0.25, 35e-3
@@ -97,7 +97,7 @@ def _of_sil(motion: Motion, seeds: Sequence[int], tick: Callable[[], None]) -> R
 def _pilot_of_sil(name: str, trim: FloatArray, rng: np.random.Generator) -> Truth:
     """mayo_* as measured, mayo_random about both; two_dof with an arm that differs from that of its scenario by 10 %
     (standard deviation)."""
-    lever = plant.Lever.from_settings({row.name: row.default for row in settings_table()})
+    lever = lever_plant.Lever.from_settings({row.name: row.default for row in settings_table()})
     if name == "mayo_random":
         normal = np.clip(rng.standard_normal(3), -1.8, 1.8)
         w, a, outside = np.array((500.0, 13.5, 9.0)) * np.exp(np.array((0.3, 0.35, 0.45)) * normal)

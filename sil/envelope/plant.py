@@ -16,9 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 STOP_RATE = 2e-3
 """v_f: theta_dot at which friction reaches 71 % of its limit [rad/s]."""

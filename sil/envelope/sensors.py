@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 
 from .motions import PERIOD, Recording, columns, stream
-from .plant import FloatArray
 
 NOISE: Mapping[str, float] = {"theta": 1e-3, "theta_dot": 1e-2, "tau_m": 2e-3, "z_ddot": 0.01}
-"""Standard deviation of a sample [rad, rad/s, N m, m/s^2], as in sil/sensors.py."""
+"""Standard deviation of a sample [rad, rad/s, N m, m/s^2], as in sil/plants/sensors.py."""
 SPIKE = 0.3
 """[rad]"""
 

@@ -15,7 +15,8 @@ probably right. It is also the readable version of the estimator:
 - `estimator`        the whole estimator: inputs, trim, gaps, alignment.
 """
 
+from lever_cdkf.host_tools.models.lever import Lever
+
 from .estimator import Estimator, Start, align, run
-from .lever import Lever
 
 __all__ = ["Estimator", "Lever", "Start", "align", "run"]

@@ -36,10 +36,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
 from . import cdkf
-from .cdkf import Array
 
 Flags = NDArray[np.bool_]
 Motion = Callable[[Array, Array], Array]

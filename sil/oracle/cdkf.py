@@ -11,12 +11,10 @@ covariance = factor factorᵀ. Sigma points are the 2n + 1 columns of an array: 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from lever_cdkf.host_tools.arrays import Array
 
-Array = NDArray[Any]  # of floats
 Function = Callable[[Array], Array]
 
 H_SQUARED = 3.0  # the kurtosis of a Gaussian: the best central-difference step (Nørgaard et al. 2000)

@@ -1,8 +1,7 @@
 """Detection of a sudden change of the pilot: the corrections of w, white as long as all is right, point one way."""
 
 import numpy as np
-
-from .cdkf import Array
+from lever_cdkf.host_tools.arrays import Array
 
 LONG = 100.0  # memory of the average of the statistic, in memories of the sum
 

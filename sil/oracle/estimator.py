@@ -9,16 +9,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.models.detrend import Detrend
+from lever_cdkf.host_tools.models.lever import Lever
+from lever_cdkf.host_tools.models.linear import Hand, LinearBlackBox, LinearPhysical
 from numpy.typing import NDArray
 
 from . import cdkf
 from .belief import Augmented, Belief, Force, TwoStage
-from .cdkf import Array
-from .detrend import Detrend
 from .grip import Grip
 from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
-from .lever import Lever
-from .linear import Hand, LinearBlackBox, LinearPhysical
 from .scale import Scale
 
 ESTIMATORS = ("dual", "joint", "augmented")

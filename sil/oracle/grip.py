@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.models.detrend import Detrend
+from lever_cdkf.host_tools.models.lever import GRAVITY, Lever
 
-from .cdkf import Array
-from .detrend import Detrend
 from .learning import seconds
-from .lever import GRAVITY, Lever
 
 MEMORY = 10.0  # [s] of comparison and mean square
 LEAST = 2.0  # [s] of comparison before the force is wrong

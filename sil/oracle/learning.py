@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
 from .belief import Belief, Innovation
-from .cdkf import Array
 from .change import ChangeDetection
 from .noise import NoiseEstimation
 from .scale import Scale

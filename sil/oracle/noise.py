@@ -9,10 +9,10 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
 from .belief import Innovation
-from .cdkf import Array
 
 SAMPLES_LEAST = 20  # of an output
 NEAR = (0.67, 1.5)  # of a factor within, SHARE is done; of one outside, all of it,

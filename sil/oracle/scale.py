@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-
-from .cdkf import Array
+from lever_cdkf.host_tools.arrays import Array
 
 PARAMETERS = {
     "lever": ("m_p", "c_p", "k_p"),

@@ -24,9 +24,9 @@ is at rest first, and runs that leave the model's bounds are drawn again (matche
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ..oracle.cdkf import Array
 from .data import PARAMETERS, Batch
 from .transitions import (
     SIZE,

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
-
-from ..oracle.cdkf import Array
 
 STATES, PARAMETERS, OUTPUTS = 2, 3, 2
 

@@ -10,9 +10,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.models.detrend import DAMPING
 
-from ..oracle.cdkf import Array
-from ..oracle.detrend import DAMPING
 from .data import OUTPUTS, Batch
 
 

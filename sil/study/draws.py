@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 
-from ..excitation import Noise
-from ..oracle.cdkf import Array
+from ..plants.excitation import Noise
 
 STREAMS = ("base", "dither", "pilot", "process", "output")
 """What random numbers are drawn for, each from a stream of its own in each run; a new purpose goes to the end."""

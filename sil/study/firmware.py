@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from lever_cdkf.host_tools.native import Config, run_samples
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.native import Config, run_samples
 from numpy.typing import NDArray
 
-from ..oracle.cdkf import Array
 from .data import PARAMETERS, Batch, Estimates
 
 _PAIRS = ((0, 1), (0, 2), (1, 2))  # of parameter_correlation

@@ -19,9 +19,9 @@ from __future__ import annotations
 from itertools import chain
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ..oracle.cdkf import Array
 from .data import PARAMETERS, Batch
 from .transitions import (
     dynamics_gradient,

@@ -18,11 +18,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from lever_cdkf.host_tools.config import setting, settings_table
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.config import setting, settings_table
+from lever_cdkf.host_tools.models.lever import Lever
+from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
 
-from ..oracle.cdkf import Array
-from ..oracle.lever import Lever
-from ..oracle.linear import LinearBlackBox, LinearPhysical
 from ..units import GRAVITY
 from .data import OUTPUTS, STATES, Batch, Knowledge, Model, Truth, rest_angle
 from .draws import excitation, streams

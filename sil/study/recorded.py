@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.firmware import quantities
+from lever_cdkf.host_tools.results.trace import Trace
 
-from .. import loop, quantities, trace
-from ..oracle.cdkf import Array
-from ..reading import ScenarioError
-from ..scenario import Scenario, load
-from ..trace import Trace
+from ..run import loop
+from ..run.columns import columns_of
+from ..scenarios.scenario import Scenario, load
+from ..toml_tables import ScenarioError
 from .data import Batch, Truth
 from .detrended import detrended
 from .matched import KINDS, knowledge
@@ -56,7 +58,7 @@ def recorded(name: str, runs: int, seed: int, duration: float | None = None) -> 
 def _run(scenario: Scenario) -> Trace:
     with LeverBus(f"study {scenario.name}", config=scenario.config) as bus:
         recording = loop.run(scenario, bus)
-    return trace.build(recording, recording.frames())
+    return columns_of(recording, recording.frames())
 
 
 def _columns(traces: list[Trace], names: Sequence[str]) -> Array:

@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from scipy.stats import bootstrap, chi2
 
-from ..oracle.cdkf import Array
 from .data import Batch, Estimates
 
 # --- errors ----------------------------------------------------------------------------------------------------------

@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.host_tools.config import settings_table
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.config import settings_table
+from lever_cdkf.host_tools.models.lever import Lever
 
-from ..oracle.cdkf import Array
-from ..oracle.lever import Lever
 from ..units import GRAVITY
 from .data import OUTPUTS, PARAMETERS, Batch, Truth
 from .detrended import detrended

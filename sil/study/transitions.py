@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ..oracle.cdkf import Array
 from .data import PARAMETERS, STATES, Batch
 
 SIZE = PARAMETERS + STATES

@@ -15,7 +15,7 @@ from accuracy.tables import Place  # noqa: E402
 from lever_cdkf.host_tools.errors import LeverError  # noqa: E402
 from lever_cdkf.host_tools.files import write_text  # noqa: E402
 from lever_cdkf.host_tools.progress import Progress  # noqa: E402
-from lever_cdkf.sil import seeds  # noqa: E402
+from lever_cdkf.sil.run import seeds  # noqa: E402
 
 _DESCRIPTION = f"""\
 Runs each scenario of the tables of accuracy in README.md and sil/README.md with seeds 1 to {tables.SEEDS}, and compares

@@ -11,10 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.sil import seeds
-from lever_cdkf.sil.quantities import DYNAMICS
-from lever_cdkf.sil.seeds import FloatArray, Summary
+from lever_cdkf.host_tools.firmware.quantities import DYNAMICS
+from lever_cdkf.host_tools.results.summary import SimulationSummary
+from lever_cdkf.sil.run import seeds
 
 SEEDS = 20
 """Runs of each scenario: seeds 1 to 20."""
@@ -44,10 +45,10 @@ class Table:
     place: Place
     scenarios: tuple[str, ...]
     columns: tuple[str, ...]
-    cells: Callable[[Sequence[Summary]], tuple[str, ...]]
+    cells: Callable[[Sequence[SimulationSummary]], tuple[str, ...]]
     """Those of a row, but for the scenario's name."""
 
-    def text(self, summaries: Mapping[str, Sequence[Summary]]) -> str:
+    def text(self, summaries: Mapping[str, Sequence[SimulationSummary]]) -> str:
         """As Markdown; `summaries` by the name of the scenario."""
         count = len(summaries[self.scenarios[0]])
         rows = [(f"`{name}`", *self.cells(summaries[name])) for name in self.scenarios]
@@ -59,8 +60,8 @@ def markdown(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     return "".join(f"| {' | '.join(row)} |\n" for row in (header, ("---",) * len(header), *rows))
 
 
-def _all_quantities(summaries: Sequence[Summary]) -> tuple[str, ...]:
-    keys = list(summaries[0]["parameters"])
+def _all_quantities(summaries: Sequence[SimulationSummary]) -> tuple[str, ...]:
+    keys = list(summaries[0].parameters)
     parameters = [_percent(seeds.rms(summaries, key)) for key in keys if key not in (_FREQUENCY, _DAMPING)]
     frequency = seeds.rms(summaries, _FREQUENCY)
     return (
@@ -69,17 +70,17 @@ def _all_quantities(summaries: Sequence[Summary]) -> tuple[str, ...]:
         _covered(summaries, min(keys, key=lambda key: np.mean(seeds.coverage(summaries, key)))),
         _seconds(seeds.times_to_5_percent(summaries, _FREQUENCY)),
         _percent(seeds.flagged(summaries), digits=0),
-        str(summaries[int(np.argmax(frequency))]["scenario"]["seed"]),
+        str(summaries[int(np.argmax(frequency))].scenario.seed),
     )
 
 
-def _dynamics(summaries: Sequence[Summary]) -> tuple[str, ...]:
+def _dynamics(summaries: Sequence[SimulationSummary]) -> tuple[str, ...]:
     cells = []
     for key in (_FREQUENCY, _DAMPING):
-        bias = float(np.median([summary["parameters"][key]["bias_percent"] for summary in summaries]))
+        bias = float(np.median([summary.parameters[key].bias_percent or 0.0 for summary in summaries]))
         cells += [f"{bias:+.1f} %", _percent(seeds.rms(summaries, key)), _covered(summaries, key)]
-    ratios = np.array([summary["nis"]["mean"] / summary["nis"]["expected"] for summary in summaries])
-    correlations = np.array([abs(summary["whiteness"]["largest"]) for summary in summaries])
+    ratios = np.array([(each.nis.mean or 0.0) / (each.nis.expected or 1.0) for each in summaries])
+    correlations = np.array([abs(each.whiteness.largest) for each in summaries if each.whiteness])
     worst = ratios[np.argmax(np.abs(ratios - 1.0))]
     return (
         *cells,
@@ -116,7 +117,7 @@ def _percent(values: FloatArray, digits: int = 1) -> str:
     return f"{_number(float(np.median(values)), digits)} / {_number(float(np.max(values)), digits)} %"
 
 
-def _covered(summaries: Sequence[Summary], key: str) -> str:
+def _covered(summaries: Sequence[SimulationSummary], key: str) -> str:
     """All runs / worst run."""
     covered = seeds.coverage(summaries, key)
     return f"{np.mean(covered):.0f} / {np.min(covered):.0f} %"

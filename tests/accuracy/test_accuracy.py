@@ -12,7 +12,7 @@ import pytest
 from accuracy import tables, tuning
 from accuracy.tables import TABLES, Place, Table
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.sil import seeds
+from lever_cdkf.sil.run import seeds
 
 
 def written(root: Path, place: Place) -> list[list[str]]:
@@ -44,11 +44,11 @@ def test_the_worst_run_is_as_bad_as_the_table_says(name: str, root: Path) -> Non
     header, _, *rows = written(root, TABLES[0].place)
     row = dict(zip(header, next(row for row in rows if row[0] == f"`{name}`"), strict=True))
     (summary,) = seeds.run([seeds.Task(name, int(row["worst seed"]))], jobs=1)
-    errors = {key: entry["rms_percent"] for key, entry in summary["parameters"].items()}
+    errors = {key: entry.rms_percent or 0.0 for key, entry in summary.parameters.items()}
     assert errors["natural_frequency"] == pytest.approx(pair(row["f_n"])[1], abs=0.1 if "." in row["f_n"] else 1.0)
     for key in ("m_p", "c_p", "k_p"):
         assert key not in errors or errors[key] <= pair(row[key])[1] + 0.1
-    covered = [entry["coverage_2sigma"] for entry in summary["parameters"].values()]
+    covered = [entry.coverage_2sigma or 0.0 for entry in summary.parameters.values()]
     assert 100.0 * max(covered) >= pair(row["±2σ covers"])[1] - 1.0
 
 

@@ -9,16 +9,17 @@ from pathlib import Path
 
 import numpy as np
 from accuracy.tables import Place, markdown
-from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.host_tools.config import Config
-from lever_cdkf.host_tools.estimator import Estimator
-from lever_cdkf.host_tools.innovations import SAMPLE
-from lever_cdkf.sil import buslog, runner, scenario
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.estimator import Estimator
+from lever_cdkf.host_tools.firmware.innovations import SAMPLE
+from lever_cdkf.host_tools.tune import recording
+from lever_cdkf.host_tools.tune.calibration import Calibrated, calibrate
+from lever_cdkf.host_tools.tune.likelihood import Likelihood
+from lever_cdkf.host_tools.tune.search import Found, Search, groups
 from lever_cdkf.sil.envelope import motions, plant, sensors
-from lever_cdkf.sil.tune import recording
-from lever_cdkf.sil.tune.calibration import Calibrated, calibrate
-from lever_cdkf.sil.tune.likelihood import Likelihood
-from lever_cdkf.sil.tune.search import Found, Search, groups
+from lever_cdkf.sil.run import buslog, runner
+from lever_cdkf.sil.scenarios import scenario
 
 PLACE = Place("sil/README.md", "tuning")
 COLUMNS = ("truth", "found", "95 % interval holds the truth")

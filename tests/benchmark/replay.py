@@ -23,12 +23,12 @@ from pathlib import Path
 
 import can
 import numpy as np
-from lever_cdkf.host_tools import bulk, codec
-from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.host_tools.logs import Recording
+from lever_cdkf.host_tools.can import bulk, codec
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.can.logs import Recording
 from lever_cdkf.host_tools.tables import Row, print_tables
-from lever_cdkf.sil import scenario
-from lever_cdkf.sil.runner import simulate
+from lever_cdkf.sil.run.runner import simulate
+from lever_cdkf.sil.scenarios import scenario
 
 START_US = 1_700_000_000_000_000
 MINUTE_US = 60_000_000

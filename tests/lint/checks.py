@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
-PYTHON_FOLDERS = ("firmware", "host_tools", "sil", "tests")
+PYTHON_FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
 
 MISRA = (FIRMWARE / "MISRA.md").read_text(encoding="utf-8")
 NOT_APPLIED = {f"misra-c2012-{rule}" for rule in re.findall(r"^\| (\d+\.\d+) \|", MISRA, re.MULTILINE)}
@@ -80,9 +80,10 @@ def types(build_dir: str | Path) -> str:
         return "the numpy for Python 3.10 declares other types\n" if os.environ.get("LEVER_REQUIRE_ALL") == "1" else ""
     package = Path(build_dir) / "package_tree/lever_cdkf"
     package.mkdir(parents=True, exist_ok=True)
-    for folder in ("host_tools", "sil"):
-        (package / folder).unlink(missing_ok=True)
-        (package / folder).symlink_to(ROOT / folder)
+    for part in ("host_tools", "sil", "api/lever_cdkf/__init__.py"):
+        link = package / Path(part).name
+        link.unlink(missing_ok=True)
+        link.symlink_to(ROOT / part)
     options = (f"--config-file={ROOT}/pyproject.toml", f"--cache-dir={build_dir}/mypy", "--explicit-package-bases")
     environment = {"MYPYPATH": f"{package.parent}:{ROOT / 'tests'}"}
     return _said(*_run("mypy", *options, package.parent, "firmware", "tests", environment=environment))

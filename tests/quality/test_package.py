@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.native import run_samples
+from lever_cdkf.host_tools.firmware.native import run_samples
 from quality import tools
 
 PROJECT = Path(__file__).with_name("package")

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import pytest
 import readmes
-from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.sil import scenario
-from lever_cdkf.sil.runner import simulate
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.sil.run.runner import simulate
+from lever_cdkf.sil.scenarios import scenario
 from quality import tools
 
-FOLDERS = ("firmware", "host_tools", "sil", "tests")
+FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
 READMES = [tools.ROOT / "README.md", *(file for folder in FOLDERS for file in (tools.ROOT / folder).rglob("README.md"))]
 TIME_LIMIT = "1800"
 """For what hangs [s]; nothing is expected to be fast."""

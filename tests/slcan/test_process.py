@@ -18,7 +18,7 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools.protocol_ahead import read_ahead
+from lever_cdkf.host_tools.can.protocol_ahead import read_ahead
 from vcan import rig
 
 SAMPLES = 250

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import can
-from lever_cdkf.host_tools import codec
-from lever_cdkf.host_tools.bus import LeverBus
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.bus import LeverBus
 
 PATIENCE_S = 120.0
 """How long to wait for what must happen; a loaded machine is slow."""

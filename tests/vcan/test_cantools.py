@@ -13,7 +13,7 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.files import native_file
 from vcan import rig
 

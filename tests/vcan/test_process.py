@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.can import codec
 from vcan import rig
 
 SAMPLES = 250

@@ -2,7 +2,7 @@
  *
  * Names are those of lever_settings.def, in its units, and the four choices model, preload, estimator and adaptation;
  * the last of two equal names counts. The grammar of a settings file, for all who read one (lever_can,
- * host_tools/settings_file.py, firmware/settings.cmake), in bytes:
+ * host_tools/firmware/settings_file.py, firmware/settings.cmake), in bytes:
  *
  *     file       = [ EF BB BF ] line { LF line }
  *     line       = blank [ assignment blank ] [ "#" comment ] [ CR ]

@@ -20,9 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import C1, C2, H_SQUARED, Array, H
+from ...oracle.cdkf import C1, C2, H_SQUARED, H
 from ..data import PARAMETERS, STATES, Batch, Estimates
 from .recursion import (
     apply,

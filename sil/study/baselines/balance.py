@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.models.lever import Lever
+from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
 
-from ...oracle.cdkf import Array
-from ...oracle.lever import Lever
-from ...oracle.linear import LinearBlackBox, LinearPhysical
 from ..data import Batch
 
 MODELS = (Lever, LinearPhysical, LinearBlackBox)

@@ -17,9 +17,9 @@ makes a likelihood of the source's prediction-error cost; x stays where it is wh
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import PARAMETERS, STATES, Batch, Estimates
 from .recursion import (
     Slopes,

@@ -11,9 +11,9 @@ exact to rounding; process and measurement noise as known; covariance P - K S Ká
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import OUTPUTS, PARAMETERS, STATES, Batch, Estimates
 from .recursion import (
     Slopes,

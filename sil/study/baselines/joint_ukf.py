@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import PARAMETERS, STATES, Batch, Estimates
 from .joint_ekf import Joint
 from .recursion import factor, follow, transposed

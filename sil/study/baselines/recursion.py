@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import OUTPUTS, PARAMETERS, STATES, Batch, Estimates
 
 DIFFERENCE = 1e-5

@@ -16,9 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import Batch, Estimates, Knowledge
 from .balance import Coefficients, balance
 

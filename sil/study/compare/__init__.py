@@ -3,7 +3,7 @@
 cases.py      what is run: matched walks, steps, wrong noise, recorded scenarios, in one registry
 entrants.py   who runs: the firmware in several configurations, and the baselines
 campaign.py   runs them, in processes, and brings back errors
-judgement.py  makes one row of figures of each;  comparison.py: who has smaller errors than whom
-words.py      says who wins where, and whether what was promised is kept
-table.py      rows as tables and as CSV;  page.py, charts.py: as a page for a browser
+evaluation.py makes one row of figures of each;  comparison.py: who has smaller errors than whom
+verdicts.py   says who wins where, and whether what was promised is kept
+table.py      rows as tables and as CSV;  compare_page.py, charts.py: as a page for a browser
 """

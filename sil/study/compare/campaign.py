@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import PARAMETERS, Batch, Estimates
 from ..scores import errors, normalised_squares
 from ..transitions import dynamics_gradient, with_dynamics

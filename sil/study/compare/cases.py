@@ -8,19 +8,17 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import numpy as np
-from lever_cdkf.host_tools.config import settings_table
+from lever_cdkf.host_tools.arrays import Array, BoolArray
+from lever_cdkf.host_tools.firmware.config import settings_table
 from numpy.typing import NDArray
 
-from ... import scenario as scenarios
-from ...oracle.cdkf import Array
+from ...scenarios import scenario as scenarios
 from .. import bound, linearised
 from ..data import Batch
 from ..detrended import detrended
 from ..matched import Condition, matched
 from ..recorded import recorded, usable
 from ..steps import Step, stepped
-
-BoolArray = NDArray[np.bool_]
 
 PRIOR: Mapping[str, Mapping[str, float]] = {
     "lever": {"m_p_sigma": 0.25, "c_p_sigma": 0.3, "k_p_sigma": 0.3},

@@ -8,14 +8,14 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.report.figure import Figure, Spec, axis, band, dots, line
 
-from ...oracle.cdkf import Array
-from ...report.figure import Figure, Spec, axis, band, dots, line
 from ..scores import settling_times
 from .campaign import Results
 from .cases import cases
 from .entrants import entrants
-from .judgement import FREQUENCY, Row, quantities
+from .evaluation import FREQUENCY, Row, quantities
 
 COLOURS = ("estimate", "base", "torque", "good", "quiet", "text")
 _LANE = 22  # [pixels] of one estimator in a figure, for one series; further ones take a third of it

@@ -21,9 +21,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from scipy import stats
-
-from ...oracle.cdkf import Array
 
 LEAST_RUNS = 8
 """Fewer say nothing of chance."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from lever_cdkf.host_tools.config import settings_table
+from lever_cdkf.host_tools.firmware.config import settings_table
 
 from ..baselines import BASELINES
 from ..data import Estimator

@@ -14,8 +14,8 @@ from lever_cdkf.host_tools.tables import Row as TableRow
 
 from .cases import cases
 from .entrants import entrants
-from .judgement import Row, quantities
-from .words import Claim
+from .evaluation import Row, quantities
+from .verdicts import Claim
 
 _QUANTITIES = ("parameter_1", "parameter_2", "parameter_3", "natural_frequency", "damping_ratio")
 

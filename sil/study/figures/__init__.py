@@ -1,9 +1,10 @@
 """The paper's figures for this system, from one command: `lever figures`.
 
 Each figure is computed from runs of the firmware and described once (`description`), its caption included; `png` and
-`page` draw what is described, for print and for a browser. `catalogue` lists the figures, `runs` is what they share.
+`figures_page` draw what is described, for print and for a browser. `catalogue` lists the figures, `runs` is what they
+share.
 
-    commands → {catalogue → one module for each group of figures → {runs, description}, png, page → description}
+    {catalogue → one module for each group of figures → {runs, description}, png, figures_page → description}
 
 A new figure: a function like those, and a line in `catalogue.FIGURES`.
 """

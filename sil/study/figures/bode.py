@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.models.lever import Lever
+from lever_cdkf.host_tools.report.bode import FREQUENCIES, transfer
 
-from ...oracle.cdkf import Array
-from ...oracle.lever import Lever
-from ...report.bode import FREQUENCIES, transfer
 from ..data import rest_angle
 from ..matched import Condition, matched
 from .description import Column, Figure, Surface, number, percent

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 
-from ...oracle.cdkf import Array
 from ..data import PARAMETERS
 from ..firmware import Firmware
 from ..matched import Condition, matched

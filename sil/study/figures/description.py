@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import numpy as np
-
-from ...oracle.cdkf import Array
+from lever_cdkf.host_tools.arrays import Array
 
 _MARGIN = 0.05  # of a y axis, above and below
 

@@ -6,11 +6,11 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.host_tools.config import setting
-from lever_cdkf.host_tools.native import Config, lib
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.config import setting
+from lever_cdkf.host_tools.firmware.native import Config, lib
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import Batch, rest_angle
 from ..matched import Condition, matched
 from ..scores import median_and_worst, settling_times

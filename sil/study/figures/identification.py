@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..linearised import covariances, variances
 from ..matched import Condition, matched
 from .description import Column, Curve, Figure, Row, Trace, interval, number, percent

@@ -9,10 +9,10 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from lever_cdkf.host_tools.config import setting
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.config import setting
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
 from ..data import Batch
 from ..matched import KINDS, Condition, matched
 from .description import Band, Column, Curve, Figure, Points, Row, Trace, interval, number, percent

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.host_tools.native import Config, run_samples
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.native import Config, run_samples
+from lever_cdkf.host_tools.report.series import spread_indices
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import Array
-from ...report.series import spread_indices
 from ..data import Batch
 from ..matched import Condition
 

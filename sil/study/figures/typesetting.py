@@ -36,7 +36,7 @@ def own_css() -> str:
 
 def css() -> str:
     """The whole style of the page."""
-    return (files("lever_cdkf.sil.report") / "page.css").read_text(encoding="utf-8") + own_css()
+    return (files("lever_cdkf.host_tools.report") / "page.css").read_text(encoding="utf-8") + own_css()
 
 
 @cache

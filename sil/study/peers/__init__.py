@@ -3,5 +3,5 @@
 logs.py      the conditions of sil/envelope as logs: what the sensors said, and what the firmware made of it
 filters.py   the peers on many logs at once, with and without a high-pass
 campaign.py  runs both, in processes, and brings back figures of each run
-words.py     tables and verdicts
+tables.py    tables and verdicts
 """

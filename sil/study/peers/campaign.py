@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.host_tools.arrays import Array
 
 from ...envelope import conditions
 from ...envelope.condition import Condition
 from ...envelope.firmware import Track
 from ...envelope.measure import FIGURES, Outcome
-from ...oracle.cdkf import Array
 from .filters import PEERS, tracks
 from .logs import Log, chunks, logs
 

@@ -12,15 +12,15 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from lever_cdkf.host_tools.config import settings_table
-from lever_cdkf.host_tools.library import lib
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.config import settings_table
+from lever_cdkf.host_tools.firmware.library import lib
+from lever_cdkf.host_tools.models.lever import Lever
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from ...envelope.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from ...envelope.motions import FREQUENCIES, PERIOD, STRIDE
 from ...envelope.sensors import NOISE
-from ...oracle.cdkf import Array
-from ...oracle.lever import Lever
 from ..baselines.joint_ekf import Joint, JointEkf
 from ..baselines.joint_ukf import JointUkf
 from ..baselines.recursion import follow

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.errors import SettingsError
+from lever_cdkf.host_tools.firmware.config import Config
 
 from ...envelope import firmware, pilots, plant
 from ...envelope.condition import ClosedLoop, Condition
 from ...envelope.motions import Motion, Recording, arms, lanes, stream, truth
 from ...envelope.sensors import Sensors, measured
-from ...oracle.cdkf import Array
 
 LANES = 64
 """Runs filtered at a time: more would save little time and cost memory."""

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.config import Config
-from lever_cdkf.sil.envelope import campaign, conditions, firmware, page, table
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware, table
 from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
 from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
@@ -95,7 +95,7 @@ def test_estimates_that_are_not_finite_keep_no_limit(monkeypatch: pytest.MonkeyP
     results = campaign.run([row], {}, 2, lambda *_: None)
     assert not results[0].ok
     assert table.rows(results)[0]["measured"] == {"f_n rms [%]": None, "f_n covered [%]": 0.0}
-    assert 'id="chart-steady"' in page.build(results, 2)
+    assert 'id="chart-steady"' in envelope_page.build(results, 2)
 
 
 @pytest.mark.usefixtures("short")

@@ -8,18 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.config import settings_table
-from lever_cdkf.sil import plant as sil_plant
+from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
+from lever_cdkf.host_tools.firmware.config import settings_table
 from lever_cdkf.sil.envelope import measure, motions, pilots, plant
 from lever_cdkf.sil.envelope.condition import Limit
 from lever_cdkf.sil.envelope.conditions import CONDITIONS
 from lever_cdkf.sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_cdkf.sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_cdkf.sil.envelope.motions import Motion, Recording
-from lever_cdkf.sil.envelope.plant import FloatArray
 from lever_cdkf.sil.envelope.sensors import NOISE, Fault, Sensors, measured
-from lever_cdkf.sil.transfer import ComplexArray
-from lever_cdkf.sil.truth import Conditions
+from lever_cdkf.sil.plants import lever_plant as sil_plant
+from lever_cdkf.sil.plants.truth import Conditions
 
 QUIET = Motion(duration=8.0, process_noise=0.0)
 SEEDS = range(3)

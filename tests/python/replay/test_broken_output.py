@@ -13,9 +13,8 @@ from pathlib import Path
 
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.replay.outputs import FILES
-
-from .conftest import Session
+from lever_cdkf.host_tools.replay.outputs import FILES
+from python.conftest import Session
 
 LEVER = str(Path(sys.executable).with_name("lever"))
 

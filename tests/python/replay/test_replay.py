@@ -6,6 +6,7 @@ import csv
 import hashlib
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,12 @@ import numpy as np
 import polars
 import pytest
 from asammdf import MDF
-from lever_cdkf.host_tools import cli, codec
-from lever_cdkf.sil.replay import reduction
-from lever_cdkf.sil.replay.outputs import FILES
-
-from ..report.reading import figures, read
-from .conftest import Session, simulated
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.replay import reduction
+from lever_cdkf.host_tools.replay.outputs import FILES
+from python.conftest import Session, simulated
+from python.report.reading import figures, read
 
 Summary = dict[str, Any]
 
@@ -271,9 +272,9 @@ def test_mf4_holds_the_signals_of_the_trace(session: Session, replay: tuple[Path
 
 def test_the_summary_says_what_the_simulations_does(session: Session, replay: tuple[Path, Summary]) -> None:
     told, simulation, trace = replay[1], session.result.summary, session.result.trace
-    assert told["samples"] == simulation["samples"]
-    assert told["modes_s"] == simulation["modes_s"]
-    assert told["estimator"] == simulation["estimator"]
+    assert told["samples"] == simulation.samples
+    assert told["modes_s"] == simulation.modes_s
+    assert told["estimator"] == asdict(simulation.estimator)
     for key, column in (("k_p", "k_p_estimate_N_m"), ("damping_ratio", "damping_ratio_estimate")):
         assert told["estimates"][key]["last"] == trace[column][-1]
         assert told["estimates"][key]["greatest"] == np.nanmax(trace[column])

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.sil import scenario
-from lever_cdkf.sil.report import write_report
-from lever_cdkf.sil.runner import Result, simulate
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.report import write_report
+from lever_cdkf.sil.run.runner import Result, simulate
+from lever_cdkf.sil.scenarios import scenario
 
 SCENARIO = """
 title = "Short & sudden"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.sil import pilots
-from lever_cdkf.sil.report import models, write_report
-from lever_cdkf.sil.runner import Result
+from lever_cdkf.host_tools.report import write_report
+from lever_cdkf.sil.plants import pilots
+from lever_cdkf.sil.run.runner import Result
 from scipy import signal
 
 from .conftest import run
@@ -85,7 +85,7 @@ def test_another_kind_of_truth_is_said_to_be_one_and_compared_where_it_can_be(mi
 
 
 def test_every_model_of_the_truth_has_words(tmp_path: Path) -> None:
-    assert models.ABOUT_TRUTH.keys() == pilots.MODELS.keys()
+    assert all(kind.about for kind in pilots.MODELS.values())
     page = page_of(run("mayo_ectomorphic", "duration=6 s", "converged_after=2 s", "limits={}"), tmp_path)
     text = "".join(page.text)
     assert "a hand that follows the cabin as Mayo (1989) measured it" in text
@@ -96,7 +96,7 @@ def test_every_model_of_the_truth_has_words(tmp_path: Path) -> None:
 def test_without_a_summary_the_model_is_that_of_the_columns(black_box: tuple[Result, Reader], tmp_path: Path) -> None:
     result, _ = black_box
     trace = {name: column for name, column in result.trace.items() if "_true" not in name}
-    write_report(trace, {}, tmp_path / "replay.html")
+    write_report(trace, None, tmp_path / "replay.html")
     page = read(tmp_path / "replay.html")
     assert len(curves(page, "figure-parameters", "estimate")) == 3
     assert "a21 minus stiffness" in "".join(page.text)

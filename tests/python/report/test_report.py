@@ -6,17 +6,18 @@ import re
 import struct
 import subprocess
 import sys
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.native import enum_names
-from lever_cdkf.sil.report import picture, words, write_report
-from lever_cdkf.sil.report.charts.health import FAULT_WORDS
-from lever_cdkf.sil.report.run import COHERENT, Run
-from lever_cdkf.sil.runner import Result
+from lever_cdkf.host_tools.firmware.native import enum_names
+from lever_cdkf.host_tools.report import picture, summary_html, write_report
+from lever_cdkf.host_tools.report.charts.health import FAULT_WORDS
+from lever_cdkf.host_tools.report.run import COHERENT, Run
+from lever_cdkf.sil.run.runner import Result
 
 from .reading import Reader, figures, first_number, read, unpack
 
@@ -81,7 +82,7 @@ def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
     rows = {row[0]: row[1:] for row in errors[1:]}
     assert list(rows) == list(ROWS.values())
     for key, name in ROWS.items():
-        expected, row = result.summary["parameters"][key], rows[name]
+        expected, row = asdict(result.summary.parameters[key]), rows[name]
         assert float(row[0]) == pytest.approx(expected["rms_percent"], abs=0.005)
         assert float(row[1]) == pytest.approx(expected["bias_percent"], abs=0.005)
         assert float(row[2]) == pytest.approx(100.0 * expected["coverage_2sigma"], abs=0.05)
@@ -89,9 +90,9 @@ def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
             shown = [None if text == "never" else float(text) for text in cell.split(", ")]
             assert shown == [None if time is None else pytest.approx(time, abs=0.0051) for time in expected[times]]
     values = {row[0]: row[1] for row in run[1:]}
-    assert first_number(values["samples"]) == result.summary["samples"]
-    assert first_number(values["lost"]) == result.summary["lost"] > 0
-    nis = result.summary["nis"]
+    assert first_number(values["samples"]) == result.summary.samples
+    assert first_number(values["lost"]) == result.summary.lost > 0
+    nis = asdict(result.summary.nis)
     assert float(values["mean normalised innovation squared"]) == pytest.approx(nis["mean"], rel=5e-3)
     assert float(values["innovations inside their 95 % bound"]) == pytest.approx(
         100 * nis["inside_95_percent"], rel=5e-3
@@ -101,10 +102,10 @@ def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
 def test_cards_and_headline_say_what_the_summary_says(page: Reader, result: Result) -> None:
     text = "".join(page.text)
     for key, name in ROWS.items():
-        expected = result.summary["parameters"][key]
+        expected = asdict(result.summary.parameters[key])
         assert f"{expected['rms_percent']:.1f} % {name}" in text
         assert f"{100 * expected['coverage_2sigma']:.0f} % {name}" in text
-    verdict = result.summary["verdict"]
+    verdict = result.summary.verdict
     assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
 
 
@@ -120,14 +121,16 @@ def test_cards_and_headline_say_what_the_summary_says(page: Reader, result: Resu
 def test_the_headline_is_good_only_if_sigma_and_whiteness_are(
     passed: bool, covered: float, white: bool, mood: str, result: Result
 ) -> None:
-    entries = {key: entry | {"coverage_2sigma": covered} for key, entry in result.summary["parameters"].items()}
-    made = {"passed": passed, "parameters": entries, "whiteness": result.summary["whiteness"] | {"white": white}}
-    assert f'class="verdict {mood}"' in words.verdict(Run(result.trace, result.summary | made))
+    summary = result.summary
+    assert summary.whiteness is not None
+    entries = {key: replace(entry, coverage_2sigma=covered) for key, entry in summary.parameters.items()}
+    made = replace(summary, passed=passed, parameters=entries, whiteness=replace(summary.whiteness, white=white))
+    assert f'class="verdict {mood}"' in summary_html.verdict(Run(result.trace, made))
 
 
 def test_all_settings_are_shown(page: Reader, result: Result) -> None:
     shown = {row[0]: row[1] for row in page.tables[-1][1:]}
-    settings = result.summary["estimator"]["settings"]
+    settings = result.summary.estimator.settings
     assert list(shown) == list(settings)
     assert {name: float(value) for name, value in shown.items()} == pytest.approx(settings, rel=1e-5)
 
@@ -171,7 +174,7 @@ def test_a_jump_is_drawn_where_it_is_and_marked(page: Reader) -> None:
 def test_maps_and_slices_are_the_response_of_the_parameters(page: Reader, result: Result) -> None:
     """Against the transfer function by scipy, from the columns of the trace and DESIGN section 3."""
     signal = pytest.importorskip("scipy.signal")
-    s = result.summary["estimator"]["settings"]
+    s = result.summary.estimator.settings
     heat = figures(page)["figure-map-truth"]["data"][0]
     time, frequency, z = (unpack(heat[axis]) for axis in "xyz")
     length, slice_of = s["lever_length"], figures(page)["figure-slices"]["layout"]["sliders"][0]["steps"]
@@ -253,16 +256,15 @@ def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Re
 
 
 def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, result: Result) -> None:
-    told = result.summary["whiteness"]
+    told = result.summary.whiteness
+    assert told is not None
     bars = traces(page, "figure-whiteness", "residual of the rate")[0]
-    np.testing.assert_allclose(unpack(bars["y"]), told["autocorrelation"], rtol=1e-6)
+    np.testing.assert_allclose(unpack(bars["y"]), told.autocorrelation, rtol=1e-6)
     assert unpack(bars["x"]) == pytest.approx(20.0 * np.arange(1, 26))
     lower, upper = (unpack(trace["y"]) for trace in traces(page, "figure-whiteness", "95 % of white noise"))
-    assert (lower[0], upper[0]) == pytest.approx((-told["band_95"], told["band_95"]))
+    assert (lower[0], upper[0]) == pytest.approx((-told.band_95, told.band_95))
     values = {row[0]: row[1] for row in page.tables[1][1:]}
-    assert float(values["largest correlation of residuals (white noise: 0)"]) == pytest.approx(
-        told["largest"], rel=5e-3
-    )
+    assert float(values["largest correlation of residuals (white noise: 0)"]) == pytest.approx(told.largest, rel=5e-3)
     assert "Here the residual passes as white." in "".join(page.text)
 
 
@@ -285,7 +287,7 @@ def test_every_fault_has_a_word() -> None:
 
 def test_a_replay_without_truth_leaves_out_what_it_cannot_know(result: Result, tmp_path: Path) -> None:
     trace = {name: column for name, column in result.trace.items() if "_true" not in name}
-    write_report(trace, {}, tmp_path / "replay.html")
+    write_report(trace, None, tmp_path / "replay.html")
     page = read(tmp_path / "replay.html")
     assert page.ids("section") == [name for name in SECTIONS if name != "numbers"]
     assert "figure-map-truth" not in figures(page)
@@ -317,7 +319,7 @@ def test_a_run_that_got_no_answer_still_has_a_report(result: Result, tmp_path: P
 
 
 def test_two_samples_are_enough(result: Result, tmp_path: Path) -> None:
-    write_report({name: column[:2] for name, column in result.trace.items()}, {}, tmp_path / "report.html")
+    write_report({name: column[:2] for name, column in result.trace.items()}, None, tmp_path / "report.html")
     assert "excitation" in read(tmp_path / "report.html").ids("section")
 
 
@@ -345,8 +347,8 @@ def test_a_longer_run_makes_no_larger_page(report: Path, result: Result, tmp_pat
 def test_nothing_slow_is_imported() -> None:
     """Neither scipy nor plotly's Python classes: each takes longer than all the rest."""
     code = """
-import sys, numpy as np, lever_cdkf.sil.report.page
-from lever_cdkf.sil.report import write_report
+import sys, numpy as np, lever_cdkf.host_tools.report.page
+from lever_cdkf.host_tools.report import write_report
 slow = {"scipy", "pandas", "plotly.graph_objs", "plotly.io", "matplotlib", "cantools"} & set(sys.modules)
 sys.exit(f"imports {slow}" if slow else 0)
 """

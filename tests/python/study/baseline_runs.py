@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.native import settings_table
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.native import settings_table
 from lever_cdkf.sil.oracle import Lever
-from lever_cdkf.sil.oracle.cdkf import Array
 from lever_cdkf.sil.study.data import Batch, Knowledge, Truth
 
 SETTINGS = {setting.name: setting.default for setting in settings_table()}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.oracle.linear import LinearBlackBox, LinearPhysical
+from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
 from lever_cdkf.sil.study.baselines import BASELINES, Baseline
 from lever_cdkf.sil.study.data import Batch
 from python.study.baseline_runs import Plan, lever, resting_angle, simulate

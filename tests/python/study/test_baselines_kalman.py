@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
-from lever_cdkf.sil.oracle.cdkf import Array
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.sil.study.baselines.algorithm1 import Algorithm1, ParameterFilter, differences
 from lever_cdkf.sil.study.baselines.dual_ekf import DualEkf
 from lever_cdkf.sil.study.baselines.joint_ekf import JointEkf, joint_ekf

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.sil.oracle.cdkf import Array
-from lever_cdkf.sil.oracle.linear import LinearBlackBox, LinearPhysical
+from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
 from lever_cdkf.sil.study.baselines.balance import Ratios, Same
 from lever_cdkf.sil.study.baselines.lms import Nlms
 from lever_cdkf.sil.study.baselines.regression import Equations, equations

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
-from lever_cdkf.host_tools.config import settings_table
-from lever_cdkf.sil.oracle.lever import Lever
+from lever_cdkf.host_tools.firmware.config import settings_table
+from lever_cdkf.host_tools.models.lever import Lever
 from lever_cdkf.sil.study import bound, linearised
 from lever_cdkf.sil.study.data import Batch, Knowledge, Truth
 from lever_cdkf.sil.study.matched import Condition, matched

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.native import enum_names
+from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.sil.study.baselines import BASELINES
-from lever_cdkf.sil.study.compare import campaign, comparison, judgement, table, words
+from lever_cdkf.sil.study.compare import campaign, comparison, evaluation, table, verdicts
 from lever_cdkf.sil.study.compare.campaign import Outcome, Results
 from lever_cdkf.sil.study.compare.cases import Plan, References, cases
 from lever_cdkf.sil.study.compare.entrants import entrants
-from lever_cdkf.sil.study.compare.judgement import Row
+from lever_cdkf.sil.study.compare.evaluation import Row
 from lever_cdkf.sil.study.data import Batch, Estimates
 from numpy.typing import NDArray
 
@@ -31,7 +31,7 @@ Lever = Callable[..., int]
 @pytest.fixture
 def lever(monkeypatch: pytest.MonkeyPatch) -> Lever:
     """lever("compare", …): the exit status. What is installed may be older than this tree and not know the command."""
-    entry = importlib.metadata.EntryPoint("study", "lever_cdkf.sil.study.commands", cli.COMMANDS)
+    entry = importlib.metadata.EntryPoint("study", "lever_cdkf.sil.commands.compare", cli.COMMANDS)
     others = importlib.metadata.entry_points
 
     def entry_points(group: str) -> Any:
@@ -106,7 +106,7 @@ def made_up(errors: NDArray[Any], time: NDArray[Any], stated: float = 1.0) -> Ou
 def one_row(outcome: Outcome, references: References | None = None) -> Row:
     case, plan = "lever_fixed_dither_quiet", Plan(len(outcome.errors))
     results = Results(plan, {(case, "joint"): outcome}, {} if references is None else {case: references})
-    (row,) = judgement.judge(results)
+    (row,) = evaluation.judge(results)
     return row
 
 
@@ -149,10 +149,10 @@ def test_settling_of_known_errors() -> None:
         errors[run, (time > 25.0) & (time < 25.0 + seconds), 3] = -0.1
     errors[:, time < 24.0] = 0.3  # before the step: nothing to do with it
     outcome = made_up(errors, time)
-    row = judgement.judge(Results(Plan(3), {("step_up", "dual_shipped"): outcome}, {}))[0]
+    row = evaluation.judge(Results(Plan(3), {("step_up", "dual_shipped"): outcome}, {}))[0]
     assert (row.settled_median, row.settled_worst) == pytest.approx((1.0, 3.0), abs=0.021)
     errors[1, -1, 3] = 0.1
-    row = judgement.judge(Results(Plan(3), {("step_up", "dual_shipped"): made_up(errors, time)}, {}))[0]
+    row = evaluation.judge(Results(Plan(3), {("step_up", "dual_shipped"): made_up(errors, time)}, {}))[0]
     assert row.settled_worst == math.inf
 
 
@@ -236,11 +236,11 @@ def against(name: str, more: float, probability: float, case: str = CASE) -> com
 def test_winner_and_who_may_be_as_good() -> None:
     found = against("dual", 1.04, 0.2) | against("rls", 3.0, 1e-6)
     rows = [row("dual", 0.108), row("joint", 0.104), row("rls", 0.3)]
-    assert words.verdict(rows, found, {}) == (
+    assert verdicts.verdict(rows, found, {}) == (
         "Smallest errors: joint (1.04 × the Kalman filter linearised at the truth on average); no significant "
         "difference to dual (+4 %)."
     )
-    assert words.verdict(rows[1:], found, {}).endswith("; all others are significantly worse.")
+    assert verdicts.verdict(rows[1:], found, {}).endswith("; all others are significantly worse.")
 
 
 @pytest.mark.parametrize(
@@ -252,19 +252,19 @@ def test_winner_and_who_may_be_as_good() -> None:
 )
 def test_says_so_when_ours_is_not_best(probability: float, said: str) -> None:
     found = against("joint", 1.2, probability)
-    assert words.verdict([row("joint", 0.12), row("joint_ekf", 0.1)], found, {}).endswith(said)
+    assert verdicts.verdict([row("joint", 0.12), row("joint_ekf", 0.1)], found, {}).endswith(said)
 
 
 def test_who_broke_down_is_not_ranked() -> None:
-    said = words.verdict([row("joint", 0.12), row("lms", 0.01, failures=2)], {}, {})
+    said = verdicts.verdict([row("joint", 0.12), row("lms", 0.01, failures=2)], {}, {})
     assert said.startswith("Smallest errors: joint")
     assert said.endswith("Broke down, and so not ranked: lms in 2 of 20 runs.")
-    assert words.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("Nobody did all runs.")
+    assert verdicts.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("Nobody did all runs.")
 
 
 def test_seven_runs_are_too_few() -> None:
     rows = [row("joint", 0.12, asked=7, runs=7), row("lms", 0.3, asked=7, runs=7)]
-    assert words.verdict(rows, {}, {}) == "Too few runs for a verdict: 7, at least 8 are needed."
+    assert verdicts.verdict(rows, {}, {}) == "Too few runs for a verdict: 7, at least 8 are needed."
 
 
 def test_fastest_after_a_step() -> None:
@@ -275,10 +275,10 @@ def test_fastest_after_a_step() -> None:
     ]
     errors = against("dual_shipped", 2.0, 1e-9, "step_up")
     fastest = "dual_shipped (median 0.40 s, worst 0.90 s); the fastest baseline, joint_ekf: 1.50 s"
-    said = words.verdict(rows, errors, against("joint_ekf", 3.75, 1e-9, "step_up"))
+    said = verdicts.verdict(rows, errors, against("joint_ekf", 3.75, 1e-9, "step_up"))
     assert "joint_ekf (baseline) (natural frequency 1 % rms)" in said
     assert said.endswith(f"Fastest after the step: {fastest}.")
-    said = words.verdict(rows, errors, against("joint_ekf", 3.75, 0.2, "step_up"))
+    said = verdicts.verdict(rows, errors, against("joint_ekf", 3.75, 0.2, "step_up"))
     assert said.endswith(f"{fastest}, which may be chance.")
 
 
@@ -289,14 +289,14 @@ def test_claims_take_the_worst_and_say_where() -> None:
         rows[0], linearised=ratios, baseline=(1.0,) * 5, nees=3.2, nees_low=2.5, nees_high=3.5
     )
     rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01,) * 5)
-    found = {claim.text: claim for claim in words.claims(rows)}
+    found = {claim.text: claim for claim in verdicts.claims(rows)}
     first = found["joint: error ÷ Kalman filter linearised at the truth"]
     assert (first.measured, first.where, first.kept) == (1.2, f"{CASE}, joint, k_p", False)
     assert first.kept_in_words == "no"
     rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01, 0.01, 0.06, 0.01, 0.01))
-    assert words.claims(rows)[0].kept_in_words == "no, but within chance"
+    assert verdicts.claims(rows)[0].kept_in_words == "no, but within chance"
     rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01, 0.01, 0.04, 0.01, 0.01))  # of five: 2.3 sigma
-    assert words.claims(rows)[0].kept_in_words == "no"
+    assert verdicts.claims(rows)[0].kept_in_words == "no"
     assert found["joint: NEES ÷ its 95 % limit"].kept
     assert found["joint: error ÷ best baseline's, preload fixed"].measured == 1.0
     assert found["firmware: runs with NaN or a refused factor"].kept
@@ -370,7 +370,7 @@ def test_a_small_campaign(lever: Lever, tmp_path: Path, capsys: pytest.CaptureFi
     assert all(f'id="{key}"' in page for key in figures)
     assert len(json.loads(tables.read_text())) == 2
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
-    (row,) = judgement.judge(alone)
+    (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
 
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.config import settings_table
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.native import Config, Estimator
+from lever_cdkf.host_tools.firmware.config import settings_table
+from lever_cdkf.host_tools.firmware.native import Config, Estimator
 from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.figures import catalogue, grip, runs
 from lever_cdkf.sil.study.figures.description import LOOKS, Band, Curve, Figure, Points, Row, Surface, Trace, number

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from lever_cdkf.sil.report import picture
-from lever_cdkf.sil.study.figures import catalogue, page, runs
+from lever_cdkf.host_tools.report import picture
+from lever_cdkf.sil.study.figures import catalogue, figures_page, runs
 
 SHORT = runs.Extent(duration=3.0, runs=3)
 
@@ -18,7 +18,7 @@ def test_the_page_is_drawn_without_complaint_or_sideways_scrolling(tmp_path: Pat
     probe += "document.documentElement.scrollWidth + ' of ' + document.documentElement.clientWidth; }, 3000));</script>"
     figures = [make(1, SHORT) for make in catalogue.FIGURES.values()]
     copy = tmp_path / "probed.html"
-    copy.write_text(page.build(figures).replace("</body>", f"{probe}</body>"), encoding="utf-8")
+    copy.write_text(figures_page.build(figures).replace("</body>", f"{probe}</body>"), encoding="utf-8")
     options = ("--dump-dom", "--enable-logging=stderr", "--enable-unsafe-swiftshader", "--window-size=500,900")
     result = picture.browse(copy.as_uri(), *options)
     said = [line for line in result.stderr.splitlines() if "CONSOLE" in line]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.study.figures import catalogue, page, png, runs
+from lever_cdkf.sil.study.figures import catalogue, figures_page, png, runs
 from lever_cdkf.sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
 from lever_cdkf.sil.study.figures.typesetting import colours, css, in_html, in_mathtext
 from PIL import Image
@@ -232,7 +232,7 @@ def test_every_colour_of_the_page_exists_in_both_themes(folder: Path) -> None:
 def test_text_is_set_in_type() -> None:
     assert in_html("m_p < 2 & a_21") == "m<sub>p</sub> &lt; 2 &amp; a<sub>21</sub>"
     assert in_mathtext("|θ/z̈| ẋ [N s/m], k_p") == r"|θ/$\ddot{z}$| $\dot{x}$ [N s/m], $k_{p}$"
-    assert "<sub>" not in page.build([made("states")]).split("<body>")[0]
+    assert "<sub>" not in figures_page.build([made("states")]).split("<body>")[0]
 
 
 # --- the command -----------------------------------------------------------------------------------------------------

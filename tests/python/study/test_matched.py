@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.config import settings_table
 from lever_cdkf.host_tools.errors import SettingsError
-from lever_cdkf.sil import plant
-from lever_cdkf.sil.oracle.linear import LinearBlackBox
+from lever_cdkf.host_tools.firmware.config import settings_table
+from lever_cdkf.host_tools.models.linear import LinearBlackBox
+from lever_cdkf.sil.plants import lever_plant
 from lever_cdkf.sil.study.data import Batch, rest_angle
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
@@ -185,16 +185,16 @@ def test_deviations_count_from_the_trim(name: str) -> None:
 
 
 @pytest.mark.parametrize("preload", ["fixed", "trim"])
-def test_the_lever_starts_at_rest_and_has_the_dynamics_of_the_plant(preload: plant.Preload) -> None:
-    """sil/plant.py shares no code with the model here."""
+def test_the_lever_starts_at_rest_and_has_the_dynamics_of_the_plant(preload: lever_plant.Preload) -> None:
+    """sil/plants/lever_plant.py shares no code with the model here."""
     settings = {"arm_preload_angle": 0.45, "lever_preload_angle": 0.3}
     batch = matched(Condition(preload=preload, settings=settings), 6, 2.0, 5)
     assert batch.truth.p is not None
-    lever = plant.Lever.from_settings(DEFAULTS | settings)
+    lever = lever_plant.Lever.from_settings(DEFAULTS | settings)
     np.testing.assert_array_equal(batch.truth.x[:, 0, 1], 0.0)
     for run, p in enumerate(batch.truth.p):
-        truth = plant.Truth(p[:, 0], p[:, 1], p[:, 2], np.full(batch.samples, math.radians(20.0)))
-        rest, dynamics = plant.equilibrium(lever, truth, preload), plant.dynamics(lever, truth, preload)
+        truth = lever_plant.Truth(p[:, 0], p[:, 1], p[:, 2], np.full(batch.samples, math.radians(20.0)))
+        rest, dynamics = lever_plant.equilibrium(lever, truth, preload), lever_plant.dynamics(lever, truth, preload)
         assert batch.truth.x[run, 0, 0] == pytest.approx(rest[0], abs=1e-12)
         np.testing.assert_allclose(batch.rest(np.arange(batch.samples))[run], rest, atol=1e-12)
         np.testing.assert_allclose(batch.truth.dynamics[run, :, 0], dynamics.natural_frequency, rtol=1e-9)

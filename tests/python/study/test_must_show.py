@@ -6,7 +6,7 @@ Seeds are fixed, so this is no lottery: a change of the firmware that costs accu
 from __future__ import annotations
 
 import pytest
-from lever_cdkf.sil.study.compare import campaign, judgement, words
+from lever_cdkf.sil.study.compare import campaign, evaluation, verdicts
 from lever_cdkf.sil.study.compare.cases import Plan
 
 CASES = ("lever_fixed_dither_quiet", "linear_black_box_fixed_base_rough", "step_up", "step_down")
@@ -25,9 +25,9 @@ MEASURED = {
 
 
 @pytest.fixture(scope="module")
-def claims() -> dict[str, words.Claim]:
+def claims() -> dict[str, verdicts.Claim]:
     results = campaign.run(campaign.tasks(CASES, ESTIMATORS, Plan(20)), jobs=1)
-    return {claim.text: claim for claim in words.claims(judgement.judge(results))}
+    return {claim.text: claim for claim in verdicts.claims(evaluation.judge(results))}
 
 
 MISSED = {"dual: step followed in, worst [s]"}
@@ -35,11 +35,11 @@ MISSED = {"dual: step followed in, worst [s]"}
 
 
 @pytest.mark.parametrize("text", sorted(MEASURED))
-def test_claim(claims: dict[str, words.Claim], text: str) -> None:
+def test_claim(claims: dict[str, verdicts.Claim], text: str) -> None:
     claim = claims[text]
     assert claim.kept is True, f"{claim.measured:.3g}, limit {claim.limit:g}, in {claim.where}"
 
 
-def test_nothing_else_was_measured(claims: dict[str, words.Claim]) -> None:
+def test_nothing_else_was_measured(claims: dict[str, verdicts.Claim]) -> None:
     """Or it would not be held to."""
     assert {text for text, claim in claims.items() if claim.kept is not None} == MEASURED | MISSED

@@ -17,7 +17,7 @@ from lever_cdkf.sil.envelope.motions import FREQUENCIES, PERIOD, Motion
 from lever_cdkf.sil.envelope.sensors import Fault, Sensors
 from lever_cdkf.sil.study.baselines.joint_ekf import Joint
 from lever_cdkf.sil.study.data import Batch
-from lever_cdkf.sil.study.peers import filters, logs, words
+from lever_cdkf.sil.study.peers import filters, logs, tables
 from lever_cdkf.sil.study.peers.campaign import ESTIMATORS, Result
 from numpy.typing import NDArray
 
@@ -153,16 +153,18 @@ def results(case: str, runs: int, **rms: float) -> list[Result]:
 def test_verdicts_are_of_significant_differences() -> None:
     found = results("a", 8, firmware=2.0, joint_ekf=3.0, joint_ukf=np.inf)
     found += results("b", 8, firmware=2.0, joint_ekf=1.0) + results("c", 8, firmware=2.0, joint_ekf=2.001)
-    assert list(words.verdicts(found)) == [
+    assert list(tables.verdicts(found)) == [
         "The firmware's errors against joint_ekf: smaller in 1 conditions, larger in 1 (b), no significant difference "
         "in 1."
     ]
-    assert list(words.verdicts(results("a", 7, firmware=2.0))) == ["Too few runs for a verdict: at least 8 are needed."]
+    assert list(tables.verdicts(results("a", 7, firmware=2.0))) == [
+        "Too few runs for a verdict: at least 8 are needed."
+    ]
 
 
 def test_a_table_has_median_and_worst() -> None:
     one = Result("a", "firmware", np.array([1.0, 2.0, np.inf]), np.array([90.0, 95.0, 0.0]))
-    errors, coverage = words.tables([one], 3).values()
+    errors, coverage = tables.tables([one], 3).values()
     assert errors == [{"condition": "a", "firmware": "2 / ∞"}]
     assert coverage == [{"condition": "a", "firmware": "90 / 0"}]
 

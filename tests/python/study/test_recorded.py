@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import codec
-from lever_cdkf.sil import scenario
-from lever_cdkf.sil.reading import ScenarioError
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.study.recorded import recorded, usable
+from lever_cdkf.sil.toml_tables import ScenarioError
 
 
 def test_measured_is_the_truth_with_the_noise_of_the_sensors() -> None:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.config import settings_table
-from lever_cdkf.sil import plant
-from lever_cdkf.sil.oracle.detrend import Detrend
-from lever_cdkf.sil.oracle.lever import Lever
+from lever_cdkf.host_tools.firmware.config import settings_table
+from lever_cdkf.host_tools.models.detrend import Detrend
+from lever_cdkf.host_tools.models.lever import Lever
+from lever_cdkf.sil.plants import lever_plant
+from lever_cdkf.sil.plants.truth import Conditions
 from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.steps import Step, follow, stepped
-from lever_cdkf.sil.truth import Conditions
 from numpy.typing import NDArray
 from scipy.stats import chi2, kstest
 
@@ -40,9 +40,9 @@ def test_truth_moves_as_the_plant_does(batch: Batch) -> None:
     lever = Lever.from_settings(DEFAULTS, "trim")
     x = follow(lever, p, shaken, SHORT.trim, np.zeros((batch.runs, batch.samples - 1, 2)), PERIOD)[run]
     columns = (p[run, :, 0], p[run, :, 1], p[run, :, 2], np.full(batch.samples, SHORT.trim))
-    truth, base = plant.Truth(*columns), shaken[run, :, 0]
+    truth, base = lever_plant.Truth(*columns), shaken[run, :, 0]
     conditions = Conditions(base, PERIOD, 0.0, 0.0, np.random.default_rng(1))
-    body = plant.Plant(plant.Lever.from_settings(DEFAULTS), truth, "trim", conditions)
+    body = lever_plant.Plant(lever_plant.Lever.from_settings(DEFAULTS), truth, "trim", conditions)
     expected = np.empty_like(x)
     for k in range(batch.samples):
         expected[k] = body.theta, body.theta_dot
@@ -51,7 +51,7 @@ def test_truth_moves_as_the_plant_does(batch: Batch) -> None:
     moved = np.ptp(expected, axis=0)
     assert moved[0] > 0.01
     np.testing.assert_allclose(x / moved, expected / moved, rtol=0, atol=5e-5)
-    dynamics = plant.dynamics(plant.Lever.from_settings(DEFAULTS), truth, "trim")
+    dynamics = lever_plant.dynamics(lever_plant.Lever.from_settings(DEFAULTS), truth, "trim")
     np.testing.assert_allclose(batch.truth.dynamics[run, :, 0], dynamics.natural_frequency, rtol=1e-12)
     np.testing.assert_allclose(batch.truth.dynamics[run, :, 1], dynamics.damping_ratio, rtol=1e-12)
 

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.sil import buslog, runner, scenario
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.sil.run import buslog, runner
+from lever_cdkf.sil.scenarios import scenario
 
 Simulate = Callable[..., Path]
 

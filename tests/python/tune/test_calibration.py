@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.tune import recording
-from lever_cdkf.sil.tune.calibration import NAMES, Calibrated, calibrate
-from lever_cdkf.sil.tune.likelihood import Likelihood
-from lever_cdkf.sil.tune.recording import Recording
+from lever_cdkf.host_tools.tune import recording
+from lever_cdkf.host_tools.tune.calibration import NAMES, Calibrated, calibrate
+from lever_cdkf.host_tools.tune.likelihood import Likelihood
+from lever_cdkf.host_tools.tune.recording import Recording
 from python.tune.conftest import NOISE, Simulate
 
 WITHIN = (0.01, 0.3e-3, 0.03)

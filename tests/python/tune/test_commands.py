@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli, codec
-from lever_cdkf.host_tools.settings_file import make_config, read_assignments
-from lever_cdkf.sil.tune import calibration
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.firmware.settings_file import make_config, read_assignments
+from lever_cdkf.host_tools.tune import calibration
 from python.tune.conftest import NOISE, Simulate
 
 Run = Callable[..., tuple[int, str, str]]

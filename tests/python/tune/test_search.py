@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.tune import judgement, recording
-from lever_cdkf.sil.tune.likelihood import Likelihood
-from lever_cdkf.sil.tune.search import Found, Search, groups
+from lever_cdkf.host_tools.tune import recording, validation
+from lever_cdkf.host_tools.tune.likelihood import Likelihood
+from lever_cdkf.host_tools.tune.search import Found, Search, groups
 from python.tune.conftest import NOISE, WALK, Simulate
 
 
@@ -54,16 +54,16 @@ def test_what_does_not_change_gets_the_greatest_walk_that_is_not_contradicted(st
 def test_part_that_is_not_tuned_on_shows_the_improvement(steady_log: Path) -> None:
     likelihood = Likelihood(recording.read([steady_log]))
     assert not (likelihood.tuned_on & likelihood.judged_by).any()
-    fits = judgement.fits(likelihood, {}, NOISE)
-    parts = {(before.noise, before.part): (before, after) for before, after in judgement.pairs(fits)}
+    fits = validation.fits(likelihood, {}, NOISE)
+    parts = {(before.noise, before.part): (before, after) for before, after in validation.pairs(fits)}
     before, after = parts["as set", "held out"]
-    gained = judgement.gain(before, after)
+    gained = validation.gain(before, after)
     assert gained.is_clear
     assert gained.mean > 0.5
-    assert not judgement.is_worse(fits)
+    assert not validation.is_worse(fits)
     assert after.nis == pytest.approx(1.02, abs=0.03)  # 0.02: the trim filter's; of 8000 samples 0.011 is chance
     assert before.nis > 1.5
-    assert "better with noise as set" in judgement.verdict(fits, 3)
+    assert "better with noise as set" in validation.verdict(fits, 3)
 
 
 def test_settings_that_only_fit_the_part_tuned_on_are_no_gain(steady_log: Path) -> None:
@@ -77,9 +77,9 @@ def test_settings_that_only_fit_the_part_tuned_on_are_no_gain(steady_log: Path) 
     before = {**NOISE, "theta_noise": 1e-3, "noise_window": 0.0}
     found = found_in(likelihood, "theta_dot_noise", "m_p_walk", "c_p_walk", "k_p_walk", **before)
     assert found["theta_noise"].after == pytest.approx(NOISE["theta_noise"], rel=0.02)
-    fits = judgement.fits(likelihood, before, {**before, "theta_noise": found["theta_noise"].after})
-    assert judgement.is_worse(fits)
-    assert "worse" in judgement.verdict(fits, 1)
+    fits = validation.fits(likelihood, before, {**before, "theta_noise": found["theta_noise"].after})
+    assert validation.is_worse(fits)
+    assert "worse" in validation.verdict(fits, 1)
 
 
 def test_at_rest_only_noise_is_looked_for(simulate: Simulate) -> None:

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lever_cdkf.sil.report import picture
+from lever_cdkf.host_tools.report import picture
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 PATIENCE = 120.0

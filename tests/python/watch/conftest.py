@@ -10,10 +10,10 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools import codec
-from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.host_tools.commander import Commander
-from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.can.commander import Commander
+from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.watch.model import Frame
 from lever_cdkf.host_tools.watch.sources import as_frame
 

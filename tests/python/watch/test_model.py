@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import codec
-from lever_cdkf.host_tools.commander import KEEP
-from lever_cdkf.host_tools.config import Config, model_parameters
-from lever_cdkf.host_tools.library import enum_names, ffi, lib
-from lever_cdkf.host_tools.watch import model, words
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.commander import KEEP
+from lever_cdkf.host_tools.firmware.config import Config, model_parameters
+from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
+from lever_cdkf.host_tools.watch import model, status
 from lever_cdkf.host_tools.watch.model import Frame, Picture
 from lever_cdkf.host_tools.watch.paired import Paired
 from python.watch.conftest import Flight
@@ -112,26 +112,26 @@ def test_nothing_is_known_before_the_first_frame() -> None:
     assert all(math.isnan(entry.value) and math.isnan(entry.sigma) for entry in picture.dynamics())
     assert picture.mode is None
     assert picture.silence() == math.inf
-    assert words.condition(picture) == ("watch", "no frame has come yet")
+    assert status.condition(picture) == ("watch", "no frame has come yet")
 
 
 def test_what_is_old_is_not_shown_as_present(flight: Flight) -> None:
     picture = Picture()
     watch(picture, flight, 1.0)
-    assert words.condition(picture)[0] in ("good", "watch")
+    assert status.condition(picture)[0] in ("good", "watch")
     picture.take([], 1.0 + model.STALE_AFTER + 0.5)
     assert picture.silence() == pytest.approx(2.5)
     assert all(math.isnan(entry.value) for entry in (*picture.parameters(), *picture.dynamics()))
     assert picture.mode is None
     assert picture.faults() == []
-    assert words.condition(picture) == ("bad", "the estimator has said nothing for 2 s: what is shown is old")
+    assert status.condition(picture) == ("bad", "the estimator has said nothing for 2 s: what is shown is old")
     assert math.isnan(picture.history["k_p"][-1])
 
 
 def test_samples_without_an_estimator_are_told(flight: Flight) -> None:
     picture = Picture()
     picture.take([frame for frame in flight.frames(100) if frame[0] < 0x200], 0.1)
-    assert words.condition(picture)[1] == "samples pass, but no estimator answers: is the firmware running?"
+    assert status.condition(picture)[1] == "samples pass, but no estimator answers: is the firmware running?"
 
 
 def test_faults_are_named_and_held_long_enough_to_be_read(flight: Flight) -> None:
@@ -141,7 +141,7 @@ def test_faults_are_named_and_held_long_enough_to_be_read(flight: Flight) -> Non
     flight.sample += 40  # as many samples are missing
     watch(picture, flight, 0.1)
     assert "gap" in picture.faults()
-    assert "samples were missing" in words.faults(picture)
+    assert "samples were missing" in status.faults(picture)
     watch(picture, flight, 1.5)
     assert "gap" in picture.faults()
     watch(picture, flight, 1.0)
@@ -149,9 +149,9 @@ def test_faults_are_named_and_held_long_enough_to_be_read(flight: Flight) -> Non
 
 
 def test_every_mode_and_fault_of_the_firmware_has_words() -> None:
-    assert list(words.MODES) == list(enum_names("lever_mode").values())
-    assert list(words.FAULTS) == list(enum_names("lever_fault").values())
-    assert list(words.PLATFORM_FAULTS) == list(enum_names("lever_platform_fault").values())
+    assert list(status.MODES) == list(enum_names("lever_mode").values())
+    assert list(status.FAULTS) == list(enum_names("lever_fault").values())
+    assert list(status.PLATFORM_FAULTS) == list(enum_names("lever_platform_fault").values())
 
 
 def test_health_of_the_machine(flight: Flight) -> None:
@@ -167,8 +167,8 @@ def test_health_of_the_machine(flight: Flight) -> None:
     assert picture.counts["overruns"] == 12  # beyond the eight bits of the frame
     assert picture.field("PLATFORM_HEALTH", "transmit_errors") == 96
     assert "platform" in picture.faults()
-    assert "machine: received frames lost" in words.faults(picture)
-    assert words.FAULTS["platform"] not in words.faults(picture)  # which is told in more detail
+    assert "machine: received frames lost" in status.faults(picture)
+    assert status.FAULTS["platform"] not in status.faults(picture)  # which is told in more detail
 
 
 # --- counts ----------------------------------------------------------------------------------------------------------
@@ -249,7 +249,7 @@ def test_an_estimator_of_another_contract_is_told(flight: Flight) -> None:
     assert picture.identity.choices["estimator"] == "dual"
     version = {"firmware_major": 1, "firmware_minor": 0, "firmware_patch": 0, "contract": 3}
     picture.take([(0x217, codec.encode("IDENTITY", 0, {"page": 0, **version}))], 1.0)
-    assert words.condition(picture) == (
+    assert status.condition(picture) == (
         "bad",
         "the estimator speaks contract 3 of lever.dbc, this program 2: what is shown is wrong",
     )
@@ -259,7 +259,7 @@ def test_an_estimator_that_does_not_tell_its_contract_is_told(flight: Flight) ->
     picture = Picture()
     for _ in range(40):
         picture.take([frame for frame in flight.frames(100) if frame[0] != 0x217], flight.sample * 1e-3)
-        told = words.condition(picture)
+        told = status.condition(picture)
         assert (told[0] == "bad") is (picture.now > 3.1 + 1e-9)
     assert told[1].startswith("the estimator does not tell its version (IDENTITY): ")
 
@@ -272,7 +272,7 @@ def test_a_second_estimator_on_the_bus_is_told(make_flight: Callable[..., Flight
             first.send(identifier, bytes(data))
     watch(picture, first, 0.2)
     assert "duplicate" in picture.faults()
-    assert "a second estimator is on this bus" in words.condition(picture)[1]
+    assert "a second estimator is on this bus" in status.condition(picture)[1]
 
 
 def test_refused_commands_are_told(flight: Flight) -> None:

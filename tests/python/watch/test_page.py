@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lever_cdkf.sil.report import picture
+from lever_cdkf.host_tools.report import picture
 from python.watch.browser import Browser
 
 pytestmark = pytest.mark.requires("|".join(picture.BROWSERS))

@@ -14,11 +14,12 @@ from collections.abc import Awaitable, Callable, Iterator
 from typing import Any
 
 import pytest
-from lever_cdkf.host_tools import cli, codec
-from lever_cdkf.host_tools.config import Config
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.watch.server import Server
 from lever_cdkf.host_tools.watch.sources import Source
-from lever_cdkf.sil.watch.server import Server
-from lever_cdkf.sil.watch.state import State, command_of
+from lever_cdkf.host_tools.watch.state import State, command_of
 from python.watch.conftest import Flight
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.websocket import websocket_connect
@@ -442,7 +443,7 @@ def test_a_source_that_fails_is_told_at_the_end(tmp_path: Any, capsys: pytest.Ca
 
 
 def test_times_keep_their_resolution() -> None:
-    from lever_cdkf.sil.watch.state import _short
+    from lever_cdkf.host_tools.watch.state import _short
 
     assert _short(12345.678) == 12345.68
     assert _short(0.00123456) == 0.001235

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools import codec
+from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.watch import sources
 from lever_cdkf.host_tools.watch.model import ERROR, FOREIGN, Frame, Picture
 from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
-from lever_cdkf.sil.scenario import load
-from lever_cdkf.sil.watch.simulation import SimulationSource
-from lever_cdkf.sil.watch.transfer import FREQUENCIES
+from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
+from lever_cdkf.sil.run.live_source import SimulationSource
+from lever_cdkf.sil.scenarios.scenario import load
 from python.watch.conftest import Flight
 
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.library import enum_names
-from lever_cdkf.host_tools.native import Config
+from lever_cdkf.host_tools.firmware.library import enum_names
+from lever_cdkf.host_tools.firmware.native import Config
 from numpy.typing import NDArray
 
 from .recording import Recording

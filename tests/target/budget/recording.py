@@ -12,10 +12,10 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.host_tools import codec
-from lever_cdkf.host_tools.bus import LeverBus
-from lever_cdkf.sil import loop
-from lever_cdkf.sil.scenario import Scenario, load
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.sil.run import loop
+from lever_cdkf.sil.scenarios.scenario import Scenario, load
 from numpy.typing import NDArray
 
 SCENARIOS = Path(__file__).with_name("scenarios")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.config import Config
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.library import enum_names, ffi, lib
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
 from target.budget import image, measure, stack, trace
 from target.budget.recording import MODELS, record
 

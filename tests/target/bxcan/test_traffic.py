@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import can
 import pytest
-from lever_cdkf.host_tools import codec
-from lever_cdkf.host_tools.native import lib
-from lever_cdkf.sil import loop, scenario
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.firmware.native import lib
+from lever_cdkf.sil.run import loop
+from lever_cdkf.sil.scenarios import scenario
 from target.bxcan.board import MS, Board, BoardBus
 from target.bxcan.bus import Peer
 from target.bxcan.frame import Frame

@@ -12,8 +12,10 @@ from pathlib import Path
 import can
 import pytest
 import serial
-from lever_cdkf.host_tools import cli, codec, qemu
-from lever_cdkf.host_tools.protocol_ahead import read_ahead
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.board import qemu
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.protocol_ahead import read_ahead
 from vcan import rig
 
 QEMU = pytest.mark.requires(qemu.PROGRAM)

@@ -1,0 +1,36 @@
+"""Lever CDKF from Python. These names stay; modules below may move.
+
+Each is imported when it is first used, so that `import lever_cdkf` costs nothing.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .host_tools.firmware.native import Config, Estimator, run_samples
+    from .sil.run.runner import simulate
+    from .sil.scenarios.scenario import load as load_scenario
+
+__all__ = ["Config", "Estimator", "load_scenario", "run_samples", "simulate"]
+
+_NATIVE = "lever_cdkf.host_tools.firmware.native"
+_HOMES = {
+    "Config": (_NATIVE, "Config"),
+    "Estimator": (_NATIVE, "Estimator"),
+    "run_samples": (_NATIVE, "run_samples"),
+    "simulate": ("lever_cdkf.sil.run.runner", "simulate"),
+    "load_scenario": ("lever_cdkf.sil.scenarios.scenario", "load"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, attribute = _HOMES[name]
+    value = getattr(importlib.import_module(module), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,1 @@
+"""The firmware on a microcontroller: its image, and an emulated board."""

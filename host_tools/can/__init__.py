@@ -1,0 +1,1 @@
+"""The estimator on a CAN bus, or in a log of one."""

@@ -1,0 +1,71 @@
+"""Buses that are named on a command line: the options for it, and python-can's bus from them."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from ..errors import LeverError
+
+if TYPE_CHECKING:
+    import can
+
+_DEFAULTS: Mapping[str, Mapping[str, Any]] = {"slcan": {"bitrate": 1_000_000, "sleep_after_open": 0.0}}
+"""Unless told otherwise: the bit rate of lever.dbc, and no two seconds for an Arduino to reset in."""
+_IN_PROCESS = ("lever", "virtual")
+
+
+def add_bus_options(parser: argparse.ArgumentParser) -> None:
+    """--interface, --channel, --bitrate and --bus-option, for open_bus() and chosen_options()."""
+    parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser, udp_multicast …")
+    parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
+    parser.add_argument("--bitrate", metavar="RATE", type=int, help="[bit/s] for interfaces that set it")
+    parser.add_argument(
+        "--bus-option",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="more for the interface, such as tty_baudrate=921600 for slcan; may be repeated",
+    )
+
+
+def chosen_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Options for open_bus(), numbers and truth values as such. Raises LeverError."""
+    from can.util import cast_from_string
+
+    options = {}
+    for assignment in args.bus_option:
+        key, equals, value = assignment.partition("=")
+        if not (key and equals):
+            raise LeverError(f"--bus-option {assignment}: must be KEY=VALUE, such as tty_baudrate=921600")
+        options[key] = cast_from_string(value)
+    return options if args.bitrate is None else options | {"bitrate": args.bitrate}
+
+
+def check_others_can_be_heard(interface: str) -> None:
+    """Raises LeverError for an interface on which nobody but this process is."""
+    if interface in _IN_PROCESS:
+        raise LeverError(
+            f"interface {interface} is inside one process, with nobody else to be heard: give a bus such as "
+            "--interface socketcan --channel vcan0"
+        )
+
+
+def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) -> can.BusABC:
+    """A python-can bus. Raises LeverError."""
+    import can
+
+    from .protocol_ahead import read_ahead
+
+    given = {**_DEFAULTS.get(interface, {}), **options}
+    if channel is not None:
+        given["channel"] = read_ahead(channel) if interface == "slcan" else channel
+    where = interface if channel is None else f"{interface} channel {channel}"
+    try:
+        bus = can.Bus(interface=interface, **given)
+    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
+        raise LeverError(f"cannot open {where}: {error}; is it there and up?") from None
+    if bus.channel_info == can.BusABC.channel_info:  # slcan does not say what it is
+        bus.channel_info = where
+    return bus

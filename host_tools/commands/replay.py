@@ -1,0 +1,147 @@
+"""`lever replay`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..tables import Row, Tables, add_json_option
+
+if TYPE_CHECKING:
+    from ..replay.engine import Options
+
+_DESCRIPTION = """\
+Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints what it makes of them; with --out
+also writes into DIR
+
+  bus.log       what the estimator got and what it answered, in the format of candump, on recorded time
+  trace.csv     measured, estimated, standard deviations and health, a row for each sample
+  signals.mf4   the same signals with their units, for asammdf, PlotJuggler and the like
+  summary.json  estimates, innovations, what was found in the log, and a verdict
+  report.html   all of it as one page for a browser
+
+LOG is a log of candump -L (.log, or - for standard input), or .blf, .asc, .mf4, .trc, .csv or .db, compressed (.gz) or
+not. Several logs are taken one after another in the order of their first frames. Whatever else is in a log, other
+messages, other buses, damaged lines, is counted and left out. If it holds estimates too, of the firmware that ran when
+it was recorded, and of this version of lever.dbc (IDENTITY says so), they are compared with the new ones, signal by
+signal.
+
+The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
+choice (model, preload, estimator, adaptation) that is made here.
+"""
+_EPILOG = """\
+examples:
+  lever replay session.log
+  lever replay session.log -o out/session
+  lever replay session.log --model linear_physical --set theta_noise=0.002 -o out/other
+  lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
+  candump -L can0 | lever replay - -o out/live
+
+Exit status: 0 when the log was replayed; 1 when the estimator was in fault, with one line on standard error.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "replay", help="estimate again from recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log; several are one recording in pieces")
+    parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    parser.add_argument(
+        "--channel", metavar="NAME", help="the bus with the samples (default: the only one that has any)"
+    )
+    for what in ("model", "preload", "estimator", "adaptation"):
+        parser.add_argument(f"--{what}", help=f"choose the {what}, whatever the log says (`lever settings` lists them)")
+    parser.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set one value; may be repeated, the last counts",
+    )
+    add_json_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..progress import Progress
+    from ..replay.engine import replay
+    from ..replay.outputs import FILES
+    from ..tables import print_tables
+
+    options = _options(args)
+    with Progress("replay") as progress:
+        summary = replay(args.logs, options, args.out, progress.show)
+    print_tables(_tables(summary), args.json)
+    print(summary["verdict"])
+    if args.out is not None:
+        print(f"Written to {args.out}: {', '.join(FILES)}")
+    if not summary["passed"]:
+        print("lever: replay: the estimator was in fault", file=sys.stderr)
+    return 0 if summary["passed"] else 1
+
+
+def _options(args: argparse.Namespace) -> Options:
+    from ..firmware.config import CHOICES
+    from ..firmware.settings_file import make_config, parse_assignment, read_assignments
+    from ..replay.engine import Options
+
+    assignments = read_assignments(args.settings) if args.settings is not None else {}
+    assignments |= dict(parse_assignment(text) for text in args.set)
+    for what in CHOICES:
+        if (chosen := getattr(args, what)) is not None:
+            assignments |= dict([parse_assignment(f"{what}={chosen}")])
+    config = make_config(assignments)
+    chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
+    return Options(config, chosen_here, args.channel)
+
+
+def _tables(summary: dict[str, Any]) -> Tables:
+    estimates: list[Row] = [
+        {
+            "quantity": name,
+            "unit": told["unit"],
+            "at end": told["last"],
+            "sigma": told["last_sigma"],
+            "least": told["least"],
+            "greatest": told["greatest"],
+        }
+        for name, told in summary["estimates"].items()
+    ]
+    tables: dict[str, list[Row]] = {"estimates": estimates}
+    if summary["comparison"] is not None:
+        tables["replayed minus recorded estimates"] = [
+            {
+                "signal": name,
+                "unit": told["unit"],
+                "samples": told["samples"],
+                "identical": told["identical_samples"],
+                "mean difference": told["bias"],
+                "rms difference": told["rms"],
+                "largest difference": told["largest"],
+                "at [s]": told["largest_at_s"],
+                "rms in sigma [1]": told["rms_in_sigma"],
+            }
+            for name, told in summary["comparison"]["signals"].items()
+        ]
+    return tables | {"recording": [_recording_row(summary)]}
+
+
+def _recording_row(summary: dict[str, Any]) -> Row:
+    recording = summary["recording"]
+    left_out = ", ".join(f"{count} {kind}" for kind, count in recording["frames_left_out"].items())
+    return {
+        "bus": recording["channel"],
+        "duration [s]": recording["duration_s"],
+        "frames": recording["frames"],
+        "frames left out": left_out or "none",
+        "samples": summary["samples"],
+        **{count: summary[count] for count in ("lost", "corrupt", "late", "restarts")},
+        "repeated frames": recording["repeated"],
+        "damaged lines": recording["damaged_lines"],
+        "gaps": recording["gaps"],
+        "longest gap [s]": recording["longest_gap_s"],
+        "mean NIS [1]": summary["nis"]["mean"],
+    }

@@ -1,0 +1,265 @@
+"""`lever tune`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import LeverError
+from ..tables import Row, Tables, add_json_option
+
+if TYPE_CHECKING:
+    from ..firmware.settings_file import Assignments
+    from ..tune.calibration import Calibrated, Calibration
+    from ..tune.likelihood import Likelihood
+    from ..tune.recording import Recording
+    from ..tune.search import Found
+    from ..tune.validation import Fit
+
+_DESCRIPTION = """\
+Finds settings of the estimator from a recorded log: measurement noise (theta_noise, theta_dot_noise), process noise
+(theta_dot_process_noise), the walk of the parameters and how it adapts. They are those under which the log is most
+likely: the firmware's own filter runs through it some hundred times, and the density of its innovations is maximised.
+
+With dither in the log (a motor torque of 0.05 N m rms or more) it first finds the calibration: gain and delay of the
+accelerometer (z_ddot_gain, z_ddot_delay) and Coulomb friction of the lever (lever_friction), each with its standard
+deviation (_sigma). Two minutes with 0.3 N m of dither and 0.1 g of vibration give them within 1 %, 0.3 ms and 0.03 N m.
+Without dither they cannot be known. tau_m_gain never can: measure it.
+
+Noise, walks and adaptation are changed only where the log contradicts them (95 % likelihood interval). The last part of
+the log is held out: the search never sees it, and before and after are compared on it. Noise that the firmware
+estimates while running (noise_window) is off during the search, and on again when it is judged.
+
+What is printed: the settings with units (sigma: standard deviation), and for both parts, before and after,
+  lnL     log-likelihood per sample of angle [rad] and rate [rad/s], given all before [nat]; more is better
+  NIS     normalised innovation squared per output [1]: 1 where the filter is as certain as it may be, more: too certain
+  corr.   largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
+"""
+_EPILOG = """\
+examples:
+  lever sim steady --out out/steady                        a log, out/steady/bus.log
+  lever tune out/steady/bus.log -o my.settings
+  lever sim sudden_grip --settings my.settings             the same file is for `lever replay`, for lever_can, and as
+                                                           -D LEVER_SETTINGS_FILE=my.settings for building firmware
+  lever tune flight.log --settings old.settings --start 60 --length 120 --page tune.html
+  lever tune flight.log --set model=linear_physical --keep theta_noise
+
+Exit status: 0, or 1 when the new settings do clearly worse on the part held out; then no settings are written.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "tune", help="settings from a log, by maximum likelihood", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    parser.add_argument("log", nargs="+", metavar="LOG", help="recorded log, of any format that `lever replay` reads")
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="write the settings file here")
+    parser.add_argument("--page", metavar="FILE", type=Path, help="write before and after as a page for a browser")
+    parser.add_argument("--settings", metavar="FILE", help="start from a settings file (default: the firmware's)")
+    parser.add_argument(
+        "--set", metavar="NAME=VALUE", action="append", default=[], help="and from this value; may be repeated"
+    )
+    parser.add_argument(
+        "--keep", metavar="NAME", action="append", default=[], help="a setting that is not touched; may be repeated"
+    )
+    parser.add_argument(
+        "--channel", metavar="NAME", help="the bus with the samples (default: the only one that has any)"
+    )
+    parser.add_argument("--start", metavar="S", type=float, default=0.0, help="first second used (default: 0)")
+    parser.add_argument("--length", metavar="S", type=float, default=600.0, help="seconds used (default: %(default)g)")
+    parser.add_argument(
+        "--held-out",
+        metavar="SHARE",
+        type=float,
+        default=0.3,
+        help="share of it, at its end, that is not tuned on (default: %(default)g; 0: all is tuned on)",
+    )
+    add_json_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..progress import Progress
+    from ..tune import validation
+    from ..tune.calibration import calibrate
+    from ..tune.likelihood import Likelihood
+    from ..tune.recording import read
+    from ..tune.search import Search, groups
+
+    before = _settings(args)
+    with Progress("tune") as progress:
+        recording = read(args.log, args.channel, args.start, args.length, progress.show)
+        before = _as_recorded(before, recording)
+        likelihood = Likelihood(recording, args.held_out)
+        calibration = calibrate(likelihood, before, args.keep, progress.show)
+        calibrated = {**before, **calibration.assignments}
+        search = Search(likelihood, calibrated, progress.show)
+        if not search.can_learn:
+            _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
+        found = search.run(groups(calibrated, args.keep))
+        after = {**calibrated, **{entry.name: entry.after for entry in found if entry.after != entry.before}}
+        fits = validation.fits(likelihood, before, after)
+    return _conclude(args, likelihood, before, after, calibration, found, fits)
+
+
+def _settings(args: argparse.Namespace) -> Assignments:
+    """What to start from. Raises LeverError for that and for every other argument that is wrong."""
+    from ..firmware.config import setting
+    from ..firmware.settings_file import make_config, parse_assignment, read_assignments
+
+    if not 0.0 <= args.held_out <= 0.8:
+        raise LeverError(f"--held-out {args.held_out:g}: must be from 0 to 0.8")
+    for path in (args.output, args.page):  # before a search whose result could then not be kept
+        if path is not None and not path.parent.is_dir():
+            raise LeverError(f"cannot write {path}: there is no folder {path.parent}")
+    if args.start < 0.0 or not args.length > 0.0:
+        raise LeverError(f"--start {args.start:g} --length {args.length:g}: seconds, and length must be more than 0")
+    assignments = read_assignments(args.settings) if args.settings is not None else {}
+    assignments |= dict(parse_assignment(text) for text in args.set)
+    make_config(assignments)
+    for name in args.keep:
+        setting(name)
+    return assignments
+
+
+def _as_recorded(assignments: Assignments, recording: Recording) -> Assignments:
+    """With what the log chooses that was not chosen here, and with its sample_period."""
+    from ..firmware.config import Config
+    from ..firmware.settings_file import make_config
+
+    usual = Config().choices
+    chosen = {
+        name: value for name, value in recording.choices.items() if value != usual[name] and name not in assignments
+    }
+    for name, value in chosen.items():
+        _note(f"by COMMAND in the log, {name} is {value}")
+    assignments = {**chosen, **assignments}
+    set_to = make_config(assignments).settings["sample_period"]
+    if abs(recording.period - set_to) <= 0.1 * set_to:
+        return assignments
+    _note(
+        f"the log has a sample each {1e3 * recording.period:g} ms: sample_period becomes that (was {1e3 * set_to:g} ms)"
+    )
+    found = {**assignments, "sample_period": recording.period}
+    make_config(found)
+    return found
+
+
+def _note(text: str) -> None:
+    print(f"lever: tune: {text}", file=sys.stderr)
+
+
+# --- what comes out ---------------------------------------------------------------------------------------------------
+
+
+def _conclude(
+    args: argparse.Namespace,
+    likelihood: Likelihood,
+    before: Assignments,
+    after: Assignments,
+    calibration: Calibration,
+    found: Sequence[Found],
+    fits: Sequence[Fit],
+) -> int:
+    """Prints and writes everything; the exit status."""
+    from ..files import write_text
+    from ..tables import print_tables
+    from ..tune import validation
+
+    tables: Tables = {"settings": [_setting_row(entry) for entry in found], "before and after": _fit_rows(fits)}
+    if calibration.found:
+        tables = {"calibration": [_calibration_row(entry) for entry in calibration.found], **tables}
+    changed = sum(entry.after != entry.before for entry in found) + len(calibration.assignments)
+    told = validation.verdict(fits, changed)
+    print_tables(tables, args.json)
+    print(f"{_subtitle(args, likelihood)} {told} {calibration.words}".rstrip())
+    if args.page is not None:
+        from ..tune.tune_page import build
+
+        write_text(args.page, build(_subtitle(args, likelihood), told, tables, calibration.words, found, fits))
+    if validation.is_worse(fits):
+        _note("the new settings do worse on the part held out, so the log changes on the way: no settings are written")
+        return 1
+    if args.output is not None:
+        write_text(args.output, _file(args, f"{told} {calibration.words}", before, after))
+    written = [str(path) for path in (args.output, args.page) if path is not None]
+    if written:
+        print(f"Written: {', '.join(written)}")
+    return 0
+
+
+def _subtitle(args: argparse.Namespace, likelihood: Likelihood) -> str:
+    recording = likelihood.recording
+    tuned, held = (float(part.sum()) * recording.period for part in (likelihood.tuned_on, likelihood.judged_by))
+    wrong = {name: getattr(recording.health, name) for name in ("lost", "corrupt", "late")}
+    counts = ", ".join(f"{count} {name}" for name, count in wrong.items() if count)
+    return (
+        f"{', '.join(Path(log).name for log in args.log)}, {recording.bus}: tuned on {tuned:.0f} s, judged by the "
+        f"{held:.0f} s after it{f' ({counts})' if counts else ''}; {likelihood.runs} runs of the filter."
+    )
+
+
+def _setting_row(entry: Found) -> Row:
+    from ..firmware.config import setting
+
+    return {
+        "name": entry.name,
+        "unit": setting(entry.name).unit,
+        "before": entry.before,
+        "after": entry.after,
+        "most likely": entry.best,
+        "95 % from": entry.low,
+        "to": entry.high,
+        "verdict": entry.verdict,
+    }
+
+
+def _calibration_row(entry: Calibrated) -> Row:
+    from ..firmware.config import setting
+
+    return {
+        "name": entry.name,
+        "unit": setting(entry.name).unit,
+        "before": entry.before,
+        "sigma before": entry.sigma_before,
+        "after": entry.after,
+        "sigma after": entry.sigma_after,
+        "most likely": entry.best,
+        "its sigma": entry.sigma,
+        "verdict": entry.verdict,
+    }
+
+
+def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
+    """A row for each part of the log and way to have the noise."""
+    from ..tune import validation
+
+    rows: list[Row] = []
+    for before, after in validation.pairs(fits):
+        gained = validation.gain(before, after)
+        seen = {"before": before, "after": after}
+        rows.append(
+            {
+                "part": before.part,
+                "noise": before.noise,
+                **{f"lnL {when} [nat]": round(fit.log_likelihood, 4) for when, fit in seen.items()},
+                "gain [nat]": round(gained.mean, 4),
+                "± [nat]": round(gained.error, 4),
+                **{f"NIS {when}": round(fit.nis, 3) for when, fit in seen.items()},
+                **{f"corr. {when}": fit.largest_correlation for when, fit in seen.items()},
+            }
+        )
+    return rows
+
+
+def _file(args: argparse.Namespace, told: str, before: Assignments, after: Assignments) -> str:
+    """The settings file: what it was made of, and all that is not left to the firmware's defaults."""
+    from ..firmware.settings_file import format_assignments, make_config
+
+    was = make_config(before).settings
+    notes = {name: f"was {was[name]:g}" for name in after if name in was and after[name] != was[name]}
+    lines = (line for part in (f"lever tune {' '.join(args.log)}", told) for line in textwrap.wrap(part, 110))
+    return "".join(f"# {line}\n" for line in lines) + format_assignments(after, notes)

@@ -1,0 +1,158 @@
+"""`lever monitor` and `lever live`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any
+
+from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options
+from ..errors import LeverError
+
+if TYPE_CHECKING:
+    from ..firmware.config import Config
+    from ..watch.sources import Source
+
+_MONITOR = """\
+Shows the estimator on a CAN bus in the terminal, ten times a second: its parameters with standard deviation and trend,
+natural frequency and damping ratio, mode and faults in words, and of each message the rate and what was lost or corrupt
+by its E2E counter and CRC. It listens and sends nothing, and receives in a thread of its own, so that the bus never
+waits for the terminal. Works over ssh and from 80 by 24 characters on.
+
+Instead of a bus, LOG is played at the pace it was recorded at, or the pilot of --scenario is simulated in real time.
+"""
+_MONITOR_EPILOG = """\
+keys: q quits, space holds the picture, t changes the time span of the trends, f shows or hides the feedthrough (shown
+from 32 lines on), c clears the counts
+
+examples:
+  lever monitor --interface socketcan --channel can0
+  lever monitor --interface slcan --channel /dev/ttyACM0
+  lever monitor --scenario demo
+  lever monitor session.log
+  lever monitor session.log --once                   the picture at the end of the log, as text
+  lever monitor --interface socketcan --channel can0 --once --duration 5
+"""
+_LIVE = """\
+Serves a web page that shows the estimator while it runs: the Bode diagram of its model as it changes, the parameters
+with their bands over time, health and message rates, and controls to run, freeze and reset it, to shake it with dither
+and to choose its model. The page comes from this computer alone, and works on a phone as well.
+
+Only this computer can open it unless --host says otherwise. There is no password: who can reach the port can send
+COMMAND frames (E2E protects against faults, not people), so give --read-only with --host, or use a tunnel:
+  ssh -L 8642:localhost:8642 THE_OTHER_COMPUTER
+"""
+_LIVE_EPILOG = """\
+examples:
+  lever live --scenario demo                         then open http://127.0.0.1:8642/
+  lever live --interface socketcan --channel can0 --read-only
+  lever live session.log --port 0                    any free port
+
+Ctrl-C ends it.
+"""
+PORT = 8642
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    monitor = subparsers.add_parser(
+        "monitor", help="watch the estimator in the terminal", description=_MONITOR, epilog=_MONITOR_EPILOG
+    )
+    _add_source(monitor)
+    monitor.add_argument("--once", action="store_true", help="print one picture as plain text and end")
+    monitor.add_argument(
+        "--duration",
+        metavar="SECONDS",
+        type=_seconds,
+        help="end after so long (default: never; with --once: listen for 2 s)",
+    )
+    monitor.set_defaults(run=run_monitor)
+    live = subparsers.add_parser(
+        "live", help="watch and control the estimator in a browser", description=_LIVE, epilog=_LIVE_EPILOG
+    )
+    _add_source(live)
+    live.add_argument("--settings", metavar="FILE", help="the estimator's settings file, for the lever's geometry")
+    live.add_argument("--host", default="127.0.0.1", help="address to listen at (default: %(default)s, this computer)")
+    live.add_argument("--port", type=_port, default=PORT, help="default: %(default)s; 0 takes any that is free")
+    live.add_argument("--read-only", action="store_true", help="without controls: no frame is ever sent")
+    live.add_argument("--duration", metavar="SECONDS", type=_seconds, help="end after so long (default: never)")
+    live.set_defaults(run=run_live)
+
+
+def _add_source(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "log",
+        nargs="?",
+        metavar="LOG",
+        help="a recorded log that python-can reads; with --channel, only that one's frames",
+    )
+    parser.add_argument("--scenario", metavar="NAME", help="simulate a scenario of `lever sim --list` or a .toml file")
+    add_bus_options(parser)
+
+
+def run_monitor(args: argparse.Namespace) -> int:
+    """`lever monitor`."""
+    if not args.once and not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise LeverError("this is not a terminal: `lever monitor --once` prints one picture as text")
+    source = _source(args)[0]
+
+    from ..watch.terminal import Monitor, print_once
+
+    if args.once:
+        print_once(source, 2.0 if args.duration is None else args.duration)
+    else:
+        Monitor(source, args.duration).run()
+    if source.error is not None:
+        raise LeverError(source.error)
+    return 0
+
+
+def run_live(args: argparse.Namespace) -> int:
+    """`lever live`."""
+    source, config = _source(args)
+
+    from ..watch.server import serve
+
+    serve(source, config, host=args.host, port=args.port, read_only=args.read_only, duration=args.duration)
+    return 0
+
+
+def _source(args: argparse.Namespace) -> tuple[Source, Config]:
+    """What is to be watched, and the configuration of the estimator as far as it is known here."""
+    from ..firmware.config import Config
+
+    given = [name for name in ("log", "scenario", "interface") if getattr(args, name) is not None]
+    if len(given) != 1:
+        what = "nothing to watch" if not given else f"{' and '.join(given)} at once"
+        raise LeverError(f"{what}: give a LOG, --scenario NAME, or --interface and --channel of a bus, one of them")
+    settings = getattr(args, "settings", None)
+    if args.scenario is not None:
+        from ..watch.sources import simulated
+
+        if settings is not None:
+            raise LeverError("--settings goes with a bus or a log; a scenario has its own settings")
+        return simulated(args.scenario)
+
+    from ..firmware.settings_file import make_config, read_assignments
+    from ..watch.sources import BusSource, LogSource
+
+    config = Config() if settings is None else make_config(read_assignments(settings))
+    if args.log is not None:
+        return LogSource(args.log, args.channel), config
+    check_others_can_be_heard(args.interface)
+    return BusSource(args.interface, args.channel, chosen_options(args)), config
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < 1e9:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return value
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port from 0 to 65535")
+    return int(text)

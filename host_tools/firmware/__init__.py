@@ -1,0 +1,1 @@
+"""The firmware in this process: its library, configuration, instances and innovations, without CAN."""

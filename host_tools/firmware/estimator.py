@@ -1,0 +1,252 @@
+"""One estimator without CAN hardware: samples or frames in, estimates or frames out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..errors import LeverError
+from .config import CHOICES, Config, choice_value
+from .library import enum_names, ffi, lib, struct_dtype
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+FRAME_SAMPLE: int = lib.LEVER_FRAME_SAMPLE
+"""What on_frame() returns when a sample is complete: call step() now."""
+
+FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
+"""What FEEDTHROUGH is sent for on the bus, one after the other [Hz]."""
+
+SAMPLE_VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
+"""What a sample may hold besides its time, each with a flag: lever_sample_t."""
+
+_MODES = enum_names("lever_mode")
+
+
+class Estimate(NamedTuple):
+    """lever_estimate_t: the estimate after the last sample; _sigma: standard deviation, in the unit of its value."""
+
+    time_us: int
+    """Time of the sample [µs], wraps at 2**32."""
+    theta: float
+    """Lever angle [rad]."""
+    theta_sigma: float
+    theta_dot: float
+    """Lever rate [rad/s]."""
+    theta_dot_sigma: float
+    parameter: tuple[float, float, float]
+    """Of the model: name and unit of each are in model_parameters(model)."""
+    parameter_sigma: tuple[float, float, float]
+    parameter_correlation: tuple[float, float, float]
+    """Of their errors [1]: first and second, first and third, second and third."""
+    natural_frequency: float
+    """Undamped, of arm and lever about the trim [Hz]."""
+    natural_frequency_sigma: float
+    damping_ratio: float
+    """[1]"""
+    damping_ratio_sigma: float
+    trim: float
+    """Angle about which the dynamics are linearised [rad]."""
+    nis: float
+    """Normalised innovation squared [1], chi-square with nis_size degrees of freedom; 0 without measurement."""
+    nis_size: int
+
+
+class Feedthrough(NamedTuple):
+    """lever_feedthrough_t: θ/z̈ of the estimated model at one frequency, and how sure it is."""
+
+    response: complex
+    """[rad/(m/s²)]"""
+    gain_sigma: float
+    """Standard deviation of the gain, relative to it [1]: of the error along the phasor."""
+    phase_sigma: float
+    """Standard deviation of the phase [rad]: of the error across the phasor."""
+    correlation: float
+    """Of the errors of gain and phase [1]."""
+
+
+class Health(NamedTuple):
+    """lever_health_t: mode, faults at the last sample, and counts since the start."""
+
+    mode: str
+    """A name of enum_names("lever_mode")."""
+    faults: tuple[str, ...]
+    """Names of enum_names("lever_fault")."""
+    samples: int
+    lost: int
+    corrupt: int
+    late: int
+    recoveries: int
+    excitation: float
+    """rms of theta_dot [rad/s]."""
+    torque: float
+    """What the torque gate asks of the motor until the next sample [N m]."""
+    gate_open: bool
+    """Whether torque may be other than zero: see lever_idle() of the façade."""
+
+
+def fault_names(faults: int) -> tuple[str, ...]:
+    """The names of the bits in a fault mask."""
+    return tuple(name for bit, name in enum_names("lever_fault").items() if faults & bit)
+
+
+def health_of(pointer: Any) -> Health:
+    """The content of a lever_health_t."""
+    values = {name: getattr(pointer, name) for name in Health._fields}
+    return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
+
+
+class Estimator:
+    """An instance of the firmware. Any number may exist; each belongs to one thread at a time."""
+
+    def __init__(self, config: Config | None = None) -> None:
+        self._memory = ffi.new("lever_memory_t *")  # holds the instance: both must live as long as this object
+        self._config = config or Config()
+        self.pointer: Any = lib.lever_init(self._memory, self._config.pointer)
+        """For calls of `lib`; valid as long as this object."""
+        if self.pointer == ffi.NULL:
+            raise LeverError("the firmware refused its configuration: Config.pointer was changed after its check")
+        self._sample = ffi.new("lever_sample_t *")
+        self._estimate = ffi.new("lever_estimate_t *")
+        self._feedthrough = ffi.new("lever_feedthrough_t *")
+        self._health = ffi.new("lever_health_t *")
+        self._received = ffi.new("lever_frame_t *")
+        self._received_data = ffi.buffer(self._received.data)
+        self._answer = ffi.new("lever_frame_t *")
+        self._answer_data = ffi.buffer(self._answer.data)
+
+    def update(
+        self,
+        time_us: int,
+        theta: float | None = None,
+        theta_dot: float | None = None,
+        tau_m: float | None = None,
+        z_ddot: float | None = None,
+        grip_force: float | None = None,
+    ) -> str:
+        """Takes a sample and returns the mode after it.
+
+        Time [µs] (wrapped to 32 bits here), lever angle [rad] and rate [rad/s], motor torque [N m], vertical
+        acceleration of the base [m/s²], force of the hand on the lever [N]; None is missing or invalid.
+        """
+        sample = self._sample
+        sample.time_us = time_us & 0xFFFFFFFF
+        for name, value in zip(SAMPLE_VALUES, (theta, theta_dot, tau_m, z_ddot, grip_force), strict=True):
+            setattr(sample, name, 0.0 if value is None else value)
+            setattr(sample, f"{name}_valid", value is not None)
+        return _MODES[lib.lever_update(self.pointer, sample)]
+
+    def command(
+        self,
+        request: str = "none",
+        *,
+        model: str | None = None,
+        preload: str | None = None,
+        estimator: str | None = None,
+        adaptation: str | None = None,
+        dither_rms: float | None = None,
+    ) -> None:
+        """Carries out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
+
+        dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque fades out a second
+        of sample time after the last command: repeat one. Raises LeverError.
+        """
+        command = ffi.new("lever_command_t *", {"dither_rms": lib.LEVER_KEEP if dither_rms is None else dither_rms})
+        command.request = choice_value("lever_request", "request", request)
+        for what, name in zip(CHOICES, (model, preload, estimator, adaptation), strict=True):
+            setattr(command, what, lib.LEVER_KEEP if name is None else choice_value(f"lever_{what}", what, name))
+        if not lib.lever_command(self.pointer, command):
+            raise LeverError(f"the firmware refused the command {request!r}, dither_rms = {dither_rms} N m")
+
+    def idle(self, elapsed_us: int) -> None:
+        """No sample came for so long [µs] since the last one, or the last call of this: ages the torque gate."""
+        lib.lever_idle(self.pointer, elapsed_us)
+
+    def estimate(self) -> Estimate:
+        """The estimate after the last sample."""
+        lib.lever_estimate(self.pointer, self._estimate)
+        values = {name: getattr(self._estimate, name) for name in Estimate._fields}
+        for name in ("parameter", "parameter_sigma", "parameter_correlation"):
+            values[name] = tuple(values[name])
+        return Estimate(**values)
+
+    def feedthrough(self, frequency: float) -> Feedthrough:
+        """Biodynamic feedthrough θ/z̈ at a frequency [Hz] after the last sample."""
+        found = self._feedthrough
+        lib.lever_feedthrough(self.pointer, frequency, found)
+        response = complex(found.real, found.imaginary)
+        return Feedthrough(response, found.gain_sigma, found.phase_sigma, found.correlation)
+
+    def health(self) -> Health:
+        """Mode, faults and counts after the last sample."""
+        lib.lever_health(self.pointer, self._health)
+        return health_of(self._health)
+
+    def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
+        """Takes a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""
+        length = len(data)
+        if length > 8:
+            raise LeverError(f"frame {identifier:#x} has {length} bytes; a classic CAN frame has at most 8")
+        received = self._received
+        received.id = identifier
+        received.length = length
+        self._received_data[0:length] = data
+        return lib.lever_on_frame(self.pointer, received)  # type: ignore[no-any-return]
+
+    def step(self) -> int:
+        """Takes the sample that on_frame() has completed; returns the mode, a key of enum_names("lever_mode")."""
+        return lib.lever_step(self.pointer)  # type: ignore[no-any-return]
+
+    def next_frame(self) -> tuple[int, bytes] | None:
+        """The next frame to send, as identifier and data; None when there is none left. Fetch them after every frame
+        taken: a COMMAND is acknowledged, sample or not."""
+        answer = self._answer
+        if not lib.lever_next_frame(self.pointer, answer):
+            return None
+        return answer.id, self._answer_data[0 : answer.length]
+
+
+def run_samples(
+    config: Config | None, samples: Mapping[str, NDArray[Any]], at: NDArray[np.int64] | None = None
+) -> dict[str, NDArray[Any]]:
+    """Feeds N samples to a fresh estimator and returns what it says after each, or after those with the indices `at`.
+
+    samples: arrays of N: time_us (whole numbers, wrapped here), theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot
+    [m/s²], grip_force [N]; bool arrays theta_valid … may say what is valid, without them what is not NaN is. One that
+    is missing is never valid. Returned: each field of lever_estimate_t in single precision (N by 3 for parameter,
+    parameter_sigma, parameter_correlation), mode and faults as the numbers of the façade's enums, and how often the
+    filter was restarted so far (recoveries).
+    """
+    import numpy as np
+
+    estimator = Estimator(config)
+    count = len(samples["time_us"])
+    taken = np.zeros(count, struct_dtype("lever_sample_t"))
+    taken["time_us"] = np.asarray(samples["time_us"]).astype(np.int64)  # to 32 bits: wraps
+    for name in SAMPLE_VALUES:
+        if name in samples:
+            taken[name] = samples[name]
+            taken[f"{name}_valid"] = samples.get(f"{name}_valid", ~np.isnan(samples[name]))
+    unknown = set(samples) - set(taken.dtype.names or ())
+    if unknown:
+        raise LeverError(f"unknown columns of samples: {', '.join(sorted(unknown))}")
+    asked = np.arange(count) if at is None else np.asarray(at)
+    if (len(asked) and not 0 <= asked[0] <= asked[-1] < count) or (np.diff(asked) <= 0).any():
+        raise LeverError(f"at: the indices must rise from 0 to at most {count - 1}")
+    estimates = np.zeros(len(asked), struct_dtype("lever_estimate_t"))
+    healths = np.zeros(len(asked), struct_dtype("lever_health_t"))
+    lever = estimator.pointer
+    sample = ffi.from_buffer("lever_sample_t[]", taken)
+    estimate = ffi.from_buffer("lever_estimate_t[]", estimates)
+    health = ffi.from_buffer("lever_health_t[]", healths)
+    index = 0
+    for row, last in enumerate(asked.tolist()):
+        while index <= last:
+            lib.lever_update(lever, sample + index)
+            index += 1
+        lib.lever_estimate(lever, estimate + row)
+        lib.lever_health(lever, health + row)
+    columns = {name: estimates[name].copy() for name in estimates.dtype.names or ()}
+    return columns | {name: healths[name].copy() for name in ("mode", "faults", "recoveries")}

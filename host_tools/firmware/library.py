@@ -1,0 +1,72 @@
+"""The firmware's shared library through cffi: `ffi` and `lib` are the façade firmware/lever_cdkf.h, their manual.
+
+Importing takes about 50 ms (cffi reads the header); a library that is not there is a LeverError.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import cffi
+
+from ..errors import LeverError
+from ..files import native_file
+
+if TYPE_CHECKING:
+    import numpy as np
+
+_SHARED = {"darwin": "lib{}.dylib", "win32": "{}.dll"}.get(sys.platform, "lib{}.so")
+
+ffi: Any = cffi.FFI()
+
+
+def load(library: str) -> Any:
+    """The functions of a shared library; what installing has made of its header declares them. Raises LeverError."""
+    ffi.cdef(native_file(f"{library}_cdef.h").read_text(encoding="utf-8"))
+    path = native_file(_SHARED.format(library))
+    try:
+        return ffi.dlopen(str(path))
+    except OSError as error:
+        raise LeverError(f"cannot load {path}: {error}") from None
+
+
+lib = load("lever_cdkf")
+
+
+@cache
+def enum_names(enum: str) -> dict[int, str]:
+    """Value to name of a façade enum, in lower case without prefix: enum_names("lever_mode") is {0: "init", …}.
+
+    The prefix is the enum's name, or that without its last word (LEVER_PLATFORM_CLOCK of enum lever_platform_fault).
+    """
+    elements = {value: name.lower() for value, name in ffi.typeof(f"enum {enum}").elements.items()}
+    prefix = enum if all(name.startswith(f"{enum}_") for name in elements.values()) else enum.rpartition("_")[0]
+    names = {value: name.removeprefix(f"{prefix}_") for value, name in sorted(elements.items())}
+    return {value: name for value, name in names.items() if name != "count"}
+
+
+def struct_dtype(ctype: str) -> np.dtype[Any]:
+    """The numpy dtype of a struct, padding included."""
+    import numpy as np
+
+    struct = ffi.typeof(ctype)
+    names, formats, offsets = [], [], []
+    for name, field in struct.fields:
+        shape: tuple[int, ...] = ()
+        kind = field.type
+        while kind.kind == "array":
+            shape, kind = (*shape, kind.length), kind.item
+        names.append(name)
+        formats.append((_scalar(kind), shape) if shape else _scalar(kind))
+        offsets.append(field.offset)
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": ffi.sizeof(struct)})
+
+
+def _scalar(kind: Any) -> str:
+    """numpy's name of a number or enum."""
+    if kind.cname == "_Bool":
+        return "bool"
+    letter = "f" if kind.cname in ("float", "double") else "i" if kind.cname.startswith("int") else "u"
+    return f"{letter}{ffi.sizeof(kind)}"

@@ -1,0 +1,1 @@
+"""The estimator's models in float64, and transfer functions."""

@@ -1,0 +1,112 @@
+"""Estimates that a recording already holds, of an estimator that ran when it was made, against those of the replay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..firmware.quantities import DYNAMICS, quantities, recorded_name
+from ..results.summary import Difference
+from ..results.trace import ESTIMATED, Trace
+
+
+@dataclass(frozen=True)
+class _Signal:
+    name: str
+    unit: str
+    column: str
+    sigma: str | None
+
+
+def signals(model: str) -> list[_Signal]:
+    """What is compared: states, NIS, and each quantity with its standard deviation."""
+    units = {"theta": "rad", "theta_dot": "rad/s", "nis": "1"}
+    found = [_Signal(field, units[field], column, None) for column, _, field in ESTIMATED]
+    for each in quantities(model):
+        estimate, sigma = each.column("estimate"), each.column("sigma")
+        found.append(_Signal(each.key, each.unit, estimate, sigma))
+        found.append(_Signal(f"{each.key}_sigma", each.unit, sigma, None))
+    return found
+
+
+class _Sums:
+    """Of one signal."""
+
+    def __init__(self, signal: _Signal) -> None:
+        self.signal = signal
+        self.difference = Difference(signal.unit)
+        self._sum = self._squares = self._in_sigma = 0.0
+        self._with_sigma = 0
+
+    def add(self, trace: Trace) -> None:
+        difference = trace[self.signal.column] - trace[recorded_name(self.signal.column)]
+        known = np.isfinite(difference)
+        count = int(known.sum())
+        if not count:
+            return
+        told, values = self.difference, difference[known]
+        told.samples += count
+        told.identical_samples += int(np.sum(values == 0.0))
+        self._sum += float(np.sum(values))
+        self._squares += float(values @ values)
+        farthest = int(np.argmax(np.abs(values)))
+        if told.largest is None or abs(values[farthest]) > abs(told.largest):
+            told.largest = float(values[farthest])
+            told.largest_at_s = float(trace["time_s"][known][farthest])
+        if self.signal.sigma is not None:
+            sigma = trace[self.signal.sigma][known]
+            with_sigma = sigma > 0.0
+            self._with_sigma += int(with_sigma.sum())
+            self._in_sigma += float(np.sum(np.square(values[with_sigma] / sigma[with_sigma])))
+
+    def finished(self) -> Difference:
+        told = self.difference
+        if told.samples:
+            told.bias, told.rms = self._sum / told.samples, math.sqrt(self._squares / told.samples)
+        if self._with_sigma:
+            told.rms_in_sigma = math.sqrt(self._in_sigma / self._with_sigma)
+        return told
+
+
+class Comparison:
+    """Signal by signal."""
+
+    def __init__(self, model: str) -> None:
+        self._sums = [_Sums(signal) for signal in signals(model)]
+        self._names = {quantity.key: quantity.name for quantity in DYNAMICS}
+
+    def add(self, trace: Trace) -> None:
+        """Further samples."""
+        for each in self._sums:
+            each.add(trace)
+
+    def summary(self) -> dict[str, Any] | None:
+        """For summary.json; None where the recording holds no estimates."""
+        differences = {each.signal.name: each.finished() for each in self._sums}
+        compared = [each for each in differences.values() if each.samples]
+        if not compared:
+            return None
+        identical = all(each.identical_samples == each.samples for each in compared)
+        return {
+            "identical": identical,
+            "signals": {name: asdict(each) for name, each in differences.items()},
+            "in_words": self._in_words(differences, identical),
+        }
+
+    def _in_words(self, differences: dict[str, Difference], identical: bool) -> str:
+        if identical:
+            return "The estimates that were recorded with the log are reproduced bit for bit."
+        by_sigma = {name: each for name, each in differences.items() if each.rms_in_sigma is not None}
+        if not by_sigma:
+            return "The log holds estimates too, but none of this model's parameters: only the states can be compared."
+        worst = max(by_sigma, key=lambda name: by_sigma[name].rms_in_sigma or 0.0)
+        told = by_sigma[worst]
+        unit = "" if told.unit == "1" else f" {told.unit}"
+        return (
+            f"Against the estimates that were recorded with the log, {self._names.get(worst, worst)} differs most: rms "
+            f"{told.rms_in_sigma:.2g} σ ({told.rms:.3g}{unit}), at most {abs(told.largest or 0.0):.3g}{unit} at "
+            f"{told.largest_at_s:.1f} s."
+        )

@@ -1,0 +1,235 @@
+"""A replay: the frames of a recording through the firmware, in recorded order, and its answers into what keeps them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..can import codec
+from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
+from ..can.logs import Recording
+from ..can.traffic import Traffic
+from ..files import write_text
+from ..firmware.library import enum_names
+from ..firmware.native import Config, Estimator
+from ..results.summary import SCHEMA, ReplaySummary, of
+from ..results.trace import Trace
+from .columns import Columns, model_numbers
+from .commands_in_log import Commands
+from .comparison import Comparison
+from .mf4 import Mf4
+from .outputs import SUMMARY, BusLog, Outputs, TraceCsv
+from .recorded_run import Kept, RecordedRun
+from .repeats import Repeats
+from .summary import Figures, verdict
+from .timeline import Timeline
+
+Progress = Callable[[int, int], None]
+"""Called now and then with the bytes done and the bytes in all."""
+
+_ABSOLUTE = 10**15  # [us]: recorded times from 2001 on are of a calendar
+_ROWS_AT_ONCE = 1 << 15
+
+
+class _Sink(Protocol):
+    def add(self, trace: Trace, /) -> None: ...
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a user may ask for."""
+
+    config: Config = field(default_factory=Config)
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    """Choices of `config` (model, estimator …) that no COMMAND in the log may change."""
+    channel: str | None = None
+    """The bus with the samples; by default the only one that has any."""
+
+
+def replay(
+    logs: Iterable[str | Path], options: Options, out_dir: Path | None = None, progress: Progress | None = None
+) -> dict[str, Any]:
+    """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
+    trace.csv, signals.mf4, report.html and summary.json there, all or none. Raises LeverError."""
+    traffic = Traffic(Recording(logs), options.channel)
+    with ExitStack() as stack:
+        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir))
+        made = _Replay(traffic, options, outputs)
+        made.run(progress)
+        summary = made.summary()
+        if outputs is not None:
+            made.finish(outputs, summary)
+        return summary
+
+
+class _Replay:
+    """The parts, joined."""
+
+    def __init__(self, traffic: Traffic, options: Options, outputs: Outputs | None) -> None:
+        self._traffic, self._options, self._outputs = traffic, options, outputs
+        self._feeder = Feeder(Estimator(options.config))
+        self._commands = Commands(options.config.choices, options.chosen)
+        self._repeats = Repeats()
+        self._timeline = Timeline(options.config.settings["sample_period"])
+        self._bus_log: BusLog | None = None
+        self._csv: TraceCsv | None = None
+        self._mf4: Mf4 | None = None
+        self._columns: Columns | None = None
+        self._sinks: list[_Sink] = []
+        self._waiting: list[Rows] = []
+        self._model_number = -1
+        self._model_changes = 0
+        self._started_us = 0
+        self._recorded_contract: int | None = None
+        self._other_contract = False
+
+    def run(self, progress: Progress | None) -> None:
+        """All of the recording."""
+        recording = self._traffic.recording
+        for frames in self._traffic.chunks():
+            self._repeats.add(frames)
+            self._identify(frames)
+            for fed, rows in self._feeder.feed(self._commands.applied(frames)):
+                if self._outputs is not None:
+                    self._log(fed, self._outputs)
+                self._take(rows)
+            if progress is not None:
+                progress(recording.done, recording.size)
+        self._take(self._feeder.flush(), last=True)
+
+    def _identify(self, frames: Frames) -> None:
+        """Which contract the recorded estimator speaks, by its first IDENTITY that says so."""
+        if self._recorded_contract is None:
+            data = frames["data"][frames["id"] == codec.message("IDENTITY").frame_id]
+            said = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
+            self._recorded_contract = next((int(number) for number in said[np.isfinite(said)]), None)
+
+    def _log(self, fed: Frames, outputs: Outputs) -> None:
+        if self._bus_log is None:
+            self._bus_log = BusLog(outputs.path("bus.log"), self._traffic.channel or "")
+        self._bus_log.add(fed)
+
+    def _take(self, rows: Rows, last: bool = False) -> None:
+        """Gathers rows, so that what is done with columns pays."""
+        self._waiting.append(rows)
+        if last or sum(map(len, self._waiting)) >= _ROWS_AT_ONCE:
+            gathered = np.concatenate(self._waiting)
+            self._waiting.clear()
+            if len(gathered):
+                self._use(gathered)
+
+    def _use(self, rows: Rows) -> None:
+        if self._columns is None:
+            self._columns = self._start(rows)
+        for _, number in model_numbers(rows):
+            if number != self._model_number:
+                self._model_changes += 1
+                self._model_number = number
+        trace = self._columns.of(rows)
+        for sink in self._sinks:
+            sink.add(trace)
+        if self._csv is not None:
+            self._csv.add(trace, self._columns.held(rows))
+        if self._mf4 is not None:
+            published = (rows["fresh"] >> SLOTS["PILOT_PARAMETERS"]) & 1 != 0
+            recorded = (rows["fresh"] >> RECORDED["PILOT_PARAMETERS"]) & 1 != 0
+            self._mf4.add(trace, published, recorded)
+
+    def _start(self, rows: Rows) -> Columns:
+        """Everything that has to know the model."""
+        self._model_number = next((number for _, number in model_numbers(rows)), 0)
+        self.model = enum_names("lever_model")[self._model_number]
+        there = bool(np.any(rows["known"] >> min(RECORDED.values())))
+        with_recorded = there and self._recorded_contract == codec.contract()
+        self._other_contract = there and not with_recorded
+        self._started_us = int(rows["time_us"][0])
+        self.figures = Figures(self._options.config, self.model)
+        self.kept = Kept(self._options.config.settings["sample_period"])
+        self._sinks = [self.figures]
+        self._comparison = Comparison(self.model) if with_recorded else None
+        if self._comparison is not None:
+            self._sinks.append(self._comparison)
+        if self._outputs is not None:
+            self._sinks.append(self.kept)
+            self._csv = TraceCsv(self._outputs.path("trace.csv"))
+            self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
+        return Columns(self._timeline, self.model, with_recorded)
+
+    # --- what comes of it ---------------------------------------------------------------------------------------------
+
+    def summary(self) -> dict[str, Any]:
+        """The content of summary.json."""
+        compared = None if self._comparison is None else self._comparison.summary()
+        choices = self._commands.choices | {"model": self.model}
+        summary: dict[str, Any] = {
+            "schema": SCHEMA,
+            "recording": self._recording(),
+            "estimator": {**choices, "settings": self._options.config.settings},
+            "samples": self._timeline.clocks.samples,
+            **self.figures.summary(),
+            "comparison": compared,
+        }
+        summary["passed"] = "fault" not in summary["modes_s"]
+        summary["verdict"] = verdict(summary)
+        return summary
+
+    def _recording(self) -> dict[str, Any]:
+        traffic, clocks = self._traffic, self._timeline.clocks
+        recording = traffic.recording
+        first, last = traffic.first_us, traffic.last_us
+        return {
+            "logs": [Path(path).name for path in recording.paths],
+            "channel": traffic.channel,
+            "start": _calendar(first) if first >= _ABSOLUTE else None,
+            "duration_s": (last - first) * 1e-6,
+            "frames": traffic.frames,
+            "frames_left_out": {kind: count for kind, count in traffic.others.items() if count},
+            "corrupt_recorded_answers": traffic.corrupt_answers,
+            "answers_of_other_contract": self._other_contract,
+            "misplaced_answers": 0 if self._columns is None else self._columns.misplaced,
+            "damaged_lines": recording.damaged,
+            "ends_early": [_without_folder(reason) for reason in recording.ends_early],
+            "refused": self._feeder.refused,
+            "repeated": self._repeats.count,
+            "commands": self._commands.count,
+            "commands_changed": self._commands.changed,
+            "model_changes": self._model_changes,
+            "other_buses_with_samples": sorted(traffic.other_samples),
+            "typical_step_s": self._timeline.typical_step_us * 1e-6,
+            "gaps": clocks.gaps,
+            "longest_gap_s": clocks.longest_gap_s,
+            "late_samples": clocks.late,
+            "clock_wraps": clocks.wraps,
+            "clock_restarts": clocks.restarts,
+            "recorder_clock_jumps": clocks.recorder_jumps,
+        }
+
+    def finish(self, outputs: Outputs, summary: dict[str, Any]) -> None:
+        """Completes the files and puts them into place."""
+        from ..report import write_page
+
+        for part in (self._bus_log, self._csv, self._mf4):
+            if part is not None:
+                part.close()
+        write_page(RecordedRun(self.kept, of(ReplaySummary, summary)), outputs.path("report.html"))
+        text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
+        write_text(outputs.path(SUMMARY), text + "\n")
+        outputs.finish()
+
+
+def _calendar(time_us: int) -> str:
+    moment = datetime.fromtimestamp(time_us // 1_000_000, tz=timezone.utc)
+    return moment.strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+def _without_folder(reason: str) -> str:
+    """A reason that begins with the path of a log: the same wherever that is."""
+    path, colon, rest = reason.partition(": ")
+    return f"{Path(path).name}{colon}{rest}"

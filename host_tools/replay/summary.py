@@ -1,0 +1,121 @@
+"""What a replay comes to: the figures of all samples, and a verdict in words. There is no truth to judge by."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ..can.fields import COUNTS
+from ..firmware.native import Config, enum_names
+from ..firmware.quantities import quantities
+from ..results import nis, whiteness
+from ..results.nis import Innovations, freedom
+from ..results.trace import CONVERGED_AFTER, Trace
+from .reduction import Groups
+
+
+class Figures:
+    """Sums over the samples as they come."""
+
+    def __init__(self, config: Config, model: str) -> None:
+        self._period = config.settings["sample_period"]
+        self._quantities = quantities(model)
+        self._innovations = Innovations()
+        size = whiteness.average_size(self._period)
+        self._residuals = Groups(size, lambda values: (whiteness.averages(values, size),))
+        self._average_s = size * self._period
+        self._modes: dict[int, int] = {}
+        self._last: dict[str, float] = {}
+        self._extremes: dict[str, tuple[float, float]] = {}
+
+    def add(self, trace: Trace) -> None:
+        """Further samples."""
+        judged = trace["time_s"] >= CONVERGED_AFTER
+        outputs = freedom(trace["theta_measured_rad"], trace["theta_dot_measured_rad_s"])
+        self._innovations.add(trace["nis"][judged], outputs[judged])
+        residual = whiteness.residual(trace)
+        assert residual is not None
+        self._residuals.add(np.where(judged, residual, np.nan))
+        modes, counts = np.unique(trace["mode"][np.isfinite(trace["mode"])], return_counts=True)
+        for mode, count in zip(modes.tolist(), counts.tolist(), strict=True):
+            self._modes[int(mode)] = self._modes.get(int(mode), 0) + count
+        columns = [each.column(kind) for each in self._quantities for kind in ("estimate", "sigma")]
+        for name in (*columns, *COUNTS):
+            known = trace[name][np.isfinite(trace[name])]
+            if len(known):
+                self._last[name] = float(known[-1])
+                least, greatest = self._extremes.get(name, (np.inf, -np.inf))
+                self._extremes[name] = min(least, float(known.min())), max(greatest, float(known.max()))
+
+    def estimates(self) -> dict[str, dict[str, Any]]:
+        """The last estimate of each quantity with its standard deviation, and between what it was."""
+        told = {}
+        for each in self._quantities:
+            least, greatest = self._extremes.get(each.column("estimate"), (None, None))
+            told[each.key] = {
+                "unit": each.unit,
+                "last": self._last.get(each.column("estimate")),
+                "last_sigma": self._last.get(each.column("sigma")),
+                "least": least,
+                "greatest": greatest,
+            }
+        return told
+
+    def summary(self) -> dict[str, Any]:
+        """The part of summary.json that is about all samples."""
+        residuals = self._residuals.all()
+        measured = None if residuals is None else whiteness.of_averages(residuals[0], self._average_s)
+        names = enum_names("lever_mode")
+        return {
+            "estimates": self.estimates(),
+            "nis": asdict(self._innovations.figures()),
+            "whiteness": None if measured is None else asdict(measured),
+            **{count: int(self._last.get(count, 0)) for count in COUNTS},
+            "modes_s": {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())},
+        }
+
+
+def verdict(summary: dict[str, Any]) -> str:
+    """The replay in a few sentences."""
+    measured = summary["whiteness"]
+    sentences = [
+        *_troubles(summary),
+        _comparison(summary["comparison"]),
+        nis.verdict(nis.Nis(**summary["nis"])),
+        whiteness.verdict(whiteness.Whiteness(**measured) if measured else None),
+    ]
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _comparison(told: dict[str, Any] | None) -> str:
+    return "" if told is None else str(told["in_words"])
+
+
+def _troubles(summary: dict[str, Any]) -> list[str]:
+    """What the reader has to know before believing the rest."""
+    told, recording = [], summary["recording"]
+    if "fault" in summary["modes_s"]:
+        told.append(f"Trouble: the estimator was in fault for {summary['modes_s']['fault']:g} s.")
+    if recording["ends_early"]:
+        told.append(f"The log is not whole: {'; '.join(recording['ends_early'])}.")
+    if recording["damaged_lines"]:
+        told.append(f"{recording['damaged_lines']} of its lines are no frames.")
+    if recording["gaps"]:
+        gaps, longest = recording["gaps"], recording["longest_gap_s"]
+        told.append(f"Samples are missing in {gaps} places, the longest gap {longest:.3g} s.")
+    if recording["clock_restarts"]:
+        told.append(f"The sender's clock started over {recording['clock_restarts']} times.")
+    if recording["model_changes"]:
+        told.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
+    if recording["answers_of_other_contract"]:
+        told.append(
+            "The estimates in the log are of another contract, or none that it tells (IDENTITY): they are not compared."
+        )
+    if recording["misplaced_answers"]:
+        told.append(f"{recording['misplaced_answers']} recorded estimates do not belong to the sample before them.")
+    step, period = recording["typical_step_s"], summary["estimator"]["settings"]["sample_period"]
+    if step and not 0.7 < step / period < 1.4:
+        told.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
+    return told

@@ -1,0 +1,38 @@
+"""The report of a run: one self-contained, interactive HTML page for somebody who has never seen the project.
+
+`write_report` is all that others need. Inside: `run` reads the trace, `charts` turn it into figures (plain plotly.js
+JSON, so plotly's Python classes are never loaded), `summary_html` makes verdict and tables, `models` says what is
+special in the estimator's model and in the truth, `page` puts it together with page.html, page.css, page.js and
+plotly.js from the plotly package.
+
+The picture of a result for a README is the top of this page: see picture.py.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from ..files import write_text
+
+if TYPE_CHECKING:
+    from ..results.summary import Summary
+    from .run import Run
+
+
+def write_report(trace: Mapping[str, NDArray[Any]], summary: Summary | None, path: str | os.PathLike[str]) -> None:
+    """Writes the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
+    of summary.json, where there is one. Raises LeverError when `path` cannot be written."""
+    from .run import Run  # here, so that importing this package stays quick
+
+    write_page(Run(trace, summary), path)
+
+
+def write_page(run: Run, path: str | os.PathLike[str]) -> None:
+    """write_report() of a run that may have kept less than a whole trace."""
+    from .page import build
+
+    write_text(path, build(run))

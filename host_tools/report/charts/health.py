@@ -1,0 +1,91 @@
+"""What the estimator says of itself: its mode, the faults it sees, and what the bus lost."""
+
+import numpy as np
+
+from ...arrays import Array
+from ...firmware import native
+from ..figure import Figure, Spec, axis, line, time_axis
+from ..run import Run
+from ..series import runs, spread_indices
+
+COUNTS = ("lost", "corrupt", "late")
+LANE_POINTS = 1500  # how finely the bars are drawn
+LEAST_SHARE = 0.002  # of the whole time: no bar is drawn shorter, or it could not be seen
+COUNT_COLOURS = {"lost": "estimate", "corrupt": "torque", "late": "base"}
+
+# In words for the page; the bits and their exact meaning are enum lever_fault of firmware/lever_cdkf.h.
+FAULT_WORDS = {
+    "theta": "angle missing",
+    "theta_dot": "rate missing",
+    "torque": "torque missing",
+    "base": "base acceleration missing",
+    "gap": "samples missing",
+    "communication": "frame corrupt or out of order",
+    "innovation": "surprised by measurements",
+    "excitation": "too little motion",
+    "bound": "parameter at its bound",
+    "recovered": "filter restarted",
+    "change": "sudden change noticed",
+    "platform": "machine reports a fault",
+    "clock": "sample clock stands or runs back",
+    "duplicate": "second estimator on the bus",
+    "settling": "levels settling",
+    "mismatch": "innovations not white",
+    "calibration": "torque and base disagree",
+    "hands_off": "hands off",
+}
+
+
+def timeline(run: Run) -> Figure | None:
+    """A row for each mode and each fault that occurred, with a bar whenever it was present; below it the counts."""
+    mode, faults = run.column("mode"), run.column("faults")
+    if mode is None or faults is None:
+        return None
+    bars = _modes(run, mode) + _faults(run, faults)
+    names = [bar["name"] for bar in bars]
+    lanes = axis("", type="category", categoryorder="array", categoryarray=names[::-1], showgrid=False, automargin=True)
+    lanes["range"] = [-0.6, len(names) - 0.4]
+    height = 110 + 26 * len(names)
+    rows = [lanes | {"weight": 26.0 * len(names)}]
+    counts = {name: values for name in COUNTS if (values := run.column(name)) is not None and np.nanmax(values) > 0.0}
+    if counts:
+        rows.append(axis("frames so far", rangemode="tozero", weight=130.0))
+        height += 150
+    figure = Figure(rows, time_axis(run.end), height)
+    figure.traces += bars
+    chosen = spread_indices(len(run.time), 1000)
+    for name, values in counts.items():
+        style = {"line_shape": "hv", "line_width": 1.5}
+        figure.add(line(run.time[chosen], values[chosen], name, COUNT_COLOURS[name], 1, **style))
+    figure.mark(run.changes)
+    return figure
+
+
+def _modes(run: Run, mode: Array) -> list[Spec]:
+    known = native.enum_names("lever_mode")
+    present = [int(value) for value in np.unique(mode[np.isfinite(mode)])]
+    return [_bar(run, mode == value, f"mode: {known.get(value, value)}", "estimate") for value in present]
+
+
+def _faults(run: Run, faults: Array) -> list[Spec]:
+    bits = np.nan_to_num(faults).astype(np.int64)
+    return [
+        _bar(run, (bits & value) != 0, FAULT_WORDS.get(name, name), "fault")
+        for value, name in native.enum_names("lever_fault").items()
+        if np.any(bits & value)
+    ]
+
+
+def _bar(run: Run, active: np.ndarray, name: str, colour: str) -> Spec:
+    """One thick line over each stretch in which something was so; stretches too close to be told apart become one."""
+    starts = spread_indices(len(active), LANE_POINTS)
+    anywhere = np.logical_or.reduceat(active, starts)
+    ends = np.append(run.time[starts[1:]], run.end)
+    x: list[float | None] = []
+    for first, last in runs(anywhere):
+        start = float(run.time[starts[first]])
+        x += [round(start, 4), round(max(float(ends[last]), start + LEAST_SHARE * run.end), 4), None]
+    y = [name if moment is not None else None for moment in x]
+    style = {"color": f"@{colour}", "width": 12}
+    hover = {"hovertemplate": f"{name} %{{x:.2f}} s<extra></extra>", "showlegend": False}
+    return {"type": "scatter", "mode": "lines", "x": x, "y": y, "name": name, "yaxis": "y", "line": style} | hover

@@ -1,0 +1,121 @@
+"""Plotly figures as plain dictionaries (the documented JSON of plotly.js), in the colours and manners of this page.
+
+A colour is a name with "@": page.js puts in what page.css says for it, so a figure follows the light or dark theme.
+Several charts in one figure are rows: row 0 on top, all over the same x axis.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from .series import packed
+
+Spec = dict[str, Any]
+ROW_GAP = 22  # [pixels] between two rows
+TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
+
+
+def line(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) -> Spec:
+    """A curve. `more` are further properties of the trace; those of its line start with line_."""
+    style = {"color": f"@{colour}", "width": 1.8}
+    style |= {key[5:]: more.pop(key) for key in list(more) if key.startswith("line_")}
+    return _trace(x, y, name, row) | {"mode": "lines", "line": style, "legendgroup": name} | more
+
+
+def dots(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) -> Spec:
+    """Separate points."""
+    marker = {"color": f"@{colour}", "size": 4}
+    return _trace(x, y, name, row) | {"mode": "markers", "marker": marker, "legendgroup": name} | more
+
+
+def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0, **more: Any) -> list[Spec]:
+    """The area between two curves."""
+    known = np.isfinite(low) & np.isfinite(high)
+    edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": name}
+    lower = _trace(x[known], low[known], name, row) | edge | {"showlegend": False}
+    upper = _trace(x[known], high[known], name, row) | edge | {"fill": "tonexty", "fillcolor": f"@{colour}"}
+    return [lower, upper | more]
+
+
+def _trace(x: Array, y: Array, name: str, row: int) -> Spec:
+    axis = f"y{row + 1}" if row else "y"
+    return {"type": "scatter", "x": packed(x), "y": packed(y), "name": name, "yaxis": axis}
+
+
+def axis_range(columns: list[Array], settled: slice, share: float = 0.08, zero: bool = False) -> list[float] | None:
+    """An axis range that shows all that the columns do in `settled`, so that a wild start does not squeeze the rest."""
+    values = np.concatenate([column[settled] for column in columns])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return None
+    low, high = float(values.min()), float(values.max())
+    low = min(low, 0.0) if zero else low
+    margin = share * ((high - low) or abs(high) or 1.0)
+    return [0.0 if zero and low == 0.0 else low - margin, high + margin]
+
+
+@dataclass
+class Figure:
+    """What page.js draws. `height` in pixels; `x_axis` and each row are the layouts of their axes.
+
+    The share of a row in the height is its "weight", 1 unless it says otherwise.
+    """
+
+    rows: list[Spec]
+    x_axis: Spec
+    height: int = 320
+    traces: list[Spec] = field(default_factory=list)
+    shapes: list[Spec] = field(default_factory=list)
+    annotations: list[Spec] = field(default_factory=list)
+    more: Spec = field(default_factory=dict)
+    over_time: bool = True
+    """Whether x is the time of the run, so that zooming here zooms the other figures over time."""
+
+    def add(self, *traces: Spec) -> None:
+        """Adds traces; a name that is there already is shown once in the legend."""
+        for trace in traces:
+            known = any(trace["name"] == other["name"] and other.get("showlegend", True) for other in self.traces)
+            self.traces.append({"showlegend": False} | trace if known else trace)
+
+    def mark(self, moments: list[float]) -> None:
+        """Vertical lines at the times at which the truth changed."""
+        for moment in moments:
+            style = {"color": "@mark", "width": 1, "dash": "dot"}
+            self.shapes.append(
+                {"type": "line", "x0": moment, "x1": moment, "y0": 0, "y1": 1, "yref": "paper", "line": style}
+            )
+
+    def spec(self) -> Spec:
+        """The figure for plotly.js."""
+        layout: Spec = {
+            "height": self.height,
+            "shapes": self.shapes,
+            "annotations": self.annotations,
+            "xaxis": self.x_axis | {"anchor": "y" if len(self.rows) == 1 else f"y{len(self.rows)}"},
+        }
+        gap = ROW_GAP / self.height
+        weights = [row.get("weight", 1.0) for row in self.rows]
+        unit = (1.0 - gap * (len(self.rows) - 1)) / sum(weights)
+        top = 1.0
+        for index, (row, weight) in enumerate(zip(self.rows, weights, strict=True)):
+            bottom = max(0.0, top - unit * weight)
+            axis_layout = {key: value for key, value in row.items() if key != "weight"}
+            layout[f"yaxis{index + 1}" if index else "yaxis"] = {"domain": [bottom, top]} | axis_layout
+            top = bottom - gap
+        return {"data": self.traces, "layout": layout | self.more, "over_time": self.over_time}
+
+
+def time_axis(end: float) -> Spec:
+    return {"title": {"text": "time [s]"}, "range": [0.0, end]}
+
+
+def frequency_axis(low: float, high: float) -> Spec:
+    """A logarithmic axis from `low` to `high` [Hz]."""
+    return axis("frequency [Hz]", type="log", range=[math.log10(low), math.log10(high)], tickvals=TICKS)
+
+
+def axis(title: str, **more: Any) -> Spec:
+    return {"title": {"text": title}, **more}

@@ -1,0 +1,111 @@
+"""What a reader is told of the estimator's model, and of a truth that is of another kind."""
+
+from ..results import whiteness
+from .charts import transfer
+from .run import Run
+
+ABOUT_MODEL = {
+    "linear_physical": "In this run the estimator knows nothing of the lever's geometry. It takes arm and lever "
+    "together for a mass m on a spring k with a damper c, shaken by the floor, the angle for a distance and the torque "
+    "for a force: θ̈ = −(k/m) θ − (c/m) θ̇ + z̈ + τ<sub>m</sub>/m.",
+    "linear_black_box": "In this run the estimator asks for no mass, damping or stiffness, but for the three numbers "
+    "of any second-order system, θ̈ = a<sub>21</sub> θ + a<sub>22</sub> θ̇ + b<sub>21</sub> z̈. Natural frequency and "
+    "damping ratio follow from the first two.",
+    "hand": "In this run the estimator takes the pilot for a hand as Mayo (1989) measured it on people: on a spring "
+    "and a damper in the cabin, and damped in space as well, so that the lever leans while the cabin climbs. Its "
+    "vertical motion d in the cabin is d̈ = −k<sub>hand</sub> d − c<sub>hand</sub> ḋ − z̈ − c<sub>space</sub> ż, all "
+    "per unit of its mass, and θ is the trim + d/(ℓ cos θ<sub>0</sub>).",
+}
+PARAMETERS = {
+    "lever": "Mass, damping and stiffness of the pilot's arm",
+    "linear_physical": "Mass, damping and stiffness that the linear model needs to move as the lever does",
+    "linear_black_box": "The three coefficients of a second-order system that moves as the lever does",
+    "hand": "Stiffness and damping of the pilot's hand, and the part of the damping that is against space",
+}
+
+
+def about(run: Run) -> list[str]:
+    """Sentences, as HTML, on what is special in this run's model and truth; none for the lever."""
+    told = [ABOUT_MODEL[run.model]] if run.model in ABOUT_MODEL else []
+    if run.mismatch is not None:
+        told.append(
+            f"<strong>The truth of this run is of another kind:</strong> {run.about_truth}. The "
+            "parameters of the estimator's model have no true values then; what can be compared are natural frequency "
+            "and damping ratio, the answer to the floor, and whether the innovations are white."
+        )
+    return told
+
+
+def parameters_caption(run: Run) -> str:
+    """What the chart of the parameters shows."""
+    shown = f"{PARAMETERS[run.model]}, with a band of ±2σ"
+    if run.mismatch is not None:
+        return (
+            f"{shown}. There is no truth to hold them against: the pilot of this run is not of this kind, and these "
+            "are the values with which the model imitates him."
+        )
+    if not run.has_truth:
+        return f"{shown}."
+    return f"{shown}: the blue line should follow the dashed one, and the band hold it about 95 % of the time."
+
+
+def dynamics_caption(run: Run) -> str:
+    """What the chart of natural frequency and damping ratio shows."""
+    told = [
+        "What decides about collective bounce: how fast arm and lever swing by themselves, and how quickly that dies "
+        "out (a damping ratio of 1 is no swing at all)."
+    ]
+    if _has_scale(run):
+        told.append("Both are usually known better than the three parameters, whose common scale cancels in them.")
+    if run.about_true_dynamics:
+        told.append(run.about_true_dynamics)
+    return " ".join(told)
+
+
+def feedthrough_caption(run: Run) -> str:
+    """What the Bode diagram with its band shows, and how good it was where the truth is known."""
+    told = [
+        "The same at one time, as a Bode diagram: magnitude and phase, and below the measured coherence of floor and "
+        "lever over the whole run. Where that is low, noise, torque or the pilot's own movement move the lever, and "
+        "there is little to learn from the floor. Between 2 and 8 Hz the shaded band is ±2σ, as the estimator sends "
+        "it; it contains what the parameters leave open, not what the model cannot do. Drag the slider through the run."
+    ]
+    if (found := transfer.accuracy(run)) is not None:
+        told.append(
+            f"After the first third of the run the complex error was {100.0 * found.error:.1f} % rms; ±2σ held the "
+            f"true magnitude {100.0 * found.gain_covered:.0f} % and the true phase {100.0 * found.phase_covered:.0f} % "
+            "of the time."
+        )
+    return " ".join(told)
+
+
+def excitation_caption(run: Run) -> str:
+    """What the chart of the excitation shows."""
+    told = ["What shakes the lever. Without motion there is nothing to learn from."]
+    if _has_scale(run):
+        told.append(
+            "Without motor torque only ratios of the three parameters can be told, and the bands above must be wide."
+        )
+    return " ".join(told)
+
+
+def _has_scale(run: Run) -> bool:
+    """Whether the parameters have a common scale that base motion alone does not tell."""
+    return run.model in ("lever", "linear_physical")
+
+
+def whiteness_caption(run: Run) -> str:
+    """What the chart of the autocorrelation shows."""
+    told = run.whiteness
+    found = ""
+    if told is not None:
+        found = (
+            f" Here the residual passes as white. {whiteness.CANNOT_SEE}"
+            if told.white
+            else " Here the residual is coloured: the arm, or a sensor, is not as assumed."
+        )
+    return (
+        "Is the residual white? Autocorrelation of measured minus estimated rate, averaged over 20 ms. White noise "
+        "stays about the band; bars beyond 0.2 mean that something moves the lever in a way that the model does not "
+        f"know.{found}"
+    )

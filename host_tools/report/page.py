@@ -1,0 +1,220 @@
+"""Puts the page together: sections of words and figures, the style, plotly.js and the script that draws."""
+
+import html
+from importlib.resources import files
+
+from . import models, summary_html
+from .charts import comparison, health, signals, tracking, transfer
+from .document import document
+from .figure import Figure
+from .run import Run
+
+
+class Page:
+    """Sections in the order they are added."""
+
+    def __init__(self) -> None:
+        self.sections: list[str] = []
+        self.contents: list[tuple[str, str]] = []
+        self.figures: dict[str, Figure] = {}
+
+    def section(self, key: str, short: str, title: str, *parts: str) -> None:
+        """Adds a section of HTML parts, unless all are empty; `short` is its title in the table of contents."""
+        if any(parts):
+            self.contents.append((key, short))
+            self.sections.append(f'<section id="{key}"><h2>{title}</h2>{"".join(parts)}</section>')
+
+    def figure(self, key: str, figure: Figure | None, caption: str) -> str:
+        """The place of a figure with its caption; nothing without a figure."""
+        if figure is None:
+            return ""
+        self.figures[key] = figure
+        place = f'<div class="chart" id="{key}" style="height:{figure.height}px"></div>'
+        return f"<figure>{place}<figcaption>{caption}</figcaption></figure>"
+
+
+def build(run: Run) -> str:
+    """The whole page."""
+    page = Page()
+    _explained(page, run)
+    _estimates(page, run)
+    _comparison(page, run)
+    _transfer(page, run)
+    _signals(page, run)
+    _health(page, run)
+    _numbers(page, run)
+    scenario = run.simulated.scenario if run.simulated else None
+    title = (
+        (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.get("logs", ())) or "recorded run"
+    )
+    links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
+    body = (
+        f'<header><h1>Lever CDKF: {html.escape(title)}</h1><p class="subtitle">{_subtitle(run)}</p></header>'
+        f"{summary_html.verdict(run)}{summary_html.cards(run)}<nav>{links}</nav>{''.join(page.sections)}"
+        "<footer>Made by <code>lever</code>. Nothing on this page is loaded from elsewhere.</footer>"
+    )
+    return document(f"Lever CDKF: {title}", body, {key: figure.spec() for key, figure in page.figures.items()})
+
+
+def _subtitle(run: Run) -> str:
+    description = html.escape((run.simulated and run.simulated.scenario.description) or summary_html.recorded(run))
+    length = f"{run.samples:,} samples in {run.end:.0f} s.".replace(",", "\u2009")
+    return f"{description} {length}".strip()
+
+
+def _explained(page: Page, run: Run) -> None:
+    checked = " The truth is known in a simulation: this page holds the claims against it." if run.has_truth else ""
+    about = "".join(f"<p>{paragraph}</p>" for paragraph in models.about(run))
+    svg = (files(__package__) / "schematic.svg").read_text(encoding="utf-8")
+    page.section(
+        "explained",
+        "About",
+        "What you are looking at",
+        '<div class="explained"><div>'
+        "<p>A helicopter pilot's left arm rests on the collective lever. The cabin shakes, the arm moves the lever, "
+        "the lever moves the rotor, and the rotor shakes the cabin: a loop that can grow by itself. How close it is "
+        "to that depends on the arm, which acts like a mass m<sub>p</sub> on a spring k<sub>p</sub> with a damper "
+        "c<sub>p</sub>, and which changes as the pilot grips, relaxes or tires.</p><p>Nobody can measure these three. "
+        "The estimator works them out on line, many times a second, from the lever's angle θ and rate, the "
+        "acceleration of the floor z̈ and the torque τ<sub>m</sub> of the lever's own motor, and says how sure it is: "
+        f"the shaded bands are ±2 standard deviations (σ).{checked}</p>{about}</div>{svg}</div>",
+    )
+
+
+def _estimates(page: Page, run: Run) -> None:
+    marks = " Dotted lines mark sudden changes of the pilot." if run.changes else ""
+    page.section(
+        "parameters",
+        "Pilot's arm",
+        "The pilot's arm",
+        page.figure(
+            "figure-parameters",
+            tracking.parameters(run),
+            f"{models.parameters_caption(run)}{marks}",
+        ),
+    )
+    page.section(
+        "dynamics",
+        "Frequency and damping",
+        "Natural frequency and damping",
+        page.figure(
+            "figure-dynamics",
+            tracking.dynamics(run),
+            models.dynamics_caption(run),
+        ),
+    )
+
+
+def _comparison(page: Page, run: Run) -> None:
+    page.section(
+        "comparison",
+        "Recorded estimates",
+        "Against the estimates in the log",
+        page.figure(
+            "figure-comparison",
+            comparison.recorded(run),
+            "The log holds estimates already, of the firmware that ran when it was recorded: wide line. Thin line: the "
+            "same samples through this firmware, with the settings below. Where only one is seen, they are equal.",
+        ),
+        summary_html.comparison_table(run),
+    )
+
+
+def _transfer(page: Page, run: Run) -> None:
+    maps = transfer.maps(run)
+    meaning = (
+        "Brightness is how many degrees the lever moves for 1 m/s² of floor motion, over time and frequency. The white "
+        "line is the natural frequency."
+    )
+    captions = {"truth": f"<strong>Truth.</strong> {meaning}", "estimate": f"<strong>Estimate.</strong> {meaning}"}
+    if "truth" in maps:
+        captions["estimate"] = (
+            "<strong>Estimate.</strong> The same of the estimated parameters, same colours: the closer it looks to the "
+            "truth, the better."
+        )
+    pair = "".join(page.figure(f"figure-map-{name}", figure, captions[name]) for name, figure in maps.items())
+    page.section(
+        "bode",
+        "Bode diagram",
+        "Biodynamic feedthrough: how the floor moves the lever",
+        f'<div class="pair">{pair}</div>' if pair else "",
+        page.figure(
+            "figure-slices",
+            transfer.slices(run),
+            models.feedthrough_caption(run),
+        ),
+    )
+
+
+def _signals(page: Page, run: Run) -> None:
+    true = run.first_name("theta_true_rad", "theta_dot_true_rad_s")
+    lies = f"Estimate and {'measurement' if true is None else 'truth'} lie on each other unless something is wrong."
+    page.section(
+        "states",
+        "States",
+        "States and innovations",
+        page.figure(
+            "figure-detail",
+            signals.detail(run),
+            "A close look at angle and rate of the lever: grey dots are what the sensors said, the blue line what the "
+            "estimator makes of it. The buttons choose the moment.",
+        ),
+        page.figure(
+            "figure-motion",
+            signals.motion(run),
+            f"The whole run: the range that angle and rate covered in each short stretch of time. {lies}",
+        ),
+        page.figure(
+            "figure-innovations",
+            signals.innovations(run),
+            "Innovations: how far each measurement was from what the estimator expected, squared, in units of what it "
+            "expected to be wrong by. Dots inside the band around 1 are what chance alone gives; above it the "
+            "estimator is over-confident, below it too cautious.",
+        ),
+        page.figure("figure-whiteness", signals.whiteness(run), models.whiteness_caption(run)),
+    )
+    page.section(
+        "excitation",
+        "Excitation",
+        "Excitation",
+        page.figure(
+            "figure-excitation",
+            signals.excitation(run),
+            models.excitation_caption(run),
+        ),
+        page.figure(
+            "figure-spectra",
+            signals.spectra(run),
+            "At which frequencies the lever is shaken. They should cover its natural frequency (shaded).",
+        ),
+    )
+
+
+def _health(page: Page, run: Run) -> None:
+    page.section(
+        "health",
+        "Health",
+        "Health",
+        page.figure(
+            "figure-health",
+            health.timeline(run),
+            "What the estimator said of itself: its mode (blue) and the faults it noticed (orange). Below, how many "
+            "frames were lost, corrupt or late on the bus. What is not shown did not happen.",
+        ),
+    )
+
+
+def _numbers(page: Page, run: Run) -> None:
+    tables = (
+        (summary_html.errors_table(run), summary_html.run_table(run), summary_html.recording_table(run))
+        if run.summary
+        else ()
+    )
+    page.section("numbers", "Numbers", "All numbers", *tables)
+    scenario = {**vars(run.simulated.scenario), "description": None} if run.simulated else {}
+    rows = [(html.escape(key), html.escape(value)) for key, value in summary_html.flat(scenario)]
+    estimator = {**vars(run.summary.estimator), "settings": None} if run.summary else {}
+    rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in summary_html.flat(estimator)]
+    made = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
+    settings = f"<details><summary>Settings of the estimator</summary>{summary_html.settings_table(run)}</details>"
+    page.section("made", "Settings", "How this run was made", made, settings)

@@ -1,0 +1,127 @@
+"""Columns made fit for a page: fewer points, spectra, changes, and the bands that chance alone would give."""
+
+import base64
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array
+
+
+def packed(values: Array) -> dict[str, object]:
+    """A column as plotly.js reads typed arrays: four bytes a value instead of ten characters; NaN is a gap."""
+    array = np.asarray(values, dtype="<f4")
+    text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+    spec: dict[str, object] = {"dtype": "f4", "bdata": text}
+    if array.ndim == 2:
+        spec["shape"] = f"{array.shape[0]},{array.shape[1]}"
+    return spec
+
+
+def spread_indices(count: int, most: int, keep: NDArray[np.intp] | None = None) -> NDArray[np.intp]:
+    """At most `most` evenly spread indices of 0 … count-1, and `keep` with the one before each."""
+    even: NDArray[np.intp] = np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)
+    if keep is None or not keep.size:
+        return even
+    return np.unique(np.concatenate((even, keep, np.maximum(keep - 1, 0))))
+
+
+def envelope(time: Array, values: Array, buckets: int = 1000) -> tuple[Array, Array]:
+    """Least and greatest value of each of `buckets` stretches of time, in turn: a dense curve as seen from afar.
+
+    A short column is returned as it is. A stretch without any value gives NaN.
+    """
+    size = -(-len(values) // buckets)
+    if size < 3:
+        return time, values
+    padding = -len(values) % size
+    rows = np.concatenate((values, np.full(padding, np.nan))).reshape(-1, size)
+    empty = np.isnan(rows).all(axis=1)
+    low = np.where(empty, np.nan, np.fmin.reduce(rows, axis=1))
+    high = np.where(empty, np.nan, np.fmax.reduce(rows, axis=1))
+    start = time[::size]
+    return np.repeat(start, 2), np.column_stack((low, high)).ravel()
+
+
+def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: float = 0.05) -> list[float]:
+    """Times [s] at which a column steps by more than `relative` in one sample; steps closer than `apart` are one."""
+    if len(time) < 2:
+        return []
+    stepped = np.zeros(len(time) - 1, dtype=bool)
+    for column in columns:
+        scale = np.maximum(np.abs(column[:-1]), np.finfo(np.float64).tiny)
+        stepped |= np.abs(np.diff(column)) > relative * scale
+    found: list[float] = []
+    for moment in time[1:][stepped].tolist():
+        if not found or moment - found[-1] > apart:
+            found.append(moment)
+    return found
+
+
+def runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of every stretch in which `active` is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], active, [False])).astype(np.int8)))
+    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
+
+
+class Welch:
+    """One-sided power spectral density [unit²/Hz] of samples as they come: the mean over half-overlapping Hann windows.
+
+    P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967). As scipy.signal.welch, whose import alone would take longer
+    than the rest of the report. Gaps (NaN) count as the mean of their window.
+    """
+
+    def __init__(self, sample_period: float, seconds: float = 4.0) -> None:
+        self._period = sample_period
+        self._length = max(1, round(seconds / sample_period))
+        self._rest = np.zeros(0)
+        self._power = np.zeros(self._length // 2 + 1)
+        self._windows = 0
+
+    def add(self, values: Array) -> None:
+        """Further samples."""
+        joined, hop = np.concatenate((self._rest, values)), max(1, self._length // 2)
+        if len(joined) < self._length:
+            self._rest = joined
+            return
+        windows = np.lib.stride_tricks.sliding_window_view(joined, self._length)[::hop]
+        self._power = self._power + self._density(windows).sum(axis=0)
+        self._windows += len(windows)
+        self._rest = joined[len(windows) * hop :].copy()
+
+    def spectrum(self) -> tuple[Array, Array]:
+        """Frequencies [Hz] and density; of what there is, if that is shorter than a window."""
+        if self._windows:
+            length, power = self._length, self._power / self._windows
+        else:
+            length, power = len(self._rest), self._density(self._rest[np.newaxis])[0]
+        return np.fft.rfftfreq(length, self._period).astype(np.float64), power
+
+    def _density(self, windows: Array) -> Array:
+        length = windows.shape[1]
+        known = np.isfinite(windows)
+        mean = np.where(known, windows, 0.0).sum(axis=1, keepdims=True) / np.maximum(
+            known.sum(axis=1, keepdims=True), 1
+        )
+        detrended = np.where(known, windows - mean, 0.0)
+        shape = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+        power: Array = np.abs(np.fft.rfft(detrended * shape, axis=1)) ** 2 * (self._period / float(shape @ shape))
+        power[:, 1 : (length + 1) // 2] *= 2.0
+        return power
+
+
+def welch(values: Array, sample_period: float, seconds: float = 4.0) -> tuple[Array, Array]:
+    """Frequencies [Hz] and power spectral density of a whole column, by Welch."""
+    averaged = Welch(sample_period, seconds)
+    averaged.add(values)
+    return averaged.spectrum()
+
+
+def chi_square_band(freedom: Array) -> tuple[Array, Array]:
+    """Between which two values 95 % of a chi-square variable divided by its degrees of freedom lie.
+
+    E. B. Wilson, M. M. Hilferty, PNAS 17 (1931): the cube root is nearly normal; within 1 % from 30 degrees on.
+    """
+    spread = 2.0 / (9.0 * freedom)
+    low, high = (1.0 - spread + sign * 1.959964 * np.sqrt(spread) for sign in (-1.0, 1.0))
+    return low**3, high**3

@@ -1,0 +1,228 @@
+"""summary.json as values: what a simulation, or a replay, comes to. None stands for what there is nothing to say of."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..errors import LeverError
+from .nis import Nis
+from .whiteness import Whiteness
+
+SCHEMA = 1
+"""Goes up when a field changes its meaning, its name or its place, or goes."""
+
+_Content = TypeVar("_Content")
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """Its choices and settings."""
+
+    model: str
+    preload: str
+    estimator: str
+    adaptation: str
+    settings: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What both have."""
+
+    schema: int = SCHEMA
+    estimator: Estimator
+    samples: int
+    lost: int
+    corrupt: int
+    late: int
+    restarts: int
+    nis: Nis
+    whiteness: Whiteness | None
+    modes_s: dict[str, float]
+    """Seconds in each mode."""
+    passed: bool
+    verdict: str
+    """In a few sentences."""
+
+
+# --- of a simulation -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What was run."""
+
+    name: str
+    title: str
+    description: str
+    seed: int
+    sample_period_s: float
+    converged_after_s: float
+    changes_s: list[float]
+    """After which the parameters have to be found anew: the start, and every jump."""
+    limits: dict[str, float]
+
+
+@dataclass(frozen=True)
+class TrueTransfer:
+    """theta/z_ddot of the truth: polynomials of s, highest power first, from each of `time_s` on."""
+
+    time_s: list[float]
+    numerator: list[list[float]]
+    denominator: list[list[float]]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The pilot's model, and where that is not the estimator's, what it is."""
+
+    model: str
+    about: str | None = None
+    about_dynamics: str | None = None
+    transfer: TrueTransfer | None = None
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """What the estimator said of itself; None where it did not."""
+
+    version: str | None
+    contract: int | None
+    settings_as_scenario: bool | None
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How one quantity was estimated."""
+
+    rms_percent: float | None
+    bias_percent: float | None
+    coverage_2sigma: float | None
+    """Share of the samples (0 to 1) at which estimate +- 2 sigma holds the truth."""
+    time_to_10_percent_s: list[float | None]
+    """After the start and each jump, until the error stays within 10 % up to the next jump; None: it never does."""
+    time_to_5_percent_s: list[float | None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationSummary(Summary):
+    """Of `lever sim`."""
+
+    scenario: Scenario
+    truth: Truth
+    firmware: Firmware
+    parameters: dict[str, Quality]
+    """By quantity, as far as there is a truth."""
+    unanswered: int
+    misplaced: int
+    fault_shares: dict[str, float]
+    """Shares (0 to 1) of the judged time with each fault that there was."""
+    flagged_share: float | None
+    """The same with any that tells the user not to trust the estimates."""
+    missed: list[str]
+    """Limits, in words."""
+    simulated_time_s: float
+    wall_time_s: float | None = None
+    wall_time_per_simulated_time: float | None = None
+
+    def timed(self, seconds: float) -> SimulationSummary:
+        """With how long the run took by the wall clock; the only part that differs between equal runs."""
+        return dataclasses.replace(
+            self, wall_time_s=seconds, wall_time_per_simulated_time=seconds / self.simulated_time_s
+        )
+
+
+# --- of a replay -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One quantity at the end, and between what it was."""
+
+    unit: str
+    last: float | None
+    last_sigma: float | None
+    least: float | None
+    greatest: float | None
+
+
+@dataclass
+class Difference:
+    """Replayed minus recorded, of one signal; None where the recording has none of it."""
+
+    unit: str
+    samples: int = 0
+    """At which both are known."""
+    identical_samples: int = 0
+    """Equal in every bit on the bus."""
+    bias: float | None = None
+    """Mean difference."""
+    rms: float | None = None
+    largest: float | None = None
+    """The difference that is farthest from 0, with its sign."""
+    largest_at_s: float | None = None
+    rms_in_sigma: float | None = None
+    """Rms of the difference over the replay's standard deviation; None where there is none."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """With the estimates that the log holds."""
+
+    identical: bool
+    signals: dict[str, Difference]
+    in_words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplaySummary(Summary):
+    """Of `lever replay`."""
+
+    recording: dict[str, Any]
+    """What was in the log."""
+    estimates: dict[str, Estimate]
+    comparison: Comparison | None
+
+
+# --- to and from JSON ------------------------------------------------------------------------------------------------
+
+
+def text(summary: Summary) -> str:
+    """The content of summary.json."""
+    return json.dumps(dataclasses.asdict(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def read(path: str | Path) -> SimulationSummary | ReplaySummary:
+    """A summary.json. Raises LeverError."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        if content["schema"] != SCHEMA:
+            raise LeverError(f"{path}: schema {content['schema']}, not {SCHEMA}: of another version")
+        return of(ReplaySummary, content) if "recording" in content else of(SimulationSummary, content)
+    except (ValueError, TypeError, KeyError) as error:
+        raise LeverError(f"{path}: not a summary of this version: {error!r}") from None
+
+
+def of(kind: type[_Content], content: Mapping[str, Any]) -> _Content:
+    """A dataclass of JSON's dictionaries and lists. Raises TypeError for a field that is unknown or missing."""
+    hints = typing.get_type_hints(kind)
+    return kind(**{name: _value(hints.get(name, object), each) for name, each in content.items()})
+
+
+def _value(kind: Any, content: Any) -> Any:
+    if isinstance(kind, types.UnionType):
+        (kind,) = (each for each in kind.__args__ if each is not type(None))
+    if content is None:
+        return None
+    if dataclasses.is_dataclass(kind):
+        return of(typing.cast("type[Any]", kind), content)
+    if typing.get_origin(kind) is dict:
+        return {name: _value(kind.__args__[1], each) for name, each in content.items()}
+    return content

@@ -1,0 +1,116 @@
+"""A test for whiteness: the autocorrelation of the residual of theta_dot.
+
+A Kalman filter whose model is right has white innovations (Kailath 1968), and with a settled gain its residual,
+measured minus estimated, is white with them: it is R / S times the innovation. A model that is wrong leaves something
+of the motion in both. At 1 kHz that is far below the noise of a sample, and NIS does not see it; averages over 20 ms
+show it, as the motion stays alike in that time and the noise does not.
+
+The test sees motion, and torque, that the model lacks. It does not see an error that the parameters absorb: friction in
+the lever, a gain or a delay of a sensor. Residuals stay white then, and the parameters are biased.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray
+
+AVERAGE = 0.02
+"""Time over which the residual is averaged [s]."""
+LAGS = 25
+"""Lags looked at, in averages: 20 ms to 0.5 s, a period of 2 Hz."""
+COLOURED = 0.2
+"""A correlation that is not put down to chance or tuning. Seen: models that are right leave 0.05 to 0.11 in 40 s, those
+that are asked for the pilots of two_dof and hand 0.5."""
+CANNOT_SEE = "That test does not see friction in the lever, nor gain and delay of a sensor: these bias the parameters."
+"""For every verdict that says that residuals are white."""
+
+_ONE, _ANY = 1.960, 3.083  # normal deviates that one, or any of LAGS, exceeds with a probability of 5 %
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """What summary.json says of it."""
+
+    average_s: float
+    autocorrelation: list[float]
+    """At lags of 1, 2, … LAGS averages."""
+    band_95: float
+    """White noise stays within plus and minus this at 95 % of the lags."""
+    largest: float
+    """The correlation that is farthest from 0."""
+    largest_after_s: float
+    """Its lag."""
+    white: bool
+
+
+def residual(trace: Mapping[str, FloatArray]) -> FloatArray | None:
+    """Measured minus estimated theta_dot [rad/s] of a trace; None where it has not both."""
+    measured, estimate = (trace.get(f"theta_dot_{kind}_rad_s") for kind in ("measured", "estimate"))
+    return None if measured is None or estimate is None else measured - estimate
+
+
+def measure(values: FloatArray, period: float) -> Whiteness | None:
+    """Of a residual at samples `period` [s] apart, NaN where there is none; None when it is too short to tell."""
+    size = average_size(period)
+    return of_averages(averages(values, size), size * period)
+
+
+def average_size(period: float) -> int:
+    """Samples in an average."""
+    return max(1, round(AVERAGE / period))
+
+
+def of_averages(averages: FloatArray, step: float) -> Whiteness | None:
+    """measure() from averages that are `step` [s] apart."""
+    known = np.isfinite(averages)
+    count = int(known.sum())
+    if count < 4 * LAGS:
+        return None
+    centred = np.where(known, averages - np.mean(averages[known]), 0.0)
+    variance = float(np.sum(np.square(centred))) / count
+    if variance == 0.0:
+        return None
+    pairs = [max(1, int(np.sum(known[lag:] & known[:-lag]))) for lag in range(1, LAGS + 1)]
+    products = [float(centred[lag:] @ centred[:-lag]) for lag in range(1, LAGS + 1)]
+    correlation = [product / pair / variance for product, pair in zip(products, pairs, strict=True)]
+    largest = max(range(LAGS), key=lambda index: abs(correlation[index]))
+    return Whiteness(
+        average_s=step,
+        autocorrelation=correlation,
+        band_95=_ONE / math.sqrt(count),
+        largest=correlation[largest],
+        largest_after_s=(largest + 1) * step,
+        white=all(abs(r) <= max(COLOURED, _ANY / math.sqrt(pair)) for r, pair in zip(correlation, pairs, strict=True)),
+    )
+
+
+def averages(values: FloatArray, size: int) -> FloatArray:
+    """Of `size` values each; NaN where more than half are."""
+    rows = values[: len(values) // size * size].reshape(-1, size)
+    known = np.isfinite(rows)
+    count = known.sum(axis=1)
+    total = np.where(known, rows, 0.0).sum(axis=1)
+    means: FloatArray = np.where(2 * count >= size, total / np.maximum(count, 1), np.nan)
+    return means
+
+
+def verdict(measured: Whiteness | None) -> str:
+    """What the autocorrelation of the residual says, and what it cannot see."""
+    if measured is None:
+        return ""
+    size = f"{measured.largest:.2f} after {1000.0 * measured.largest_after_s:.0f} ms"
+    if measured.white:
+        last = measured.average_s * len(measured.autocorrelation)
+        return (
+            f"Residuals of the rate pass the test for whiteness up to a lag of {last:g} s (largest correlation {size})."
+            f" {CANNOT_SEE}"
+        )
+    return (
+        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{measured.band_95:.2f}): "
+        "the arm, or a sensor, is not what the model assumes."
+    )

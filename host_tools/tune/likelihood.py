@@ -1,0 +1,70 @@
+"""How likely a recording is to the estimator with given settings; one part of it to tune on, another to judge by.
+
+The estimator runs through all of the recording, as in flight. What it says counts from the end of its start on
+(aligning, levels, the worst of a wrong first guess), and is added up over each part by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import LeverError
+from ..firmware.innovations import innovations
+from ..firmware.settings_file import Assignments, make_config
+from .recording import Recording
+
+START = 10.0
+"""Longest time that is left to the start of the estimator [s], but at most START_SHARE of the recording."""
+START_SHARE = 0.2
+SHORTEST = 20.0
+"""Least duration of a recording [s]."""
+LEARNT_LEAST = 5.0
+"""Of the part that is tuned on, the parameters must have learnt for so long [s], for their walk to be looked for."""
+
+
+@dataclass
+class Likelihood:
+    """Of a recording. `held_out` is the share at its end that is only judged by."""
+
+    recording: Recording
+    held_out: float = 0.3
+    runs: int = field(default=0, init=False)
+    """How often the estimator has run through the recording."""
+
+    def __post_init__(self) -> None:
+        """Raises LeverError for a recording that is too short."""
+        duration = self.recording.duration
+        if duration < SHORTEST:
+            raise LeverError(f"too short to tune on: {duration:.1f} s of samples; at least {SHORTEST:.0f} s are needed")
+        time, begin = self.recording.time, min(START, START_SHARE * duration)
+        split = begin + (1.0 - self.held_out) * (duration - begin)
+        self.tuned_on: Array = (time >= begin) & (time < split)
+        """True at the samples that are tuned on."""
+        self.judged_by: Array = time >= split
+        """True at those that are held out."""
+
+    def run(self, assignments: Assignments, delay: float = 0.0) -> Array:
+        """What the estimator with these settings and choices makes of the samples: innovations.INNOVATION for each.
+
+        A `delay` of the base acceleration [s] is undone before.
+        """
+        self.runs += 1
+        return innovations(make_config(assignments), self.recording.without_delay(delay))
+
+    def of(self, assignments: Assignments) -> float:
+        """Logarithm of the likelihood of the part that is tuned on; -inf where the filter breaks down."""
+        total = float(self.run(assignments)["log_likelihood"][self.tuned_on].sum())
+        return total if np.isfinite(total) else -np.inf
+
+    def learnt(self, assignments: Assignments) -> float:
+        """For how long the parameters learn in the part that is tuned on [s]."""
+        return float(self.run(assignments)["learns"][self.tuned_on].sum()) * self.recording.period
+
+
+def noise_as_set(assignments: Assignments) -> Mapping[str, str | float]:
+    """The same settings without noise being estimated while running, which would hide what is wrong with it."""
+    return {**assignments, "noise_window": 0.0}

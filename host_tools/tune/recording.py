@@ -1,0 +1,101 @@
+"""The samples in a log, as the firmware takes them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..can import codec, logs
+from ..can.traffic import Traffic
+from ..errors import LeverError
+from ..firmware.estimator import Health
+from ..firmware.innovations import FRAME, samples_of
+
+_SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Part of a log."""
+
+    samples: Array
+    """Of dtype innovations.SAMPLE."""
+    period: float
+    """Between two samples: the median [s]."""
+    bus: str
+    choices: dict[str, str]
+    """Of model, preload, estimator and adaptation, by COMMAND in the log; the firmware's defaults without."""
+    health: Health
+    """Counts of what was lost, corrupt or late."""
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last, gaps included [s]."""
+        return float(self.time[-1])
+
+    @property
+    def time(self) -> Array:
+        """Of each sample since the first [s]; time_us wraps, and goes on where its sender has started it anew."""
+        steps = _steps(self.samples) * 1e-6
+        return np.concatenate(([0.0], np.cumsum(np.where(steps > 0.0, steps, self.period))))
+
+    def without_delay(self, delay: float) -> Array:
+        """The samples with the base acceleration as it is measured `delay` later [s]."""
+        measured = self.samples["z_ddot_valid"]
+        if delay == 0.0 or not measured.any():
+            return self.samples
+        samples, time = self.samples.copy(), self.time
+        samples["z_ddot"] = np.interp(time + delay, time[measured], samples["z_ddot"][measured])
+        return samples
+
+
+def read(
+    paths: Sequence[str | os.PathLike[str]],
+    channel: str | None = None,
+    start: float = 0.0,
+    length: float = float("inf"),
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Recording:
+    """The samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`, both [s] of
+    recorded time. Raises LeverError."""
+    traffic = Traffic(logs.Recording(paths), channel)
+    log = traffic.recording
+    identifiers = np.array([codec.message(name).frame_id for name in _SAMPLES])
+    command = codec.message("COMMAND").frame_id
+    pieces = []
+    for chunk in traffic.chunks():
+        since = (chunk["time_us"] - traffic.first_us) * 1e-6
+        sampled = np.isin(chunk["id"], identifiers) & (since >= start)
+        pieces.append(chunk[(sampled | (chunk["id"] == command)) & (since < start + length)])
+        if progress is not None:
+            progress(log.done, log.size, "reading the log")
+        if len(since) and since[-1] > start + length:
+            break
+    name = ", ".join(log.paths)
+    if channel is None and traffic.other_samples:
+        buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
+        raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
+    frames = np.concatenate(pieces)
+    base = codec.message("BASE_SAMPLE").frame_id
+    if not (frames["id"] == base).any():
+        raise LeverError(f"{name}: no BASE_SAMPLE ({base:#x}) from {start:g} s on, so no samples")
+    return _recording(frames, str(traffic.channel), name)
+
+
+def _recording(frames: Array, bus: str, log: str) -> Recording:
+    received = np.zeros(len(frames), FRAME)
+    for field in ("id", "length", "data"):
+        received[field] = frames[field]
+    samples, choices, health = samples_of(received)
+    if len(samples) < 2:
+        raise LeverError(f"{log}: none of its samples is accepted: {health.corrupt} frames are corrupt (E2E)")
+    return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, choices, health)
+
+
+def _steps(samples: Array) -> Array:
+    """From each sample to the next [us]; less than half the range of time_us ahead is forward, all else back."""
+    return np.diff(samples["time_us"]).astype(np.int32)

@@ -1,0 +1,269 @@
+"""The page and its WebSocket, on this computer.
+
+Who may talk to it. There is no password, so two things keep other people's web pages, open in the same browser, away:
+the Host header must name this server by number, as localhost, or by a name of this computer (a page that has its own
+name point here, DNS rebinding, still sends that name), and a WebSocket must come from a page of this very server
+(Origin). Frames of other pages may not show it (Content-Security-Policy). Commands come by the WebSocket alone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import ipaddress
+import json
+import logging
+import signal
+import socket
+import sys
+from contextlib import suppress
+from importlib.resources import files
+from typing import Any
+from urllib.parse import urlsplit
+
+import tornado.httpserver
+import tornado.ioloop
+import tornado.web
+import tornado.websocket
+
+from .. import report
+from ..errors import LeverError
+from ..firmware.config import Config
+from .model import STEP
+from .sources import Source
+from .state import State, command_of
+
+_PAGE = files(__package__) / "page"
+_FILES = {
+    "": (_PAGE / "page.html", "text/html"),
+    "colours.css": (files(report) / "page.css", "text/css"),
+    "page.css": (_PAGE / "page.css", "text/css"),
+    "page.js": (_PAGE / "page.js", "text/javascript"),
+    "axes.js": (_PAGE / "axes.js", "text/javascript"),
+    "charts.js": (_PAGE / "charts.js", "text/javascript"),
+}
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+_LARGEST_MESSAGE = 512  # [bytes] from a page
+_MOST_BEHIND = 50  # messages a page may fail to take in a row before it is let go; it connects again
+
+
+class Server:
+    """The page of a source at a port of the address `host`."""
+
+    def __init__(self, source: Source, config: Config, *, host: str, port: int, read_only: bool) -> None:
+        """Takes the port. Raises LeverError."""
+        self.source, self.config, self.host = source, config, host
+        self.state = State(source, config, read_only=read_only)
+        self.socket = _bind(host, port)
+        self.port: int = self.socket.getsockname()[1]
+        self.pages: set[Channel] = set()
+
+    @property
+    def address(self) -> str:
+        """For a browser on this computer."""
+        host = self.host if self.host not in ("", "0.0.0.0", "::") else "127.0.0.1"
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
+
+    async def run(self, stop: asyncio.Event) -> None:
+        """Serves until `stop` is set."""
+        application = tornado.web.Application(
+            [(r"/socket", Channel, {"server": self}), (r"/(.*)", Page, {"server": self})],
+            log_function=lambda _handler: None,
+            websocket_max_message_size=_LARGEST_MESSAGE,
+        )
+        web = tornado.httpserver.HTTPServer(application, max_body_size=_LARGEST_MESSAGE)
+        web.add_socket(self.socket)
+        self.source.start()
+        clock = tornado.ioloop.PeriodicCallback(self.advance, 1000.0 * STEP)
+        clock.start()
+        try:
+            await stop.wait()
+        finally:
+            clock.stop()
+            web.stop()
+            for page in list(self.pages):
+                page.close(1001, "the server ends")
+            await web.close_all_connections()
+            with suppress(LeverError):
+                self.source.end_dither()
+            self.source.stop()
+
+    def advance(self) -> None:
+        """Tells all pages what is new. Dither goes on as long as there is a page that shows it."""
+        messages = self.state.advance()
+        with suppress(LeverError):  # a bus that fails says so in the source's error
+            if self.pages:
+                self.source.keep_alive()
+            else:
+                self.source.end_dither()
+        for page in list(self.pages):
+            page.update(messages)
+
+    def is_host(self, header: str) -> bool:
+        """Whether the Host header names this server; a port may be another one, because of tunnels."""
+        try:
+            name = urlsplit(f"//{header}").hostname or ""
+        except ValueError:
+            return False
+        own = socket.gethostname().lower()
+        return name in {"localhost", self.host.lower(), own, f"{own}.local"} - {""} or _is_address(name)
+
+
+class _Guarded(tornado.web.RequestHandler):
+    """A handler that turns away who is not to be here."""
+
+    def initialize(self, server: Server) -> None:
+        self.server = server
+
+    def prepare(self) -> None:
+        if not self.server.is_host(self.request.headers.get("Host", "")):
+            raise tornado.web.HTTPError(
+                421, reason="not a name of this server: use its address, or start it with --host"
+            )
+
+    def set_default_headers(self) -> None:
+        self.clear_header("Server")
+        for name, value in _HEADERS.items():
+            self.set_header(name, value)
+
+    def write_error(self, status_code: int, **kwargs: Any) -> None:
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(f"{status_code}: {self._reason}\n")
+
+
+class Page(_Guarded):
+    """The files of the page."""
+
+    def get(self, name: str) -> None:
+        if name not in _FILES:
+            raise tornado.web.HTTPError(404)
+        file, kind = _FILES[name]
+        self.set_header("Content-Type", f"{kind}; charset=utf-8")
+        self.write(file.read_bytes())
+
+    head = get
+
+
+class Channel(_Guarded, tornado.websocket.WebSocketHandler):
+    """What a page is told, and what it asks for."""
+
+    _behind = 0
+    _sending: asyncio.Future[None] | None = None
+
+    def prepare(self) -> None:
+        super().prepare()
+        origin = self.request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc.lower() != self.request.headers["Host"].lower():
+            raise tornado.web.HTTPError(403, reason="another page may not ask this server")
+
+    def check_origin(self, origin: str) -> bool:
+        """prepare() has done so."""
+        return True
+
+    def open(self, *_: str, **__: str) -> None:
+        self.set_nodelay(True)
+        self.tell(self.server.state.start())
+        self.server.pages.add(self)
+
+    def on_close(self) -> None:
+        self.server.pages.discard(self)
+
+    def update(self, messages: list[str]) -> None:
+        """Sends what is new. A page that is slow misses it, so that nothing piles up here, and then starts anew."""
+        if self._sending is not None and not self._sending.done():
+            self._behind += 1
+            if self._behind > _MOST_BEHIND:
+                self.close(1013, "too slow")
+            return
+        if self._behind:
+            messages = [self.server.state.start(), *messages[-1:]]
+            self._behind = 0
+        for message in messages:
+            self.tell(message)
+
+    def tell(self, message: str) -> None:
+        self._sending = asyncio.ensure_future(self._send(message))
+
+    async def _send(self, message: str) -> None:
+        try:
+            await self.write_message(message)
+        except tornado.websocket.WebSocketClosedError:
+            self.server.pages.discard(self)
+
+    def on_message(self, message: str | bytes) -> None:
+        try:
+            if not self.server.state.controls:
+                raise LeverError("this page only shows: no commands")
+            command = command_of(json.loads(message), self.server.config)
+            self.server.source.command(command)
+        except (LeverError, ValueError) as error:
+            self.tell(json.dumps({"refused": str(error)}))
+            return
+        self.tell(json.dumps({"sent": command}))
+
+
+def serve(
+    source: Source, config: Config, *, host: str, port: int, read_only: bool, duration: float | None = None
+) -> None:
+    """Serves the page until Ctrl-C, or for `duration` [s]. Raises LeverError."""
+    try:
+        server = Server(source, config, host=host, port=port, read_only=read_only)
+    except LeverError:
+        source.stop()
+        raise
+    if not ipaddress.ip_address(server.socket.getsockname()[0].partition("%")[0]).is_loopback:
+        what = "see the estimator" if not server.state.controls else "see and command the estimator"
+        print(f"lever: warning: anybody who reaches port {server.port} can {what}: no password", file=sys.stderr)
+    logging.getLogger("tornado").setLevel(logging.ERROR)
+    interrupted = asyncio.run(_until_stopped(server, duration))
+    if interrupted:
+        raise KeyboardInterrupt
+    if source.error is not None:
+        raise LeverError(source.error)
+
+
+async def _until_stopped(server: Server, duration: float | None) -> bool:
+    """Runs the server; returns whether a signal has ended it."""
+    stop, loop, interrupted = asyncio.Event(), asyncio.get_running_loop(), []
+
+    def end() -> None:
+        interrupted.append(True)
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with suppress(NotImplementedError):  # Windows: asyncio.run() itself ends on Ctrl-C there
+            loop.add_signal_handler(number, end)
+    if duration is not None:
+        loop.call_later(duration, stop.set)
+    print(f"{server.source.title}: open {server.address} (Ctrl-C ends)", flush=True)
+    await server.run(stop)
+    return bool(interrupted)
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        bound = socket.create_server((host, port), family=family)
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            raise LeverError(f"port {port} of {host} is in use: give another --port, or 0") from None
+        raise LeverError(f"cannot listen at {host} port {port}: {error.strerror or error}") from None
+    bound.setblocking(False)
+    return bound
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,286 @@
+"""`lever sim` and `lever demo`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lever_cdkf.host_tools.can import buses
+from lever_cdkf.host_tools.can.buses import add_bus_options, chosen_options
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
+
+if TYPE_CHECKING:
+    import can
+
+    from ..run.runner import Result
+    from ..scenarios.scenario import Scenario
+
+_DESCRIPTION = """\
+Simulates a pilot's arm on the lever and lets the firmware estimate it over CAN, in lock-step: every sample is answered
+before the next one is sent. Prints how good the estimates were; with --out also writes into DIR
+
+  bus.log       every frame both ways, in the format of candump, with simulated time
+  trace.csv     truth, measured, estimated, standard deviations and health, a row for each sample
+  summary.json  errors, coverage, times to converge, innovations, counts, and a verdict
+  report.html   all of it as one page for a browser
+
+With --seeds N it runs the scenario N times, each time with other random numbers, in as many processes as there are
+cores, and prints median and worst over the runs: a single run is one draw of noise and vibration. Its only file is
+that of --json. The columns are, for each quantity,
+
+  rms         error relative to the truth from converged_after on, of a run: its median and worst over the runs
+  coverage    share of that time for which +-2 sigma holds the truth: of all runs together, of the median and worst run
+  to 5 %      time from the start and from each jump of the truth until the error stays within 5 %
+  never       share of the starts and jumps after which it does not
+
+and of faults the share of that time with each. Those that warn say that the estimates are not to be trusted: a sensor
+(theta, theta_dot, torque, base), innovation, bound, mismatch, calibration, hands_off.
+
+
+With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
+is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
+and lever_can with --lock-step; bus.log is the same to the byte but for the channel's name.
+"""
+_EPILOG = """\
+examples:
+  lever sim --list
+  lever sim steady --out out/steady
+  lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
+  lever sim my_own.toml
+  lever sim steady --seeds 20 --json steady.json           median and worst of 20 runs, a minute on two cores
+  lever sim steady --seed 7 --out out/seed7                one of these runs, with its report
+  lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
+  lever sim steady --settings > steady.settings; lever_can --can vcan0 --lock-step --settings steady.settings &
+  lever sim steady --interface socketcan --channel vcan0
+  lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
+
+Exit status: 0 when every sample was answered, the estimator never was in fault, and the limits of the scenario were
+kept; 1 when not, with one line on standard error. With --seeds the first two are asked of every run, and the limits of
+the median rms error and of the coverage of all runs together.
+"""
+_CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
+_DEMO = "demo"
+_PRINT = ""  # --settings without a file
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    sim = subparsers.add_parser(
+        "sim", help="simulate a scenario and judge the estimates", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    what = sim.add_mutually_exclusive_group(required=True)
+    what.add_argument("scenario", nargs="?", metavar="SCENARIO", help="a name of --list, or the path of a .toml file")
+    what.add_argument("--list", action="store_true", help="print the scenarios that come with the package")
+    add_bus_options(sim)
+    sim.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    sim.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
+    )
+    sim.add_argument("--seed", type=int, help="set the seed of all random numbers; with --seeds the first (default: 1)")
+    sim.add_argument("--seeds", type=int, metavar="N", help="run N times, with consecutive seeds: median and worst")
+    sim.add_argument("--jobs", type=int, metavar="N", help="with --seeds: processes (default: one a core)")
+    sim.add_argument("--realtime", action="store_true", help="pace the samples by the clock")
+    sim.add_argument(
+        "--settings",
+        metavar="FILE",
+        nargs="?",
+        const=_PRINT,
+        help="use the estimator settings in FILE; without FILE: print a settings file with those of the run, and stop",
+    )
+    add_json_option(sim)
+    sim.set_defaults(run=run, interface="lever")
+    demo = subparsers.add_parser(
+        "demo",
+        help="simulate a tiring, then startled pilot and write a report",
+        description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled.",
+    )
+    demo.add_argument("--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
+    add_json_option(demo)
+    demo.set_defaults(run=run_demo)
+
+
+def run(args: argparse.Namespace) -> int:
+    """`lever sim`."""
+    from ..scenarios.scenario import load
+
+    if args.list:
+        return _list(args.json)
+    overrides = _from_file(args.settings) if args.settings not in (None, _PRINT) else []
+    overrides += args.set
+    if args.seeds is not None:
+        return _simulate_seeds(args, overrides)
+    if args.jobs is not None:
+        raise LeverError("--jobs is for --seeds: a single run is one process")
+    overrides += [] if args.seed is None else [f"seed={args.seed}"]
+    scenario = load(args.scenario, overrides)
+    if args.settings == _PRINT:
+        from lever_cdkf.host_tools.firmware.settings_file import format_config
+
+        sys.stdout.write(format_config(scenario.config))
+        return 0
+    channel = args.channel or _CHANNELS.get(args.interface)
+    if channel is None:
+        raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
+    return _simulate(scenario, args.interface, channel, chosen_options(args), args.out, args.json, args.realtime)
+
+
+def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
+    """`lever sim --seeds`."""
+    from lever_cdkf.host_tools.progress import Progress
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from ..run import seeds
+    from ..scenarios.scenario import load
+
+    _check_seeds(args)
+    load(args.scenario, overrides)  # what is wrong with it is said once, and at once
+    first = 1 if args.seed is None else args.seed
+    tasks = [seeds.Task(args.scenario, seed, tuple(overrides)) for seed in range(first, first + args.seeds)]
+    with Progress("sim") as progress:
+        summaries = seeds.run(tasks, args.jobs or os.cpu_count() or 1, progress.show)
+    print_tables(seeds.tables(summaries), args.json)
+    print(seeds.verdict(summaries))
+    reasons = seeds.troubles(summaries) + seeds.missed(summaries)
+    if reasons:
+        print(f"lever: {args.scenario}: {'; '.join(reasons)}", file=sys.stderr)
+    return 1 if reasons else 0
+
+
+def _check_seeds(args: argparse.Namespace) -> None:
+    """Raises LeverError for what does not go with --seeds."""
+    for option, number in (("--seeds", args.seeds), ("--jobs", args.jobs)):
+        if number is not None and number < 1:
+            raise LeverError(f"{option} {number}: must be at least 1")
+    for option, given in (
+        ("--out", args.out is not None),
+        ("--realtime", args.realtime),
+        ("--settings without a file", args.settings == _PRINT),
+        (f"--interface {args.interface}", args.interface != "lever"),
+        ("--channel", args.channel is not None),
+        ("--bitrate", args.bitrate is not None),
+        ("--bus-option", bool(args.bus_option)),
+    ):
+        if given:
+            raise LeverError(f"{option} is for a single run: leave out --seeds, and name the run by --seed")
+
+
+def _from_file(path: str) -> list[str]:
+    """A settings file as overrides of a scenario. Raises LeverError."""
+    from lever_cdkf.host_tools.firmware.config import CHOICES, setting
+    from lever_cdkf.host_tools.firmware.settings_file import read_assignments
+
+    return [
+        f"estimator.{name}={value}" if name in CHOICES else f"settings.{name}={value} {setting(name).unit}"
+        for name, value in read_assignments(path).items()
+    ]
+
+
+def run_demo(args: argparse.Namespace) -> int:
+    """`lever demo`."""
+    from ..scenarios.scenario import load
+
+    return _simulate(load(_DEMO), "lever", "lever", {}, args.out, args.json, realtime=False)
+
+
+def _list(json_file: str | None) -> int:
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from ..scenarios.scenario import load, names
+
+    scenarios = [load(name) for name in names()]
+    rows: list[Row] = [
+        {"name": scenario.name, "duration [s]": scenario.duration, "title": scenario.title} for scenario in scenarios
+    ]
+    print_tables({"scenarios": rows}, json_file)
+    return 0
+
+
+def _simulate(
+    scenario: Scenario,
+    interface: str,
+    channel: str,
+    bus_options: Mapping[str, Any],
+    out: Path | None,
+    json_file: str | None,
+    realtime: bool,
+) -> int:
+    from lever_cdkf.host_tools.progress import Progress
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from ..run.runner import simulate
+
+    with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
+        result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
+    print_tables(_tables(result), json_file)
+    print(result.summary.verdict)
+    if out is not None:
+        print(f"Written to {out}: report.html, summary.json, trace.csv, bus.log")
+    if result.summary.passed:
+        return 0
+    print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)
+    return 1
+
+
+def open_bus(
+    scenario: Scenario, interface: str, channel: str, bus_options: Mapping[str, Any] | None = None
+) -> can.BusABC:
+    """The bus to the estimator; `bus_options` are python-can's for the interface. Raises LeverError."""
+    if interface == "lever":
+        from lever_cdkf.host_tools.can.bus import LeverBus
+
+        return LeverBus(channel, config=scenario.config, **(bus_options or {}))
+    return buses.open_bus(interface, channel, bus_options or {})
+
+
+def _tables(result: Result) -> Tables:
+    """What is printed at the end."""
+    from lever_cdkf.host_tools.firmware.quantities import quantities
+
+    summary, trace = result.summary, result.trace
+    rows: list[Row] = []
+    for quantity in quantities(summary.estimator.model):
+        entry, truth = summary.parameters.get(quantity.key), trace.get(quantity.column("true"))
+        rows.append(
+            {
+                "quantity": quantity.key,
+                "unit": quantity.unit,
+                "truth at end": None if truth is None else float(truth[-1]),
+                "estimate": float(trace[quantity.column("estimate")][-1]),
+                "sigma": float(trace[quantity.column("sigma")][-1]),
+                "rms error [%]": entry.rms_percent if entry else None,
+                "bias [%]": entry.bias_percent if entry else None,
+                "truth within 2 sigma [1]": entry.coverage_2sigma if entry else None,
+                "time to 10 % [s]": _times(entry.time_to_10_percent_s if entry else ()),
+                "time to 5 % [s]": _times(entry.time_to_5_percent_s if entry else ()),
+            }
+        )
+    run_row: Row = {
+        "samples": summary.samples,
+        **{count: getattr(summary, count) for count in ("unanswered", "lost", "corrupt", "late", "restarts")},
+        "mean NIS [1]": summary.nis.mean,
+        "expected NIS [1]": summary.nis.expected,
+        "largest correlation [1]": summary.whiteness.largest if summary.whiteness else None,
+        "simulated time [s]": summary.simulated_time_s,
+        "wall time [s]": summary.wall_time_s,
+        "firmware": summary.firmware.version,
+    }
+    return {summary.scenario.title: rows, "run": [run_row]}
+
+
+def _times(times: Sequence[float | None]) -> str:
+    """Times after each change; a dash where the estimate never got there for good."""
+    return ", ".join("-" if seconds is None else f"{seconds:.1f}" for seconds in times)
+
+
+def _reason(result: Result) -> str:
+    """Why a run did not pass, in a line."""
+    summary = result.summary
+    reasons = [f"{summary.unanswered} samples without an answer"] if summary.unanswered else []
+    if summary.misplaced:
+        reasons.append(f"{summary.misplaced} estimates are of other samples: is the port in --lock-step, and alone?")
+    reasons += ["the estimator was in fault"] if "fault" in summary.modes_s else []
+    return "; ".join(reasons + summary.missed)

@@ -1,0 +1,1 @@
+"""A scenario run against an estimator, and what comes of it."""

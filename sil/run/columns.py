@@ -1,0 +1,85 @@
+"""The trace of a run, made from the frames as they were on the bus, in whole columns.
+
+Where a frame of the estimator comes at a divided rate, its values are held until the next one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.can import codec, fields
+from lever_cdkf.host_tools.results.feedthrough import FEEDTHROUGH
+from lever_cdkf.host_tools.results.trace import ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
+from numpy.typing import NDArray
+
+from .buslog import Frames
+from .loop import Recording
+
+
+def columns_of(recording: Recording, frames: Frames) -> Trace:
+    """The columns of trace.csv, in order."""
+    sample = np.array(recording.sample, dtype=np.int64)
+    count = len(recording.inputs.time)
+    decoded = _Decoded(frames, sample, count, round(recording.scenario.period * 1e6))
+    trace = _truth(recording)
+    for column, message, field in MEASURED:
+        trace[column] = decoded.at_samples(message, field)
+    for column, message, field in ESTIMATED:
+        trace[column] = decoded.at_samples(message, field)
+    model = recording.scenario.config.choices["model"]
+    for column, message, field in (*quantity_fields(model), *FEEDTHROUGH, *HEALTH):
+        trace[column] = decoded.held(message, field)
+    trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
+    return trace
+
+
+def _truth(recording: Recording) -> Trace:
+    inputs = recording.inputs
+    values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}
+    return {
+        "time_s": inputs.time,
+        "theta_true_rad": np.array(recording.theta),
+        "theta_dot_true_rad_s": np.array(recording.theta_dot),
+        "z_ddot_true_m_s2": inputs.z_ddot,
+        "tau_m_true_N_m": np.array(recording.tau_m),
+        "trim_true_rad": inputs.truth.rest,
+        **{quantity.column("true"): values[quantity.key] for quantity in recording.scenario.judged()},
+    }
+
+
+class _Decoded:
+    """The fields of all frames, decoded a message at a time when first asked for."""
+
+    def __init__(self, frames: Frames, sample: NDArray[np.int64], count: int, period_us: int) -> None:
+        self._frames, self._sample, self._count, self._period_us = frames, sample, count, period_us
+        self._messages: dict[str, tuple[NDArray[np.int64], dict[str, FloatArray]]] = {}
+
+    def _message(self, name: str) -> tuple[NDArray[np.int64], dict[str, FloatArray]]:
+        if name not in self._messages:
+            where = self._frames.of(codec.message(name).frame_id)
+            sample, decoded = self._sample[where], fields.columns(name, self._frames.data[where])
+            if "time_low" in decoded:
+                own = fields.belongs(decoded, sample * self._period_us)
+                sample, decoded = sample[own], {field: values[own] for field, values in decoded.items()}
+            self._messages[name] = sample, decoded
+        return self._messages[name]
+
+    def at_samples(self, message: str, field: str) -> FloatArray:
+        """The field at each sample; NaN without a frame or with a cleared validity bit."""
+        sample, decoded = self._message(message)
+        valid = decoded.get(f"{field}_valid", np.ones(len(sample)))
+        column = np.full(self._count, np.nan)
+        column[sample] = np.where(valid == 0.0, np.nan, decoded[field])
+        return column
+
+    def held(self, message: str, field: str) -> FloatArray:
+        """The last value of the field at or before each sample; NaN before the first.
+
+        Counts go on beyond their bits and start from 0, also if the firmware has counted in an earlier run.
+        """
+        sample, decoded = self._message(message)
+        values = decoded[field]
+        if field in fields.COUNTS and len(values):
+            values = np.unwrap(values, period=float(fields.COUNTS[field])) - values[0]
+        last = np.searchsorted(sample, np.arange(self._count), side="right")
+        return np.concatenate(((np.nan,), values))[last]

@@ -1,0 +1,371 @@
+"""A run in lock-step over any python-can bus: one sample out, one estimate back, whatever time that takes.
+
+An estimate says which sample it belongs to, by the low bits of its time: what answers another one is not taken for this
+one's. Dither needs a COMMAND a second, and gets one every KEEP_ALIVE of simulated time.
+
+Everything that does not depend on the estimator (excitation, noise, dropouts, truth) is made beforehand, everything
+that is not needed to go on (decoding, statistics, files) is done afterwards, both in whole columns; the loop in between
+advances the plant, encodes two frames and waits for STATE_ESTIMATE. Time is the time in the frames, so that a run gives
+the same bytes at any speed and on any bus.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from array import array
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+import can
+import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, Commander, refusal, result_of
+from lever_cdkf.host_tools.can.identity import Identity
+from lever_cdkf.host_tools.errors import LeverError
+from numpy.typing import NDArray
+
+from ..plants import excitation, sensors
+from ..plants.truth import Body, Conditions, Truth
+from ..scenarios.scenario import Scenario
+from .buslog import Frames
+
+Progress = Callable[[int, int], None]
+"""Called now and then with the samples done and the samples in all."""
+
+ANSWER_TIMEOUT = 5.0
+"""Longest wait for a STATE_ESTIMATE [s]; a sample that gets none in that time is counted as unanswered."""
+FIRST_TIMEOUT = 2.0
+"""Longest wait for the first one: the other process may still be starting."""
+MOST_UNANSWERED = 20
+"""Samples without an answer in a row, after which nobody is taken to be there."""
+
+_PROGRESS_EVERY = 500
+
+
+class NoAnswerError(LeverError):
+    """No estimator answers on the bus."""
+
+
+class RefusedError(LeverError):
+    """The estimator refuses a COMMAND of the run."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What is known of a run before it starts: one value a sample."""
+
+    time: FloatArray
+    truth: Truth
+    z_ddot: FloatArray
+    """True base acceleration [m/s^2]."""
+    z_ddot_measured: FloatArray
+    torque: FloatArray
+    """Commanded by the scenario itself [N m]."""
+    disturbance: FloatArray
+    """Torque in the lever that nobody measures [N m]."""
+    missing: dict[str, NDArray[np.bool_]]
+    """For each of sensors.VALUES and sensors.FRAMES."""
+
+
+@dataclass
+class Recording:
+    """What a run left behind, in the order in which it happened."""
+
+    scenario: Scenario
+    inputs: Inputs
+    identifier: array[int] = field(default_factory=lambda: array("H"))
+    sample: array[int] = field(default_factory=lambda: array("L"))
+    data: bytearray = field(default_factory=bytearray)
+    theta: list[float] = field(default_factory=list)
+    theta_dot: list[float] = field(default_factory=list)
+    tau_m: list[float] = field(default_factory=list)
+    grip_force: list[float] = field(default_factory=list)
+    unanswered: int = 0
+    misplaced: int = 0
+    """Estimates that belong to another sample than the one that was to be answered."""
+    identity: Identity = field(default_factory=Identity)
+
+    def frames(self) -> Frames:
+        """All frames, with the time of their sample."""
+        identifier = np.array(self.identifier, dtype=np.uint16)
+        outgoing = [codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")]
+        period_us = round(self.scenario.period * 1e6)
+        return Frames(
+            np.array(self.sample, dtype=np.int64) * period_us,
+            identifier,
+            np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8),
+            ~np.isin(identifier, outgoing),
+        )
+
+
+def prepare(scenario: Scenario) -> Inputs:
+    """The parts of a run that do not depend on the estimator."""
+    time, period = scenario.time(), scenario.period
+    base = excitation.total(scenario.base, time, scenario.streams("base", scenario.base))
+    dropouts = scenario.sensors.dropout
+    gone = {}
+    for what in (*sensors.VALUES, *sensors.FRAMES):
+        gone[what] = sensors.missing(dropouts, what, time, period, scenario.streams("dropout", dropouts))
+    measured = scenario.sensors.z_ddot.measure(base, period, scenario.stream("z_ddot"))
+    return Inputs(
+        time=time,
+        truth=scenario.truth(time),
+        z_ddot=base,
+        z_ddot_measured=scenario.corruption("z_ddot", time).of(measured),
+        torque=excitation.total(scenario.torque, time, scenario.streams("torque", scenario.torque)),
+        disturbance=excitation.total(scenario.disturbance, time, scenario.streams("disturbance", scenario.disturbance)),
+        missing=gone,
+    )
+
+
+def run(
+    scenario: Scenario,
+    bus: can.BusABC,
+    *,
+    realtime: bool = False,
+    progress: Progress | None = None,
+    commander: Commander | None = None,
+) -> Recording:
+    """Runs `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock.
+
+    `commander`: of whoever else sends COMMAND on this bus. Raises NoAnswerError when nobody answers, RefusedError when
+    the estimator refuses a COMMAND, and LeverError when it speaks another contract.
+    """
+    recording = Recording(scenario, prepare(scenario))
+    _loop(recording, _Link(bus, recording, commander or Commander()), realtime, progress)
+    return recording
+
+
+class _Link:
+    """The estimator at the other end of the bus; records every frame both ways."""
+
+    def __init__(self, bus: can.BusABC, recording: Recording, commander: Commander) -> None:
+        self._bus = bus
+        self._recording = recording
+        self._commander = commander
+        self._period_us = round(recording.scenario.period * 1e6)
+        self._estimate = codec.message("STATE_ESTIMATE").frame_id
+        self._motor = codec.message("MOTOR_COMMAND").frame_id
+        self._acknowledgement = codec.message("COMMAND_ACK").frame_id
+        self._identity = codec.message("IDENTITY").frame_id
+        self._torque = _signed_field("MOTOR_COMMAND", "torque")
+        self._motor_time = codec.raw_field("MOTOR_COMMAND", "time_low")
+        self._estimate_time = codec.raw_field("STATE_ESTIMATE", "time_low")
+        self._gate_open = codec.raw_field("MOTOR_COMMAND", "valid")
+        self._motor_started = False
+        self._unanswered_in_a_row = 0
+        incoming = [message for message in codec.database().messages if message.senders == ["ESTIMATOR"]]
+        self._incoming = frozenset(message.frame_id for message in incoming)
+
+    def sender(self, name: str) -> Callable[[int, bytes], None]:
+        """A function that sends a frame of the message `name`: called with the sample and the 8 bytes."""
+        identifier = codec.message(name).frame_id
+        message = can.Message(arbitration_id=identifier, is_extended_id=False, data=bytes(8))
+        send, recording = self._bus.send, self._recording
+
+        def send_frame(sample: int, data: bytes) -> None:
+            message.data = bytearray(data)
+            send(message)
+            recording.identifier.append(identifier)
+            recording.sample.append(sample)
+            recording.data += data
+
+        return send_frame
+
+    def command(self, sample: int, values: Mapping[str, codec.Value]) -> None:
+        """Sends a COMMAND and waits until it is acknowledged. A run that has ended just before may have left the
+        sequence of its counter anywhere, so the first one is sent until it is in it. Raises LeverError."""
+        send = self.sender("COMMAND")
+        for _ in range(1 if sample else 16):
+            counter = self._commander.send(values, lambda _, data: send(sample, data))
+            result = self._acknowledged(sample, counter)
+            if result != SEQUENCE:
+                break
+        if result not in (ACCEPTED, None):
+            raise RefusedError(f"{self._bus.channel_info}: {refusal(str(result))}")
+
+    def _acknowledged(self, sample: int, counter: int) -> str | None:
+        """What became of a COMMAND; None when that is not said in time."""
+        timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
+        while (frame := self._take(sample, timeout)) is not None:
+            if frame[0] == self._acknowledgement:
+                ack = codec.decode(*frame)[1]
+                if ack["command_counter"] == counter:
+                    return result_of(ack)
+        if not sample:
+            raise NoAnswerError(
+                f"no COMMAND_ACK on {self._bus.channel_info}: is the firmware, of this version, running there?"
+            )
+        return None
+
+    def answer(self, sample: int) -> float:
+        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for.
+        What still fades of an earlier run's, before the gate opens for the first time, is none of this one."""
+        time_low = sample * self._period_us & 0xFFFF
+        timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
+        torque = 0.0
+        while (frame := self._take(sample, timeout)) is not None:
+            identifier, data = frame
+            if identifier == self._motor:
+                if self._motor_time(data) == time_low:
+                    self._motor_started = self._motor_started or self._gate_open(data) != 0
+                    torque = self._torque(data) if self._motor_started else 0.0
+            elif identifier == self._estimate:
+                if self._estimate_time(data) == time_low:
+                    self._unanswered_in_a_row = 0
+                    return torque
+                self._recording.misplaced += 1
+        self._miss(sample)
+        return torque
+
+    def _take(self, sample: int, timeout: float) -> tuple[int, bytes | bytearray] | None:
+        """The next frame of the estimator, recorded; None when none comes in time."""
+        recording = self._recording
+        while (message := self._bus.recv(timeout)) is not None:
+            identifier, data = message.arbitration_id, message.data
+            if identifier not in self._incoming or len(data) != 8:
+                continue  # somebody else's
+            recording.identifier.append(identifier)
+            recording.sample.append(sample)
+            recording.data += data
+            if identifier == self._identity:
+                recording.identity.take(codec.decode(identifier, data)[1])
+                recording.identity.check(f"the estimator on {self._bus.channel_info}")
+            return identifier, data
+        return None
+
+    def _miss(self, sample: int) -> None:
+        self._recording.unanswered += 1
+        self._unanswered_in_a_row += 1
+        if self._unanswered_in_a_row >= MOST_UNANSWERED or not sample:
+            raise NoAnswerError(
+                f"no STATE_ESTIMATE on {self._bus.channel_info} at sample {sample}: is the firmware running there?"
+            )
+
+
+def _signed_field(name: str, signal: str) -> Callable[[bytes | bytearray], float]:
+    """A fast reader of one signed, scaled field of an 8-byte frame, which is always available."""
+    layout = codec.message(name).get_signal_by_name(signal)
+    raw, scale, half = codec.raw_field(name, signal), float(layout.scale), 1 << (layout.length - 1)
+    return lambda data: ((raw(data) ^ half) - half) * scale
+
+
+def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress | None) -> None:
+    """The samples, one after the other."""
+    scenario, inputs = recording.scenario, recording.inputs
+    count = len(inputs.time)
+    body = _body(scenario, inputs)
+    commands = _commands(scenario, inputs.time)
+    pace = _pace(scenario.period) if realtime else None
+    send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
+    encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    thetas, theta_dots, torques = recording.theta, recording.theta_dot, recording.tau_m
+    measure = [_reader_of(recording, name) for name in ("theta", "theta_dot", "tau_m")]
+    send_grip = _grip_sender(recording, link)
+    no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
+    base = np.where(inputs.missing["z_ddot"], np.nan, inputs.z_ddot_measured).tolist()
+    period_us = round(scenario.period * 1e6)
+    command, own_torque, last = 0.0, inputs.torque.tolist(), count - 1
+
+    for sample in range(count):
+        thetas.append(body.theta)
+        theta_dots.append(body.theta_dot)
+        torques.append(body.tau_m)
+        if sample in commands:
+            link.command(sample, commands[sample])
+        recording.grip_force.append(body.grip_force)
+        if not no_lever[sample]:
+            send_lever(sample, encode_lever(sample, *(read(sample) for read in measure)))
+        if send_grip is not None:
+            send_grip(sample)
+        if not no_base[sample]:
+            send_base(sample, encode_base(sample, base[sample], sample * period_us))
+            command = link.answer(sample)
+        if sample != last:
+            body.advance(command + own_torque[sample])
+        if pace is not None:
+            next(pace)
+        if progress is not None and sample % _PROGRESS_EVERY == 0:
+            progress(sample, count)
+    if progress is not None:
+        progress(count, count)
+
+
+def _body(scenario: Scenario, inputs: Inputs) -> Body:
+    return inputs.truth.body(
+        Conditions(
+            inputs.z_ddot,
+            scenario.period,
+            scenario.pilot.process_noise,
+            scenario.motor.lag,
+            scenario.stream("process"),
+            disturbance=inputs.disturbance,
+        )
+    )
+
+
+def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec.Value]]:
+    """What to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the start,
+    the dither as it changes, and while it is on, one that keeps it alive."""
+    changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
+    start: dict[str, codec.Value] = {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}
+    commands = {0: start}
+    repetition = max(1, round(KEEP_ALIVE / scenario.period))
+    for (sample, rms), end in zip(changes.items(), [*changes, len(time)][1:], strict=True):
+        commands[sample] = {**commands.get(sample, {}), "dither_rms": rms}
+        if rms > 0.0:
+            commands |= {later: {} for later in range(sample + repetition, end, repetition)}
+    return commands
+
+
+def _reader_of(recording: Recording, name: str) -> Callable[[int], float]:
+    """The reading of a signal of the lever at a sample, from the history up to it; NaN when invalid."""
+    scenario, inputs = recording.scenario, recording.inputs
+    sensor: sensors.Sensor = getattr(scenario.sensors, name)
+    offsets = sensor.offsets(len(inputs.time), scenario.stream(name))
+    corruption = scenario.corruption(name, inputs.time)
+    corruption.offset[inputs.missing[name]] = np.nan
+    reader = _reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period)
+    return _corrupted(reader, corruption)
+
+
+def _grip_sender(recording: Recording, link: _Link) -> Callable[[int], None] | None:
+    """Sends the GRIP_SAMPLE of a sample; None without that sensor."""
+    if recording.scenario.sensors.grip_force is None:
+        return None
+    read, send, encode = _reader_of(recording, "grip_force"), link.sender("GRIP_SAMPLE"), codec.encoder("GRIP_SAMPLE")
+    return lambda sample: send(sample, encode(sample, read(sample)))
+
+
+def _reader(
+    sensor: sensors.Sensor, history: list[float], offsets: list[float], period: float
+) -> Callable[[int], float]:
+    """A sensor of a signal that is known only up to now; as Sensor.measure() otherwise."""
+    gain = 1.0 + sensor.gain_error
+    whole, part = sensor.lag(period)
+    if whole == 0 and part == 0.0:
+        return lambda sample: gain * history[sample] + offsets[sample]
+
+    def delayed(sample: int) -> float:
+        newer, older = history[max(sample - whole, 0)], history[max(sample - whole - 1, 0)]
+        return gain * (newer + part * (older - newer)) + offsets[sample]
+
+    return delayed
+
+
+def _corrupted(reader: Callable[[int], float], corruption: sensors.Corruption) -> Callable[[int], float]:
+    """What `reader` reads, with the faults in it; as Corruption.of() otherwise."""
+    source, factor, offset = (column.tolist() for column in vars(corruption).values())
+    return lambda sample: factor[sample] * reader(source[sample]) + offset[sample]
+
+
+def _pace(period: float) -> Iterator[None]:
+    """Waits, each time it is advanced, until that many periods have gone by on the wall clock."""
+    due = clock.perf_counter()
+    while True:
+        due += period
+        remaining = due - clock.perf_counter()
+        if remaining > 0.0:
+            clock.sleep(remaining)
+        yield

@@ -1,0 +1,268 @@
+"""What a run comes to: summary.json, and the verdict in words.
+
+Errors are relative to the truth at the same sample and judged only from `converged_after` seconds after the start and
+after each jump of the truth on; how long the estimates need until then is what the times to 10 % and 5 % tell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
+from lever_cdkf.host_tools.can.fields import COUNTS
+from lever_cdkf.host_tools.firmware.native import enum_names
+from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
+from lever_cdkf.host_tools.results import nis, summary, whiteness
+from lever_cdkf.host_tools.results.nis import Innovations, Nis, freedom
+from lever_cdkf.host_tools.results.summary import Estimator, Firmware, Quality, SimulationSummary, TrueTransfer, Truth
+from lever_cdkf.host_tools.results.trace import Trace
+from lever_cdkf.host_tools.results.whiteness import Whiteness
+
+from ..scenarios.scenario import Scenario
+from .loop import Recording
+
+MOST_TRANSFERS = 50
+"""How often, spread over the run, the transfer function of a truth is looked at for changes."""
+
+WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mismatch", "calibration", "hands_off")
+"""Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""
+
+
+def build(recording: Recording, trace: Trace) -> SimulationSummary:
+    """The content of summary.json, but for the wall times."""
+    scenario = recording.scenario
+    quality = {quantity.key: _quality(quantity, scenario, trace) for quantity in scenario.judged()}
+    count = len(recording.inputs.time)
+    modes = _modes(trace)
+    fault_shares, flagged_share = _faults(scenario, trace)
+    missed = missed_limits(
+        scenario.limits,
+        {name: entry.rms_percent for name, entry in quality.items()},
+        {name: entry.coverage_2sigma for name, entry in quality.items()},
+    )
+    found = SimulationSummary(
+        estimator=Estimator(**scenario.config.choices, settings=dict(scenario.config.settings)),
+        samples=count,
+        **{name: _last(trace[name]) for name in COUNTS},
+        nis=_nis(scenario, trace),
+        whiteness=_whiteness(scenario, trace),
+        modes_s=modes,
+        passed=not (missed or recording.unanswered or recording.misplaced or "fault" in modes),
+        verdict="",
+        scenario=_scenario(scenario),
+        truth=_truth(recording),
+        firmware=_firmware(recording),
+        parameters=quality,
+        unanswered=recording.unanswered,
+        misplaced=recording.misplaced,
+        fault_shares=fault_shares,
+        flagged_share=flagged_share,
+        missed=missed,
+        simulated_time_s=count * scenario.period,
+    )
+    return replace(found, verdict=_verdict(found))
+
+
+def _scenario(scenario: Scenario) -> summary.Scenario:
+    return summary.Scenario(
+        name=scenario.name,
+        title=scenario.title,
+        description=scenario.description,
+        seed=scenario.seed,
+        sample_period_s=scenario.period,
+        converged_after_s=scenario.converged_after,
+        changes_s=list(scenario.changes()),
+        limits=dict(scenario.limits or {}),
+    )
+
+
+def _truth(recording: Recording) -> Truth:
+    scenario, inputs = recording.scenario, recording.inputs
+    if scenario.pilot.model == scenario.config.choices["model"]:
+        return Truth(scenario.pilot.model)
+    at = np.linspace(0, len(inputs.time) - 1, MOST_TRANSFERS).astype(np.intp)
+    transfer = inputs.truth.transfer(at)
+    rows = np.hstack((transfer.numerator, transfer.denominator))
+    new = np.flatnonzero(np.append(True, np.any(np.diff(rows, axis=0) != 0.0, axis=1)))
+    polynomials = TrueTransfer(
+        time_s=inputs.time[at[new]].tolist(),
+        numerator=transfer.numerator[new].tolist(),
+        denominator=transfer.denominator[new].tolist(),
+    )
+    return Truth(scenario.pilot.model, scenario.pilot.about, scenario.pilot.about_dynamics, polynomials)
+
+
+def _firmware(recording: Recording) -> Firmware:
+    identity = recording.identity
+    same = None if identity.settings_crc is None else identity.settings_crc == recording.scenario.config.settings_crc
+    return Firmware(identity.version, identity.contract, same)
+
+
+def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
+    truth = trace[quantity.column("true")]
+    error = trace[quantity.column("estimate")] - truth
+    relative, sigma = error / truth, trace[quantity.column("sigma")]
+    judged = judged_samples(scenario, trace["time_s"]) & np.isfinite(relative)
+    reached = [times_to(relative, trace["time_s"], scenario.changes(), within) for within in (0.1, 0.05)]
+    if not judged.any():
+        return Quality(None, None, None, *reached)
+    return Quality(
+        rms_percent=100.0 * float(np.sqrt(np.mean(np.square(relative[judged])))),
+        bias_percent=100.0 * float(np.mean(relative[judged])),
+        coverage_2sigma=float(np.mean(np.abs(error[judged]) <= 2.0 * sigma[judged])),
+        time_to_10_percent_s=reached[0],
+        time_to_5_percent_s=reached[1],
+    )
+
+
+def judged_samples(scenario: Scenario, time: FloatArray) -> BoolArray:
+    """True from `converged_after` seconds after each change on, until the next one."""
+    judged = np.ones(len(time), dtype=np.bool_)
+    for change in scenario.changes():
+        judged &= ~((time >= change) & (time < change + scenario.converged_after))
+    return judged
+
+
+def times_to(relative: FloatArray, time: FloatArray, changes: tuple[float, ...], within: float) -> list[float | None]:
+    """After each change, the time [s] until |relative| stays <= within up to the next change; None if it never does.
+
+    A sample without an estimate (NaN) counts as outside.
+    """
+    times: list[float | None] = []
+    for begin, end in zip(changes, (*changes[1:], math.inf), strict=True):
+        part = np.flatnonzero((time >= begin) & (time < end))
+        outside = np.flatnonzero(~(np.abs(relative[part]) <= within))
+        first = int(outside[-1]) + 1 if len(outside) else 0
+        times.append(round(float(time[part[first]]) - begin, 9) if first < len(part) else None)
+    return times
+
+
+def _nis(scenario: Scenario, trace: Trace) -> Nis:
+    """Of the judged samples."""
+    outputs = freedom(trace["theta_measured_rad"], trace["theta_dot_measured_rad_s"])
+    judged = judged_samples(scenario, trace["time_s"])
+    innovations = Innovations()
+    innovations.add(trace["nis"][judged], outputs[judged])
+    return innovations.figures()
+
+
+def _whiteness(scenario: Scenario, trace: Trace) -> Whiteness | None:
+    """Of the judged samples; None where there are too few."""
+    residual = whiteness.residual(trace)
+    if residual is None:
+        return None
+    judged = np.where(judged_samples(scenario, trace["time_s"]), residual, np.nan)
+    return whiteness.measure(judged, scenario.period)
+
+
+def _last(column: FloatArray) -> int:
+    known = column[np.isfinite(column)]
+    return int(known[-1]) if len(known) else 0
+
+
+def _modes(trace: Trace) -> dict[str, float]:
+    """Seconds spent in each mode, by name, as far as HEALTH told."""
+    mode, step = trace["mode"], float(trace["time_s"][1] - trace["time_s"][0])
+    samples = {name: int(np.sum(mode == number)) for number, name in enum_names("lever_mode").items()}
+    return {name: round(count * step, 9) for name, count in samples.items() if count}
+
+
+def _faults(scenario: Scenario, trace: Trace) -> tuple[dict[str, float], float | None]:
+    """Shares (0 to 1) of the judged time with each fault that there was, and with any of WARNINGS (null: not known)."""
+    column = trace["faults"][judged_samples(scenario, trace["time_s"])]
+    faults = column[np.isfinite(column)].astype(np.int64)
+    if not len(faults):
+        return {}, None
+    bits = {name: bit for bit, name in enum_names("lever_fault").items()}
+    shares = {name: float(np.mean(faults & bit != 0)) for name, bit in bits.items()}
+    warnings = sum(bits[name] for name in WARNINGS)
+    return {name: share for name, share in shares.items() if share > 0.0}, float(np.mean(faults & warnings != 0))
+
+
+def missed_limits(
+    limits: Mapping[str, float] | None, rms_percent: Mapping[str, float | None], coverage: Mapping[str, float | None]
+) -> list[str]:
+    """The limits of a scenario that were not kept, in words; None is not judged."""
+    missed = []
+    limits = limits or {}
+    for name, rms in rms_percent.items():
+        limit = limits.get(name)
+        if limit is not None and rms is not None and rms > 100.0 * limit:
+            missed.append(f"rms error of {name} {rms:.1f} % (limit {100.0 * limit:g} %)")
+    least = limits.get("coverage")
+    for name, share in coverage.items():
+        if least is not None and share is not None and share < least:
+            missed.append(f"coverage of {name} {100.0 * share:.0f} % (limit {100.0 * least:g} %)")
+    return missed
+
+
+def _verdict(found: SimulationSummary) -> str:
+    """The run in a few sentences, for somebody who has not seen a Kalman filter before."""
+    return " ".join(
+        sentence
+        for sentence in (
+            _verdict_run(found),
+            _verdict_truth(found),
+            _verdict_limits(found),
+            _verdict_sigma(found.parameters),
+            nis.verdict(found.nis),
+            whiteness.verdict(found.whiteness),
+        )
+        if sentence
+    )
+
+
+def _verdict_run(found: SimulationSummary) -> str:
+    troubles = []
+    if found.unanswered:
+        troubles.append(f"{found.unanswered} samples got no answer")
+    if found.misplaced:
+        troubles.append(f"{found.misplaced} estimates came that belong to other samples")
+    if "fault" in found.modes_s:
+        troubles.append(f"the estimator was in fault for {found.modes_s['fault']:g} s")
+    told = f"Trouble: {' and '.join(troubles)}." if troubles else ""
+    if found.firmware.settings_as_scenario is False:
+        told = f"{told} The estimator has other settings than the scenario.".lstrip()
+    return told
+
+
+def _verdict_truth(found: SimulationSummary) -> str:
+    if found.truth.model == found.estimator.model:
+        return ""
+    return (
+        f"The pilot ({found.truth.model}) is not of the estimator's kind ({found.estimator.model}): "
+        "only natural frequency and damping ratio can be held against the truth."
+    )
+
+
+def _verdict_limits(found: SimulationSummary) -> str:
+    errors = ", ".join(
+        f"{_words(name)} {entry.rms_percent:.1f} %"
+        for name, entry in found.parameters.items()
+        if entry.rms_percent is not None
+    )
+    if not errors:
+        return "Too short to judge: the run ends before the estimates were to have converged."
+    if found.missed:
+        return f"Limits missed: {'; '.join(found.missed)}. Rms errors after convergence: {errors}."
+    kept = "All limits kept. " if found.scenario.limits else ""
+    return f"{kept}Rms errors after convergence: {errors}."
+
+
+def _verdict_sigma(quality: dict[str, Quality]) -> str:
+    covered = {name: entry.coverage_2sigma for name, entry in quality.items() if entry.coverage_2sigma is not None}
+    if not covered:
+        return ""
+    worst = min(covered, key=lambda name: covered[name])
+    percent = f"{100.0 * covered[worst]:.0f} % of the time"
+    if covered[worst] >= LEAST_COVERAGE:
+        return f"In this run ±2σ covers every truth for at least {percent}."
+    return f"In this run the stated σ of {_words(worst)} is too small: ±2σ covers the truth for {percent}."
+
+
+def _words(name: str) -> str:
+    """A quantity as it stands in a sentence; symbols stay."""
+    return {quantity.key: quantity.name for quantity in DYNAMICS}.get(name, name)

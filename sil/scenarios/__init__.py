@@ -1,0 +1,1 @@
+"""Runs as data, and what reads them."""

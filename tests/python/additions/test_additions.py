@@ -1,0 +1,242 @@
+"""Where a new thing goes: what the READMEs of sil and host_tools say of it, followed in a copy of the packages.
+What is added there is listed, runs, and shows in the report."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools.files import LIBRARY_DIR, native_file
+
+SCENARIO = """
+title = "A seesaw"
+description = "All that is new at once."
+duration = "4 s"
+converged_after = "1 s"
+[pilot]
+model = "seesaw"
+trim = "20 deg"
+k_seat = { kind = "vee", first = "2000 N/m", last = "1500 N/m" }
+m_seat = "2 kg"
+[[base]]
+kind = "square"
+rms = "0.1 g"
+frequency = "3 Hz"
+[sensors.theta]
+noise = "1 mrad"
+fault = [{ kind = "offset", by = "1 mrad", start = "2 s" }]
+[limits]
+natural_frequency = "1000 %"
+"""
+PLANT = '''
+"""A truth of the test: a mass on a spring."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
+
+from .linear_plant import LinearTruth, System
+
+
+@dataclass(frozen=True)
+class Seesaw(LinearTruth):
+    model = "seesaw"
+    m_seat: FloatArray
+    k_seat: FloatArray
+    trim: FloatArray
+
+    @property
+    def parameters(self) -> Mapping[str, FloatArray]:
+        return {"m_seat": self.m_seat, "k_seat": self.k_seat}
+
+    @property
+    def system(self) -> System:
+        one = np.ones_like(self.m_seat)
+        return System(self.k_seat / self.m_seat, 8.0 * one, -one, 1.0 / self.m_seat, self.trim)
+'''
+PILOT = '''
+@dataclass(frozen=True, kw_only=True)
+class SeesawPilot(Pilot):
+    """A mass on a spring."""
+
+    model = "seesaw"
+    about = "a seesaw, which nobody expected"
+    signs: ClassVar[Mapping[str, int]] = {"m_seat": 1, "k_seat": 1}
+    m_seat: Trajectory = item(read_trajectory(), "kg")
+    k_seat: Trajectory = item(read_trajectory(), "N/m")
+
+    def build(self, time, values, trim, lever):
+        return seesaw_plant.Seesaw(**values, trim=trim)
+
+
+_ALL = (SeesawPilot, '''
+TRAJECTORY = '''
+@dataclass(frozen=True)
+class Vee(Trajectory):
+    """Down and up again, with a little noise of its own."""
+
+    first: float = quantity(SIGNAL)
+    last: float = quantity(SIGNAL)
+
+    def values(self, time, rng):
+        middle = 0.5 * time[-1]
+        return self.first + (self.last - self.first) * (1 - abs(time - middle) / middle) + rng.standard_normal()
+
+
+KINDS: Mapping[str, type[Trajectory]] = {
+    "vee": Vee,'''
+EXCITATION = '''
+@dataclass(frozen=True, kw_only=True)
+class Square(Excitation):
+    """Up and down."""
+
+    rms: float = quantity(SIGNAL, least=0.0)
+    frequency: float = quantity("Hz", above=0.0)
+
+    def scaled(self, time, rng):
+        return self.rms * np.sign(np.sin(2.0 * np.pi * self.frequency * time))
+
+
+KINDS: dict[str, type[Excitation]] = {
+    "square": Square,'''
+FAULT = '''
+@dataclass(frozen=True, kw_only=True)
+class Offset(Fault):
+    """Off by so much."""
+
+    by: float = quantity(SIGNAL)
+
+    def corrupt(self, inside, found, rng):
+        found.offset[inside] += self.by
+
+
+FAULTS: dict[str, type[Fault]] = {"offset": Offset, '''
+BASELINE = '''
+"""An estimator of the test: the first guess. Source: none."""
+
+import numpy as np
+
+from ..data import Estimates
+
+
+def guess(batch, at):
+    raise NotImplementedError
+'''
+COMMAND = '''
+"""`lever hello`."""
+
+
+def add_parser(subparsers):
+    subparsers.add_parser("hello", help="says hello")
+
+
+def run(args):
+    print("hello")
+    return 0
+'''
+RUN = """
+import sys
+sys.meta_path[:] = [each for each in sys.meta_path if "Editable" not in type(each).__name__ + type(each).__module__
+                    and "Redirecting" not in type(each).__name__]
+sys.path.insert(0, sys.argv.pop(1))
+from lever_cdkf.host_tools import cli
+sys.exit(cli.main())
+"""
+
+
+class Copy:
+    """The packages, to be added to."""
+
+    def __init__(self, root: Path, folder: Path) -> None:
+        self.folder = folder
+        package = folder / "lever_cdkf"
+        shutil.copytree(root / "api/lever_cdkf", package, ignore=shutil.ignore_patterns("__pycache__"))
+        for name in ("host_tools", "sil"):
+            shutil.copytree(root / name, package / name, ignore=shutil.ignore_patterns("__pycache__", "c"))
+
+    def file(self, path: str, text: str) -> None:
+        (self.folder / "lever_cdkf" / path).write_text(text.lstrip("\n"), encoding="utf-8")
+
+    def change(self, path: str, old: str, new: str) -> None:
+        file = self.folder / "lever_cdkf" / path
+        text = file.read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{path}: {old}"
+        file.write_text(text.replace(old, new), encoding="utf-8")
+
+    def lever(self, *arguments: str) -> str:
+        """What the command says, of this copy."""
+        environment = {**os.environ, LIBRARY_DIR: str(native_file("lever.dbc").parent), "COLUMNS": "200"}
+        command = [sys.executable, "-c", RUN, str(self.folder), *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=self.folder)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+
+@pytest.fixture(scope="module")
+def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Copy:
+    made = Copy(root, tmp_path_factory.mktemp("additions"))
+    made.file("sil/scenarios/seesaw.toml", SCENARIO)
+    made.file("sil/plants/seesaw_plant.py", PLANT)
+    pilots = "sil/plants/pilots.py"
+    made.change(pilots, "mayo_plant, reflex_plant,", "mayo_plant, seesaw_plant, reflex_plant,")
+    made.change(pilots, "\n_ALL = (", PILOT)
+    made.change("sil/plants/trajectories.py", "\nKINDS: Mapping[str, type[Trajectory]] = {", TRAJECTORY)
+    made.change("sil/plants/excitation.py", "\nKINDS: dict[str, type[Excitation]] = {", EXCITATION)
+    made.change("sil/plants/sensors.py", "\nFAULTS: dict[str, type[Fault]] = {", FAULT)
+    made.change("host_tools/results/trace.py", "\nHEALTH = (\n", '\nHEALTH = (\n    ("gap", "HEALTH", "fault_gap"),\n')
+    made.file("sil/study/baselines/guess.py", BASELINE)
+    baselines = "sil/study/baselines/__init__.py"
+    made.change(baselines, "from .joint_ekf", "from .guess import guess\nfrom .joint_ekf")
+    made.change(
+        baselines, "    for baseline in (\n", '    for baseline in (\n        Baseline("guess", "it", "none", guess),\n'
+    )
+    made.change(
+        "sil/envelope/conditions.py", "\n_STEADY = (", '\n_STEADY = (\n    Condition("calm", "no motion", Motion()),'
+    )
+    made.change(
+        "sil/study/compare/cases.py",
+        "def _wrong_noise() -> Iterator[Case]:\n",
+        'def _wrong_noise() -> Iterator[Case]:\n    yield WrongNoise(name="wronger", title="wronger")\n',
+    )
+    made.file("sil/commands/hello.py", COMMAND)
+    entries = made.folder / "hello-1.dist-info"
+    entries.mkdir()
+    (entries / "METADATA").write_text("Metadata-Version: 2.1\nName: hello\nVersion: 1\n")
+    (entries / "entry_points.txt").write_text("[lever_cdkf.commands]\nhello = lever_cdkf.sil.commands.hello\n")
+    return made
+
+
+def test_a_scenario_with_a_new_plant_trajectory_excitation_fault_and_column_runs(copy: Copy) -> None:
+    assert "A seesaw" in copy.lever("sim", "--list")
+    copy.lever("sim", "seesaw", "--out", "out")
+    summary = json.loads((copy.folder / "out/summary.json").read_text())
+    assert summary["truth"]["model"] == "seesaw"
+    assert summary["samples"] == 4000
+    header, *rows = (copy.folder / "out/trace.csv").read_text().splitlines()
+    gap = header.split(",").index("gap")
+    assert rows[-1].split(",")[gap] == "0.000000"
+    assert "a seesaw, which nobody expected" in (copy.folder / "out/report.html").read_text()
+    copy.lever("replay", "out/bus.log", "--out", "again")
+    assert ",gap," in (copy.folder / "again/trace.csv").read_text().splitlines()[0]
+
+
+def test_an_estimator_and_a_case_are_compared(copy: Copy) -> None:
+    listed = copy.lever("compare", "--list")
+    assert "guess" in listed
+    assert "wronger" in listed
+
+
+def test_a_condition_is_part_of_the_envelope(copy: Copy) -> None:
+    assert "calm" in copy.lever("envelope", "--list")
+
+
+def test_a_command_is_one_of_levers(copy: Copy) -> None:
+    assert "says hello" in copy.lever("--help")
+    assert copy.lever("hello") == "hello\n"

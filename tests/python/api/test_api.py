@@ -1,0 +1,51 @@
+"""The public names of lever_cdkf: they are there, they cost nothing until used, and they do what their page says."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import lever_cdkf
+import numpy as np
+import pytest
+
+PUBLIC = ["Config", "Estimator", "load_scenario", "run_samples", "simulate"]
+
+
+def test_the_public_names_are_these() -> None:
+    assert lever_cdkf.__all__ == PUBLIC
+    assert all(callable(getattr(lever_cdkf, name)) for name in PUBLIC)
+    assert set(PUBLIC) <= set(dir(lever_cdkf))
+    with pytest.raises(AttributeError, match="no attribute 'Scenario'"):
+        _ = lever_cdkf.Scenario
+
+
+@pytest.mark.parametrize("package", ["lever_cdkf", "can"])
+def test_importing_loads_nothing_of_it(package: str) -> None:
+    """python-can looks for our interface's entry point, and must not load what is behind it."""
+    listed = f"import sys, {package}; print(*(name for name in sys.modules if name.startswith('lever_cdkf.')))"
+    done = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_samples_and_instance_agree() -> None:
+    from lever_cdkf import Config, Estimator, run_samples
+
+    time_us = 1000 * np.arange(300)
+    theta = 0.35 + 0.01 * np.sin(20e-6 * time_us)
+    still = np.zeros(len(time_us))
+    config = Config(settings={"m_p": 3.0})
+    whole = run_samples(config, {"time_us": time_us, "theta": theta, "tau_m": still, "z_ddot": still})
+    one = Estimator(config)
+    for time, angle in zip(time_us.tolist(), theta.tolist(), strict=True):
+        one.update(time, theta=angle, theta_dot=None, tau_m=0.0, z_ddot=0.0)
+    assert whole["natural_frequency"][-1] == one.estimate().natural_frequency > 0.0
+
+
+def test_a_scenario_runs_without_a_bus() -> None:
+    from lever_cdkf import load_scenario, simulate
+
+    steady = load_scenario("steady", ["duration=0.5 s", "converged_after=0.1 s", "limits={}"])
+    result = simulate(steady)
+    assert result.summary.samples == len(result.trace["time_s"]) == 500
+    assert result.summary.unanswered == 0

@@ -1,0 +1,399 @@
+"""LeverBus as a python-can interface: what comes back, when, with which time, and what is refused."""
+
+from __future__ import annotations
+
+import gc
+import itertools
+import logging
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.bus import LeverBus, LeverBusError
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.firmware.native import Config, Estimator
+
+Frame = tuple[int, bytes]
+MakeBus = Callable[..., LeverBus]
+Samples = Callable[[int, int], list[tuple[Frame, Frame]]]
+Exchange = Callable[[can.BusABC, tuple[Frame, Frame]], list[can.Message]]
+ToMessage = Callable[[Frame], can.Message]
+
+
+def seen(messages: list[can.Message]) -> list[tuple[float, int, bytes]]:
+    """What a log would show of messages."""
+    return [(message.timestamp, message.arbitration_id, bytes(message.data)) for message in messages]
+
+
+# --- answers ---------------------------------------------------------------------------------------------------------
+
+
+def test_each_sample_is_answered_as_by_the_firmware(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    bus, estimator = make_bus("x"), Estimator()
+    identifiers = set()
+    for lever, base in samples(0, 300):
+        answers = exchange(bus, (lever, base))
+        estimator.on_frame(*lever)
+        estimator.on_frame(*base)
+        estimator.step()
+        assert [(a.arbitration_id, bytes(a.data)) for a in answers] == list(iter(estimator.next_frame, None))
+        assert [a.arbitration_id for a in answers].count(0x210) == 1
+        assert answers[-1].arbitration_id == 0x210
+        identifiers |= {a.arbitration_id for a in answers}
+    assert {0x210, 0x211, 0x212, 0x213, 0x214} <= identifiers
+    assert bus.estimator.health() == estimator.health()
+
+
+def test_form_of_an_answer(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    answer = exchange(make_bus("bench"), samples(0, 1)[0])[-1]
+    assert (answer.channel, answer.dlc, answer.is_rx) == ("bench", 8, True)
+    assert not any((answer.is_extended_id, answer.is_remote_frame, answer.is_error_frame, answer.is_fd))
+    assert codec.decode(answer.arbitration_id, answer.data)[0] == "STATE_ESTIMATE"
+
+
+def test_dither_command_gives_motor_commands(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    bus = make_bus("x", settings={"align_time": 0.05, "dither_fade": 0.1})
+    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
+    command = codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **keep})
+    bus.send(can.Message(arbitration_id=0x120, is_extended_id=False, data=command))
+    torques = []
+    for sample in samples(0, 500):
+        answers = exchange(bus, sample)
+        torques += [codec.decode(a.arbitration_id, a.data)[1]["torque"] for a in answers if a.arbitration_id == 0x215]
+    assert len(torques) >= 400
+    assert 0.05 < max(torques) <= 1.5
+
+
+def test_nothing_without_a_good_base_sample(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
+    bus = make_bus("x")
+    (lever, base), *_ = samples(0, 1)
+    bus.send(message(lever))
+    assert bus.recv(10.0) is None
+    bus.send(message((base[0], bytes([base[1][0] ^ 1]) + base[1][1:])))
+    bus.send(message((base[0], base[1][:7])))
+    bus.send(message((0x123, b"")))
+    assert bus.recv(10.0) is None
+    assert bus.estimator.health().corrupt == 2
+
+
+def test_buses_of_one_channel_share_nothing(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    one, other = make_bus("x"), make_bus("x")
+    for sample in samples(0, 10):
+        assert exchange(one, sample)
+    assert one.estimator.health().samples == 10
+    assert other.estimator.health().samples == 0
+    assert other.recv(0.0) is None
+
+
+def test_hundreds_of_buses(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    buses = [make_bus(str(index), settings={"k_p": 800.0 + index}) for index in range(200)]
+    inputs = samples(0, 40)
+    together: list[list[can.Message]] = [[] for _ in buses]
+    for sample in inputs:
+        for bus, answers in zip(buses, together, strict=True):
+            answers += exchange(bus, sample)
+    for index in (0, 77, 199):
+        alone = make_bus(settings={"k_p": 800.0 + index})
+        assert seen([answer for sample in inputs for answer in exchange(alone, sample)]) == seen(together[index])
+
+
+# --- receiving -------------------------------------------------------------------------------------------------------
+
+
+def test_who_has_sent_never_waits(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    bus = make_bus("x")
+    start = time.monotonic()
+    assert bus.recv(0.05) is None  # nobody has sent, so somebody may
+    assert 0.05 <= time.monotonic() - start < 5.0
+    exchange(bus, samples(0, 1)[0])
+    start = time.monotonic()
+    assert bus.recv(60.0) is None
+    assert bus.recv() is None
+    assert time.monotonic() - start < 5.0
+
+
+def test_another_thread_waits_for_the_answer(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
+    bus = make_bus("x")
+    received: list[can.Message | None] = []
+    receiver = threading.Thread(target=lambda: received.append(bus.recv(30.0)))
+    receiver.start()
+    for frame in samples(0, 1)[0]:
+        bus.send(message(frame))
+    receiver.join(30.0)
+    assert received[0] is not None
+    assert received[0].channel == "x"
+
+
+def test_with_two_senders_both_wait(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
+    bus = make_bus("x")
+    other = threading.Thread(target=bus.send, args=(message((0x7FF, b"")),))
+    other.start()
+    bus.send(message((0x7FF, b"")))
+    other.join()
+    bus.send(message((0x7FF, b"")))
+
+    def later() -> None:
+        for frame in samples(0, 1)[0]:
+            bus.send(message(frame))
+
+    timer = threading.Timer(0.05, later)
+    timer.start()
+    assert bus.recv(30.0) is not None
+    timer.join()
+
+
+def test_filters(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    bus = make_bus("x", can_filters=[{"can_id": 0x210, "can_mask": 0x7FF, "extended": False}])
+    answers = [answer for sample in samples(0, 100) for answer in exchange(bus, sample)]
+    assert [answer.arbitration_id for answer in answers] == [0x210] * 100
+    bus.set_filters([{"can_id": 0x211, "can_mask": 0x7FF}, {"can_id": 0x214, "can_mask": 0x7FF}])
+    answers = [answer for sample in samples(100, 100) for answer in exchange(bus, sample)]
+    assert {answer.arbitration_id for answer in answers} == {0x211, 0x214}
+    bus.set_filters(None)
+    assert exchange(bus, samples(200, 1)[0])[-1].arbitration_id == 0x210
+
+
+def test_own_messages(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    bus = make_bus("x", receive_own_messages=True)
+    (lever, base), *_ = samples(1, 1)
+    received = exchange(bus, (lever, base))
+    assert [(m.arbitration_id, bytes(m.data), m.is_rx) for m in received[:2]] == [(*lever, False), (*base, False)]
+    assert len(received) > 2
+    assert all(m.is_rx for m in received[2:])
+    assert [m.timestamp for m in received] == [0.0] + [pytest.approx(1e-3)] * (len(received) - 1)
+    assert all(m.channel == "x" for m in received)
+
+
+def test_what_is_sent_may_be_reused(make_bus: MakeBus, samples: Samples) -> None:
+    bus = make_bus("x", receive_own_messages=True)
+    (lever, _), *_ = samples(0, 1)
+    message = can.Message(arbitration_id=0x110, is_extended_id=False, data=lever[1], timestamp=12.5)
+    bus.send(message)
+    message.data[0] ^= 255
+    received = bus.recv()
+    assert received is not None
+    assert bytes(received.data) == lever[1]
+    assert message.timestamp == 12.5
+
+
+def test_queue_is_bounded(
+    make_bus: MakeBus, samples: Samples, message: ToMessage, caplog: pytest.LogCaptureFixture
+) -> None:
+    bus, unbounded = make_bus("x", rx_queue_size=5), make_bus("x")
+    with caplog.at_level(logging.WARNING):
+        for sample in samples(0, 30):
+            for frame in sample:
+                bus.send(message(frame))
+                unbounded.send(message(frame))
+    assert seen(list(iter(bus.recv, None))) == seen(list(iter(unbounded.recv, None)))[-5:]
+    assert [record.getMessage() for record in caplog.records] == [
+        "lever firmware in this process, channel 'x': nobody receives; of 5 frames the oldest are dropped"
+    ]
+
+
+# --- time ------------------------------------------------------------------------------------------------------------
+
+
+def test_time_is_that_of_the_samples(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
+    runs = []
+    for pause in (0.0, 0.002):
+        bus, messages = make_bus("x"), []
+        for sample in samples(0, 50):
+            messages += exchange(bus, sample)
+            time.sleep(pause)
+        runs.append(seen(messages))
+    assert runs[0] == runs[1]
+    assert runs[0][-1][0] == 49 * 1000 * 1e-6
+
+
+def test_time_goes_on_where_the_frames_wrap(make_bus: MakeBus, exchange: Exchange) -> None:
+    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    bus, start, step = make_bus("x"), 2**32 - 3_000_000, 10_000
+    times = []
+    for k in range(600):  # through the end of the 32 bits
+        sample = ((0x110, lever(k, 0.35, 0.0, 0.0)), (0x111, base(k, 0.0, start + step * k)))
+        times.append(exchange(bus, sample)[-1].timestamp)
+    assert times == pytest.approx([(start + step * k) * 1e-6 for k in range(600)], abs=1e-6)
+
+
+def test_time_never_goes_back(make_bus: MakeBus, exchange: Exchange) -> None:
+    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    bus = make_bus("x")
+    times = []
+    for k, time_us in enumerate((5000, 6000, 4000, 7000)):
+        sample = ((0x110, lever(k, 0.35, 0.0, 0.0)), (0x111, base(k, 0.0, time_us)))
+        times.append(exchange(bus, sample)[-1].timestamp)
+    assert times == pytest.approx([5e-3, 6e-3, 6e-3, 7e-3])
+    assert bus.estimator.health().late == 1
+
+
+# --- other frames ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["is_extended_id", "is_remote_frame", "is_error_frame"])
+def test_frames_of_other_kinds_pass_by(make_bus: MakeBus, samples: Samples, message: ToMessage, kind: str) -> None:
+    bus = make_bus("x", receive_own_messages=True)
+    lever, base = (message(frame) for frame in samples(0, 1)[0])
+    setattr(base, kind, True)
+    bus.send(lever)
+    bus.send(base)
+    received = list(iter(bus.recv, None))
+    assert len(received) == 2  # both of them own
+    assert getattr(received[1], kind) is True
+    health = bus.estimator.health()
+    assert (health.mode, health.samples, health.corrupt) == ("init", 0, 0)
+
+
+@pytest.mark.parametrize("frame", [can.Message(is_fd=True, data=bytes(8)), can.Message(data=bytes(12), is_fd=False)])
+def test_fd_frames_are_refused(make_bus: MakeBus, frame: can.Message) -> None:
+    with pytest.raises(can.CanOperationError, match="interface 'lever' is classic CAN: it has no FD frames"):
+        make_bus("x").send(frame)
+
+
+# --- life ------------------------------------------------------------------------------------------------------------
+
+
+def test_shutdown(samples: Samples, message: ToMessage, caplog: pytest.LogCaptureFixture) -> None:
+    with LeverBus("x") as bus:
+        for frame in samples(0, 1)[0]:
+            bus.send(message(frame))
+    bus.shutdown()
+    with pytest.raises(can.CanOperationError, match="channel 'x' is shut down"):
+        bus.recv(0.0)
+    with pytest.raises(can.CanOperationError, match="channel 'x' is shut down"):
+        bus.send(message(samples(0, 1)[0][0]))
+    del bus
+    gc.collect()
+    assert caplog.records == []
+
+
+def test_shutdown_ends_a_waiting_receiver(make_bus: MakeBus) -> None:
+    bus = make_bus("x")
+    caught: list[Exception] = []
+
+    def receive() -> None:
+        try:
+            bus.recv()
+        except can.CanOperationError as error:
+            caught.append(error)
+
+    receiver = threading.Thread(target=receive)
+    receiver.start()
+    bus.shutdown()
+    receiver.join(30.0)
+    assert len(caught) == 1
+
+
+def test_configurations(make_bus: MakeBus, tmp_path: Path) -> None:
+    path = tmp_path / "my.settings"
+    path.write_text("m_p = 3 # kg\npreload = fixed\n")
+    every: list[dict[str, Any]] = [
+        {"config": Config(preload="fixed", settings={"m_p": 3.0})},
+        {"settings": {"m_p": 3, "preload": "fixed"}},
+        {"settings": path},
+        {"settings": str(path)},
+    ]
+    for arguments in every:
+        bus = make_bus("x", **arguments)
+        assert bus.estimator.estimate().parameter[0] == pytest.approx(3.0, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"settings": {"m_p": 100.0}}, "m_p = 100.0 is out of range: it must be a number from 0.3 to 10 kg"),
+        ({"settings": {"m_q": 1.0}}, "unknown setting 'm_q'; did you mean m_p"),
+        ({"settings": {"preload": "no"}}, "preload = 'no' is not known; allowed: fixed, trim"),
+        ({"settings": "/none/my.settings"}, "/none/my.settings: cannot be read"),
+        ({"settings": {}, "config": Config()}, "takes config or settings, not both"),
+        ({"speed": 3}, "interface 'lever' has no option speed; it has config, settings, receive_own_messages"),
+        ({"fd": True}, "interface 'lever' is classic CAN: it has no fd"),
+        ({"rx_queue_size": 0}, "rx_queue_size is 0; it must be a number of frames, at least 1"),
+        ({"rx_queue_size": "many"}, "rx_queue_size is 'many'; it must be a number of frames"),
+    ],
+)
+def test_bad_arguments(arguments: dict[str, Any], text: str) -> None:
+    with pytest.raises(LeverBusError) as caught:
+        LeverBus("x", **arguments)
+    assert text in str(caught.value)
+    assert isinstance(caught.value, LeverError)
+    assert isinstance(caught.value, can.CanInitializationError)
+
+
+def test_options_of_python_can_itself_are_no_error(make_bus: MakeBus) -> None:
+    bus = make_bus(7, single_handle=True, bitrate=500_000, fd=False)
+    assert str(bus) == "lever firmware in this process, channel '7'"
+    bus.flush_tx_buffer()
+    assert bus.state == can.BusState.ACTIVE
+
+
+def test_senders_do_not_mix_their_frames(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
+    bus, ended = make_bus("x"), threading.Event()
+    noise = message((0x7FF, b"noise..."))
+
+    def send_noise() -> None:
+        while not ended.is_set():
+            bus.send(noise)
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    other = threading.Thread(target=send_noise)
+    other.start()
+    for sample in samples(0, 2000):
+        for frame in sample:
+            bus.send(message(frame))
+    ended.set()
+    other.join()
+    sys.setswitchinterval(interval)
+    health = bus.estimator.health()
+    assert (health.samples, health.corrupt, health.lost) == (2000, 0, 0)
+
+
+# --- other parts of python-can ---------------------------------------------------------------------------------------
+
+
+def test_notifier_and_redirection(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
+    """What can_bridge does: another bus gets the answers, and its frames get into the firmware."""
+    lever = make_bus("x")
+    near, far = can.Bus(interface="virtual", channel="joined"), can.Bus(interface="virtual", channel="joined")
+    out = can.Notifier(lever, [can.RedirectReader(near)], 0.05)
+    back = can.Notifier(near, [can.RedirectReader(lever)], 0.05)
+    for sample in samples(0, 30):
+        for frame in sample:
+            far.send(message(frame))
+        while True:
+            answer = far.recv(30.0)
+            assert answer is not None
+            if answer.arbitration_id == 0x210:
+                break
+    for notifier, bus in ((out, near), (back, far)):
+        notifier.stop()
+        bus.shutdown()
+    assert lever.estimator.health().samples == 30
+
+
+def test_periodic_sending(make_bus: MakeBus) -> None:
+    bus, base = make_bus("x"), codec.encoder("BASE_SAMPLE")
+    counter = itertools.count()
+
+    def next_sample(message: can.Message) -> None:
+        k = next(counter)
+        message.data[:] = base(k, 0.0, 1000 * k)
+
+    frame = can.Message(arbitration_id=0x111, is_extended_id=False, data=bytes(8))
+    bus.send_periodic(frame, 0.001, modifier_callback=next_sample)
+    assert all(bus.recv(30.0) is not None for _ in range(10))
+
+
+def test_thread_safe_wrapper(samples: Samples, installed: str) -> None:
+    assert installed
+    with can.ThreadSafeBus(interface="lever", channel="x") as bus:
+        for identifier, data in samples(0, 1)[0]:
+            bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
+        assert 0x210 in [answer.arbitration_id for answer in iter(lambda: bus.recv(1.0), None)]

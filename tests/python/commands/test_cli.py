@@ -1,0 +1,250 @@
+"""The command `lever`: help, tables and JSON, one-line errors, exit statuses, and how commands are found."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.commands import dbc, settings
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.files import native_file
+from lever_cdkf.host_tools.firmware.native import settings_table
+
+LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
+
+
+def entry(name: str, load: Any) -> Any:
+    """An entry point as importlib.metadata finds it."""
+
+    class Entry(SimpleNamespace):
+        def __lt__(self, other: Any) -> bool:
+            return bool(self.name < other.name)
+
+    return Entry(name=name, value=f"somewhere.{name}", load=load)
+
+
+@pytest.fixture
+def commands(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The commands that `lever` finds: those of host_tools, and what a test adds."""
+    found = [entry("settings", lambda: settings), entry("dbc", lambda: dbc)]
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found if group == cli.COMMANDS else [])
+    return found
+
+
+def command_that(raises: BaseException) -> Any:
+    """A module with the command `act`."""
+
+    def run(_args: argparse.Namespace) -> int:
+        raise raises
+
+    return SimpleNamespace(add_parser=lambda subparsers: subparsers.add_parser("act"), run=run)
+
+
+# --- help ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("commands")
+@pytest.mark.parametrize("command", [[], ["settings"], ["dbc"]])
+def test_help(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([*command, "--help"]) == 0
+    shown = capsys.readouterr()
+    assert shown.out.startswith(f"usage: {' '.join(['lever', *command])} ")
+    assert "example" in shown.out or "a first session" in shown.out
+    assert max(map(len, shown.out.splitlines())) <= 120
+    assert shown.err == ""
+
+
+def test_help_of_every_installed_command(installed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert installed
+    with pytest.raises(LeverError, match="invalid choice"):
+        cli._parser().parse_args(["none"])
+    names = cli._parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+    assert {"settings", "dbc"} <= set(names or ())
+    for name in names or ():
+        assert cli.main([name, "--help"]) == 0
+        assert capsys.readouterr().out.startswith(f"usage: lever {name} ")
+
+
+@pytest.mark.usefixtures("commands")
+def test_version(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.metadata, "version", {"lever-cdkf": "1.2.3"}.__getitem__)
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == "lever 1.2.3\n"
+
+
+# --- tables ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("commands")
+def test_settings_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.json"
+    assert cli.main(["settings", "--json", str(path)]) == 0
+    lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    rows = {row["name"]: row for row in json.loads(path.read_text())["settings"]}
+    for setting in settings_table():
+        row = rows.pop(setting.name)
+        assert row == {
+            "name": setting.name,
+            "unit": setting.unit,
+            "default": setting.default,
+            "least": setting.least,
+            "greatest": setting.greatest,
+            "meaning": setting.meaning,
+        }
+        numbers = f"{setting.default:.6g} {setting.least:.6g} {setting.greatest:.6g}"
+        assert f"{setting.name} {setting.unit} {numbers} {setting.meaning}" in lines
+    assert list(rows) == ["model", "preload", "estimator", "adaptation"]
+    assert "preload trim one of fixed, trim" in lines
+
+
+@pytest.mark.usefixtures("commands")
+def test_settings_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, rows = tmp_path / "my.settings", tmp_path / "a.json"
+    assert cli.main(["settings", "--set", "m_p=3", "--set", "preload=fixed", "--set", "m_p = 3.5"]) == 0
+    path.write_text(capsys.readouterr().out)
+    assert cli.main(["settings", "--settings", str(path), "--set", "c_p=50", "--json", str(rows)]) == 0
+    lines = [line.split("  #")[0].rstrip() for line in capsys.readouterr().out.splitlines()]
+    assert {"m_p = 3.5", "preload = fixed", "c_p = 50.0", "model = lever"} <= set(lines)
+    assert len(lines) == 4 + len(settings_table())
+    values = {row["name"]: row["value"] for row in json.loads(rows.read_text())["settings"]}
+    assert lines == [f"{name} = {value}" for name, value in values.items()]
+
+
+@pytest.mark.usefixtures("commands")
+def test_dbc_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.json"
+    assert cli.main(["dbc", "--json", str(path)]) == 0
+    lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert (
+        "LEVER_SAMPLE theta 16 16 True 0.0001 rad -3.2767 3.2767 Lever angle from the floor. -32768 not_available"
+        in lines
+    )
+    assert any(line.startswith("COMMAND 0x120 8 INCEPTOR 33 Requests and choices; ") for line in lines)
+    tables = json.loads(path.read_text())
+    assert [row["message"] for row in tables["messages"]] == [message.name for message in codec.database().messages]
+    described = [(row["message"], row["signal"], row["step"], row["unit"]) for row in tables["signals"]]
+    assert described == [
+        (message.name, signal.name, signal.scale, signal.unit)
+        for message in codec.database().messages
+        for signal in message.signals
+    ]
+
+
+@pytest.mark.usefixtures("commands")
+def test_dbc_path(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["dbc", "--path"]) == 0
+    assert capsys.readouterr().out == f"{native_file('lever.dbc')}\n"
+
+
+# --- errors ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("commands")
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ([], "the following arguments are required: COMMAND (see `lever --help`)"),
+        (["none"], "invalid choice: 'none'"),
+        (["--none"], "(see `lever --help`)"),
+        (["settings", "more"], "unrecognized arguments: more (see `lever --help`)"),
+        (["settings", "--sett", "x"], "unrecognized arguments: --sett x"),
+        (["settings", "--set"], "argument --set: expected one argument (see `lever settings --help`)"),
+        (["settings", "--set", "m_p"], "'m_p' has no '=': write name = value"),
+        (["settings", "--set", "m_p=x"], "m_p = 'x' is not a number (give it in kg, without the unit)"),
+        (["settings", "--set", "m_p=100"], "m_p = 100.0 is out of range: it must be a number from 0.3 to 10 kg ("),
+        (["settings", "--settings", "/none/x"], "/none/x: cannot be read: No such file or directory"),
+        (["settings", "--json", "/none/x"], "cannot write /none/x: No such file or directory"),
+        (["dbc", "--json", "/"], "cannot write /: Is a directory"),
+        (["dbc", "--path", "--json", "x"], "argument --json: not allowed with argument --path"),
+    ],
+)
+def test_bad_input_is_one_line(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("lever: error: ")
+    assert text in shown.err
+    assert shown.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "text"),
+    [
+        (LeverError("no such pilot"), 2, "lever: error: no such pilot\n"),
+        (LeverError("two\nlines"), 2, "lever: error: two lines\n"),
+        (PermissionError(13, "Permission denied", "/x"), 2, "lever: error: [Errno 13] Permission denied: '/x'\n"),
+        (KeyboardInterrupt(), 130, ""),
+    ],
+)
+def test_errors_of_commands(
+    error: BaseException, status: int, text: str, commands: list[Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    commands.append(entry("act", lambda: command_that(error)))
+    assert cli.main(["act"]) == status
+    assert capsys.readouterr().err == text
+
+
+def test_can_errors_are_one_line(commands: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+    import can
+
+    commands.append(entry("act", lambda: command_that(can.CanInitializationError("no such interface"))))
+    assert cli.main(["act"]) == 2
+    assert capsys.readouterr().err == "lever: error: no such interface\n"
+
+
+def test_a_defect_is_not_hidden(commands: list[Any]) -> None:
+    commands.append(entry("act", lambda: command_that(ZeroDivisionError("defect"))))
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["act"])
+
+
+def test_reader_that_has_enough(installed: str) -> None:
+    assert installed
+    shell = f"{' '.join(LEVER)} dbc | true; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("1\n", "")
+
+
+# --- how commands are found ------------------------------------------------------------------------------------------
+
+
+def test_own_run_and_shared_run(commands: list[Any]) -> None:
+    def add_parser(subparsers: Any) -> None:
+        subparsers.add_parser("one")
+        subparsers.add_parser("two").set_defaults(run=lambda _args: 22)
+
+    commands.append(entry("both", lambda: SimpleNamespace(add_parser=add_parser, run=lambda _args: 11)))
+    assert cli.main(["one"]) == 11
+    assert cli.main(["two"]) == 22
+
+
+@pytest.mark.usefixtures("commands")
+def test_broken_plug_in_does_not_take_the_others_along(commands: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+    def broken() -> Any:
+        raise ImportError("No module named 'plot'")
+
+    commands.append(entry("broken", broken))
+    assert cli.main(["dbc", "--path"]) == 0
+    assert capsys.readouterr().err == "lever: warning: no commands from somewhere.broken: No module named 'plot'\n"
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, importlib.metadata\n"
+        "from lever_cdkf.host_tools import cli\n"
+        "cli.main(['--help'])\n"
+        "known = {'numpy', 'cffi', 'cantools', 'can', 'rich', 'polars', 'plotly', 'textual', 'tornado'}\n"
+        "heavy = known & set(sys.modules)\n"
+        "print(' '.join(sorted(heavy)), file=sys.stderr, end='')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,0 +1,81 @@
+"""What only installing gives: the entry points. Skipped where the package is not installed."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+import pytest
+from lever_cdkf.host_tools.can.bus import LeverBus, LeverBusError
+from lever_cdkf.host_tools.firmware.native import Config
+
+pytestmark = pytest.mark.usefixtures("installed")
+
+Samples = Callable[[int, int], list[tuple[tuple[int, bytes], tuple[int, bytes]]]]
+BIN = Path(sys.executable).parent
+
+
+def test_python_can_knows_the_interface(samples: Samples) -> None:
+    assert "lever" in can.VALID_INTERFACES
+    for arguments in ({"settings": {"m_p": 3.0}}, {"config": Config(settings={"m_p": 3.0})}):
+        with can.Bus(interface="lever", channel="bench", **arguments) as bus:
+            assert isinstance(bus, LeverBus)
+            assert bus.estimator.estimate().parameter[0] == pytest.approx(3.0, rel=1e-5)
+            for identifier, data in samples(0, 1)[0]:
+                bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
+            assert 0x210 in [answer.arbitration_id for answer in iter(bus.recv, None)]
+
+
+def test_errors_come_through_python_can() -> None:
+    with pytest.raises(LeverBusError, match=r"m_p = 100.0 is out of range"):
+        can.Bus(interface="lever", channel="x", settings={"m_p": 100.0})
+
+
+def test_can_player_plays_a_recording(samples: Samples, tmp_path: Path) -> None:
+    log = tmp_path / "session.log"
+    with can.CanutilsLogWriter(log, channel="vcan0") as writer:
+        for k, sample in enumerate(samples(0, 50)):
+            for identifier, data in sample:
+                frame = can.Message(1.0 + k * 1e-3, identifier, is_extended_id=False, data=data)
+                writer.on_message_received(frame)
+    player = [sys.executable, "-m", "can.player", "-i", "lever", "-c", "bench", str(log)]
+    done = subprocess.run(player, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    player[3:3] = ["-v", "-v"]
+    done = subprocess.run(player, capture_output=True, text=True, check=False, timeout=60)
+    assert len(re.findall(r"ID: {6}11[01] ", done.stdout)) == 100
+
+
+def test_can_logger_opens_and_waits(tmp_path: Path) -> None:
+    logger = [sys.executable, "-u", "-m", "can.logger", "-i", "lever", "-c", "bench", "-f", str(tmp_path / "a.log")]
+    with subprocess.Popen(logger, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "Connected to LeverBus: lever firmware in this process, channel 'bench'\n"
+        process.stdout.readline()
+        time.sleep(0.5)
+        used = sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]))
+        time.sleep(0.5)
+        after = sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 0
+    assert after - used <= 10  # hundredths of a second: it waits, and does not go round
+
+
+def test_the_command_lever() -> None:
+    done = subprocess.run([BIN / "lever", "--version"], capture_output=True, text=True, check=False)
+    assert re.fullmatch(r"lever \d+\.\d+\.\d+\n", done.stdout), done.stderr
+    done = subprocess.run([BIN / "lever", "settings", "--set", "x"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "lever: error: 'x' has no '=': write name = value\n"
+
+
+def test_versions_agree(installed: str, root: Path) -> None:
+    header = (root / "firmware/lever_cdkf.h").read_text()
+    parts = re.findall(r"#define LEVER_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header)
+    assert installed == ".".join(parts)

@@ -1,0 +1,314 @@
+"""The binding: façade structs and enums, configurations, and instances that do not disturb each other."""
+
+from __future__ import annotations
+
+import gc
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.errors import LeverError, SettingsError
+from lever_cdkf.host_tools.files import LIBRARY_DIR, native_file
+from lever_cdkf.host_tools.firmware import native
+from lever_cdkf.host_tools.firmware.native import Config, Estimate, Estimator, Health, ffi, lib
+
+QUICK = Config(settings={"align_time": 0.05})
+DEFAULTS = {"model": "lever", "preload": "trim", "estimator": "dual", "adaptation": "robbins_monro"}
+
+
+def recording(count: int, seed: int = 0) -> dict[str, Any]:
+    """Samples of a swinging lever at 1 kHz, a tenth of them without theta."""
+    random = np.random.default_rng(seed)
+    time = np.arange(count) * 1e-3
+    theta = 0.35 + 0.02 * np.sin(2.0 * np.pi * 3.0 * time) + 1e-3 * random.standard_normal(count)
+    theta[random.random(count) < 0.1] = np.nan
+    return {
+        "time_us": np.arange(count) * 1000,
+        "theta": theta,
+        "theta_dot": 0.38 * np.cos(2.0 * np.pi * 3.0 * time) + 1e-2 * random.standard_normal(count),
+        "tau_m": 0.3 * random.standard_normal(count),
+        "z_ddot": np.sin(2.0 * np.pi * 2.0 * time),
+    }
+
+
+def feed(estimator: Estimator, samples: dict[str, Any], index: int) -> str:
+    """One sample of a recording; NaN is missing."""
+    values = {name: float(samples[name][index]) for name in ("theta", "theta_dot", "tau_m", "z_ddot")}
+    present: dict[str, Any] = {name: None if math.isnan(value) else value for name, value in values.items()}
+    return estimator.update(int(samples["time_us"][index]), **present)
+
+
+# --- the façade as cffi reads it -------------------------------------------------------------------------------------
+
+
+def test_settings_table_is_the_definition(root: Path) -> None:
+    text = (root / "firmware/lever_settings.def").read_text(encoding="utf-8")
+    pattern = r'^LEVER_SETTING\((\w+), "(.*?)", (\S+)f, (\S+)f, (\S+)f, "(.*)"\)$'
+    expected = [
+        (name, unit, float(default), float(least), float(greatest), meaning)
+        for name, unit, default, least, greatest, meaning in re.findall(pattern, text, re.MULTILINE)
+    ]
+    rows = native.settings_table()
+    assert len(rows) == text.count("\nLEVER_SETTING(")
+    assert [(row.name, row.unit, row.meaning) for row in rows] == [row[:2] + row[5:] for row in expected]
+    numbers = np.array([(row.default, row.least, row.greatest) for row in rows], np.float32)
+    np.testing.assert_array_equal(numbers, np.array([row[2:5] for row in expected], np.float32))
+
+
+def test_enum_names() -> None:
+    assert native.enum_names("lever_preload") == {0: "fixed", 1: "trim"}
+    assert native.enum_names("lever_mode")[lib.LEVER_MODE_COAST] == "coast"
+    assert native.fault_names(lib.LEVER_FAULT_THETA | lib.LEVER_FAULT_RECOVERED) == ("theta", "recovered")
+    assert native.fault_names(0) == ()
+
+
+def test_parameters_of_every_model_are_those_on_the_bus() -> None:
+    """Against lever.dbc; names and units are the firmware's."""
+    message = codec.message("PILOT_PARAMETERS")
+    for number, model in native.enum_names("lever_model").items():
+        on_bus = [(signal.name, signal.unit) for signal in message.signals if signal.multiplexer_ids == [number]]
+        assert [tuple(parameter) for parameter in native.model_parameters(model)] == on_bus
+    with pytest.raises(SettingsError, match="model = 'arm' is not known; allowed: lever, linear_physical, linear_b"):
+        native.model_parameters("arm")
+
+
+@pytest.mark.parametrize(("python", "c"), [(Estimate, "lever_estimate_t"), (Health, "lever_health_t")])
+def test_results_have_the_fields_of_the_structs(python: type[Estimate] | type[Health], c: str) -> None:
+    assert [name for name, _ in ffi.typeof(c).fields] == list(python._fields)
+
+
+# --- configuration ---------------------------------------------------------------------------------------------------
+
+
+def test_defaults() -> None:
+    config = Config()
+    assert config.choices == DEFAULTS
+    assert config.settings == {row.name: row.default for row in native.settings_table()}
+    assert lib.lever_config_check(config.pointer) == ffi.NULL
+
+
+def test_choices_and_settings_reach_the_firmware() -> None:
+    config = Config(preload="fixed", adaptation="annealing", settings={"theta_noise": 2e-3, "m_p": 3})
+    assert config.choices == {**DEFAULTS, "preload": "fixed", "adaptation": "annealing"}
+    assert config.pointer.preload == lib.LEVER_PRELOAD_FIXED
+    assert config.pointer.settings.theta_noise == float(np.float32(2e-3))
+    assert config.settings["m_p"] == 3.0
+    assert Estimator(config).estimate().parameter[0] == pytest.approx(3.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("row", native.settings_table(), ids=lambda row: str(row.name))
+def test_range_of_every_setting(row: native.Setting) -> None:
+    numbers: list[Any] = [row.least, row.greatest, row.default, np.float32(row.least), np.float64(row.greatest)]
+    for number in numbers:
+        row.check(number)
+    below = row.least - max(abs(row.least), 1e-6) * 1e-3
+    for value in (below, row.greatest * 1.001, math.inf, -math.inf, math.nan, 1e60):
+        with pytest.raises(SettingsError) as caught:
+            Config(settings={row.name: value})
+        line = str(caught.value)
+        assert line.startswith(f"{row.name} = {value} is out of range: it must be a number from ")
+        assert f"{row.least:g} to {row.greatest:g} {row.unit} (" in line
+        assert "\n" not in line
+
+
+@pytest.mark.parametrize("value", ["2", True, None, [2.0]])
+def test_a_setting_is_a_number(value: Any) -> None:
+    with pytest.raises(SettingsError, match=r"m_p = .* must be a number from 0\.3 to 10 kg"):
+        Config(settings={"m_p": value})
+
+
+def test_unknown_names() -> None:
+    with pytest.raises(SettingsError, match="unknown setting 'theta_nose'; did you mean theta_noise"):
+        Config(settings={"theta_nose": 1e-3})
+    with pytest.raises(SettingsError, match="unknown setting 'x'; `lever settings` lists them all"):
+        Config(settings={"x": 1.0})
+    with pytest.raises(SettingsError, match="preload = 'none' is not known; allowed: fixed, trim"):
+        Config(preload="none")
+    with pytest.raises(SettingsError, match="model = 'count' is not known; allowed: lever"):
+        Config(model="count")
+
+
+def test_configuration_changed_behind_its_back() -> None:
+    config = Config()
+    config.pointer.settings.m_p = -1.0
+    with pytest.raises(LeverError, match="refused its configuration"):
+        Estimator(config)
+
+
+# --- one instance ----------------------------------------------------------------------------------------------------
+
+
+def test_life_of_an_instance() -> None:
+    estimator = Estimator(QUICK)
+    assert estimator.health() == Health("init", (), 0, 0, 0, 0, 0, 0.0, 0.0, gate_open=False)
+    modes = {estimator.update(1000 * k, 0.35, 0.0, 0.0, 0.0) for k in range(300)}
+    assert modes == {"align", "run"}
+    estimate = estimator.estimate()
+    assert estimate.time_us == 299_000
+    assert estimate.theta == pytest.approx(0.35, abs=1e-3)
+    assert estimate.nis_size == 2
+    assert all(sigma > 0.0 for sigma in (*estimate.parameter_sigma, estimate.theta_sigma))
+    health = estimator.health()
+    assert (health.mode, health.samples, health.late) == ("run", 300, 0)
+
+
+def test_missing_values_and_wrapped_time() -> None:
+    estimator = Estimator(QUICK)
+    start = 2**32 - 100_000
+    for k in range(200):
+        estimator.update(start + 1000 * k, 0.35, 0.0, 0.0, 0.0)
+    estimator.update(start + 200_000, theta_dot=0.0)
+    assert {"theta", "torque", "base"} <= set(estimator.health().faults)
+    assert "theta_dot" not in estimator.health().faults
+    assert estimator.estimate().nis_size == 1
+    assert estimator.estimate().time_us == 100_000
+    assert estimator.update(start + 201_000) == "coast"
+    assert estimator.update(start + 100_000, 0.35) == "coast"
+    assert estimator.health().late == 1
+    estimator.update(start + 202_000, math.nan, 0.0, 0.0, 0.0)
+    assert estimator.health().corrupt == 1
+
+
+def test_commands() -> None:
+    estimator = Estimator(QUICK)
+    for k in range(200):
+        estimator.update(1000 * k, 0.35, 0.0, 0.0, 0.0)
+    estimator.command("freeze", dither_rms=0.3)
+    assert estimator.update(200_000, 0.35, 0.0, 0.0, 0.0) == "frozen"
+    estimator.command("run", adaptation="fixed")
+    assert estimator.update(201_000, 0.35, 0.0, 0.0, 0.0) == "run"
+    with pytest.raises(LeverError, match="request = 'stop' is not known; allowed: none, run, freeze, reset"):
+        estimator.command("stop")
+    with pytest.raises(LeverError, match="preload = 'loose' is not known"):
+        estimator.command(preload="loose")
+    with pytest.raises(LeverError, match="refused the command 'none', dither_rms = nan N m"):
+        estimator.command(dither_rms=math.nan)
+
+
+def test_frames_give_what_samples_give(samples: Callable[[int, int], Any]) -> None:
+    by_frames, by_samples = Estimator(), Estimator()
+    for k, ((_, motion), (_, base)) in enumerate(samples(0, 400)):
+        assert by_frames.on_frame(0x110, motion) == lib.LEVER_FRAME_TAKEN
+        assert by_frames.on_frame(0x111, base) == native.FRAME_SAMPLE
+        assert native.enum_names("lever_mode")[by_frames.step()] == by_frames.health().mode
+        theta, theta_dot, tau_m = np.frombuffer(motion[2:], "<i2")
+        z_ddot = np.frombuffer(base[2:4], "<i2")[0]
+        by_samples.update(1000 * k, theta / 10000, theta_dot / 2000, tau_m / 1000, z_ddot / 1000)
+        assert by_frames.estimate() == by_samples.estimate()
+        frames = list(iter(by_frames.next_frame, None))
+        assert frames[-1][0] == 0x210
+        assert all(len(data) == 8 for _, data in frames)
+    assert by_frames.next_frame() is None
+
+
+def test_frames_that_are_not_for_the_firmware() -> None:
+    estimator = Estimator()
+    assert estimator.on_frame(0x7FF, b"") == lib.LEVER_FRAME_IGNORED
+    assert estimator.on_frame(0x111, bytes(7)) == lib.LEVER_FRAME_REFUSED
+    assert estimator.health().corrupt == 1
+    estimator.step()
+    assert estimator.next_frame() is None
+    with pytest.raises(LeverError, match="frame 0x111 has 9 bytes; a classic CAN frame has at most 8"):
+        estimator.on_frame(0x111, bytes(9))
+
+
+# --- many instances, whole recordings --------------------------------------------------------------------------------
+
+
+def test_hundreds_of_instances_are_independent() -> None:
+    count, length = 300, 150
+    settings = [{"m_p": 1.5 + 0.01 * index, "theta_noise": 1e-3 * (1 + index % 3)} for index in range(count)]
+    samples = [recording(length, seed) for seed in range(count)]
+    together = [Estimator(Config(settings=each)) for each in settings]
+    gc.collect()  # nothing but the estimators may be needed any more
+    for index in range(length):
+        for estimator, each in zip(together, samples, strict=True):
+            feed(estimator, each, index)
+    estimates = [estimator.estimate() for estimator in together]
+    assert len(set(estimates)) == count
+    for index in range(0, count, 7):
+        alone = Estimator(Config(settings=settings[index]))
+        for sample in range(length):
+            feed(alone, samples[index], sample)
+        assert alone.estimate() == estimates[index]
+        assert alone.health() == together[index].health()
+
+
+@pytest.mark.parametrize("estimator", native.enum_names("lever_estimator").values())
+@pytest.mark.parametrize("model", native.enum_names("lever_model").values())
+def test_run_samples_is_the_loop(model: str, estimator: str) -> None:
+    config, samples = Config(model=model, estimator=estimator, settings={"align_time": 0.1}), recording(300)
+    columns = native.run_samples(config, samples)
+    instance = Estimator(config)
+    for index in range(300):
+        mode = feed(instance, samples, index)
+        for name, value in instance.estimate()._asdict().items():
+            np.testing.assert_array_equal(columns[name][index], np.asarray(value, columns[name].dtype))
+        assert native.enum_names("lever_mode")[columns["mode"][index]] == mode
+        assert native.fault_names(columns["faults"][index]) == instance.health().faults
+    assert columns["parameter"].shape == columns["parameter_correlation"].shape == (300, 3)
+    assert columns["theta"].dtype == np.float32
+
+
+def test_the_correlation_of_the_parameters_explains_the_sigma_of_the_frequency() -> None:
+    """The linear physical model's frequency is sqrt(k/m) / 2 pi: its sigma by the law of error propagation."""
+    columns = native.run_samples(Config(model="linear_physical"), recording(4000))
+    m, _, k = columns["parameter"][-1].astype(float)
+    sigma_m, _, sigma_k = columns["parameter_sigma"][-1].astype(float)
+    _, m_with_k, _ = columns["parameter_correlation"][-1].astype(float)
+    assert np.abs(columns["parameter_correlation"]).max() <= 1.0
+    relative = 0.5 * np.sqrt((sigma_m / m) ** 2 + (sigma_k / k) ** 2 - 2.0 * m_with_k * sigma_m * sigma_k / (m * k))
+    frequency = np.sqrt(k / m) / (2.0 * np.pi)
+    assert columns["natural_frequency"][-1] == pytest.approx(frequency, rel=1e-5)
+    assert columns["natural_frequency_sigma"][-1] == pytest.approx(relative * frequency, rel=0.05)
+    assert m_with_k > 0.5  # without a torque only their ratio is known
+
+
+def test_run_samples_wraps_time() -> None:
+    samples = recording(300)
+    expected = native.run_samples(None, samples)
+    for start in (2**32 - 50_000, 7 * 2**32, 7.0 * 2**32):
+        columns = native.run_samples(None, {**samples, "time_us": samples["time_us"] + start})
+        np.testing.assert_array_equal(columns["parameter"], expected["parameter"])
+        assert columns["time_us"].tolist() == [(1000 * k + start) % 2**32 for k in range(300)]
+
+
+def test_run_samples_with_flags() -> None:
+    samples = recording(200)
+    samples["theta"] = np.nan_to_num(samples["theta"])
+    samples["theta_valid"] = np.arange(200) % 2 == 0
+    del samples["tau_m"]
+    columns = native.run_samples(None, samples)
+    np.testing.assert_array_equal(columns["faults"] & lib.LEVER_FAULT_THETA != 0, ~samples["theta_valid"])
+    assert np.all(columns["faults"] & lib.LEVER_FAULT_TORQUE)
+    assert native.run_samples(None, {"time_us": np.empty(0)})["theta"].shape == (0,)
+    with pytest.raises(LeverError, match="unknown columns of samples: tau"):
+        native.run_samples(None, {**samples, "tau": samples["theta"]})
+
+
+# --- loading ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_library_that_cannot_be_loaded(tmp_path: Path) -> None:
+    (tmp_path / "liblever_cdkf.so").write_text("not a library")
+    environment = {**os.environ, LIBRARY_DIR: f"{tmp_path}{os.pathsep}{os.environ.get(LIBRARY_DIR, '')}"}
+    command = [sys.executable, "-m", "lever_cdkf.host_tools.cli", "settings"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert re.fullmatch(r"lever: error: cannot load .*/liblever_cdkf\.so: .*\n", done.stderr)
+
+
+def test_a_file_that_is_not_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv(LIBRARY_DIR, str(tmp_path))
+    with pytest.raises(LeverError, match=rf"nothing.so is not in {tmp_path}, .*_native: install the package") as caught:
+        native_file("nothing.so")
+    assert "\n" not in str(caught.value)

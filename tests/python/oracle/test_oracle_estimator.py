@@ -1,0 +1,280 @@
+"""The whole estimator of the float64 oracle against other filters on the same samples, limits, and closed forms."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+from lever_cdkf.host_tools.firmware.native import settings_table
+from lever_cdkf.host_tools.models.detrend import Detrend
+from lever_cdkf.sil.oracle import Estimator, Lever, Start, cdkf
+from lever_cdkf.sil.oracle.change import ChangeDetection
+from numpy.typing import NDArray
+from scipy.signal import butter, freqs
+
+Array = NDArray[Any]  # of floats
+Flags = NDArray[np.bool_]
+AT_REST = {"arm_preload_angle": 0.3984, "lever_preload_angle": 0.35}  # preload fixed: PILOT's arm holds it at START
+DEFAULTS = {row.name: row.default for row in settings_table()}
+NEITHER = {"caution_time": 0.0, "noise_window": 0.0, "change_threshold": 0.0}  # as the other filters
+SETTINGS = DEFAULTS | AT_REST | NEITHER
+EACH_SAMPLE = SETTINGS | {"learn_period": 0.0}
+PILOT = np.array([2.5, 42.0, 1500.0])
+BOTH = np.array([True, True])
+OUTPUT_NOISE = np.diag([SETTINGS["theta_noise"], SETTINGS["theta_dot_noise"]])
+START = Start(np.array([0.35, 0.0]), np.diag([1e-3, 1e-2]), 0.35)
+
+
+def recorded(count: int, pilot: Array = PILOT) -> dict[str, Array]:
+    """Samples of a pilot on a shaking floor, with the motor helping, at 1 kHz."""
+    rng = np.random.default_rng(42)
+    time = np.arange(count) * 1e-3
+    lever, x = Lever.from_settings(SETTINGS, "fixed"), START.state[:, None]
+    z_ddot = sum(np.sin(2 * np.pi * f * time + f) for f in (1.7, 2.9, 4.3, 6.1))
+    tau_m = 0.3 * sum(np.cos(2 * np.pi * f * time - f) for f in (1.3, 3.7, 5.3))
+    states = np.empty((count, 2))
+    for k in range(count):
+        if k:
+            middle = (float(z_ddot[k] + z_ddot[k - 1]) / 2, float(tau_m[k] + tau_m[k - 1]) / 2)
+            x = lever.step(x, pilot[:, None], middle, START.trim, 1e-3)
+            x[1] += SETTINGS["theta_dot_process_noise"] * np.sqrt(1e-3) * rng.standard_normal()
+        states[k] = x[:, 0]
+    y = states + rng.standard_normal((count, 2)) * [SETTINGS["theta_noise"], SETTINGS["theta_dot_noise"]]
+    return {"time": time, "y": y, "z_ddot": np.asarray(z_ddot), "tau_m": np.asarray(tau_m)}
+
+
+def start_of(samples: dict[str, Array]) -> Start:
+    inputs = (float(samples["z_ddot"][0]), float(samples["tau_m"][0]))
+    return dataclasses.replace(START, state=samples["y"][0], input=inputs)
+
+
+def feed(estimator: Estimator, samples: dict[str, Array], first: int, last: int, valid: Flags = BOTH) -> None:
+    for k in range(first, last):
+        estimator.step(samples["time"][k], samples["y"][k], valid, (samples["z_ddot"][k], samples["tau_m"][k]))
+
+
+def estimate(estimator: Estimator) -> Array:
+    """[w; x]."""
+    return np.concatenate((estimator.belief.w, estimator.belief.x))
+
+
+def process_covariance(t: float) -> Array:
+    """What a step of t [s] adds to [w; x]: random walks of w, and a random walk of θ̇ with its integral in θ."""
+    covariance = np.diag([*(SETTINGS[f"{name}_walk"] ** 2 * t for name in ("m_p", "c_p", "k_p")), 0.0, 0.0])
+    power = SETTINGS["theta_dot_process_noise"] ** 2
+    covariance[3:, 3:] = power * np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])
+    return covariance
+
+
+@pytest.mark.parametrize(("form", "share"), [("augmented", 1e-9), ("joint", 1e-9), ("dual", 5e-2)])
+def test_it_is_the_joint_filter(form: str, share: float) -> None:
+    """Against one plain CDKF on z = [w; x], written out here; within so many standard deviations.
+
+    What a walk of w leaves unexplained of x, the dual filter drops and the joint one keeps.
+    """
+    samples = recorded(1500, PILOT * [1.2, 0.8, 1.1])
+    estimator = Estimator(EACH_SAMPLE, start_of(samples), "fixed", "fixed", estimator=form)
+    estimator.learning.greatest_sigma = np.full(3, np.inf)
+    lever = Lever.from_settings(SETTINGS, "fixed")
+    z, factor = estimate(estimator), estimator.belief.joint_factor
+    noise = np.linalg.cholesky(process_covariance(1e-3))
+    for k in range(1, 1500):
+        u = tuple(0.5 * float(samples[name][k] + samples[name][k - 1]) for name in ("z_ddot", "tau_m"))
+
+        def step(z: Array, u: tuple[float, ...] = u) -> Array:
+            p = PILOT[:, None] * np.exp(z[:3])
+            return np.concatenate((z[:3], lever.step(z[3:], p, (u[0], u[1]), estimator.trim, 1e-3)))
+
+        z, first, second = cdkf.differences(step(cdkf.draw(z, factor)))
+        factor = cdkf.tria(np.hstack((first, second, noise[:, 3:])))
+        expected = cdkf.measure(z, factor, lambda z: z[3:], OUTPUT_NOISE)
+        innovation = samples["y"][k] - expected.mean
+        z, factor = cdkf.update(z, factor, expected, cdkf.gain(factor, expected), innovation)
+        factor = cdkf.tria(np.hstack((factor, noise[:, :3])))  # the parameters walk when they have learnt
+
+        feed(estimator, samples, k, k + 1)
+        assert (np.abs(estimate(estimator) - z) < share * cdkf.deviations(factor)).all()
+        assert estimator.nis == pytest.approx(cdkf.normalised_square(expected.factor, innovation), rel=share, abs=share)
+    assert (np.abs(estimator.belief.joint_factor - factor) < share * cdkf.deviations(factor)[:, None]).all()
+
+
+def test_agrees_with_the_unscented_filter_of_filterpy() -> None:
+    """The same sigma points, weighted by Julier and Uhlmann: close, as both are right to second order."""
+    settings = EACH_SAMPLE | {f"{name}_sigma": 0.15 for name in ("m_p", "c_p", "k_p")}
+    samples = recorded(2500, PILOT * [1.1, 0.9, 1.1])
+    estimator = Estimator(settings, start_of(samples), "fixed", adaptation="fixed")
+    middle = [(0.0, 0.0)]
+
+    def step(z: Array, dt: float) -> Array:
+        p = (PILOT * np.exp(z[:3]))[:, None]
+        return np.concatenate((z[:3], estimator.model.step(z[3:, None], p, middle[0], estimator.trim, dt)[:, 0]))
+
+    points = MerweScaledSigmaPoints(5, alpha=1.0, beta=0.0, kappa=-2.0)
+    reference = UnscentedKalmanFilter(5, 2, 1e-3, lambda z: z[3:], step, points)
+    reference.x = estimate(estimator)
+    reference.P = estimator.belief.joint_factor @ estimator.belief.joint_factor.T
+    reference.Q = process_covariance(1e-3)
+    reference.R = OUTPUT_NOISE @ OUTPUT_NOISE.T
+    for k in range(1, 2500):
+        base, torque = (0.5 * float(samples[name][k] + samples[name][k - 1]) for name in ("z_ddot", "tau_m"))
+        middle[0] = (base, torque)
+        reference.predict()
+        reference.update(samples["y"][k])
+        feed(estimator, samples, k, k + 1)
+    sigma = cdkf.deviations(estimator.belief.joint_factor)
+    assert (np.abs(estimate(estimator) - reference.x) < 0.01 * sigma).all()
+    np.testing.assert_allclose(sigma, np.sqrt(reference.P.diagonal()), rtol=0.01)
+
+
+def test_finds_another_pilot_within_its_own_uncertainty() -> None:
+    pilot = PILOT * [1.2, 0.7, 0.85]
+    samples = recorded(5000, pilot)
+    estimator = Estimator(SETTINGS, start_of(samples), "fixed")
+    feed(estimator, samples, 1, 5000)
+    found, sigma = estimator.parameters()
+    assert (np.abs(found - pilot) < 3.0 * sigma).all()
+    assert (sigma < 0.12 * pilot).all()
+
+
+def test_coasting_moves_with_the_model_and_grows_uncertain() -> None:
+    samples = recorded(1200)
+    estimator = Estimator(EACH_SAMPLE, start_of(samples), "fixed")
+    feed(estimator, samples, 1, 1000)
+    before = np.concatenate((cdkf.deviations(estimator.belief.w_factor), estimator.state_deviations()))
+    w, x = estimator.belief.w.copy(), estimator.belief.x[:, None]
+    for k in range(1000, 1200):
+        middle = tuple(0.5 * float(samples[name][k] + samples[name][k - 1]) for name in ("z_ddot", "tau_m"))
+        x = estimator.model.step(x, PILOT[:, None] * np.exp(w[:, None]), (middle[0], middle[1]), estimator.trim, 1e-3)
+        feed(estimator, samples, k, k + 1, ~BOTH)
+        assert estimator.nis == 0.0
+    np.testing.assert_array_equal(estimator.belief.w, w)
+    assert (np.abs(estimator.belief.x - x[:, 0]) < 0.05 * estimator.state_deviations()).all()
+    assert (np.concatenate((cdkf.deviations(estimator.belief.w_factor), estimator.state_deviations())) > before).all()
+
+
+def test_a_gap_is_predicted_through_in_steps_of_a_sample_period() -> None:
+    samples = recorded(12)
+    samples |= {name: np.full(12, samples[name][0]) for name in ("z_ddot", "tau_m")}
+    once = SETTINGS | {"learn_period": 0.01}  # both walk at its end
+    bridged, stepped = (Estimator(once, start_of(samples), "fixed") for _ in range(2))
+    feed(bridged, samples, 10, 11, ~BOTH)
+    feed(stepped, samples, 1, 11, ~BOTH)
+    np.testing.assert_allclose(bridged.belief.x, stepped.belief.x, atol=1e-9)
+    np.testing.assert_allclose(bridged.belief.joint_factor, stepped.belief.joint_factor, atol=1e-9)
+
+
+# --- the adaptations -------------------------------------------------------------------------------------------------
+
+
+def test_annealing_falls_exponentially_to_the_floor() -> None:
+    samples = recorded(1000)
+    settings = SETTINGS | {"annealing_time": 0.5, "excitation_least": 0.0, "walk_ceiling": 10.0}
+    estimator = Estimator(settings, start_of(samples), "fixed", adaptation="annealing")
+    np.testing.assert_allclose(estimator.learning.walk, estimator.learning.ceiling)
+    feed(estimator, samples, 1, 501)
+    np.testing.assert_allclose(estimator.learning.walk, np.exp(-1.0) * estimator.learning.ceiling, rtol=1e-9)
+    settings["annealing_time"] = 0.01
+    feed(estimator, samples, 501, 1000)
+    np.testing.assert_array_equal(estimator.learning.walk, estimator.learning.floor)
+
+
+def test_robbins_monro_stays_between_floor_and_ceiling_and_uses_the_room() -> None:
+    samples = recorded(3000, PILOT * [1.5, 0.5, 1.6])
+    estimator = Estimator(SETTINGS | {"walk_ceiling": 3.0}, start_of(samples), "fixed", "robbins_monro")
+    seen = []
+    for k in range(1, 3000):
+        feed(estimator, samples, k, k + 1)
+        seen.append(estimator.learning.walk / estimator.learning.floor)
+    assert np.min(seen) >= 1.0
+    assert 2.0 < np.max(seen) <= 9.0 * (1.0 + 1e-12)
+
+
+def test_without_motion_the_walk_is_at_its_floor_and_the_uncertainty_limited() -> None:
+    nothing = np.zeros(4000)
+    still = {"time": np.arange(4000) * 1e-3, "y": np.tile([0.35, 0.0], (4000, 1)), "z_ddot": nothing, "tau_m": nothing}
+    walk = {f"{name}_walk": 0.5 for name in ("m_p", "c_p", "k_p")}
+    estimator = Estimator(SETTINGS | walk, start_of(still), "fixed")
+    feed(estimator, still, 1, 4000)
+    np.testing.assert_array_equal(estimator.learning.walk, estimator.learning.floor)
+    assert (cdkf.deviations(estimator.belief.w_factor) <= estimator.learning.greatest_sigma * (1.0 + 1e-9)).all()
+
+
+def test_parameters_stay_in_their_bounds() -> None:
+    samples = recorded(4000, PILOT * [1.0, 1.0, 1.8])
+    bounds = np.array([[1.0, 5.0], [10.0, 100.0], [1000.0, 1600.0]])
+    estimator = Estimator(SETTINGS, start_of(samples), bounds=bounds)
+    seen = []
+    for k in range(1, 4000):
+        feed(estimator, samples, k, k + 1)
+        seen.append(estimator.parameters()[0])
+    assert (np.min(seen, axis=0) >= bounds[:, 0] * (1 - 1e-12)).all()
+    assert (np.max(seen, axis=0) <= bounds[:, 1] * (1 + 1e-12)).all()
+    assert np.max(seen, axis=0)[2] == pytest.approx(1600.0)
+
+
+# --- noise, and sudden changes ---------------------------------------------------------------------------------------
+
+
+def test_noise_that_is_set_too_small_is_found() -> None:
+    samples = recorded(4000)
+    settings = SETTINGS | {"noise_window": 0.5, "theta_noise": SETTINGS["theta_noise"] / 3.0}
+    estimator = Estimator(settings, start_of(samples), "fixed")
+    feed(estimator, samples, 1, 4000)
+    np.testing.assert_allclose(estimator.learning.noise.output_noise, OUTPUT_NOISE.diagonal(), rtol=0.1)
+
+
+def test_white_corrections_are_no_change_and_a_drift_is() -> None:
+    """The statistic is chi-square with three degrees of freedom: 30 has a probability of 1e-6."""
+    rng, variance = np.random.default_rng(3), np.array([1.0, 4.0, 0.25])
+    change = ChangeDetection(memory=0.3, threshold=30.0)
+    white = rng.standard_normal((20000, 3)) * np.sqrt(variance)
+    assert not any(change.step(correction, variance, 0.02) for correction in white)
+    assert change.average == pytest.approx(1.0, abs=0.3)
+    drift = np.sqrt(variance) * [2.0, 0.0, 0.0]
+    assert any(change.step(correction + drift, variance, 0.02) for correction in white[:30])
+
+
+# --- trim ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("frequency", [0.1, 1.0, 4.0])
+def test_detrending_is_a_butterworth_high_pass(frequency: float) -> None:
+    time = np.arange(0.0, 60.0, 1e-3)
+    detrend = Detrend()
+    out = np.array([detrend.step(value, 1.0, 1e-3) for value in np.sin(2 * np.pi * frequency * time).tolist()])
+    late = time >= 50.0
+    wave = np.exp(-2j * np.pi * frequency * time[late])
+    gain = (out[late] * wave).mean() / (np.sin(2 * np.pi * frequency * time[late]) * wave).mean()
+    numerator, denominator = butter(6, 2 * np.pi, "highpass", analog=True)
+    assert gain == pytest.approx(freqs(numerator, denominator, [2 * np.pi * frequency])[1][0], abs=0.015)
+
+
+def test_a_level_follows_a_ramp_without_lag() -> None:
+    detrend = Detrend()
+    for k in range(5000):
+        deviation = detrend.step(0.1 * k * 1e-3, 1.0, 1e-3)
+    assert deviation == pytest.approx(0.0, abs=2e-4)
+
+
+def test_the_parameters_do_not_follow_a_new_trim() -> None:
+    """The whole recording moved by an angle that rises slowly: the parameters hardly notice."""
+    samples = recorded(7000, PILOT * [1.2, 0.8, 1.1])
+    moved = samples | {"y": samples["y"].copy()}
+    still, carried = (Estimator(SETTINGS, start_of(samples)) for _ in range(2))
+    angle = 0.05 * np.clip((samples["time"] - 2.0) / 3.0, 0.0, 1.0)
+    moved["y"][:, 0] += angle
+    moved["y"][:, 1] += np.gradient(angle, 1e-3)
+    feed(still, samples, 1, 7000)
+    feed(carried, moved, 1, 7000)
+    assert (np.abs(still.belief.w - carried.belief.w) < 2.0 * cdkf.deviations(still.belief.w_factor)).all()
+    assert carried.trim - still.trim == pytest.approx(0.05, abs=1e-3)
+
+
+@pytest.mark.parametrize("what", ["adaptation", "estimator", "model"])
+def test_unknown_choices_are_refused(what: str) -> None:
+    choice: dict[str, Any] = {what: "magic"}
+    with pytest.raises(ValueError, match=f'{what}: "magic" is none of'):
+        Estimator(SETTINGS, START, **choice)

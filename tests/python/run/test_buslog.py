@@ -1,0 +1,50 @@
+"""bus.log against python-can's writer and reader."""
+
+import io
+
+import can
+import numpy as np
+import pytest
+from lever_cdkf.sil.run.buslog import Frames, lines
+
+
+def some_frames(count: int, last_us: int) -> Frames:
+    random = np.random.default_rng(0)
+    return Frames(
+        np.sort(random.integers(0, last_us, count)),
+        random.integers(0, 0x800, count).astype(np.uint16),
+        random.integers(0, 256, (count, 8)).astype(np.uint8),
+        random.random(count) < 0.5,
+    )
+
+
+@pytest.mark.parametrize("last_us", [9_999_999, 150_000_000, 3_600_000_000])
+def test_bytes_are_those_of_python_can(last_us: int) -> None:
+    frames = some_frames(3000, last_us)
+    text = io.StringIO()
+    writer = can.CanutilsLogWriter(text, channel="vcan0")
+    for i in range(len(frames)):
+        writer.on_message_received(
+            can.Message(
+                timestamp=int(frames.time_us[i]) * 1e-6,
+                arbitration_id=int(frames.identifier[i]),
+                data=frames.data[i].tobytes(),
+                is_extended_id=False,
+                is_rx=bool(frames.received[i]),
+            )
+        )
+    assert b"".join(lines(frames, "vcan0")).decode() == text.getvalue()
+
+
+def test_python_can_reads_back_what_was_written() -> None:
+    frames = some_frames(500, 20_000_000)
+    read = list(can.CanutilsLogReader(io.StringIO(b"".join(lines(frames, "lever")).decode())))
+    assert [message.arbitration_id for message in read] == frames.identifier.tolist()
+    assert [bytes(message.data) for message in read] == [row.tobytes() for row in frames.data]
+    assert [message.is_rx for message in read] == frames.received.tolist()
+    assert [round(message.timestamp * 1e6) for message in read] == frames.time_us.tolist()
+    assert {message.channel for message in read} == {"lever"}
+
+
+def test_no_frames_no_lines() -> None:
+    assert list(lines(some_frames(0, 1), "lever")) == []

@@ -1,0 +1,266 @@
+"""The summary against closed forms on a trace that is made up."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf import load_scenario, simulate
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.firmware.native import enum_names
+from lever_cdkf.host_tools.firmware.quantities import quantities
+from lever_cdkf.host_tools.results import whiteness
+from lever_cdkf.host_tools.results.summary import Firmware, SimulationSummary, of, read, text
+from lever_cdkf.host_tools.results.trace import Trace
+from lever_cdkf.host_tools.results.whiteness import Whiteness
+from lever_cdkf.sil.run import loop, summary
+from lever_cdkf.sil.scenarios.scenario import Scenario
+from scipy import stats
+
+COUNT = 10_000
+TIME = np.arange(COUNT, dtype=np.float64) * 1e-3
+TEXT = """
+title = "t"
+duration = "10 s"
+converged_after = "2 s"
+[pilot]
+trim = "20 deg"
+m_p = "2 kg"
+c_p = { kind = "steps", first = "50 N s/m", at = ["4 s"], to = ["40 N s/m"] }
+k_p = "2000 N/m"
+[limits]
+m_p = "5 %"
+natural_frequency = "2 %"
+coverage = "90 %"
+"""
+
+
+@pytest.fixture
+def recording(load: Callable[..., Scenario]) -> loop.Recording:
+    scenario = load(TEXT)
+    return loop.Recording(scenario, loop.prepare(scenario))
+
+
+def perfect(recording: loop.Recording) -> Trace:
+    """A trace in which every estimate is the truth, with 1 % of sigma."""
+    random = np.random.default_rng(0)
+    dynamics = {"natural_frequency": np.full(COUNT, 3.5), "damping_ratio": np.full(COUNT, 0.3)}
+    values = {**recording.inputs.truth.parameters, **dynamics}
+    trace: Trace = {"time_s": TIME, "theta_measured_rad": np.zeros(COUNT), "theta_dot_measured_rad_s": np.zeros(COUNT)}
+    for quantity in quantities("lever"):
+        trace[quantity.column("true")] = values[quantity.key]
+        trace[quantity.column("estimate")] = values[quantity.key].copy()
+        trace[quantity.column("sigma")] = 0.01 * values[quantity.key]
+    trace["nis"] = random.chisquare(2, COUNT)
+    trace["mode"] = np.where(TIME < 0.1, 1.0, 2.0)
+    return trace | {name: np.zeros(COUNT) for name in ("faults", "lost", "corrupt", "late", "restarts")}
+
+
+def test_a_perfect_estimate_is_perfect(recording: loop.Recording) -> None:
+    made = summary.build(recording, perfect(recording))
+    for entry in made.parameters.values():
+        assert (entry.rms_percent, entry.bias_percent, entry.coverage_2sigma) == (0.0, 0.0, 1.0)
+        assert entry.time_to_10_percent_s == entry.time_to_5_percent_s == [0.0, 0.0]
+    assert made.passed
+    assert made.verdict.startswith("All limits kept. Rms errors after convergence: m_p 0.0 %")
+    assert "In this run ±2σ covers every truth for at least 100 % of the time." in made.verdict
+    assert made.modes_s == {"align": 0.1, "run": 9.9}
+    assert made.scenario.changes_s == [0.0, 4.0]
+
+
+def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.Recording) -> None:
+    trace = perfect(recording)
+    judged = ((TIME >= 2) & (TIME < 4)) | (TIME >= 6)
+    trace["m_p_estimate_kg"] = np.where(judged, np.where(np.arange(COUNT) % 2, 2.0 * 1.07, 2.0 * 0.97), 7.0)
+    made = summary.build(recording, trace)
+    entry = made.parameters["m_p"]
+    assert entry.rms_percent == pytest.approx(math.sqrt((49 + 9) / 2))
+    assert entry.bias_percent == pytest.approx(2.0)
+    assert entry.coverage_2sigma == 0.0
+    assert not made.passed
+    assert made.missed == ["rms error of m_p 5.4 % (limit 5 %)", "coverage of m_p 0 % (limit 90 %)"]
+    assert "Limits missed: rms error of m_p 5.4 % (limit 5 %)" in made.verdict
+    assert "In this run the stated σ of m_p is too small" in made.verdict
+
+
+def test_coverage_of_a_gaussian_error_is_that_of_two_sigma(recording: loop.Recording) -> None:
+    trace = perfect(recording)
+    trace["k_p_estimate_N_m"] += 0.01 * 2000 * np.random.default_rng(1).standard_normal(COUNT)
+    coverage = summary.build(recording, trace).parameters["k_p"].coverage_2sigma
+    assert coverage == pytest.approx(stats.norm.cdf(2) - stats.norm.cdf(-2), abs=0.01)
+
+
+def test_times_run_from_each_change_until_inside_for_good() -> None:
+    relative = 0.5 * np.exp(-TIME / 0.5)
+    relative[TIME >= 4.0] = -0.3 * np.exp(-(TIME[TIME >= 4.0] - 4.0) / 1.0)
+    changes = (0.0, 4.0)
+    times = summary.times_to(relative, TIME, changes, 0.1)
+    assert times == pytest.approx([0.5 * math.log(5), math.log(3)], abs=1.1e-3)
+    relative[2500] = 0.2
+    assert summary.times_to(relative, TIME, changes, 0.1)[0] == pytest.approx(2.501)
+    relative[3999] = math.nan
+    assert summary.times_to(relative, TIME, changes, 0.1)[0] is None
+    assert summary.times_to(np.zeros(COUNT), TIME, changes, 0.1) == [0.0, 0.0]
+
+
+def test_nis_of_chi_square_is_inside_its_bands(recording: loop.Recording) -> None:
+    trace = perfect(recording)
+    nis = summary.build(recording, trace).nis
+    assert nis.mean is not None
+    assert nis.mean_band_95 is not None
+    assert nis.expected == 2.0
+    assert nis.mean_band_95[0] < nis.mean < nis.mean_band_95[1]
+    assert nis.inside_95_percent == pytest.approx(0.95, abs=0.01)
+    width = nis.mean_band_95[1] - nis.mean_band_95[0]
+    exact = np.diff(stats.chi2.ppf((0.025, 0.975), 2 * 6000)) / 6000
+    assert width == pytest.approx(exact[0], rel=0.01)
+
+
+def test_nis_expects_as_many_degrees_of_freedom_as_outputs(recording: loop.Recording) -> None:
+    trace = perfect(recording)
+    half = np.arange(COUNT) % 2 == 0
+    trace["theta_measured_rad"][half] = math.nan
+    trace["nis"][half] = np.random.default_rng(2).chisquare(1, half.sum())
+    trace["theta_dot_measured_rad_s"][::4] = math.nan  # both missing: not counted
+    trace["nis"][::4] = 0.0
+    nis = summary.build(recording, trace).nis
+    assert nis.expected == pytest.approx((1 + 2 + 2) / 3, abs=1e-3)
+    assert nis.mean == pytest.approx(nis.expected, rel=0.05)
+    assert nis.inside_95_percent == pytest.approx(0.95, abs=0.01)
+
+
+def test_faults_and_missing_answers_fail_a_run(recording: loop.Recording) -> None:
+    trace = perfect(recording)
+    recording.unanswered = 3
+    made = summary.build(recording, trace)
+    assert not made.passed
+    assert made.verdict.startswith("Trouble: 3 samples got no answer.")
+    recording.unanswered, recording.misplaced = 0, 2
+    made = summary.build(recording, trace)
+    assert not made.passed
+    assert made.verdict.startswith("Trouble: 2 estimates came that belong to other samples.")
+    recording.misplaced = 0
+    trace["mode"][5000:5100] = 5.0
+    made = summary.build(recording, trace)
+    assert not made.passed
+    assert "the estimator was in fault for 0.1 s" in made.verdict
+
+
+def test_faults_are_shares_of_the_judged_time(recording: loop.Recording) -> None:
+    """6 s of 10 are judged: those from 2 s after the start and after the jump at 4 s on."""
+    bits = {name: bit for bit, name in enum_names("lever_fault").items()}
+    trace = perfect(recording)
+    trace["faults"][:2500] = bits["mismatch"] + bits["change"]  # half a second of it judged
+    trace["faults"][7000:8000] = bits["bound"]
+    trace["faults"][8000:8500] = bits["excitation"]
+    trace["faults"][9400:] = np.nan  # HEALTH has not told
+    made = summary.build(recording, trace)
+    expected = {"bound": 1.0, "change": 0.5, "mismatch": 0.5, "excitation": 0.5}
+    assert made.fault_shares == pytest.approx({name: seconds / 5.4 for name, seconds in expected.items()})
+    assert made.flagged_share == pytest.approx(1.5 / 5.4)
+    trace["faults"][:] = np.nan
+    made = summary.build(recording, trace)
+    assert (made.fault_shares, made.flagged_share) == ({}, None)
+
+
+def test_settings_of_the_estimator_that_are_not_the_scenarios_are_told(recording: loop.Recording) -> None:
+    crc = recording.scenario.config.settings_crc
+    pages = {"firmware_major": 0.0, "firmware_minor": 2.0, "firmware_patch": 0.0, "contract": 2.0}
+    for wrong in (0, 1):
+        recording.identity.take(pages | {"settings_crc": float(crc ^ wrong)})
+        made = summary.build(recording, perfect(recording))
+        assert made.firmware == Firmware("0.2.0", 2, not wrong)
+        assert ("other settings than the scenario" in made.verdict) is bool(wrong)
+        assert made.passed
+
+
+def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., Scenario]) -> None:
+    scenario = load(TEXT, "converged_after=20 s")
+    recording = loop.Recording(scenario, loop.prepare(scenario))
+    trace = perfect(recording)
+    trace["m_p_estimate_kg"][:] = math.nan
+    made = summary.build(recording, trace)
+    assert made.passed
+    assert made.verdict.startswith("Too short to judge")
+    content = json.loads(text(made.timed(0.5)))
+    assert content["parameters"]["m_p"]["rms_percent"] is None
+    assert content["parameters"]["m_p"]["time_to_10_percent_s"] == [None, None]
+    assert content["wall_time_per_simulated_time"] == pytest.approx(0.05)
+
+
+def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable[..., Scenario]) -> None:
+    scenario = load(TEXT, "estimator.model=linear_physical", "limits={natural_frequency='2 %', coverage='90 %'}")
+    recording = loop.Recording(scenario, loop.prepare(scenario))
+    trace = perfect(recording)
+    trace["damping_ratio_sigma"][:] = 0.0
+    trace["damping_ratio_estimate"] *= 1.01
+    made = summary.build(recording, trace)
+    assert list(made.parameters) == ["natural_frequency", "damping_ratio"]
+    assert made.missed == ["coverage of damping_ratio 0 % (limit 90 %)"]
+    assert "m_p" not in made.verdict
+
+
+def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(load: Callable[..., Scenario]) -> None:
+    """The pilot tightens his c_p at 4 s; against M, D, K and the forcing of DESIGN section 3 worked out here."""
+    scenario = load(TEXT, "estimator.model=linear_physical", "limits={}")
+    recording = loop.Recording(scenario, loop.prepare(scenario))
+    told = summary.build(recording, perfect(recording)).truth
+    assert told.model == "lever"
+    assert told.transfer is not None
+    assert told.transfer.time_s == [0.0, pytest.approx(4.0, abs=10.0 / summary.MOST_TRANSFERS)]
+    cosine, arm = math.cos(math.radians(20.0)), 0.45**2
+    for c_p, numerator, denominator in zip(
+        (50.0, 40.0), told.transfer.numerator, told.transfer.denominator, strict=True
+    ):
+        assert numerator == pytest.approx([-0.45 * (0.6 + 2.0) * cosine])
+        expected = [arm * (0.3 + 2.0) + 0.02, arm * c_p * cosine**2 + 0.5, arm * 2000.0 * cosine**2 + 5.0]
+        assert denominator == pytest.approx(expected)
+
+
+def test_white_residuals_are_a_test_passed_and_no_proof_of_the_model() -> None:
+    white = Whiteness(0.02, [0.0] * 25, band_95=0.04, largest=0.08, largest_after_s=0.06, white=True)
+    said = whiteness.verdict(white)
+    assert said.startswith(
+        "Residuals of the rate pass the test for whiteness up to a lag of 0.5 s (largest correlation 0.08"
+    )
+    assert all(unseen in said for unseen in ("friction", "gain", "delay"))
+    assert "coloured (correlation 0.08 after 60 ms; white" in whiteness.verdict(replace(white, white=False))
+    assert whiteness.verdict(None) == ""
+
+
+def test_a_file_is_read_back_as_it_was(recording: loop.Recording, tmp_path: Path) -> None:
+    made = summary.build(recording, perfect(recording)).timed(1.0)
+    file = tmp_path / "summary.json"
+    file.write_text(text(made))
+    assert read(file) == made
+    content = json.loads(file.read_text())
+    assert set(content) >= {
+        "schema", "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "restarts",
+        "unanswered", "misplaced", "firmware", "fault_shares", "flagged_share", "wall_time_s",
+        "simulated_time_s", "wall_time_per_simulated_time", "verdict",
+    }  # fmt: skip
+    assert set(content["parameters"]) == {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
+    assert set(content["parameters"]["m_p"]) == {
+        "rms_percent", "bias_percent", "coverage_2sigma", "time_to_10_percent_s", "time_to_5_percent_s",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "wrong", ["{", "[]", "{}", '{"schema": 1, "scenario": {}}', '{"schema": 0}', '{"schema": 1, "x": 2}']
+)
+def test_what_is_no_summary_is_refused_in_a_line(wrong: str, tmp_path: Path) -> None:
+    file = tmp_path / "summary.json"
+    file.write_text(wrong)
+    with pytest.raises(LeverError, match=r"summary.json: (not a summary of this version|schema 0, not 1)"):
+        read(file)
+
+
+@pytest.mark.parametrize("name", ["two_dof", "steady"])
+def test_that_of_any_run_is_read_back(name: str) -> None:
+    made = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
+    assert of(SimulationSummary, json.loads(text(made))) == made

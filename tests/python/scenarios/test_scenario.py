@@ -1,0 +1,258 @@
+"""Scenarios: those that come with the package keep what is promised of them; files that are wrong are refused well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.firmware.config import Config, settings_table
+from lever_cdkf.host_tools.firmware.native import Estimator
+from lever_cdkf.sil.plants import excitation
+from lever_cdkf.sil.run import loop
+from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.sil.scenarios.random_streams import stream
+from lever_cdkf.sil.scenarios.scenario import Scenario
+from lever_cdkf.sil.toml_tables import ScenarioError
+
+REQUIRED = {
+    "steady", "fatigue_drift", "sudden_grip", "base_only", "base_dither", "poor_excitation", "sensor_dropout",
+    "re_trim", "high_noise", "demo", "linear_physical", "linear_black_box", "two_dof", "mayo_ectomorphic",
+    "mayo_mesomorphic", "moving_pilot", "grip_moves", "friction", "hands_off", "rough_air", "sensor_faults",
+    "unknown_torque", "ramp_of_damping", "hysteretic", "reflex",
+}  # fmt: skip
+NOTHING_PROMISED = {"moving_pilot", "rough_air", "sensor_faults", "unknown_torque"}
+"""Scenarios in which the estimator cannot be right all the time."""
+LEAST = """
+title = "t"
+duration = "1 s"
+[pilot]
+trim = "20 deg"
+m_p = "3 kg"
+c_p = "50 N s/m"
+k_p = "2000 N/m"
+"""
+BLACK_BOX = """
+title = "t"
+duration = "1 s"
+[pilot]
+model = "linear_black_box"
+trim = "20 deg"
+a21 = "-500 1/s^2"
+a22 = "-9 1/s"
+b21 = "2 1"
+"""
+MAYO = """
+title = "t"
+duration = "1 s"
+[pilot]
+model = "hand"
+somatotype = "ectomorphic"
+trim = '20 deg'
+"""
+FIRMWARE_TORQUE = "[[torque]]\nkind = 'firmware'\nrms = '1 N m'\n"
+SINE_TORQUE = "[[torque]]\nkind = 'sine'\nrms = '1 N m'\nfrequency = '1 Hz'\n"
+
+Load = Callable[..., Scenario]
+
+
+def test_the_promised_scenarios_are_there() -> None:
+    assert set(scenario.names()) >= REQUIRED
+
+
+@pytest.mark.parametrize("name", scenario.names())
+def test_a_scenario_says_what_it_is_and_starts_from_a_wrong_guess(name: str) -> None:
+    loaded = scenario.load(name)
+    assert loaded.name == name
+    assert len(loaded.title) > 10
+    assert "first guess" in loaded.description.lower()
+    truth = loaded.truth(loaded.time())
+    if loaded.pilot.model == loaded.config.choices["model"]:
+        guesses = {name: (loaded.config.settings[name], true[0]) for name, true in truth.parameters.items()}
+    else:
+        guess = Estimator(loaded.config).estimate().natural_frequency
+        guesses = {"natural_frequency": (guess, truth.dynamics.natural_frequency[0])}
+    for name, (guess, true) in guesses.items():
+        assert abs(guess / true - 1.0) >= 0.2, name
+    assert ("natural_frequency" in (loaded.limits or {})) is (loaded.name not in NOTHING_PROMISED)
+
+
+@pytest.mark.parametrize("name", scenario.names())
+def test_the_standard_values_are_used(name: str) -> None:
+    loaded = scenario.load(name)
+    noise = loaded.base[0]
+    assert isinstance(noise, excitation.Noise)
+    assert (noise.rms, noise.low, noise.high) == pytest.approx((0.980665, 1.0, 10.0))
+    strength = 1.0 if name == "linear_physical" else 0.3
+    assert all(dither.rms == strength for dither in loaded.torque if isinstance(dither, scenario.FirmwareDither))
+    assert loaded.pilot.process_noise == (0.5 if name == "rough_air" else 0.05)
+    times = 5 if name == "high_noise" else 1
+    assert (loaded.sensors.theta.noise, loaded.sensors.theta_dot.noise) == (times * 1e-3, times * 1e-2)
+
+
+def test_base_only_and_base_dither_are_the_same_pilot_in_the_same_air() -> None:
+    only, dither = scenario.load("base_only"), scenario.load("base_dither")
+    first, second = loop.prepare(only), loop.prepare(dither)
+    assert np.array_equal(first.z_ddot, second.z_ddot)
+    assert np.array_equal(first.z_ddot_measured, second.z_ddot_measured)
+    assert np.array_equal(first.truth.rest, second.truth.rest)
+    for name, values in first.truth.parameters.items():
+        assert np.array_equal(values, second.truth.parameters[name])
+    assert only.dithers() == []
+    assert dither.dithers() == [(0.0, 0.3)]
+
+
+def test_settings_are_the_firmwares_but_for_overrides(load: Load) -> None:
+    assert load(LEAST).config.settings == Config().settings
+    changed = load(LEAST + '[settings]\ntheta_noise = "2 mrad"\nlever_length = "40 cm"\n')
+    assert {k for k, v in changed.config.settings.items() if v != Config().settings[k]} == {
+        "theta_noise",
+        "lever_length",
+    }
+    assert changed.config.settings["theta_noise"] == 0.002
+    assert changed.true_lever.lever_length == 0.4
+
+
+def test_the_true_lever_may_be_another_than_the_estimator_is_told(load: Load) -> None:
+    loaded = load(LEAST + '[lever]\nlever_mass = "1.5 kg"\n')
+    assert loaded.true_lever.lever_mass == 1.5
+    assert loaded.config.settings["lever_mass"] == 1.2
+
+
+def test_where_he_lets_go_the_lever_keeps_its_place_until_he_takes_it_again(load: Load) -> None:
+    moving = 'trim = { kind = "ramp", first = "20 deg", last = "30 deg", start = "0 s", duration = "1 s" }'
+    off = 'hands_off = [{ start = "0.3 s", end = "0.5 s" }, { start = "0.8 s" }]\n'
+    loaded = load(LEAST.replace('trim = "20 deg"', moving) + off)
+    rest = np.degrees(loaded.truth(loaded.time()).rest)
+    assert rest[[299, 300, 499, 500, 799, 999]] == pytest.approx([22.99, 22.99, 22.99, 25.0, 27.99, 27.99])
+    assert loaded.changes() == (0.0, 0.3, 0.5, 0.8)
+
+
+def test_one_noise_does_not_shift_another(load: Load) -> None:
+    base = '[[base]]\nkind = "noise"\nrms = "0.1 g"\nlow = "1 Hz"\nhigh = "10 Hz"\n'
+    plain = load(LEAST + base)
+    more = load(LEAST + base + '[[base]]\nkind = "noise"\nrms = "1 mg"\nlow = "1 Hz"\nhigh = "10 Hz"\n'
+                + '[[sensors.dropout]]\nwhat = "theta"\nshare = "10 %"\n')  # fmt: skip
+    assert np.abs(loop.prepare(plain).z_ddot - loop.prepare(more).z_ddot).max() < 0.06
+    assert np.array_equal(plain.stream("process").random(5), more.stream("process").random(5))
+    assert not np.array_equal(load(LEAST + base, "seed=2").stream("base").random(5), plain.stream("base").random(5))
+
+
+def test_each_name_has_a_stream_of_its_own() -> None:
+    """Those that are not numbered too; the first numbers are what numpy's SeedSequence makes of seed and place."""
+    purposes = ("process", "theta", "m_p", "fault", "k_trunk", "k_trunk2", "grip")
+    numbers = [stream(1, purpose, index).random() for purpose in purposes for index in range(3)]
+    assert len(set(numbers)) == len(numbers)
+    assert numbers == [stream(1, purpose, index).random() for purpose in purposes for index in range(3)]
+    assert stream(2, "grip").random() != stream(1, "grip").random()
+    for purpose, place in (("process", 0), ("trim", 8), ("fault", 24)):
+        numpys = np.random.default_rng(np.random.SeedSequence(7, spawn_key=(place, 3)))
+        assert stream(7, purpose, 3).random() == numpys.random()
+
+
+def test_changes_and_dithers_are_listed_in_order_of_time(load: Load) -> None:
+    loaded = load(
+        LEAST.replace(
+            '"3 kg"', '{ kind = "steps", first = "3 kg", at = ["0.7 s", "9 s"], to = ["4 kg", "5 kg"] }'
+        ).replace('"2000 N/m"', '{ kind = "steps", first = "2 N/m", at = ["0.5 s"], to = ["3 N/m"] }')
+        + '[[torque]]\nkind = "firmware"\nrms = "0.3 N m"\nend = "0.4 s"\n'
+        + '[[torque]]\nkind = "firmware"\nrms = "0.2 N m"\nstart = "0.6 s"\n'
+    )
+    assert loaded.changes() == (0.0, 0.5, 0.7)
+    assert loaded.dithers() == [(0.0, 0.3), (0.4, 0.0), (0.6, 0.2)]
+
+
+def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
+    base = '[[base]]\nkind = "sine"\nrms = "0.1 g"\nfrequency = "3 Hz"\n'
+    loaded = load(
+        LEAST + base, "duration=2 s", 'base.0.rms="1 m/s^2"', "settings.m_p=3 kg", "seed=9", "pilot.m_p='4 kg'"
+    )
+    assert (loaded.duration, loaded.seed, loaded.config.settings["m_p"]) == (2.0, 9, 3.0)
+    assert loaded.base[0].rms == 1.0  # type: ignore[attr-defined]
+    assert loaded.truth(loaded.time()).parameters["m_p"][0] == 4.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            LEAST.replace("k_p", "k_q"),
+            r"made.toml: pilot: unknown key 'k_q'; allowed: trim, preload, process_noise, m_p, c_p, k_p, hands_off",
+        ),
+        (LEAST.replace('m_p = "3 kg"', ""), "pilot: key 'm_p' is missing"),
+        (LEAST.replace('trim = "20 deg"', ""), "pilot: key 'trim' is missing"),
+        (LEAST.replace('"3 kg"', "3"), "pilot.m_p: 3 is not a quantity"),
+        (LEAST.replace('"3 kg"', '"3 g/s"'), "pilot.m_p: '3 g/s' has unit 'g/s'; allowed: kg, g"),
+        (LEAST.replace('"1 s"', '"2 h"'), "duration: '2 h' is out of range; it must be above 0 and at most 3600 s"),
+        (LEAST.replace('"3 kg"', '"-3 kg"'), "pilot.m_p: falls to -3; it must stay above 0"),
+        (LEAST.replace("20 deg", "-95 deg"), "pilot.trim: moves by 95 deg; it must stay below 90 deg"),
+        (BLACK_BOX.replace("-9 1/s", "1 1/s"), "pilot.a22: rises to 1; it must stay below 0"),
+        (BLACK_BOX + SINE_TORQUE, "torque: no torque acts on a pilot of model linear_black_box; remove it"),
+        (MAYO + SINE_TORQUE, "torque: no torque acts on a pilot of model hand; remove it"),
+        (MAYO + FIRMWARE_TORQUE, "torque: no torque acts on a pilot of model hand"),
+        (MAYO + SINE_TORQUE.replace("torque", "disturbance"), "disturbance: no torque acts on a pilot of model hand"),
+        (
+            MAYO.replace("ecto", "endo"),
+            "pilot.somatotype: 'endomorphic' is not known; allowed: ectomorphic, mesomorphic",
+        ),
+        (MAYO.replace("trim = '20 deg'", "preload = 'fixed'"), "pilot.preload: 'fixed' is not known; allowed: trim"),
+        (LEAST + "model = 'two_dof'\nk_t = '-1 N/m'", "pilot.k_t: falls to -1; it must stay above 0"),
+        (BLACK_BOX + "[limits]\na21 = '5 %'", "limits.a21: has no truth in this run to be judged by"),
+        (LEAST + "[limits]\nm_q = '5 %'", "limits: unknown key 'm_q'; allowed: m_p, c_p, k_p, m, c, k, a21"),
+        (LEAST + 'preload = "loose"', "pilot.preload: 'loose' is not known; allowed: trim, fixed"),
+        (LEAST + 'preload = "fixed"', "'trim' goes with preload trim"),
+        (LEAST + "[estimator]\nadaptation = 'magic'", "allowed: fixed, annealing, robbins_monro, forgetting"),
+        (LEAST + "[settings]\ntheta_nose = '1 rad'", "settings: unknown key 'theta_nose'; allowed: sample_period"),
+        (LEAST + "[settings]\ntheta_noise = '9 rad'", "made.toml: settings: theta_noise = 9.0 is out of range"),
+        (LEAST + "[lever]\ntheta_noise = '9 rad'", "lever: unknown key 'theta_noise'; allowed: lever_length"),
+        (LEAST + "[lever]\nlever_friction = '-1 N m'", "lever.lever_friction: '-1 N m' is out of range; it must be at"),
+        (LEAST + "hands_off = [{ end = '1 s' }]", r"pilot.hands_off\[0\]: key 'start' is missing"),
+        (LEAST + "hands_off = [{ start = '2 s', end = '1 s' }]", r"hands_off\[0\]: start 2 s is not before end 1 s"),
+        (
+            LEAST.replace('trim = "20 deg"', "preload = 'fixed'\nhands_off = [{ start = '1 s' }]"),
+            "pilot: 'hands_off' goes with preload trim",
+        ),
+        (
+            LEAST + "[sensors]\ntheta = { fault = [{ kind = 'spikes', share = '1 %', size = '1 g' }] }",
+            r"sensors.theta.fault\[0\].size: '1 g' has unit 'g'; allowed: rad",
+        ),
+        (
+            LEAST + "[sensors]\ntheta = { fault = [{ kind = 'loose' }] }",
+            r"sensors.theta.fault\[0\]: must be a table with kind = one of stuck, scale, spikes",
+        ),
+        (LEAST + "[[torque]]\nkind = 'sine'\nrms = '1 g'\nfrequency = '1 Hz'", r"torque\[0\].rms: '1 g' has unit 'g'"),
+        (LEAST + "[[sensors.dropout]]\nwhat = 'all'\nshare = '1 %'", r"sensors.dropout\[0\].what: 'all' is not known"),
+        (LEAST + "[sensors]\ntheta = { noise = '1 m' }", "sensors.theta.noise: '1 m' has unit 'm'; allowed: rad, mrad"),
+        (LEAST + "[base]\nkind = 'sine'", "base: must be a list"),
+        ("title =", "made.toml: not TOML"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_file_key_and_remedy(load: Load, text: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load(text)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("duration", "must be KEY=VALUE"),
+        ("pilot.m_p.first=3 kg", "the scenario has no 'pilot.m_p.first'"),
+        ("title.x=3", "the scenario has no 'title.x'"),
+        ("colour=red", "unknown key 'colour'"),
+    ],
+)
+def test_a_wrong_override_is_refused(load: Load, override: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load(LEAST, override)
+
+
+def test_an_unknown_scenario_or_file_is_refused_with_what_there_is() -> None:
+    with pytest.raises(ScenarioError, match="no scenario 'nope'; there are base_dither, base_only"):
+        scenario.load("nope")
+    with pytest.raises(ScenarioError, match=r"nope\.toml: no such file"):
+        scenario.load("nope.toml")
+
+
+def test_every_setting_can_be_overridden_in_its_unit(load: Load) -> None:
+    text = "".join(f'{row.name} = "{row.default!r} {row.unit}"\n' for row in settings_table())
+    assert load(LEAST + "[settings]\n" + text).config.settings == Config().settings
