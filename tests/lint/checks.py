@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -62,7 +63,8 @@ def misra(*files: str | Path) -> str:
     """
     options = ("--addon=misra", "--std=c99", "--quiet", "--inline-suppr", "--enable=style,information")
     template = "--template={file}:{line}: {severity} {id}"
-    _, output = _run("cppcheck", *options, template, "-I", FIRMWARE, *files)
+    with tempfile.TemporaryDirectory() as scratch:  # otherwise its dumps are written beside the sources
+        _, output = _run("cppcheck", *options, f"--cppcheck-build-dir={scratch}", template, "-I", FIRMWARE, *files)
     found = [match[0] for match in MISRA_FINDING.finditer(output) if match["rule"] not in NOT_APPLIED]
     return "\n".join(["fix, or suppress as firmware/MISRA.md says:", *found, ""]) if found else ""
 
