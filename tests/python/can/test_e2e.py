@@ -163,6 +163,15 @@ def test_receiver_over_random_sequences(codec: Codec) -> None:
     assert seen == {"OK", "NO_NEW_DATA", "CRC_ERROR", "SYNC", "INITIAL", "REPEATED", "SOME_LOST", "WRONG_SEQUENCE"}
 
 
+def test_the_tolerance_stops_at_fifteen(codec: Codec) -> None:
+    receiver = codec.receiver(BASE, 1, 15, 0)
+    codec.check(receiver, codec.protect(bytes(8), BASE, 0))
+    for _ in range(300):
+        codec.check(receiver, None)
+        assert receiver.max_delta <= 15
+        assert receiver.no_new_or_repeated <= 15
+
+
 @pytest.mark.parametrize("missing", range(1, 15))
 def test_lost_frames_are_counted(codec: Codec, missing: int) -> None:
     receiver = codec.receiver(BASE, 14, 15, 0)
