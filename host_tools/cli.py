@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from .errors import LeverError
-from .later import allow, put_off
+from .extras import hide_mf4, reveal_mf4
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has
@@ -53,7 +53,7 @@ class Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command line and returns its exit status: 0 only when all went well."""
-    put_off(sys.argv[1:] if argv is None else argv)
+    hide_mf4(sys.argv[1:] if argv is None else argv)
     try:
         try:
             args = _parser().parse_args(argv)
@@ -73,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"lever: error: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     finally:
-        allow()
+        reveal_mf4()
 
 
 def _expected() -> tuple[type[Exception], ...]:

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from lever_cdkf import host_tools
+
 from .errors import LeverError
 
 LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
@@ -14,9 +16,9 @@ LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
 
 
 def native_file(name: str) -> Path:
-    """The path of `name` (shared library, its declarations, lever.dbc), which installing has put beside this module."""
+    """The path of `name` (shared library, its declarations, lever.dbc), which installing has put into `_native`."""
     folders = [Path(folder) for folder in os.environ.get(LIBRARY_DIR, "").split(os.pathsep) if folder]
-    folders.append(Path(__file__).resolve().parent / "_native")
+    folders += [Path(folder) / "_native" for folder in host_tools.__path__]  # two, if the install is editable
     for folder in folders:
         if (folder / name).is_file():
             return folder / name

@@ -48,6 +48,23 @@ void alignment_begin(estimator_t *estimator, const checked_t *sample)
     alignment_step(estimator, sample, 0.0f);
 }
 
+void alignment_begin_grip(estimator_t *estimator, const checked_t *sample)
+{
+    static const float origin[MODEL_STATES] = {0.0f, 0.0f};
+    cdkf_t *cdkf = &estimator->cdkf;
+    const float x[MODEL_STATES] = {
+        sample->valid[0] ? sample->y[0] : cdkf->x[0], sample->valid[1] ? sample->y[1] : cdkf->x[1]};
+    trim_begin(&estimator->trim, x);
+    cdkf_start_state(cdkf, origin, cdkf->output_noise);
+    cdkf_begin_step(cdkf);
+    estimator->z_ddot = 0.0f;
+    estimator->tau_m = 0.0f;
+    if (estimator->setup.constants.seat_stiffness <=
+        0.0f) { /* the velocity of the base until now acts as a step, too */
+        estimator->base_motion.seat_dot = 0.0f;
+    }
+}
+
 void alignment_end_outage(estimator_t *estimator, const checked_t *sample)
 {
     if (sample->valid[0] && sample->valid[1]) {

@@ -29,6 +29,10 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
  * not known is near the trim, a rate that is not known anything plausible. */
 void alignment_start_state(estimator_t *estimator, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS]);
 
+/* Levels and state begin anew where the lever is, with a step of its acceleration: the pilot has gripped it anew, and
+ * what was before does not tell of the arm that is now. */
+void alignment_begin_grip(estimator_t *estimator, const checked_t *sample);
+
 /* After an outage the prediction is worth little: the state starts again where it is measured. */
 void alignment_end_outage(estimator_t *estimator, const checked_t *sample);
 

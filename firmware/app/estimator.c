@@ -182,8 +182,11 @@ static void average(estimator_t *estimator, float elapsed)
     }
     if (estimator->nis_size != 0u) {
         const float ratio = (estimator->nis_size == 2u) ? (0.5f * estimator->nis) : estimator->nis;
+        const float bounded = (ratio < INNOVATION_MOST) ? ratio : INNOVATION_MOST;
         monitor_add(&estimator->learning.monitor, ratio, elapsed);
-        averages->innovation += share * (((ratio < INNOVATION_MOST) ? ratio : INNOVATION_MOST) - averages->innovation);
+        if (estimator->trim.unsettled <= 0.0f) { /* innovations are those of the filter, not of the levels */
+            averages->innovation += share * (bounded - averages->innovation);
+        }
     }
 }
 
@@ -223,6 +226,10 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     const learning_t *learning = &estimator->learning;
     const lesson_t lesson = update_filter(estimator, sample);
     const bool learnt = learning_step(&estimator->learning, &estimator->setup, &estimator->cdkf, &lesson, elapsed);
+    if (estimator->learning.moved) {
+        estimator->learning.moved = false;
+        alignment_begin_grip(estimator, sample);
+    }
     note(estimator, (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
     estimator->trim.unsettled -= elapsed;
     const bool restarted = restart_if_invalid(estimator, sample, learnt);
@@ -232,7 +239,7 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     note(estimator, learning->changed > 0.0f, LEVER_FAULT_CHANGE);
     note(estimator, estimator->averages.innovation > INNOVATION_TOLERATED, LEVER_FAULT_INNOVATION);
     note(estimator, learning->whiteness.coloured, LEVER_FAULT_MISMATCH);
-    note(estimator, learning->calibration.wrong || learning->grip.wrong, LEVER_FAULT_CALIBRATION);
+    note(estimator, learning->calibration.wrong || learning->force.wrong, LEVER_FAULT_CALIBRATION);
     note(estimator, learning->hands.off, LEVER_FAULT_HANDS_OFF);
     note(estimator, restarted, LEVER_FAULT_RECOVERED);
     estimator->mode = mode_of(estimator, sample->valid[0] || sample->valid[1]);

@@ -60,9 +60,10 @@ static void look(const grip_force_t *grip, const setup_t *setup, const model_ste
     seen->torque = torque;
     seen->own[0] = torque * constants->stiffness;
     seen->own[1] = torque * constants->damping;
-    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < (uint32_t)CDKF_CALIBRATION; c++) {
         seen->error[c] = (torque * ((c <= (uint32_t)CDKF_BASE_DELAY) ? base : 1.0f)) * error[c];
     }
+    seen->error[CDKF_STEP] = 0.0f; /* of the hand's torque, which moves the lever through the force */
 }
 
 bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
@@ -85,8 +86,9 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
 
 /* Compares the impulses that sensor and motion say of the hand. Both are multiplied by the drive, which no noise is in:
  * torque that nobody knows moves lever and force differently. */
-static void compare(grip_force_t *grip, const lever_settings_t *s, const hands_t *hands, float period)
+static void compare(grip_force_t *grip, const lever_settings_t *s, const hands_t *hands)
 {
+    const float period = hands->ended;
     grip->compared += (grip->compared < MEMORY) ? period : 0.0f;
     const float share = period / grip->compared; /* a mean first, and then one with exponential forgetting */
     const float difference = grip->impulse - hands->of_hand;
@@ -101,12 +103,14 @@ static void compare(grip_force_t *grip, const lever_settings_t *s, const hands_t
     grip->wrong = grip->wrong || ((off > (limit + sure)) && (grip->compared > LEAST));
 }
 
-bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands, float period, bool counts)
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands)
 {
     const bool used = grip->right && !grip->wrong;
-    if (counts && grip->seen && (grip->missing < TRIM_OUTAGE) && (grip->settling <= 0.0f)) {
-        compare(grip, setup->settings, hands, period);
+    if (hands->ended > 0.0f) {
+        if (hands->counted && grip->seen && (grip->missing < TRIM_OUTAGE) && (grip->settling <= 0.0f)) {
+            compare(grip, setup->settings, hands);
+        }
+        grip->impulse = 0.0f;
     }
-    grip->impulse = 0.0f;
     return used && grip->wrong;
 }

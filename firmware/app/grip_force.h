@@ -21,7 +21,7 @@ typedef struct grip_force {
     float missing;  /* time since then [s] */
     float settling; /* time until its slow part is known [s] */
     float square;   /* mean square of the same without its slow part [N^2] */
-    float impulse;  /* of the force since the beginning of the block [N m s] */
+    float impulse;  /* of the force since the beginning of the block of hands_t [N m s] */
     float measured; /* mean product of that and the block's drive (hands.h), */
     float expected; /* and of what the lever's motion says of the hand: the ratio is the sensor's gain error */
     float drive_square;
@@ -40,8 +40,7 @@ void grip_force_start(grip_force_t *grip);
 bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
     const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen);
 
-/* The end of a block of `period` seconds; `counts`: the lever moved, and all else was measured. Returns true when the
- * force has just been found wrong. */
-bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands, float period, bool counts);
+/* After hands_step(). Returns true when the force has just been found wrong. */
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands);
 
 #endif

@@ -3,9 +3,10 @@
 
 #include <string.h>
 
-#define MEMORY 0.12f /* [s] */
-#define OFF 0.04f    /* residual over change, in squares; a hand leaves several times 1 */
-#define ON 0.12f
+#define BLOCK 0.038f /* [s]: two blocks of learning. In less, the noise of theta_dot is a good part of the change */
+#define MEMORY 0.16f /* [s] */
+#define OFF 0.03f    /* residual over change, in squares; a hand leaves several times 1 */
+#define ON 0.10f
 
 void hands_start(hands_t *hands)
 {
@@ -29,17 +30,26 @@ float hands_predict(
 
 void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts)
 {
-    const float change = theta_dot - hands->begin;
-    const float residual = change - (hands->impulse / constants->inertia);
-    hands->of_hand = residual * constants->inertia;
-    hands->driven = hands->drive;
-    hands->drive = 0.0f;
-    hands->begin = theta_dot;
-    hands->impulse = 0.0f;
-    if (counts) {
-        const float share = share_of(period, MEMORY);
-        hands->change += share * ((change * change) - hands->change);
-        hands->residual += share * ((residual * residual) - hands->residual);
-        hands->off = (hands->residual < ((hands->off ? ON : OFF) * hands->change));
+    hands->elapsed += period;
+    hands->dull = hands->dull || !counts;
+    hands->ended = 0.0f;
+    if (hands->elapsed > BLOCK) {
+        const float change = theta_dot - hands->begin;
+        const float residual = change - (hands->impulse / constants->inertia);
+        if (!hands->dull) {
+            const float share = share_of(hands->elapsed, MEMORY);
+            hands->change += share * ((change * change) - hands->change);
+            hands->residual += share * ((residual * residual) - hands->residual);
+            hands->off = (hands->residual < ((hands->off ? ON : OFF) * hands->change));
+        }
+        hands->of_hand = residual * constants->inertia;
+        hands->driven = hands->drive;
+        hands->counted = !hands->dull;
+        hands->ended = hands->elapsed;
+        hands->begin = theta_dot;
+        hands->impulse = 0.0f;
+        hands->drive = 0.0f;
+        hands->elapsed = 0.0f;
+        hands->dull = false;
     }
 }

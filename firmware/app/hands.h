@@ -17,8 +17,12 @@ typedef struct hands {
     float drive;    /* its part that is torque and base */
     float change;   /* mean square of a block's change [rad^2/s^2] */
     float residual; /* mean square of what the lever alone does not explain of it, likewise */
-    float of_hand;  /* what the lever alone does not explain of the last block: the hand's impulse [N m s] */
-    float driven;   /* drive of the last block */
+    float elapsed;  /* since the block began [s] */
+    float ended;    /* length of a block that has just ended; 0: none has [s] */
+    float of_hand;  /* what the lever alone does not explain of it: the hand's impulse [N m s] */
+    float driven;   /* drive of that block */
+    bool counted;   /* there was motion enough in all of it */
+    bool dull;      /* there was not motion enough in all of this one */
     bool off;       /* the verdict */
 } hands_t;
 

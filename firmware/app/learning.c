@@ -6,7 +6,7 @@
 #define KEEP_PERIOD 1.0f      /* [s] */
 #define UNSURPRISED 1.2f      /* monitor_t.surprise at a change from which on torque is thought to have changed, too, */
 #define SURPRISED 2.0f        /* and is as large as can be */
-#define REGRIP 0.6f           /* after the lever is held again [s] */
+#define GRIP 0.038f           /* two blocks: a new grip is complete, and nothing is learnt before [s] */
 #define AWAKE 0.3f            /* after a rest [s] */
 #define DISTURBANCE 2.0f      /* process noise after a change, in noise_range times the one that is set */
 #define DISTURBANCE_TIME 0.4f /* its time constant [s] */
@@ -29,11 +29,13 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
     calibration_start(&learning->calibration);
     monitor_start(&learning->monitor);
     hands_start(&learning->hands);
-    grip_force_start(&learning->grip);
+    grip_force_start(&learning->force);
     keep_only(learning, cdkf);
     learning->elapsed = 0.0f;
     learning->wait = 0.0f;
     learning->changed = 0.0f;
+    learning->gripping = 0.0f;
+    learning->moved = false;
     learning->bounded = false;
 }
 
@@ -69,20 +71,61 @@ static void disturb(const lever_settings_t *s, cdkf_t *cdkf, float part)
     cdkf->disturbance = (part * DISTURBANCE) * (s->noise_range * s->theta_dot_process_noise);
 }
 
-/* A sudden change of the pilot counts as change_walk seconds of the walk, once: a disturbance that only looks like
- * one would widen the covariance again and again. With his grip he mostly moves the lever, a torque that nobody knows:
- * the state's process noise is large for a while, so that it is not taken for an arm. Returns those seconds. */
-static float detect_change(
-    learning_t *learning, const lever_settings_t *s, cdkf_t *cdkf, const correction_t *correction, float period)
+static bool is_known(const learning_t *learning)
 {
+    return learning->kept[1].trust >= 1.0f;
+}
+
+/* How much torque the lever is moved by that nobody knows, 0 to 1: as far as innovations are larger than expected. */
+static float unknown_part(const learning_t *learning)
+{
+    const float part = (learning->monitor.surprise - UNSURPRISED) / (SURPRISED - UNSURPRISED);
+    return (part < 1.0f) ? part : 1.0f;
+}
+
+/* The pilot grips anew. */
+static void begin_grip(learning_t *learning, bool held_again)
+{
+    learning->changed = REPORTED;
+    learning->gripping = GRIP;
+    learning->wait = GRIP;
+    learning->held_again = held_again;
+}
+
+/* With his grip the pilot mostly moves the lever: from then on it rests at another angle, for the model a constant torque
+ * that nobody knows. */
+static void follow_grip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float period)
+{
+    if (learning->changed <= 0.0f) {
+        cdkf_end_step(cdkf);
+    }
+    if (learning->gripping > 0.0f) {
+        learning->gripping -= period;
+        if (learning->gripping <= 0.0f) {
+            const bool moved = learning->held_again || (unknown_part(learning) > 0.0f);
+            learning->gripping = 0.0f;
+            learning->moved = moved && setup->constants.trim;
+        }
+    }
+}
+
+/* A sudden change of the pilot counts as change_walk seconds of the walk, once: a disturbance that only looks like
+ * one would widen the covariance again and again. Returns those seconds. */
+static float detect_change(
+    learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const correction_t *correction, float period)
+{
+    const lever_settings_t *s = setup->settings;
     const bool detected =
         change_detection_step(&learning->change, correction, period, s->change_memory, s->change_threshold);
     const bool changed = detected && (learning->changed <= 0.0f);
     if (changed) {
-        const float surprise = (learning->monitor.surprise - UNSURPRISED) / (SURPRISED - UNSURPRISED);
         learning->changed = REPORTED;
-        if (surprise > 0.0f) {
-            disturb(s, cdkf, (surprise < 1.0f) ? surprise : 1.0f);
+        if (is_known(learning) && setup->constants.trim) {
+            begin_grip(learning, false);
+        } else if (unknown_part(learning) > 0.0f) { /* far from the truth, or noise set far too small */
+            disturb(s, cdkf, unknown_part(learning));
+        } else {
+            /* the arm alone */
         }
     }
     return changed ? s->change_walk : 0.0f;
@@ -93,7 +136,7 @@ static float detect_change(
 static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float period)
 {
     const noise_setting_t noise = setup_noise(setup);
-    const bool started = (learning->kept[1].trust < 1.0f);
+    const bool started = !is_known(learning);
     if ((cdkf->trust < 1.0f) || (learning->changed > TRANSIENT)) {
         noise_estimation_begin(&learning->noise);
     } else if (noise_estimation_step(&learning->noise, cdkf, &noise, period) &&
@@ -104,8 +147,9 @@ static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *c
     }
 }
 
-/* What the block says against sensors, settings and model, before it is learnt. Returns true when it teaches. */
-static bool judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float period)
+/* What the block says against sensors, settings and model, before it is learnt; the score of a step. Returns true when it teaches. */
+static bool judge(
+    learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float period, score_t *step)
 {
     const bool held = !learning->hands.off;
     const bool counts = lesson->measured && lesson->excited;
@@ -113,9 +157,10 @@ static bool judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     score_t constant[CDKF_CONSIDERED];
     cdkf_constant_scores(cdkf, constant);
     const bool on_lever = counts && (setup->model == (uint8_t)LEVER_MODEL_LEVER);
+    *step = constant[CDKF_STEP];
     hands_step(&learning->hands, &setup->constants, cdkf->x[1], period, on_lever);
-    const bool force_wrong = grip_force_judge(&learning->grip, setup, &learning->hands, period, on_lever);
-    const bool known = (learning->kept[1].trust >= 1.0f) || learning->monitor.base_wrong;
+    const bool force_wrong = grip_force_judge(&learning->force, setup, &learning->hands);
+    const bool known = is_known(learning) || learning->monitor.base_wrong;
     bool base_wrong = false;
     if (known && !learning->hands.off) {
         base_wrong = monitor_step(&learning->monitor, &sudden, period);
@@ -127,11 +172,8 @@ static bool judge(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
         whiteness_start(&learning->whiteness);
         take_back(learning, cdkf);
     } else if (!held && !learning->hands.off) { /* another grip */
-        cdkf_open(cdkf);
         keep_only(learning, cdkf);
-        noise_estimation_begin(&learning->noise);
-        disturb(setup->settings, cdkf, 1.0f);
-        learning->wait = REGRIP;
+        begin_grip(learning, true);
     } else {
         /* as before */
     }
@@ -165,7 +207,10 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
         disturb(s, cdkf, 1.0f);
     }
     cdkf->disturbance -= cdkf->disturbance * share_of(period, DISTURBANCE_TIME);
-    const bool taught = judge(learning, setup, cdkf, lesson, period);
+    score_t step;
+    follow_grip(learning, setup, cdkf, period);
+    const bool taught = judge(learning, setup, cdkf, lesson, period, &step);
+    const bool held_again = (learning->changed >= REPORTED);
     if (taught) {
         estimate_noise(learning, setup, cdkf, period);
     } else {
@@ -173,13 +218,21 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
     learning->bounded = correction.bounded;
-    const float more = taught ? detect_change(learning, s, cdkf, &correction, period) : 0.0f;
+    float more = held_again ? s->change_walk : 0.0f;
+    if (taught) {
+        if (cdkf->acting > (uint32_t)CDKF_STEP) {
+            cdkf_learn_step(cdkf, &step);
+        }
+        more = detect_change(learning, setup, cdkf, &correction, period);
+    }
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         variance[i] = adaptation.floor[i] * more;
     }
     cdkf_forget(cdkf, period, joint);
     cdkf_walk(cdkf, period, variance, joint);
-    if (taught || !lesson->excited) {
+    if (learning->changed > 0.0f) {
+        adaptation_start(&adaptation, cdkf); /* the jump is no drift */
+    } else if (taught || !lesson->excited) {
         adaptation_step(&adaptation, period, correction.w, lesson->excited, cdkf);
     } else {
         cdkf->growth = 0.0f; /* what cannot be learnt again is not forgotten */
@@ -197,7 +250,9 @@ bool learning_step(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, con
     } else {
         learning->elapsed = 0.0f;
         learning->changed = 0.0f;
+        learning->gripping = 0.0f;
         learning->bounded = false;
+        cdkf_end_step(cdkf);
     }
     if (due) {
         learn(learning, setup, cdkf, lesson);

@@ -24,12 +24,15 @@ typedef struct learning {
     calibration_t calibration;
     monitor_t monitor;
     hands_t hands;
-    grip_force_t grip;
+    grip_force_t force;
     snapshot_t kept[2]; /* the belief one and two KEEP_PERIODs ago, to be taken back */
     float kept_ago;     /* time since the first [s] */
     float elapsed;      /* since the parameters learnt last [s] */
     float wait;         /* time until anything is taught: what was before has to die away [s] */
     float changed;      /* time left to report a change [s] */
+    float gripping;     /* time left until a new grip is complete; 0: none is under way [s] */
+    bool held_again;    /* it is the first after hands off */
+    bool moved;         /* it is complete, and has moved the lever: levels and state are to begin anew */
     bool bounded;       /* a parameter rested on a bound then */
 } learning_t;
 

@@ -12,11 +12,11 @@
 #define SPIKE 8.0f           /* standard deviations */
 #define SPIKE_TIME 0.02f     /* longer than this it is no spike [s] */
 #define BASE_MEMORY 0.5f     /* [s] */
-#define BASE_MEMORY_AGAIN 0.3f
+#define BASE_MEMORY_AGAIN 0.2f
 #define BASE_WRONG 0.4f  /* gain of the base's response below which it is wrong, */
 #define BASE_RIGHT 0.7f  /* and above which it is right again; wrong and right beyond 2 minus these, too */
 #define BASE_SURE 0.1f   /* standard deviation of that gain up to which it counts, */
-#define BASE_AGAIN 0.25f /* and while it is wrong, when the state hardly follows the base */
+#define BASE_AGAIN 0.35f /* and while it is wrong, when the state hardly follows the base */
 
 void monitor_start(monitor_t *monitor)
 {

@@ -62,8 +62,13 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
         cdkf->disturbance = (learning->monitor.base_wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);
+    error[CDKF_STEP] = 0.0f;
+    if (cdkf->acting > (uint32_t)CDKF_STEP) {
+        error[CDKF_STEP] = trim_input(trim, 4u, 1.0f, period);
+        cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
+    }
     const bool gripped =
-        grip_force_step(&learning->grip, setup, trim, unknown ? NULL : force, &step, alone, error, &grip);
+        grip_force_step(&learning->force, setup, trim, unknown ? NULL : force, &step, alone, error, &grip);
     cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error, gripped ? &grip : NULL);
     estimator->z_ddot = next_z_ddot;
     estimator->tau_m = next_tau_m;

@@ -14,12 +14,12 @@ void calibration_start(calibration_t *calibration)
 }
 
 void calibration_step(
-    calibration_t *calibration, const cdkf_t *cdkf, const score_t score[CDKF_CONSIDERED], float period)
+    calibration_t *calibration, const cdkf_t *cdkf, const score_t score[CDKF_CALIBRATION], float period)
 {
     const float keep = 1.0f - (period / MEMORY);
     const float part = calibration->wrong ? AGAIN : 1.0f;
     bool wrong = false;
-    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < (uint32_t)CDKF_CALIBRATION; c++) {
         score_t *sum = &calibration->score[c];
         const float sigma = cdkf->considered_sigma[c];
         sum->vector = (keep * sum->vector) + score[c].vector;

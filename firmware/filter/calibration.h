@@ -7,7 +7,7 @@
 #include "filter/cdkf.h"
 
 typedef struct calibration {
-    score_t score[CDKF_CONSIDERED]; /* with exponential forgetting */
+    score_t score[CDKF_CALIBRATION]; /* with exponential forgetting */
     bool wrong;
 } calibration_t;
 
@@ -16,6 +16,6 @@ void calibration_start(calibration_t *calibration);
 /* Adds a block of `period` seconds; an error counts when it is beyond what its standard deviation in `cdkf` and the
  * innovations' own noise allow. */
 void calibration_step(
-    calibration_t *calibration, const cdkf_t *cdkf, const score_t score[CDKF_CONSIDERED], float period);
+    calibration_t *calibration, const cdkf_t *cdkf, const score_t score[CDKF_CALIBRATION], float period);
 
 #endif

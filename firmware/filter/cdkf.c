@@ -92,11 +92,11 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
     }
     model->respond(constants, step, &points, &response);
     if (grip != NULL) {
-        grip_see(cdkf, &response, error, grip, &seen);
+        grip_see(cdkf, &response, error, grip, step->period, &seen);
     }
     predict_mean_and_parameter_columns(cdkf, &response, step->period);
     predict_state_columns(cdkf, &response, step->period, &seen);
-    considered_predict(cdkf->considered, &response, step->period, error);
+    considered_predict(cdkf->considered, cdkf->acting, &response, step->period, error);
     response_move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
     if (seen.taken) {
         grip_take(cdkf, grip, &seen);
@@ -176,7 +176,7 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
         information_add(&cdkf->pending, row[0], innovation[0].value);
         information_add(&cdkf->pending, row[1], innovation[1].value);
     }
-    considered_correct(cdkf->considered, gain, row, innovation, learn);
+    considered_correct(cdkf->considered, cdkf->acting, gain, row, innovation, learn);
     /* w makes both uncertain together: I + R R^T = L D L^T, and the second innovation is then given the first */
     const float covariance = factor_dot_three(row[0], row[1]);
     innovation[0].inverse_variance = 1.0f / (1.0f + factor_dot_three(row[0], row[0]));

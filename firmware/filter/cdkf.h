@@ -58,7 +58,16 @@ typedef struct considered {
     float information;             /* pending: sum of its square */
 } considered_t;
 
-enum considered_error { CDKF_BASE_GAIN, CDKF_BASE_DELAY, CDKF_TORQUE_GAIN, CDKF_FRICTION, CDKF_CONSIDERED };
+/* The last is no calibration error but a constant acceleration from one moment on, which is estimated for a while. */
+enum considered_error {
+    CDKF_BASE_GAIN,
+    CDKF_BASE_DELAY,
+    CDKF_TORQUE_GAIN,
+    CDKF_FRICTION,
+    CDKF_STEP,
+    CDKF_CONSIDERED,
+    CDKF_CALIBRATION = CDKF_STEP
+};
 
 /* What samples say of w in coordinates of the columns of S_ww. */
 typedef struct information {
@@ -92,7 +101,8 @@ typedef struct cdkf {
     float response[MODEL_STATES];            /* of the state to past corrections (noise_estimation.h) */
     information_t pending;                   /* not learnt yet */
     considered_t considered[CDKF_CONSIDERED];
-    float considered_sigma[CDKF_CONSIDERED];   /* [1], [sample periods], [1], [N m] */
+    float considered_sigma[CDKF_CONSIDERED];   /* [1], [sample periods], [1], [N m], [rad/s^2] */
+    uint32_t acting;                           /* how many of them act: with CDKF_STEP or without */
     float trust;                               /* the part of the information that counts: see cdkf_learn */
     float p[MODEL_PARAMETERS];                 /* the parameters at w, in the units of the model */
     model_coefficients_t points[MODEL_POINTS]; /* at the sigma points of S_ww */
@@ -130,8 +140,9 @@ typedef struct cdkf_grip {
 } cdkf_grip_t;
 
 /* Lines 2 to 5: one step of the model. The parameters stand still. `error`: what a unit of each considered error takes
- * from the inputs, [m/s^2] per unit for those of the base, [N m] per unit for the others. `grip` is NULL where the
- * force is not measured; a force beyond 8 standard deviations is not taken. */
+ * from the inputs, [m/s^2] per unit for those of the base, [N m] per unit for the others; of CDKF_STEP what it adds to
+ * the acceleration. `grip` is NULL where the force is not measured; a force beyond 8 standard deviations is not
+ * taken. */
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
     const float error[CDKF_CONSIDERED], const cdkf_grip_t *grip);
 
@@ -158,6 +169,14 @@ typedef struct correction {
  * always been. */
 score_t cdkf_sudden_score(const cdkf_t *cdkf);
 void cdkf_constant_scores(const cdkf_t *cdkf, score_t score[CDKF_CONSIDERED]);
+
+/* From now on there is a step that nothing is known of; or none any more. */
+void cdkf_begin_step(cdkf_t *cdkf);
+void cdkf_end_step(cdkf_t *cdkf);
+
+/* Corrects w and x for the step by its score (Friedland 1969), after cdkf_learn(); its part in their standard
+ * deviations shrinks with it. */
+void cdkf_learn_step(cdkf_t *cdkf, const score_t *score);
 
 /* Line 11: conditions w, and x with it, on the pending information of the last `period` seconds. From the start, or
  * an opened covariance, on it counts in part only, and fully after `caution` seconds of information: far from the

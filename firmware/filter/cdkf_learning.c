@@ -4,6 +4,7 @@
 #include "math/factor.h"
 #include "math/share.h"
 
+#include <math.h>
 #include <string.h>
 
 #define N ((uint32_t)MODEL_STATES)
@@ -15,6 +16,7 @@ void cdkf_init(cdkf_t *cdkf, const model_t *model, const model_constants_t *cons
 {
     (void)memset(cdkf, 0, sizeof *cdkf);
     scaling_init(&cdkf->scaling, model, prior);
+    cdkf->acting = (uint32_t)CDKF_CALIBRATION;
     cdkf_open(cdkf);
     cdkf_draw(cdkf, model, constants);
 }
@@ -63,13 +65,45 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
         float *mean = (r < L) ? &cdkf->w[r] : &cdkf->x[r - L];
         *mean += factor_dot_three(row, step);
     }
-    considered_learn(cdkf->considered, cdkf->trust, u);
+    considered_learn(cdkf->considered, cdkf->acting, cdkf->trust, u);
     cdkf_drop_pending(cdkf);
     correction->bounded = scaling_bound(&cdkf->scaling, cdkf->w);
     for (uint32_t i = 0u; i < L; i++) {
         correction->variance[i] -= factor_variance(cdkf->s, L, i);
         correction->w[i] = cdkf->w[i] - correction->w[i];
     }
+}
+
+#define STEP_SIGMA 100.0f /* [rad/s^2]: a lever that rests 10 degrees from where it was */
+
+void cdkf_begin_step(cdkf_t *cdkf)
+{
+    (void)memset(&cdkf->considered[CDKF_STEP], 0, sizeof cdkf->considered[CDKF_STEP]);
+    cdkf->considered_sigma[CDKF_STEP] = STEP_SIGMA;
+    cdkf->acting = (uint32_t)CDKF_CONSIDERED;
+}
+
+void cdkf_end_step(cdkf_t *cdkf)
+{
+    cdkf->acting = (uint32_t)CDKF_CALIBRATION;
+}
+
+void cdkf_learn_step(cdkf_t *cdkf, const score_t *score)
+{
+    const considered_t *of = &cdkf->considered[CDKF_STEP];
+    const float before = cdkf->considered_sigma[CDKF_STEP];
+    const float variance = (before * before) / (1.0f + (before * before * score->information));
+    const float step = variance * score->vector;
+    cdkf->considered_sigma[CDKF_STEP] = sqrtf(variance);
+    for (uint32_t r = 0u; r < ROWS; r++) {
+        const float of_w = factor_dot_three(&cdkf->s[r * L], of->w);
+        if (r < L) {
+            cdkf->w[r] += step * of_w;
+        } else {
+            cdkf->x[r - L] += step * (of_w + of->x[r - L]);
+        }
+    }
+    (void)scaling_bound(&cdkf->scaling, cdkf->w);
 }
 
 /* Adds independent deviations of the state, columns [MODEL_STATES x MODEL_PARAMETERS], to its own uncertainty. */

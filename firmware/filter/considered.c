@@ -7,6 +7,7 @@
 #define N ((uint32_t)MODEL_STATES)
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define CONSIDERED ((uint32_t)CDKF_CONSIDERED)
+#define CALIBRATION ((uint32_t)CDKF_CALIBRATION)
 
 void considered_start_state(considered_t considered[CDKF_CONSIDERED])
 {
@@ -22,11 +23,11 @@ void considered_start_w(considered_t considered[CDKF_CONSIDERED])
     }
 }
 
-void considered_predict(considered_t considered[CDKF_CONSIDERED], const model_response_t *response, float period,
-    const float error[CDKF_CONSIDERED])
+void considered_predict(considered_t considered[CDKF_CONSIDERED], uint32_t count, const model_response_t *response,
+    float period, const float error[CDKF_CONSIDERED])
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        const float change = considered_input(response, c) * error[c];
+    for (uint32_t c = 0u; c < count; c++) {
+        const float change = considered_input(response, period, c) * error[c];
         float *x = considered[c].x;
         response_move(response, period, &x[0], &x[1]);
         x[0] += 0.5f * (period * change);
@@ -34,27 +35,32 @@ void considered_predict(considered_t considered[CDKF_CONSIDERED], const model_re
     }
 }
 
-void considered_correct(considered_t considered[CDKF_CONSIDERED], const gain_t gain[CDKF_OUTPUTS],
+static inline void correct_one(considered_t *of, const gain_t gain[CDKF_OUTPUTS],
     float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        considered_t *of = &considered[c];
-        const float first = gain_correct(&gain[0], of->x[0], &of->x[0], &of->x[1]);
-        const float second = gain_correct(&gain[1], of->x[1], &of->x[0], &of->x[1]);
-        if (learn) {
-            for (uint32_t i = 0u; i < L; i++) {
-                of->cross[i] += (row[0][i] * first) + (row[1][i] * second);
-            }
-            of->vector += (innovation[0].value * first) + (innovation[1].value * second);
-            of->information += (first * first) + (second * second);
+    const float first = gain_correct(&gain[0], of->x[0], &of->x[0], &of->x[1]);
+    const float second = gain_correct(&gain[1], of->x[1], &of->x[0], &of->x[1]);
+    if (learn) {
+        for (uint32_t i = 0u; i < L; i++) {
+            of->cross[i] += (row[0][i] * first) + (row[1][i] * second);
         }
+        of->vector += (innovation[0].value * first) + (innovation[1].value * second);
+        of->information += (first * first) + (second * second);
     }
 }
 
-void considered_correct_by(considered_t considered[CDKF_CONSIDERED], const gain_t *gain,
+void considered_correct(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t gain[CDKF_OUTPUTS],
+    float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
+{
+    for (uint32_t c = 0u; c < count; c++) {
+        correct_one(&considered[c], gain, row, innovation, learn);
+    }
+}
+
+void considered_correct_by(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t *gain,
     const float seen[CDKF_CONSIDERED], const float row[MODEL_PARAMETERS], float nu, bool learn)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < count; c++) {
         considered_t *of = &considered[c];
         const float share = gain_correct(gain, seen[c], &of->x[0], &of->x[1]);
         if (learn) {
@@ -89,7 +95,7 @@ score_t considered_score(const considered_t *considered, const information_t *pe
 
 void considered_lift(cdkf_t *cdkf, considered_of_w_t of_w)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         considered_t *considered = &cdkf->considered[c];
         for (uint32_t i = 0u; i < L; i++) {
             of_w[c][i] = factor_dot_three(&cdkf->s[i * L], considered->w);
@@ -103,7 +109,7 @@ void considered_lift(cdkf_t *cdkf, considered_of_w_t of_w)
 void considered_lower(cdkf_t *cdkf, considered_of_w_t of_w)
 {
     const float *s = cdkf->s;
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         considered_t *considered = &cdkf->considered[c];
         float *w = considered->w; /* forward substitution */
         w[0] = of_w[c][0] / s[0];
@@ -115,9 +121,9 @@ void considered_lower(cdkf_t *cdkf, considered_of_w_t of_w)
     }
 }
 
-void considered_learn(considered_t considered[CDKF_CONSIDERED], float trust, const float *u)
+void considered_learn(considered_t considered[CDKF_CONSIDERED], uint32_t count, float trust, const float *u)
 {
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < count; c++) {
         considered_t *of = &considered[c];
         for (uint32_t i = 0u; i < L; i++) {
             of->w[i] -= trust * of->cross[i];
@@ -131,7 +137,7 @@ float considered_covariance(const cdkf_t *cdkf, uint32_t i, uint32_t j)
     const float *a = &cdkf->s[i * L];
     const float *b = &cdkf->s[j * L];
     float covariance = factor_dot_three(a, b);
-    for (uint32_t c = 0u; c < CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         const considered_t *considered = &cdkf->considered[c];
         const float sigma = cdkf->considered_sigma[c];
         const float of_a = factor_dot_three(a, considered->w) + ((i < L) ? 0.0f : considered->x[i - L]);

@@ -30,26 +30,34 @@ static inline void response_move(const model_response_t *response, float period,
     *theta_dot += change;
 }
 
-/* Of the input through which error c acts. */
-static inline float considered_input(const model_response_t *response, uint32_t c)
+/* The change of theta_dot over a step by a unit of what error c acts through. */
+static inline float considered_input(const model_response_t *response, float period, uint32_t c)
 {
-    return (c <= (uint32_t)CDKF_BASE_DELAY) ? response->base : response->torque;
+    float input = response->torque;
+    if (c <= (uint32_t)CDKF_BASE_DELAY) {
+        input = response->base;
+    } else if (c == (uint32_t)CDKF_STEP) {
+        input = period;
+    } else {
+        /* a torque */
+    }
+    return input;
 }
 
 /* The state, or the parameters, start anew: no error of theirs is made by the considered ones. */
 void considered_start_state(considered_t considered[CDKF_CONSIDERED]);
 void considered_start_w(considered_t considered[CDKF_CONSIDERED]);
 
-/* Time update: the errors act through the inputs. */
-void considered_predict(considered_t considered[CDKF_CONSIDERED], const model_response_t *response, float period,
-    const float error[CDKF_CONSIDERED]);
+/* Time update: the first `count` errors act, through the inputs or as an acceleration. */
+void considered_predict(considered_t considered[CDKF_CONSIDERED], uint32_t count, const model_response_t *response,
+    float period, const float error[CDKF_CONSIDERED]);
 
 /* Measurement update, after that of the filter: gain, what each output saw of S_ww, innovation. */
-void considered_correct(considered_t considered[CDKF_CONSIDERED], const gain_t gain[CDKF_OUTPUTS],
+void considered_correct(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t gain[CDKF_OUTPUTS],
     float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn);
 
 /* By one more output that sees `seen` of each, not yet divided by S_y; `row` and `nu` are. */
-void considered_correct_by(considered_t considered[CDKF_CONSIDERED], const gain_t *gain,
+void considered_correct_by(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t *gain,
     const float seen[CDKF_CONSIDERED], const float row[MODEL_PARAMETERS], float nu, bool learn);
 
 void considered_drop_pending(considered_t considered[CDKF_CONSIDERED]);
@@ -58,7 +66,7 @@ void considered_drop_pending(considered_t considered[CDKF_CONSIDERED]);
 score_t considered_score(const considered_t *considered, const information_t *pending);
 
 /* The parameters learn: u is the reverse factor of I + information (math/factor.h). */
-void considered_learn(considered_t considered[CDKF_CONSIDERED], float trust, const float *u);
+void considered_learn(considered_t considered[CDKF_CONSIDERED], uint32_t count, float trust, const float *u);
 
 /* Before and after the columns of S change: S_ww w, which is kept in between, and S_xw w + x stay. */
 typedef float considered_of_w_t[CDKF_CONSIDERED][MODEL_PARAMETERS];

@@ -6,7 +6,7 @@
 #define SPIKE 8.0f /* standard deviations */
 
 void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float error[CDKF_CONSIDERED],
-    const cdkf_grip_t *grip, grip_seen_t *seen)
+    const cdkf_grip_t *grip, float period, grip_seen_t *seen)
 {
     const float slope[MODEL_STATES] = {response->slope[0] + grip->own[0], response->slope[1] + grip->own[1]};
     const float *theta = &cdkf->s[L * L];
@@ -18,10 +18,10 @@ void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float 
         seen->row[j] =
             (SIGMA_FIRST * response->difference[j]) + (grip->own[0] * theta[j]) + (grip->own[1] * theta_dot[j]);
     }
-    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         const float *x = cdkf->considered[c].x;
-        seen->considered[c] =
-            (slope[0] * x[0]) + (slope[1] * x[1]) + ((considered_input(response, c) * error[c]) - grip->error[c]);
+        seen->considered[c] = (slope[0] * x[0]) + (slope[1] * x[1]) +
+                              ((considered_input(response, period, c) * error[c]) - grip->error[c]);
     }
     seen->column[0] = (slope[0] * own[0]) + (slope[1] * own[2]);
     seen->column[1] = slope[1] * own[3];
@@ -78,5 +78,5 @@ void grip_take(cdkf_t *cdkf, const cdkf_grip_t *grip, const grip_seen_t *seen)
     if (grip->learn) {
         information_add(&cdkf->pending, row, nu);
     }
-    considered_correct_by(cdkf->considered, gain, seen->considered, row, nu, grip->learn);
+    considered_correct_by(cdkf->considered, cdkf->acting, gain, seen->considered, row, nu, grip->learn);
 }

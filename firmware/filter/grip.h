@@ -25,7 +25,7 @@ typedef struct grip_seen {
 
 /* What the force sees before the step. A force that is far from what is expected is not taken. */
 void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float error[CDKF_CONSIDERED],
-    const cdkf_grip_t *grip, grip_seen_t *seen);
+    const cdkf_grip_t *grip, float period, grip_seen_t *seen);
 
 /* Conditions the columns of the state on the force: it adds one. */
 void grip_condition(grip_seen_t *seen, float theta[GRIP_COLUMNS + 1], float theta_dot[GRIP_COLUMNS + 1]);

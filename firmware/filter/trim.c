@@ -54,6 +54,26 @@ void trim_set_origin(trim_t *trim)
     }
 }
 
+static void begin(level_t *level, float value)
+{
+    (void)memset(level, 0, sizeof *level);
+    level->section[0].level = value;
+}
+
+void trim_begin(trim_t *trim, const float x[MODEL_STATES])
+{
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
+        begin(&trim->output[i], trim->origin[i] + trim->ahead[i] + x[i]);
+    }
+    for (uint32_t i = 0u; i < ((uint32_t)TRIM_INPUTS - 1u); i++) {
+        begin(&trim->input[i], level_of(&trim->input[i]));
+    }
+    begin(&trim->input[TRIM_INPUTS - 1], 0.0f);
+    trim->begin_rate = trim->output[1].section[0].level;
+    (void)memset(trim->ahead, 0, sizeof trim->ahead);
+    trim_set_origin(trim);
+}
+
 void trim_unsettle(trim_t *trim)
 {
     trim->unsettled = trim->deviations ? trim->settling_time : 0.0f;

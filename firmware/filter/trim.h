@@ -42,7 +42,7 @@ float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t 
 
 #define TRIM_OUTAGE 0.0205f /* a signal missing for longer is out [s]; not a whole number of periods */
 
-enum { TRIM_INPUTS = 4, TRIM_SECTIONS = 3 };
+enum { TRIM_INPUTS = 5, TRIM_SECTIONS = 3 };
 
 /* A signal's slow part. */
 typedef struct level {
@@ -51,8 +51,9 @@ typedef struct level {
 
 typedef struct trim {
     level_t output[MODEL_STATES]; /* theta, whose level is the trim angle [rad], and theta_dot */
-    level_t input[TRIM_INPUTS];   /* z_ddot, tau_m, friction of a newton metre, grip force */
+    level_t input[TRIM_INPUTS];   /* z_ddot, tau_m, friction of a newton metre, grip force, a step of 1 */
     float origin[MODEL_STATES];   /* of the state: the levels in preload trim, otherwise 0 */
+    float begin_rate;             /* theta_dot when the levels were begun anew last [rad/s] */
     float missing[MODEL_STATES];  /* time since the last sample of each output [s] */
     float last[MODEL_STATES];     /* value of that sample */
     float ahead[MODEL_STATES];    /* by which the level of a missing output has moved since */
@@ -65,10 +66,14 @@ typedef struct trim {
 /* Starts at a trim angle, at rest; corner [Hz]. */
 void trim_start(trim_t *trim, float angle, float corner, bool deviations);
 
+/* The levels begin anew where the signals are, `x` from the last origin, as if nothing had been before: not even a rate,
+ * so that theta moves by begin_rate besides, as far as the step of 1 has not passed away. */
+void trim_begin(trim_t *trim, const float x[MODEL_STATES]);
+
 /* The trim angle [rad]. */
 float trim_angle(const trim_t *trim);
 
-/* Input i (0 z_ddot, 1 tau_m, 2 friction, 3 grip force) after `period` seconds: its deviation in preload trim. */
+/* Input i (0 z_ddot, 1 tau_m, 2 friction, 3 grip force, 4 step) after `period` seconds: its deviation in preload trim. */
 float trim_input(trim_t *trim, uint32_t i, float value, float period);
 
 /* Input i starts at a level that is `value`. */

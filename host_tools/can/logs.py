@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
+from ..extras import require
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 
 BLOCK = 1 << 22
@@ -211,11 +212,13 @@ def _one_line(error: Exception) -> str:
 
 
 def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
-    """How a file is read, by its name. Raises LogError."""
+    """How a file is read, by its name. Raises LogError, and LeverError where an extra is missing."""
     suffix = Path(path.removesuffix(_COMPRESSED)).suffix.lower()
     if path == "-" or suffix in _CANDUMP or not _is_file(path):
         return Recording._candump
     if suffix in _OTHERS:
+        if suffix == ".mf4":
+            require("mf4")
         return Recording._python_can
     known = ", ".join((*filter(None, _CANDUMP), *_OTHERS))
     raise LogError(f"{path}: {suffix} is no format of CAN logs that is known: {known}, each also with {_COMPRESSED}")

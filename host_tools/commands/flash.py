@@ -108,7 +108,9 @@ def run(args: argparse.Namespace) -> int:
     installed = [name for name in TOOLS if _find(name)]
     if not installed or (args.tool or installed[0]) not in installed:
         missing = args.tool or " and no ".join(TOOLS)
-        raise LeverError(f"no {missing} here to write flash with: apt install openocd, or pip install pyocd")
+        raise LeverError(
+            f'no {missing} here to write flash with: apt install openocd, or pip install "lever-cdkf[flash]"'
+        )
     tool = args.tool or installed[0]
     command = [_find(tool), *TOOLS[tool](image, kind, serial)]
     print(f"{image}: {size} bytes of flash, whole\n{shlex.join(command)}", flush=True)

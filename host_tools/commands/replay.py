@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..extras import warn_of_left_out
 from ..tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -72,12 +73,14 @@ def run(args: argparse.Namespace) -> int:
     from ..tables import print_tables
 
     options = _options(args)
+    if args.out is not None:
+        warn_of_left_out(FILES)
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
     print_tables(_tables(summary), args.json)
     print(summary["verdict"])
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join(FILES)}")
+        print(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
     if not summary["passed"]:
         print("lever: replay: the estimator was in fault", file=sys.stderr)
     return 0 if summary["passed"] else 1

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import LeverError
+from ..extras import require
 from ..tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -82,6 +83,10 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    require("tune")
+    if args.page is not None:
+        require("report")
+
     from ..progress import Progress
     from ..tune import validation
     from ..tune.calibration import calibrate

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options
 from ..errors import LeverError
+from ..extras import require
 
 if TYPE_CHECKING:
     from ..firmware.config import Config
@@ -91,15 +92,19 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
 
 def run_monitor(args: argparse.Namespace) -> int:
     """`lever monitor`."""
+    if not args.once:
+        require("live")
     if not args.once and not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise LeverError("this is not a terminal: `lever monitor --once` prints one picture as text")
     source = _source(args)[0]
 
-    from ..watch.terminal import Monitor, print_once
-
     if args.once:
+        from ..watch.once import print_once
+
         print_once(source, 2.0 if args.duration is None else args.duration)
     else:
+        from ..watch.terminal import Monitor
+
         Monitor(source, args.duration).run()
     if source.error is not None:
         raise LeverError(source.error)
@@ -108,6 +113,7 @@ def run_monitor(args: argparse.Namespace) -> int:
 
 def run_live(args: argparse.Namespace) -> int:
     """`lever live`."""
+    require("live")
     source, config = _source(args)
 
     from ..watch.server import serve

@@ -22,6 +22,7 @@ _SHARED = {"darwin": "lib{}.dylib", "win32": "{}.dll"}.get(sys.platform, "lib{}.
 ffi: Any = cffi.FFI()
 
 
+@cache
 def load(library: str) -> Any:
     """The functions of a shared library; what installing has made of its header declares them. Raises LeverError."""
     ffi.cdef(native_file(f"{library}_cdef.h").read_text(encoding="utf-8"))

@@ -34,6 +34,10 @@ class Detrend:
         """The level stays where it is until the next value."""
         self._slopes = [0.0] * len(DAMPING)
 
+    def begin(self, level: float) -> None:
+        """As if the signal had always been there."""
+        self._levels, self._slopes = [level] + [0.0] * (len(DAMPING) - 1), [0.0] * len(DAMPING)
+
     def step(self, value: float, corner: float, dt: float) -> float:
         """The deviation of `value` from the level before it, `dt` [s] after the last one; corner [Hz]."""
         w = 2.0 * math.pi * corner

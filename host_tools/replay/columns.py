@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any
 
@@ -20,9 +20,6 @@ from .timeline import Timeline
 
 Continued = Callable[[str, FloatArray], FloatArray]
 """From the name and values of a field to values that go on from the piece before."""
-
-_HELD = ("PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH", "HEALTH", "LINK_HEALTH")
-"""Messages that come at a divided rate."""
 
 
 class Columns:
@@ -54,14 +51,6 @@ class Columns:
                 trace[recorded_name(column)] = values(message, field)
         return trace
 
-    def held(self, rows: Rows) -> list[tuple[list[str], NDArray[np.bool_]]]:
-        """The columns that are held from one message to the next, and the rows with one."""
-        held = [([name for name, _, _ in self._fields], _any_fresh(rows, SLOTS))]
-        if self._with_recorded:
-            names = [recorded_name(name) for name, message, _ in self._compared if message in _HELD]
-            held.append((names, _any_fresh(rows, RECORDED)))
-        return held
-
     def _unwrapped(self, name: str, values: FloatArray) -> FloatArray:
         """Beyond the bits of a count, which starts at 0 in an estimator that does."""
         known = np.isfinite(values)
@@ -70,12 +59,6 @@ class Columns:
         if known.any():
             self._counts[name] = int(values[known][-1])
         return values
-
-
-def _any_fresh(rows: Rows, slots: Mapping[str, int]) -> NDArray[np.bool_]:
-    mask = sum(1 << slots[name] for name in _HELD)
-    fresh: NDArray[np.bool_] = rows["fresh"] & mask != 0
-    return fresh
 
 
 class _Decoded:

@@ -16,6 +16,7 @@ from ..can import codec
 from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.logs import Recording
 from ..can.traffic import Traffic
+from ..extras import missing
 from ..files import write_text
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
@@ -57,7 +58,8 @@ def replay(
     logs: Iterable[str | Path], options: Options, out_dir: Path | None = None, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
-    trace.csv, signals.mf4, report.html and summary.json there, all or none. Raises LeverError."""
+    trace.csv, signals.mf4, report.html and summary.json there, all or none; signals.mf4 with the extra `mf4`,
+    report.html with `report`. Raises LeverError."""
     traffic = Traffic(Recording(logs), options.channel)
     with ExitStack() as stack:
         outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir))
@@ -135,8 +137,6 @@ class _Replay:
         trace = self._columns.of(rows)
         for sink in self._sinks:
             sink.add(trace)
-        if self._csv is not None:
-            self._csv.add(trace, self._columns.held(rows))
         if self._mf4 is not None:
             published = (rows["fresh"] >> SLOTS["PILOT_PARAMETERS"]) & 1 != 0
             recorded = (rows["fresh"] >> RECORDED["PILOT_PARAMETERS"]) & 1 != 0
@@ -159,7 +159,9 @@ class _Replay:
         if self._outputs is not None:
             self._sinks.append(self.kept)
             self._csv = TraceCsv(self._outputs.path("trace.csv"))
-            self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
+            self._sinks.append(self._csv)
+            if not missing("mf4"):
+                self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
         return Columns(self._timeline, self.model, with_recorded)
 
     # --- what comes of it ---------------------------------------------------------------------------------------------
@@ -218,7 +220,8 @@ class _Replay:
         for part in (self._bus_log, self._csv, self._mf4):
             if part is not None:
                 part.close()
-        write_page(RecordedRun(self.kept, of(ReplaySummary, summary)), outputs.path("report.html"))
+        if not missing("report"):
+            write_page(RecordedRun(self.kept, of(ReplaySummary, summary)), outputs.path("report.html"))
         text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
         write_text(outputs.path(SUMMARY), text + "\n")
         outputs.finish()

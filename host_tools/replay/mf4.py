@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..can import codec
+from ..extras import require
 from ..firmware.quantities import quantities, recorded_name
-from ..later import allow
 from ..results.feedthrough import FEEDTHROUGH
 from ..results.trace import ESTIMATED, HEALTH, MEASURED, Trace
 from .outputs import writing
@@ -58,7 +58,7 @@ class Mf4:
 
     def __init__(self, path: Path, model: str, start_us: int, with_recorded: bool) -> None:
         """`start_us`: absolute time of the first sample [us since 1970], as far as the recording knows it."""
-        allow()
+        require("mf4")
         from asammdf import MDF
 
         self._path = path

@@ -9,17 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..can import bulk
 from ..can.bulk import Frames
 from ..errors import LeverError
 from ..files import make_folder
-from ..results.trace import Trace, write_csv_rows
-
-Held = list[tuple[list[str], NDArray[np.bool_]]]
-"""Neighbouring columns of a trace, and the rows at which any of them may change."""
+from ..results.trace import Trace, write_csv_header, write_csv_rows
 
 SUMMARY = "summary.json"
 """The last file to be in its place: where it is, the others are of the same replay."""
@@ -58,11 +52,15 @@ class Outputs:
         return self._unfinished / name
 
     def finish(self) -> None:
-        """Puts the files into their place. Raises LeverError."""
+        """Puts the files into their place, and takes away those of an earlier replay that this one has not. Raises
+        LeverError."""
         with writing(self._folder):
             (self._folder / SUMMARY).unlink(missing_ok=True)
             for name in FILES:
-                os.replace(self.path(name), self._folder / name)
+                if self.path(name).exists():
+                    os.replace(self.path(name), self._folder / name)
+                else:
+                    (self._folder / name).unlink(missing_ok=True)
 
 
 class BusLog:
@@ -91,12 +89,12 @@ class TraceCsv:
         with writing(path):
             self._file = path.open("wb")
 
-    def add(self, trace: Trace, held: Held) -> None:
+    def add(self, trace: Trace) -> None:
         """Further rows."""
         with writing(self._path):
             if not self._started:
-                self._file.write((",".join(trace) + "\n").encode("ascii"))
-            write_csv_rows(trace, self._file, held)
+                write_csv_header(trace, self._file)
+            write_csv_rows(trace, self._file)
         self._started = True
 
     def close(self) -> None:

@@ -6,14 +6,16 @@ from collections.abc import Mapping
 from importlib.resources import files
 from string import Template
 
-import plotly.offline
-
+from ..extras import require
 from .figure import Spec
 
 
 def document(title: str, body: str, figures: Mapping[str, Spec], style: str = "") -> str:
     """The whole page. `title` is text, `body` HTML; `figures` are drawn where an element has their key as id; `style`
     is CSS beyond page.css."""
+    require("report")
+    import plotly.offline
+
     here = files(__package__)
     drawn = json.dumps(figures, separators=(",", ":"), allow_nan=False)
     return Template((here / "page.html").read_text(encoding="utf-8")).substitute(

@@ -115,13 +115,3 @@ def welch(values: Array, sample_period: float, seconds: float = 4.0) -> tuple[Ar
     averaged = Welch(sample_period, seconds)
     averaged.add(values)
     return averaged.spectrum()
-
-
-def chi_square_band(freedom: Array) -> tuple[Array, Array]:
-    """Between which two values 95 % of a chi-square variable divided by its degrees of freedom lie.
-
-    E. B. Wilson, M. M. Hilferty, PNAS 17 (1931): the cube root is nearly normal; within 1 % from 30 degrees on.
-    """
-    spread = 2.0 / (9.0 * freedom)
-    low, high = (1.0 - spread + sign * 1.959964 * np.sqrt(spread) for sign in (-1.0, 1.0))
-    return low**3, high**3

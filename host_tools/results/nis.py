@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray
+from ..statistics import NORMAL_95, chi_square_quantile
 
-CHI_SQUARE_95 = {1: 3.841458820694124, 2: -2.0 * math.log(0.05)}
+CHI_SQUARE_95 = {freedom: chi_square_quantile(0.95, freedom) for freedom in (1, 2)}
 """Value that chi-square with so many degrees of freedom stays below with a probability of 95 %."""
 
 
@@ -52,7 +53,7 @@ class Innovations:
         if not self._count:
             return Nis()
         expected = self._freedom / self._count
-        spread = 1.96 * math.sqrt(2.0 * expected / self._count)
+        spread = NORMAL_95 * math.sqrt(2.0 * expected / self._count)
         return Nis(
             mean=self._nis / self._count,
             expected=expected,

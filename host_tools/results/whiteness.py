@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
+from ..statistics import NORMAL_95, normal_quantile
 
 AVERAGE = 0.02
 """Time over which the residual is averaged [s]."""
@@ -29,7 +30,8 @@ that are asked for the pilots of two_dof and hand 0.5."""
 CANNOT_SEE = "That test does not see friction in the lever, nor gain and delay of a sensor: these bias the parameters."
 """For every verdict that says that residuals are white."""
 
-_ONE, _ANY = 1.960, 3.083  # normal deviates that one, or any of LAGS, exceeds with a probability of 5 %
+_ALL_95 = normal_quantile(0.5 + 0.5 * 0.95 ** (1.0 / LAGS))
+"""LAGS normal deviates are all within plus and minus this with a probability of 95 %."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +84,12 @@ def of_averages(averages: FloatArray, step: float) -> Whiteness | None:
     return Whiteness(
         average_s=step,
         autocorrelation=correlation,
-        band_95=_ONE / math.sqrt(count),
+        band_95=NORMAL_95 / math.sqrt(count),
         largest=correlation[largest],
         largest_after_s=(largest + 1) * step,
-        white=all(abs(r) <= max(COLOURED, _ANY / math.sqrt(pair)) for r, pair in zip(correlation, pairs, strict=True)),
+        white=all(
+            abs(r) <= max(COLOURED, _ALL_95 / math.sqrt(pair)) for r, pair in zip(correlation, pairs, strict=True)
+        ),
     )
 
 

@@ -20,6 +20,7 @@ from scipy.optimize import brentq, minimize
 
 from ..firmware.config import model_parameters, setting, single
 from ..firmware.settings_file import Assignments, make_config
+from ..statistics import chi_square_quantile
 from .likelihood import LEARNT_LEAST, Likelihood, noise_as_set
 
 NOISE = ("theta_noise", "theta_dot_noise", "theta_dot_process_noise")
@@ -33,7 +34,7 @@ _RANGE = 1000.0  # greatest factor by which a setting is changed
 _STEP = 0.01  # of the logarithm of a setting: one per cent
 _TOLERANCE = 0.1  # of the logarithm of the likelihood; a tenth of a per cent of what is gained, where that is much
 _OFFSET = 1e3  # makes the optimiser's relative tolerance that
-_DROP = 0.5 * 3.841  # of the logarithm of the likelihood at the ends of a 95 % interval
+_DROP = 0.5 * chi_square_quantile(0.95, 1)  # of the logarithm of the likelihood at the ends of a 95 % interval
 _RUNS_A_SETTING = 80  # about; only for the progress that is shown
 
 Told = Callable[[int, int, str], None]

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from typing import ClassVar
 
-from rich.console import Console, Group, RenderableType
-from rich.rule import Rule
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
@@ -16,13 +12,12 @@ from textual.widgets import Footer, Static
 
 from . import panels
 from .model import STEP, Picture
-from .sources import LogSource, Source
+from .sources import Source
 
 SPANS = (30.0, 120.0, 300.0, 10.0)
 """[s] that trends are shown over, in the order of the key."""
 TALL = 32
 """[lines] from which on the feedthrough is shown unasked."""
-_PIPE_WIDTH = 100
 
 
 class Monitor(App[None]):
@@ -114,37 +109,3 @@ class Monitor(App[None]):
     def action_clear(self) -> None:
         self.picture.clear_counts()
         self.draw()
-
-
-def print_once(source: Source, listen: float) -> Picture:
-    """Prints one picture as plain text: after listening for `listen` seconds, or of the whole of a log."""
-    picture = Picture()
-    if isinstance(source, LogSource):
-        source.read_into(picture)
-    else:
-        _listen(source, picture, listen)
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPE_WIDTH)
-    parts: list[RenderableType] = [
-        panels.headline(picture, source),
-        panels.condition(picture, source),
-        Rule("estimates", align="left"),
-        panels.estimates(picture, SPANS[0], console.width),
-        Rule("feedthrough", align="left"),
-        panels.feedthrough(picture),
-        Rule("health", align="left"),
-        panels.health(picture, source),
-        Rule("messages", align="left"),
-        panels.messages(picture),
-    ]
-    console.print(Group(*parts))
-    return picture
-
-
-def _listen(source: Source, picture: Picture, listen: float) -> None:
-    source.start()
-    try:
-        while source.now < listen and not source.ended:
-            time.sleep(STEP)
-            picture.take(source.drain(), source.now)
-    finally:
-        source.stop()

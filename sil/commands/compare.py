@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder
 from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, add_json_option
@@ -73,6 +74,8 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """`lever compare`."""
+    require("study")
+
     from lever_cdkf.host_tools.tables import print_tables
 
     from ..study.compare import campaign, evaluation, table, verdicts

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder, write_text
 from lever_cdkf.host_tools.progress import Progress
 
@@ -72,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         print_tables({"conditions": [_listed(condition) for condition in CONDITIONS.values()]}, args.json)
         return 0
+    require("report")
     chosen = _chosen(args)
     seeds = args.seeds if args.seeds is not None else _QUICK_SEEDS if args.quick else _SEEDS
     if not 1 <= seeds <= 1000:

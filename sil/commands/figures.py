@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.host_tools.extras import require
+
 _PAGE, _CAPTIONS = "figures.html", "captions.md"
 
 if TYPE_CHECKING:
@@ -58,6 +60,8 @@ def seed(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
+    require("study")
+
     from ..study.figures.catalogue import chosen
 
     if args.list:

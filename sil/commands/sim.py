@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from lever_cdkf.host_tools.can import buses
 from lever_cdkf.host_tools.can.buses import add_bus_options, chosen_options
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.extras import require, warn_of_left_out
 from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ the median rms error and of the coverage of all runs together.
 """
 _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
 _DEMO = "demo"
+_FILES = ("report.html", "summary.json", "trace.csv", "bus.log")
 _PRINT = ""  # --settings without a file
 
 
@@ -181,6 +183,8 @@ def _from_file(path: str) -> list[str]:
 
 def run_demo(args: argparse.Namespace) -> int:
     """`lever demo`."""
+    require("report")
+
     from ..scenarios.scenario import load
 
     return _simulate(load(_DEMO), "lever", "lever", {}, args.out, args.json, realtime=False)
@@ -213,12 +217,14 @@ def _simulate(
 
     from ..run.runner import simulate
 
+    if out is not None:
+        warn_of_left_out(_FILES)
     with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
         result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
     print_tables(_tables(result), json_file)
     print(result.summary.verdict)
     if out is not None:
-        print(f"Written to {out}: report.html, summary.json, trace.csv, bus.log")
+        print(f"Written to {out}: {', '.join(name for name in _FILES if (out / name).exists())}")
     if result.summary.passed:
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)

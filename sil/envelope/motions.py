@@ -11,8 +11,8 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import BAND as BOUNCE_BAND
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from ..plants.excitation import autoregressive
 from .plant import Hardware, Lanes, natural_frequency_and_damping
 
 PERIOD = 1e-3
@@ -157,7 +157,7 @@ def _disturbance(motion: Motion, seeds: Sequence[int]) -> FloatArray:
     if motion.slow_torque:
         pole = math.exp(-PERIOD / 0.3)
         white = motion.slow_torque * math.sqrt(1.0 - pole**2) * columns("slow torque", seeds, count)
-        torque = torque + lfilter([1.0], [1.0, -pole], white, axis=0)
+        torque = torque + autoregressive(white, pole)
     if motion.tremor:
         torque = torque + band_limited(columns("tremor", seeds, count), (3.0, 5.0), motion.tremor)
     return torque

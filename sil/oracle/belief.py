@@ -45,8 +45,10 @@ Flags = NDArray[np.bool_]
 Motion = Callable[[Array, Array], Array]
 """f: the states (2, N) or (2, 1) and parameters w (3, N) or (3, 1) one step on, states (2, N)."""
 
-CONSIDERED = 4
-"""Calibration errors: of the gain and the delay of z̈, the gain of τ_m, friction."""
+CONSIDERED = 5
+"""Calibration errors: of the gain and the delay of z̈, the gain of τ_m, friction; and a step of the acceleration, which
+is estimated for a while (Friedland 1969)."""
+STEP = 4
 UNMOVED = np.zeros((2, CONSIDERED))
 FAR = 8.0
 """Standard deviations beyond which a force is not taken."""
@@ -157,6 +159,13 @@ class Belief(ABC):
         """Keeps the parameters where they may be."""
 
 
+class StepScore:
+    """What the samples of a block say of the step, by themselves: its estimate is vector / information."""
+
+    vector = 0.0
+    information = 0.0
+
+
 class TwoStage(Belief):
     """The state given the parameters, the parameters, and how the one moves with the other: dual, or joint."""
 
@@ -201,6 +210,7 @@ class TwoStage(Belief):
         self.information: Array = np.zeros_like(self._w_factor)
         self.score: Array = np.zeros_like(self._w)
         self.score_errors: Array = np.zeros_like(self.w_errors)
+        self.step_score = StepScore()
 
     def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED, force: Force | None = None) -> None:
         n = len(self._x)
@@ -246,6 +256,8 @@ class TwoStage(Belief):
             self.information = self.information + np.outer(v, v) / variance
             self.score = self.score + v * innovation / variance
             self.score_errors = self.score_errors + np.outer(v, errors) / variance
+            self.step_score.information += errors[STEP] ** 2 / variance
+            self.step_score.vector += errors[STEP] * innovation / variance
         return np.column_stack((state - np.outer(gain, seen), gain * force.noise))
 
     def update(self, y: Array, valid: Flags, noise: Array, learn: bool) -> Innovation:
@@ -263,6 +275,9 @@ class TwoStage(Belief):
             self.information = self.information + weighted @ output
             self.score = self.score + weighted @ innovation
             self.score_errors = self.score_errors + weighted @ errors
+            by_step = np.linalg.solve(given, errors[:, STEP])
+            self.step_score.vector += float(by_step @ innovation)
+            self.step_score.information += float(by_step @ errors[:, STEP])
         by_parameters = output @ self._w_factor
         return Innovation(innovation, np.linalg.cholesky(given + by_parameters @ by_parameters.T), response)
 
@@ -282,6 +297,16 @@ class TwoStage(Belief):
         self.x_errors = self.x_errors - self.v @ of_errors
         self.drop_pending()
         return correction
+
+    def begin_step(self) -> None:
+        self.w_errors[:, STEP], self.x_errors[:, STEP] = 0.0, 0.0
+
+    def correct_for_step(self, step: float) -> None:
+        self._w = self._w + step * self.w_errors[:, STEP]
+        self._x = self._x + step * self.x_errors[:, STEP]
+
+    def shift(self, x: Array) -> None:
+        self._x = self._x + x
 
     def restore(self, w: Array, w_factor: Array, errors: bool) -> None:
         explained = self.v @ self._w_factor

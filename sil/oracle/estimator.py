@@ -16,9 +16,9 @@ from lever_cdkf.host_tools.models.linear import Hand, LinearBlackBox, LinearPhys
 from numpy.typing import NDArray
 
 from . import cdkf
-from .belief import Augmented, Belief, Force, TwoStage
+from .belief import STEP, Augmented, Belief, Force, TwoStage
 from .grip import Grip
-from .learning import ADAPTATIONS, Learning, Lesson, counted, seconds
+from .learning import ADAPTATIONS, STEP_SIGMA, Learning, Lesson, counted, seconds
 from .scale import Scale
 
 ESTIMATORS = ("dual", "joint", "augmented")
@@ -101,8 +101,9 @@ class Estimator:
         self.grip: Grip | None = None
         if isinstance(self.model, Lever) and not whole:
             self.grip = Grip(self.model, settings, self.detrended)
-        self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, adapted=not whole)
-        self.considered_sigma = np.array([settings[f"{name}_sigma"] for name in CONSIDERED])
+        self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, not whole, self.detrended)
+        self.considered_sigma = np.array([*(settings[f"{name}_sigma"] for name in CONSIDERED), 0.0])
+        self.step_input, self.begin_rate = Detrend(), 0.0
         presumed = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], until measured
         self.excitation_square, self.motion_square = presumed, presumed
         self.nis = 0.0
@@ -171,6 +172,9 @@ class Estimator:
         else:
             grip = self.grip
             self.learning.step(duration, lesson, lambda period: grip.end_block(rate, period, measured and excited))
+        self.considered_sigma[STEP] = self.learning.step_sigma
+        if self.learning.moved:
+            self._begin_grip(np.where(valid, y, self.belief.x))
         self.unsettled -= counted(duration)
 
     def _is_settled(self) -> bool:
@@ -222,7 +226,9 @@ class Estimator:
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
         slope = (base - last[0]) / dt
-        errors = np.array(((-base, slope, 0.0, 0.0), (0.0, 0.0, -last[1], -stop), (-self.velocity, base, 0.0, 0.0)))
+        errors = np.array(
+            ((-base, slope, 0.0, 0.0, 0.0), (0.0, 0.0, -last[1], -stop, 0.0), (-self.velocity, base, 0.0, 0.0, 0.0))
+        )
         self._predict((z_ddot, mean[1], z_dot), errors, dt, self._force(force, mean, errors, dt))
         self.last_input = u
 
@@ -273,6 +279,25 @@ class Estimator:
             self.belief.start_state(y, np.diag(self.learning.noise.output_noise))
         self._wait_for_levels()
 
+    def _begin_grip(self, x: Array) -> None:
+        """Levels and state begin anew where the lever is, with a step of its acceleration."""
+        self.learning.moved = False
+        if not isinstance(self.belief, TwoStage):
+            return
+        for detrend, value in zip(self.outputs, self.origin + self.ahead + x, strict=True):
+            detrend.begin(float(value))
+        for detrend in self.inputs:
+            detrend.begin(detrend.level)
+        if self.grip is not None:
+            self.grip.begin()
+        self.step_input.begin(0.0)
+        self.begin_rate = self.outputs[1].level
+        self.origin, self.ahead = np.array([detrend.level for detrend in self.outputs]), np.zeros(2)
+        self.belief.start_state(np.zeros(2), np.diag(self.learning.noise.output_noise))
+        self.belief.begin_step()
+        self.learning.step_sigma = STEP_SIGMA
+        self.last_input, self.velocity = (0.0, 0.0), 0.0
+
     def _wait_for_levels(self) -> None:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
@@ -288,10 +313,15 @@ class Estimator:
         def motion(x: Array, w: Array) -> Array:
             return moved_by(x, w, u)
 
+        step = 0.0
+        if self.learning.step_sigma > 0.0 and isinstance(self.belief, TwoStage):
+            step = self._deviation(self.step_input, 1.0, dt)
+            self.belief.shift(np.array((dt * step * self.begin_rate, 0.0)))
         x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
         with_errors = np.concatenate((np.zeros((3, 1)), errors), axis=1)  # none, then a unit of each
         moved = moved_by(x, w, tuple(np.array(u)[:, np.newaxis] + with_errors))
         push = moved[:, 1:] - moved[:, :1]
+        push[:, STEP] = step * dt * np.array((0.5 * dt, 1.0))
         self.belief.predict(motion, self._process_noise(dt), push, force)
 
     def _process_noise(self, dt: float) -> Array:
@@ -302,7 +332,8 @@ class Estimator:
 
     def _average_innovation(self, square: float, duration: float) -> None:
         share = min(duration / self.settings["excitation_time"], 1.0)
-        self.average_nis += share * (square - self.average_nis)
+        if self.unsettled - counted(duration) <= 0.0:
+            self.average_nis += share * (square - self.average_nis)
         self.surprise += min(duration / SURPRISE_TIME, 1.0) * (min(square, SURPRISE_MOST) - self.surprise)
 
     def _average_motion(self, duration: float) -> None:

@@ -17,6 +17,7 @@ from lever_cdkf.host_tools.models.lever import GRAVITY, Lever
 
 from .learning import seconds
 
+BLOCK = 0.038  # [s] of comparison: longer than this
 MEMORY = 10.0  # [s] of comparison and mean square
 LEAST = 2.0  # [s] of comparison before the force is wrong
 TOLERATED = 0.2  # [1] what the lever's own equation may be off
@@ -50,7 +51,8 @@ class Grip:
         self.raw, self.square = 0.0, 0.0
         self.means = Means()
         self.right = self.wrong = False
-        self.begin = 0.0  # θ̇ at the beginning of the block
+        self.rate = 0.0  # θ̇ at the beginning of the block
+        self.elapsed, self.counts = 0.0, True  # since then; all blocks of learning in it count
         self.drive = self.alone = self.force = 0.0  # impulses since then, of the second all but the hand's
 
     def step(
@@ -101,12 +103,21 @@ class Grip:
         density = self.settings["grip_force_gain_sigma"] ** 4 / walk**2
         return math.sqrt(self.settings["grip_force_noise"] ** 2 + self.square * density / dt)
 
+    def begin(self) -> None:
+        """The level begins anew where it is."""
+        if self.level is not None:
+            self.level.begin(self.level.level)
+
     def end_block(self, rate: float, period: float, counts: bool) -> None:
-        """Compares sensor and motion, at the end of a block at the rate θ̇."""
-        hand = self.inertia * (rate - self.begin) - self.alone
-        if counts and self.level is not None and self.settling <= 0.0 and self.missing < OUTAGE:
-            self._compare(hand, period)
-        self.begin, self.drive, self.alone, self.force = rate, 0.0, 0.0, 0.0
+        """Compares sensor and motion, after a block of learning that ends at the rate θ̇."""
+        self.elapsed += period
+        self.counts = self.counts and counts
+        if self.elapsed > BLOCK:
+            hand = self.inertia * (rate - self.rate) - self.alone
+            if self.counts and self.level is not None and self.settling <= 0.0 and self.missing < OUTAGE:
+                self._compare(hand, self.elapsed)
+            self.rate, self.drive, self.alone, self.force = rate, 0.0, 0.0, 0.0
+            self.elapsed, self.counts = 0.0, True
 
     def _compare(self, hand: float, period: float) -> None:
         means = self.means

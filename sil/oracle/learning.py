@@ -12,7 +12,7 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
-from .belief import Belief, Innovation
+from .belief import Belief, Innovation, StepScore, TwoStage
 from .change import ChangeDetection
 from .noise import NoiseEstimation
 from .scale import Scale
@@ -24,6 +24,8 @@ KEEP_PERIOD = 1.0  # [s]
 AWAKE = 0.3  # [s] after a rest
 DISTURBANCE = 2.0  # process noise after a change, in noise_range times the one that is set
 DISTURBANCE_TIME = 0.4  # [s] in which it dies away
+GRIP = 0.038  # [s] until a new grip is complete
+STEP_SIGMA = 100.0  # [rad/s²], of a step that nothing is known of
 SURPRISES = (1.2, 2.0)  # at a change: from which on there is any of it, and at which it is as large as can be
 
 
@@ -66,15 +68,15 @@ class Learning:
         adaptation: str,
         bounds: Array,
         adapted: bool = True,
+        detrended: bool = True,
     ) -> None:
+        self.detrended = detrended
         self.settings, self.belief, self.adaptation, self.adapted = settings, belief, adaptation, adapted
         self.floor = scale.walk
         self.ceiling = self.floor * settings["walk_ceiling"] ** 2
         self.greatest_sigma = scale.sigma
         self.bounds = scale.scaled(bounds)
-        self.walk = (self.ceiling if adaptation == "annealing" else self.floor).copy()  # q [1/s]
-        self.drift: Array = np.zeros(3)  # leaky sum of corrections
-        self.growth = self._growth(excited=True)  # [1/s]
+        self._start_walk()
         self.disturbance = 0.0  # process noise of θ̇ besides [rad/s/√s]
         self.trust = seconds(0.0)  # part of the information that counts [1], counted like time
         self.noise = NoiseEstimation(settings)
@@ -83,6 +85,9 @@ class Learning:
         self.counted = seconds(0.0)  # the same
         self.changed = seconds(0.0)  # time left of a change
         self.wait = seconds(0.0)  # until anything is taught
+        self.grip = seconds(0.0)  # until a new grip is complete
+        self.moved = False  # it is, and has moved the lever
+        self.step_sigma = 0.0  # of the step; 0: there is none
         self.kept_ago = seconds(0.0)
         self.kept = (self._snapshot(), self._snapshot())  # one and two KEEP_PERIODs ago
 
@@ -113,20 +118,26 @@ class Learning:
             self.wait = max(self.wait, seconds(AWAKE))
         self.changed = max(self.changed - counted, seconds(0.0))
         self.disturbance *= 1.0 - min(period / DISTURBANCE_TIME, 1.0)
+        self._follow_grip(counted, lesson.surprise)
         taught = lesson.measured and self.wait <= 0.0
         if not (taught and lesson.excited):
             self.belief.drop_pending()
             self.noise.begin()
         elif self.adapted:
             self._estimate_noise(counted)
+        score = self.belief.step_score if isinstance(self.belief, TwoStage) else StepScore()
         correction, variance = self._learn(counted)
+        if taught and lesson.excited and self.step_sigma > 0.0:
+            self._learn_step(score)
         suddenly = 0.0  # seconds of the walk at once
         if taught and lesson.excited and self.adapted:
             suddenly = self._detect_change(correction, variance, period, lesson.surprise)
         self.belief.forget(self.growth * period)
         self.belief.walk(self.walk * period + self.floor * suddenly)
         self.belief.limit(self.greatest_sigma)
-        if taught or not lesson.excited:
+        if self.changed > 0.0:
+            self._start_walk()  # the jump is no drift
+        elif taught or not lesson.excited:
             self._adapt_walk(correction, period, lesson.excited)
         else:
             self.growth = 0.0  # what cannot be learnt again is not forgotten
@@ -152,11 +163,29 @@ class Learning:
             return 0.0
         self.changed = seconds(REPORTED)
         part = float(np.interp(surprise, SURPRISES, (0.0, 1.0)))
-        if part > 0.0:
+        if self.kept[1].trust >= 1.0 and self.detrended:
+            self.grip = self.wait = seconds(GRIP)
+        elif part > 0.0:
             self.disturbance = (
                 part * DISTURBANCE * self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
             )
         return self.settings["change_walk"]
+
+    def _follow_grip(self, period: np.float32, surprise: float) -> None:
+        """When it is complete it has moved the lever, if innovations are larger than expected."""
+        if self.changed <= 0.0:
+            self.step_sigma = 0.0
+        if self.grip > 0.0:
+            self.grip -= period
+            if self.grip <= 0.0:
+                self.grip, self.moved = seconds(0.0), surprise > SURPRISES[0]
+
+    def _learn_step(self, score: StepScore) -> None:
+        variance = self.step_sigma**2 / (1.0 + self.step_sigma**2 * score.information)
+        if isinstance(self.belief, TwoStage):
+            self.belief.correct_for_step(variance * score.vector)
+            self.belief.bound(self.bounds[:, 0], self.bounds[:, 1])
+        self.step_sigma = math.sqrt(variance)
 
     # --- noise, and what was learnt with a wrong one -----------------------------------------------------------------
 
@@ -182,6 +211,11 @@ class Learning:
         return Snapshot(self.belief.w.copy(), self.belief.w_factor.copy(), self.trust)
 
     # --- the walk ----------------------------------------------------------------------------------------------------
+
+    def _start_walk(self) -> None:
+        self.walk = (self.ceiling if self.adaptation == "annealing" else self.floor).copy()  # q [1/s]
+        self.drift: Array = np.zeros(3)  # leaky sum of corrections
+        self.growth = self._growth(excited=True)  # [1/s]
 
     def _growth(self, excited: bool) -> float:
         """Forgetting: the covariance grows by 1/λ = 1 + growth dt."""

@@ -12,6 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
@@ -138,14 +139,11 @@ class GaussMarkov(Normalised):
     correlation_time: float = quantity("s", above=0.0)
 
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-        from scipy import signal  # takes long to import
-
         step = float(time[1] - time[0]) if len(time) > 1 else 0.0
         left = math.exp(-step / self.correlation_time)
         white = math.sqrt(1.0 - left * left) * rng.standard_normal(len(time))
         white[0] = rng.standard_normal()
-        wave: FloatArray = signal.lfilter([1.0], [1.0, -left], white)
-        return wave
+        return autoregressive(white, left)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,6 +178,11 @@ class Pulses(Excitation):
         period, width = max(1, round(self.period / step)), round(self.width / step)
         sign = np.where((sample // period) % 2 == 0, 1.0, -1.0)
         return self.amplitude * sign * (sample % period < width)
+
+
+def autoregressive(noise: FloatArray, left: float) -> FloatArray:
+    """The process x[k] = left x[k - 1] + noise[k] along the first axis, from x[0] = noise[0]."""
+    return np.array(list(accumulate(noise, lambda last, new: left * last + new)))
 
 
 KINDS: dict[str, type[Excitation]] = {

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import can
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.extras import missing
 from lever_cdkf.host_tools.files import make_folder, replace_file, write_text
 from lever_cdkf.host_tools.results import trace
 from lever_cdkf.host_tools.results.summary import SimulationSummary, text
@@ -40,8 +41,8 @@ def simulate(
     progress: Progress | None = None,
 ) -> Result:
     """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
-    it; with `out_dir` also writes bus.log, trace.csv, report.html and summary.json there, each complete or not at all.
-    `channel` is the bus's name in bus.log.
+    it; with `out_dir` also writes bus.log, trace.csv, report.html (with the extra `report`) and summary.json there,
+    each complete or not at all. `channel` is the bus's name in bus.log.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
     files but for the wall times are the same either way. Raises LeverError.
@@ -64,6 +65,8 @@ def _write(result: Result, folder: Path, channel: str, start: float) -> None:
     """Writes the files; summary.json comes last, so that its wall time is of everything."""
     from lever_cdkf.host_tools.report import write_report
 
+    report = folder / "report.html"
+
     def bus_log(path: Path) -> None:
         with path.open("wb") as file:
             file.writelines(buslog.lines(result.frames, channel))
@@ -73,5 +76,8 @@ def _write(result: Result, folder: Path, channel: str, start: float) -> None:
 
     replace_file(folder / "bus.log", bus_log)
     replace_file(folder / "trace.csv", lambda path: trace.write_csv(result.trace, path))
-    replace_file(folder / "report.html", lambda path: write_report(result.trace, elapsed(), path))
+    if missing("report"):
+        report.unlink(missing_ok=True)  # of an earlier run
+    else:
+        replace_file(report, lambda path: write_report(result.trace, elapsed(), path))
     write_text(folder / "summary.json", text(elapsed()))

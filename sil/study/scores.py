@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
-from scipy.stats import bootstrap, chi2
+from lever_cdkf.host_tools.statistics import chi_square_band
+from scipy.stats import bootstrap
 
 from .data import Batch, Estimates
 
@@ -116,12 +117,6 @@ def consistency(squares: Array, freedom: int) -> Consistency:
     over_runs = squares.mean(axis=0)
     inside = np.mean((over_runs >= low) & (over_runs <= high))
     return Consistency(float(freedom), float(squares.mean()), (low, high), float(inside))
-
-
-def chi_square_band(freedom: int) -> tuple[float, float]:
-    """The middle 95 % of chi-square."""
-    low, high = chi2.ppf((0.025, 0.975), freedom)
-    return float(low), float(high)
 
 
 # --- convergence -----------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Makes and fills the virtual environment that the demo and the tests run in.
 
-    python3 venv.py DIR install   the project with what it depends on, built from the sources
-    python3 venv.py DIR tools     the tools that the tests use (dependency group "test" of pyproject.toml)
+    python3 venv.py DIR install   the project with what `lever demo` needs; its Python files stay in the tree
+    python3 venv.py DIR tools     all extras, and the tools that the tests use (group "test" of pyproject.toml)
 
 Versions are those of constraints.txt. Nothing is fetched when the environment has them already. Needs nothing but the
 standard library; exits 1 with one line on stderr when something is lacking.
@@ -68,9 +68,10 @@ def main() -> int:
         if step == "install":
             pip_install(venv, "what builds the project", "--group", "build")
             build_dir = f"build-dir={venv.parent / 'wheel'}"
-            pip_install(venv, "the project", "--no-build-isolation", "--config-settings", build_dir, str(ROOT))
+            editable = ("--no-build-isolation", "--config-settings", build_dir, "--editable", f"{ROOT}[report]")
+            pip_install(venv, "the project", *editable)
         else:
-            pip_install(venv, "the test tools", "--group", "test")
+            pip_install(venv, "all extras and the test tools", "lever-cdkf[all]", "--group", "test")
     except SetupError as error:
         print(f"tests/setup/venv.py: {error}", file=sys.stderr)
         return 1

@@ -1,4 +1,5 @@
-/* Whole recordings at the speed of C, for Python: text of candump to frames and back, and frames through an estimator.
+/* Whole recordings at the speed of C, for Python: text of candump to frames and back, frames through an estimator, and
+ * tables as text.
  *
  * What Python does a frame at a time takes microseconds; an hour at 1 kHz has 12 million frames. The estimator is used
  * through its façade lever_cdkf.h like everywhere else. No function here allocates, keeps or opens anything.
@@ -62,6 +63,15 @@ uint64_t bulk_parse(
  * of whoever feeds the estimator. `text` must have room for count lines of BULK_BUS_NAME + 64 bytes. Returns the bytes
  * written. */
 uint64_t bulk_format(const bulk_frame_t *frames, uint64_t count, const char *bus, char *text);
+
+/* --- tables ---------------------------------------------------------------------------------------------------- */
+
+enum { BULK_NUMBER = 32 }; /* longest number as text, with what follows it */
+
+/* Writes rows of numbers as lines of CSV: six decimals, NaN as "NaN", and beyond 9.2e18 "inf"; in columns that are
+ * `whole` no decimals, and NaN as nothing. `text` must have room for BULK_NUMBER bytes a number. Returns the bytes
+ * written. */
+uint64_t bulk_format_table(const double *numbers, uint64_t rows, uint64_t columns, const uint8_t *whole, char *text);
 
 /* --- the estimator --------------------------------------------------------------------------------------------- */
 

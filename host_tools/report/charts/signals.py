@@ -6,9 +6,10 @@ import numpy as np
 
 from ...arrays import Array
 from ...firmware.quantities import DYNAMICS
+from ...statistics import chi_square_band
 from ..figure import Figure, Spec, axis, axis_range, band, dots, frequency_axis, line, time_axis
 from ..run import Run
-from ..series import chi_square_band, envelope, packed, spread_indices
+from ..series import envelope, packed, spread_indices
 
 DEGREES = 180.0 / np.pi
 STATES = (("theta", "_rad", "angle θ [deg]"), ("theta_dot", "_rad_s", "rate θ̇ [deg/s]"))
@@ -92,7 +93,7 @@ def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
         averages.freedom[known],
         averages.total[known] / averages.freedom[known],
     )
-    low, high = chi_square_band(freedom)
+    low, high = np.array([chi_square_band(int(each)) for each in freedom]).T / freedom
     greatest = float(ratio.max())
     scale = {"type": "log"} if greatest > 10.0 else {"range": [0.0, max(2.0, 1.1 * greatest)]}
     figure = Figure([axis("NIS per output [1]", **scale)], time_axis(run.end), 280)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from scipy.stats import norm
+from lever_cdkf.host_tools.statistics import normal_quantile
 
 from .cases import Matched, Stepped, cases
 from .comparison import LEAST_RUNS, LEVEL, Differences
@@ -175,7 +175,7 @@ def claims(rows: Sequence[Row]) -> list[Claim]:
 
 def _by_chance(values: Sequence[Value], limit: float, below: bool) -> bool:
     """Bonferroni, the first step of Holm: that chance makes any of the values miss its limit has probability LEVEL."""
-    errors = float(norm.isf(LEVEL / max(len(values), 1)))
+    errors = normal_quantile(1.0 - LEVEL / max(len(values), 1))
     sign = 1.0 if below else -1.0
     return all(sign * (value - limit) <= errors * error or sign * (value - limit) <= 0.0 for value, _, error in values)
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.statistics import chi_square_band
 
 from ..data import PARAMETERS
 from ..firmware import Firmware
 from ..matched import Condition, matched
-from ..scores import Consistency, chi_square_band, consistency, errors, normalised_squares
+from ..scores import Consistency, consistency, errors, normalised_squares
 from .description import Band, Column, Curve, Figure, Row, Trace, number, percent
 from .runs import DITHER, MATCHED, PRIOR, Extent, shown
 

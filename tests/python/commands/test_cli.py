@@ -242,7 +242,7 @@ def test_help_loads_nothing_heavy() -> None:
         "import sys, importlib.metadata\n"
         "from lever_cdkf.host_tools import cli\n"
         "cli.main(['--help'])\n"
-        "known = {'numpy', 'cffi', 'cantools', 'can', 'rich', 'polars', 'plotly', 'textual', 'tornado'}\n"
+        "known = {'numpy', 'cffi', 'cantools', 'can', 'rich', 'scipy', 'plotly', 'textual', 'tornado'}\n"
         "heavy = known & set(sys.modules)\n"
         "print(' '.join(sorted(heavy)), file=sys.stderr, end='')\n"
     )

@@ -75,6 +75,13 @@ def test_the_command_lever() -> None:
     assert done.stderr == "lever: error: 'x' has no '=': write name = value\n"
 
 
+def test_the_tree_is_what_is_tested(root: Path) -> None:
+    """An edit of a Python file counts without a build step, here and in every process that a test starts."""
+    code = "from lever_cdkf import host_tools, sil; print(sil.__file__, host_tools.__file__)"
+    files = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert files == [str(root / folder / "__init__.py") for folder in ("sil", "host_tools")]
+
+
 def test_versions_agree(installed: str, root: Path) -> None:
     header = (root / "firmware/lever_cdkf.h").read_text()
     parts = re.findall(r"#define LEVER_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header)

@@ -133,9 +133,9 @@ def test_what_is_not_to_be_learnt_leaves_the_parameters_alone(form: str) -> None
 def test_considered_errors_are_what_an_unknown_push_makes(form: str) -> None:
     """Two filters on the same outputs: one knows the push, the other does not."""
     rng = np.random.default_rng(31)
-    knows, considers, size = belief(form), belief(form), np.array([0.3, -0.2, 0.1, 0.5])
+    knows, considers, size = belief(form), belief(form), np.array([0.3, -0.2, 0.1, 0.5, -0.4])
     for index in range(300):
-        b, push, y = 0.03 * rng.standard_normal((2, 3)), 0.01 * rng.standard_normal((2, 4)), rng.standard_normal(2)
+        b, push, y = 0.03 * rng.standard_normal((2, 3)), 0.01 * rng.standard_normal((2, 5)), rng.standard_normal(2)
         valid, moved = rng.random(2) > 0.2, (push @ size)[:, np.newaxis]
         knows.predict(pushed(b, np.zeros((3, 1)), moved), PROCESS)
         considers.predict(pushed(b, np.zeros((3, 1))), PROCESS, push)
@@ -170,7 +170,10 @@ def test_the_two_stage_joint_filter_is_the_augmented_one() -> None:
     two_stage, augmented = belief("joint"), belief("augmented")
     most = np.array([0.4, 0.6, 0.2])  # the last one is reached
     for index in range(300):
-        y, push = augmented.x + OUTPUT @ rng.standard_normal(2), 1e-3 * rng.standard_normal((2, 4))
+        y, push = (
+            augmented.x + OUTPUT @ rng.standard_normal(2),
+            np.pad(1e-3 * rng.standard_normal((2, 4)), ((0, 0), (0, 1))),
+        )
         valid = rng.random(2) > 0.2
         nis = []
         for one in (two_stage, augmented):

@@ -143,6 +143,27 @@ def test_truth_is_linearised_where_the_lever_rests() -> None:
     assert columns["damping_ratio_true"] == pytest.approx(damping)
 
 
+def test_numbers_are_rounded_to_the_nearest() -> None:
+    """As Python does it, which is exact: of two that are as near the even one."""
+    rng = np.random.default_rng(1)
+    ties = rng.integers(-(2**32), 2**32, 20000) / 2.0**7
+    near = np.nextafter(ties, rng.choice([-np.inf, np.inf], len(ties)))
+    wide = rng.choice([-1.0, 1.0], 20000) * 10.0 ** rng.uniform(-12.0, 18.0, 20000)
+    halves = np.round(rng.uniform(-10.0, 10.0, 20000), 6) + 0.5e-6
+    some = [0.0, -0.0, np.nan, np.inf, -np.inf, 0.9999995, 0.99999949999, 1e-300, 2.0**52, 2.0**53 + 2.0]
+    values = np.concatenate((some, ties, near, wide, halves))
+    lines = bytes(trace.csv_lines({"a": values, "b": values[::-1]})).decode().splitlines()
+    expected = [f"{value:.6f}".replace("nan", "NaN") for value in values.tolist()]
+    assert lines == [f"{one},{other}" for one, other in zip(expected, expected[::-1], strict=True)]
+
+
+def test_whole_numbers_have_no_decimals() -> None:
+    values = np.array([0.0, -0.0, 7.0, -12.0, 2.0**32, np.nan])
+    text = bytes(trace.csv_lines({"nis": values, "lost": values})).decode()
+    assert text.splitlines()[:2] == ["0.000000,0", "-0.000000,0"]
+    assert text.splitlines()[2:] == ["7.000000,7", "-12.000000,-12", "4294967296.000000,4294967296", "NaN,"]
+
+
 def test_csv_holds_the_trace(tmp_path: Path) -> None:
     _, columns = made()
     trace.write_csv(columns, tmp_path / "trace.csv")

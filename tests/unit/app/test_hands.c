@@ -116,7 +116,7 @@ static void test_blocks_that_do_not_count_leave_the_verdict(void)
 /* A block that the lever alone explains but for a part, in squares, of its change; between the thresholds it stays. */
 static void test_the_verdict_has_hysteresis(void)
 {
-    const double part[] = {0.03, 0.05, 0.11, 0.13};
+    const double part[] = {0.025, 0.035, 0.09, 0.11};
     const model_constants_t constants = {.inertia = 0.1f};
     for (uint32_t k = 0u; k < 8u; k++) {
         const bool was = (k >= 4u);
@@ -126,7 +126,7 @@ static void test_the_verdict_has_hysteresis(void)
             hands.begin = 0.0f;
             hands.impulse = 0.1f * (float)(1.0 - sqrt(part[k % 4u]));
             hands.off = (n < 99u) ? was : hands.off;
-            hands_step(&hands, &constants, 1.0f, 0.02f, true);
+            hands_step(&hands, &constants, 1.0f, 0.04f, true);
             TEST_ASSERT_TRUE((hands.begin == 1.0f) && (hands.impulse == 0.0f));
         }
         TEST_ASSERT_EQUAL(was ? ((k % 4u) != 3u) : ((k % 4u) == 0u), hands.off);

@@ -5,7 +5,7 @@
 #include "../math/random.h"
 #include "unity.h"
 
-enum { C = CDKF_CONSIDERED };
+enum { C = CDKF_CALIBRATION };
 
 #define PERIOD 0.02f
 #define MEMORY 20.0 /* [s] */

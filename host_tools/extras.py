@@ -1,0 +1,65 @@
+"""What is installed on demand: the extras of pyproject.toml, and what a user is told where one is missing."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Iterable, Sequence
+
+from .errors import LeverError
+
+PACKAGES = {
+    "flash": ("pyocd",),
+    "live": ("textual", "tornado"),
+    "mf4": ("asammdf",),
+    "report": ("plotly",),
+    "study": ("plotly", "matplotlib", "scipy"),
+    "tune": ("scipy",),
+}
+"""What each extra brings; imported by the same names."""
+
+_FILES = {"report.html": "report", "signals.mf4": "mf4"}
+"""Files of a run that need an extra. Without it they are left out."""
+
+
+def missing(extra: str) -> str:
+    """Which packages of an extra are not installed, and how to get them; empty if all are."""
+    if extra == "mf4":
+        reveal_mf4()
+    absent = [package for package in PACKAGES[extra] if not _is_installed(package)]
+    return f'this needs {" and ".join(absent)}: pip install "lever-cdkf[{extra}]"' if absent else ""
+
+
+def require(extra: str) -> None:
+    """Raises LeverError where an extra is missing."""
+    if reason := missing(extra):
+        raise LeverError(reason)
+
+
+def warn_of_left_out(files: Iterable[str]) -> None:
+    """Says on standard error which of a run's files will not be written."""
+    for name in files:
+        if name in _FILES and (reason := missing(_FILES[name])):
+            print(f"lever: warning: no {name}: {reason}", file=sys.stderr)
+
+
+def hide_mf4(arguments: Sequence[str]) -> None:
+    """Hides asammdf, which python-can imports and which takes a second, from a command that reads no MF4 log.
+
+    For the process of the command `lever` alone; whoever imports this package has python-can whole.
+    """
+    if not any(".mf4" in argument.lower() for argument in arguments):
+        sys.modules.setdefault("asammdf", None)  # type: ignore[arg-type]
+
+
+def reveal_mf4() -> None:
+    """From here on `import asammdf` works again."""
+    if sys.modules.get("asammdf", sys) is None:
+        del sys.modules["asammdf"]
+
+
+def _is_installed(package: str) -> bool:
+    try:
+        return importlib.util.find_spec(package) is not None
+    except ModuleNotFoundError:
+        return False

@@ -1,0 +1,75 @@
+"""The Python package as its users install it: from the source distribution, as a wheel."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import sysconfig
+import tarfile
+from pathlib import Path
+
+import pytest
+from quality import tools
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations")
+_SDIST = "import sys; from scikit_build_core.build import build_sdist; build_sdist(sys.argv[1])"
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sdist")
+    tools.assert_silent([sys.executable, "-c", _SDIST, folder])
+    (archive,) = folder.iterdir()
+    return archive
+
+
+@pytest.fixture(scope="module")
+def installed(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the package and nothing else."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = [sys.executable, "-m", "pip", "install", "--no-index", "--no-deps", "--no-build-isolation"]
+    tools.assert_silent([*pip, "--target", folder, sdist])
+    return folder
+
+
+def test_the_source_distribution_has_what_builds_the_package(sdist: Path) -> None:
+    with tarfile.open(sdist) as archive:
+        names = {Path(name).relative_to(Path(name).parts[0]) for name in archive.getnames()}
+    assert {Path(name) for name in ("CMakeLists.txt", "pyproject.toml", "LICENSE", "README.md")} <= names
+    assert not {name.parts[0] for name in names} & {"tests", "build", ".ci"}
+
+
+def files_of(folder: Path) -> set[Path]:
+    return {file.relative_to(folder) for file in folder.rglob("*") if file.is_file() and file.suffix != ".pyc"}
+
+
+def test_the_wheel_has_every_file_of_the_tree_and_the_libraries(installed: Path) -> None:
+    files = {each for each in files_of(installed) if each.parts[0] == "lever_cdkf"}
+    native = {file.name for file in files if file.parent == Path("lever_cdkf/host_tools/_native")}
+    libraries = {name for name in NATIVE if any(name in file for file in native)}
+    assert libraries == set(NATIVE), native
+    settings = tomllib.loads((tools.ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["scikit-build"]
+    packages = settings["wheel"]["packages"].items()
+    tree = {Path(package) / file for package, folder in packages for file in files_of(tools.ROOT / folder)}
+    assert {file for file in files if file.name not in native} == tree
+
+
+def test_the_wheel_works(installed: Path, tmp_path: Path) -> None:
+    """In an environment that has the packages of this one, but not its editable installation."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv"], check=True)
+    python = tmp_path / "venv/bin/python"
+    (folder,) = (tmp_path / "venv/lib").glob("python*/site-packages")
+    (folder / "packages.pth").write_text(f"{installed}\n{sysconfig.get_path('purelib')}\n")
+    where = "import lever_cdkf.sil as sil, lever_cdkf.host_tools as tools; print(*sil.__path__, *tools.__path__)"
+    paths = subprocess.run([python, "-c", where], capture_output=True, text=True, check=True, cwd=tmp_path).stdout
+    assert paths.split() == [str(installed / "lever_cdkf" / name) for name in ("sil", "host_tools")]
+    lever: list[str | Path] = [python, "-m", "lever_cdkf.host_tools.cli"]
+    short = ("--set", "duration=3 s", "--set", "limits={}")
+    tools.assert_silent([*lever, "sim", "steady", *short, "--out", "sim"], cwd=tmp_path)
+    tools.assert_silent([*lever, "replay", "sim/bus.log", "-o", "replay"], cwd=tmp_path)
+    assert (tmp_path / "replay/bus.log").read_bytes() == (tmp_path / "sim/bus.log").read_bytes()
