@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lint import checks
 
-CHECKS = {check.__name__: check for check in (checks.layout, checks.tidy, checks.tidy_cross, checks.misra)}
-CHECKS |= {check.__name__: check for check in (checks.python, checks.types)}
+CHECKS: dict[str, Callable[..., str]] = {
+    check.__name__: check
+    for check in (checks.layout, checks.tidy, checks.tidy_cross, checks.misra, checks.python, checks.types)
+}
 
 
 def main() -> int:

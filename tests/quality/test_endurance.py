@@ -37,11 +37,12 @@ def programs(tmp_path_factory: pytest.TempPathFactory, build_dir: Path) -> Path:
     """The folder of `single` and `double`; double.h turns every float into a double, and has libm's functions."""
     folder = tmp_path_factory.mktemp("endurance")
     flags = [flag for flag in tools.core_flags(build_dir) if not flag.startswith("-W")]
-    compiler = [tools.first_installed("cc|gcc|clang"), *flags, "-O2", "-I", tools.ROOT / "tests/unit"]
+    compiler: list[str | Path] = [tools.first_installed("cc|gcc|clang"), *flags, "-O2", "-I", tools.ROOT / "tests/unit"]
     single = [source for source in tools.core_sources() if source not in FACADE]
     double = [source for source in single if source.parent.name != "math"]
-    for name, sources in (("single", single), ("double", ["-include", FOLDER / "double.h", *double])):
-        tools.assert_silent([*compiler, *sources, FOLDER / "main.c", "-lm", "-o", folder / name])
+    to_double: list[str | Path] = ["-include", FOLDER / "double.h"]
+    tools.assert_silent([*compiler, *single, FOLDER / "main.c", "-lm", "-o", folder / "single"])
+    tools.assert_silent([*compiler, *to_double, *double, FOLDER / "main.c", "-lm", "-o", folder / "double"])
     return folder
 
 

@@ -28,7 +28,7 @@ def runs_with(program: str, folder: Path, *options: str) -> tuple[dict[str, str]
     (folder / "printed").write_text("".join(printed))
     assigned = read_assignments(folder / "printed")
     choices = {name: str(assigned.pop(name)) for name in CHOICES}
-    config = Config(**choices, settings=assigned)
+    config = Config(**choices, settings={name: float(value) for name, value in assigned.items()})
     return config.choices, config.settings_crc
 
 
