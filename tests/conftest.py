@@ -2,7 +2,7 @@
 
 A test that needs a tool of the system is marked `@pytest.mark.requires("candump")` (several names: all are needed;
 "clang-19|clang": one of them is). Without the tool it is skipped, with the command that installs it, and ctest shows
-the file as skipped. With LEVER_REQUIRE_ALL=1 (CI) every skip, whatever its reason, is an error.
+the folder as skipped. With LEVER_REQUIRE_ALL=1 (CI) every skip, whatever its reason, is an error.
 """
 
 from __future__ import annotations

@@ -27,11 +27,22 @@ PLAIN, SHIPPED = 0.003, 0.05
 """Greatest difference of the two, in standard deviations; and of their standard deviations, relatively."""
 
 
+FOLDER = Path(__file__).with_name("endurance")
+FACADE = [tools.FIRMWARE / "app" / name for name in ("lever.c", "link.c", "link_out.c")]
+"""Not built: the instance of the façade has room for floats only."""
+
+
 @pytest.fixture(scope="module")
-def programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def programs(tmp_path_factory: pytest.TempPathFactory, build_dir: Path) -> Path:
+    """The folder of `single` and `double`; double.h turns every float into a double, and has libm's functions."""
     folder = tmp_path_factory.mktemp("endurance")
-    tools.assert_silent(["cmake", "-S", Path(__file__).with_name("endurance"), "-B", folder])
-    tools.assert_silent(["cmake", "--build", folder, "--target", "single", "double", "--parallel", "2"])
+    flags = [flag for flag in tools.core_flags(build_dir) if not flag.startswith("-W")]
+    compiler: list[str | Path] = [tools.first_installed("cc|gcc|clang"), *flags, "-O2", "-I", tools.ROOT / "tests/unit"]
+    single = [source for source in tools.core_sources() if source not in FACADE]
+    double = [source for source in single if source.parent.name != "math"]
+    to_double: list[str | Path] = ["-include", FOLDER / "double.h"]
+    tools.assert_silent([*compiler, *single, FOLDER / "main.c", "-lm", "-o", folder / "single"])
+    tools.assert_silent([*compiler, *to_double, *double, FOLDER / "main.c", "-lm", "-o", folder / "double"])
     return folder
 
 

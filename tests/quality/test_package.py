@@ -1,4 +1,4 @@
-"""The core as an installed CMake package: another project finds it, builds with it, and computes the same bits."""
+"""The core as an installed CMake package or a sub-directory: another project computes the same bits with it."""
 
 from __future__ import annotations
 
@@ -24,17 +24,11 @@ def install(folder: Path, *settings: str | Path) -> Path:
     return prefix
 
 
-def configure(prefix: Path, folder: Path, *settings: str | Path) -> list[str | Path]:
-    return [
-        "cmake",
-        "-S",
-        PROJECT,
-        "-B",
-        folder,
-        f"-Dlever_cdkf_ROOT={prefix}",
-        "-DCMAKE_BUILD_TYPE=Release",
-        *settings,
-    ]
+def build(folder: Path, *settings: str | Path) -> Path:
+    """The program of the other project."""
+    tools.assert_silent(["cmake", "-S", PROJECT, "-B", folder, "-DCMAKE_BUILD_TYPE=Release", *settings])
+    tools.assert_silent(["cmake", "--build", folder, "--parallel", "2"])
+    return folder / "package"
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +47,9 @@ def test_what_is_installed(prefix: Path) -> None:
         assert (prefix / "include" / name).read_bytes() == (tools.FIRMWARE / name).read_bytes()
 
 
-def test_another_project_computes_the_same(prefix: Path, tmp_path: Path) -> None:
-    tools.assert_silent(configure(prefix, tmp_path))
-    tools.assert_silent(["cmake", "--build", tmp_path])
-    printed = tools.run([tmp_path / "package"]).stdout.split()
+@pytest.mark.parametrize("installed", [True, False])
+def test_another_project_computes_the_same(installed: bool, prefix: Path, tmp_path: Path) -> None:
+    printed = tools.run([build(tmp_path, *([f"-Dlever_cdkf_ROOT={prefix}"] if installed else []))]).stdout.split()
 
     phase = np.arange(1000) % 333 - 166
     swing = (phase * (166 - abs(phase))).astype(np.float32) / np.float32(6889.0)
@@ -85,8 +78,7 @@ def test_the_package_of_a_microcontroller(tmp_path: Path) -> None:
     prefix = install(tmp_path, f"-DCMAKE_TOOLCHAIN_FILE={TOOLCHAIN}")
     flags = "-DCMAKE_EXE_LINKER_FLAGS=--specs=nosys.specs"
     cross = (f"-DCMAKE_TOOLCHAIN_FILE={TOOLCHAIN}", f"-DCMAKE_FIND_ROOT_PATH={prefix}", flags)
-    tools.assert_silent(configure(prefix, tmp_path / "project", *cross))
-    tools.assert_silent(["cmake", "--build", tmp_path / "project"])
-    attributes = tools.run(["arm-none-eabi-readelf", "--arch-specific", tmp_path / "project/package"]).stdout
+    program = build(tmp_path / "project", f"-Dlever_cdkf_ROOT={prefix}", *cross)
+    attributes = tools.run(["arm-none-eabi-readelf", "--arch-specific", program]).stdout
     for expected in ("Tag_CPU_arch: v7E-M", "Tag_FP_arch: VFPv4-D16", "Tag_ABI_VFP_args: VFP registers"):
         assert expected in attributes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
 import subprocess
@@ -21,10 +22,12 @@ def core_sources() -> list[Path]:
     return [source for folder in CORE for source in sorted((FIRMWARE / folder).glob("*.c"))]
 
 
-def c_files() -> list[Path]:
-    """Every C file and header of the project."""
-    folders = (FIRMWARE, ROOT / "host_tools", ROOT / "tests")
-    return [file for folder in folders for suffix in "ch" for file in sorted(folder.rglob(f"*.{suffix}"))]
+def core_flags(build_dir: Path) -> list[str]:
+    """What the build compiles the core with, but for optimisation; firmware/ is where it looks for headers."""
+    entries = json.loads((build_dir / "compile_commands.json").read_text(encoding="utf-8"))
+    commands = [shlex.split(entry["command"]) for entry in entries if entry["file"] == str(FIRMWARE / "filter/cdkf.c")]
+    command = next(words for words in commands if "CMakeFiles/lever_cdkf.dir/" in words[words.index("-o") + 1])
+    return [word for word in command[1 : command.index("-o")] if not word.startswith(("-O", "-g"))]
 
 
 def python_tool(name: str) -> str:

@@ -16,7 +16,7 @@ import can
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 
-PATIENCE_S = 10.0
+PATIENCE_S = 120.0
 """How long to wait for what must happen; a loaded machine is slow."""
 
 INTERFACE = "vcan9"

@@ -101,9 +101,9 @@ class Codec:
         done = getattr(self.lib, f"message_{message.lower()}_encode")(frame, struct)
         return bytes(frame.data) if done else None
 
-    def decode(self, message: str, data: bytes) -> dict[str, Any] | None:
-        """The members of the message; None if refused."""
-        frame = self.frame(getattr(self.lib, f"MESSAGE_{message}_ID"), data)
+    def decode(self, message: str, data: bytes, frame_id: int | None = None) -> dict[str, Any] | None:
+        """The members of the message, which comes under its own identifier or another; None if refused."""
+        frame = self.frame(getattr(self.lib, f"MESSAGE_{message}_ID") if frame_id is None else frame_id, data)
         struct = self.ffi.new(f"message_{message.lower()}_t *")
         if not getattr(self.lib, f"message_{message.lower()}_decode")(struct, frame):
             return None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import e2e
 import pytest
-from python.can.codec import DBC, Codec, data_id_base
+from python.can.codec import DBC, TO_NAME, Codec, data_id_base
 
 BASE = 17
 DATA_IDS = bytes(range(BASE, BASE + 16))
@@ -55,6 +55,17 @@ def test_a_frame_is_only_right_for_its_own_message(codec: Codec) -> None:
             data = codec.protect(bytes(8), sender, counter)
             accepting = [base for base in BASES if codec.check(codec.receiver(base, 1, 15, 0), data)[0] == "INITIAL"]
             assert accepting == [sender]
+
+
+@pytest.mark.parametrize("length", range(8))
+def test_another_length_is_an_error(codec: Codec, length: int) -> None:
+    data = codec.protect(bytes(8), BASE, 0)[:length]
+    assert codec.check(codec.receiver(BASE, 1, 15, 0), data)[0] == "CRC_ERROR"
+
+
+def test_what_may_be_used(codec: Codec) -> None:
+    usable = {name for status, name in TO_NAME.items() if codec.lib.e2e_is_usable(status)}
+    assert usable == {"OK", "SOME_LOST", "INITIAL"}
 
 
 @dataclass
@@ -150,6 +161,15 @@ def test_receiver_over_random_sequences(codec: Codec) -> None:
             assert got == expected, (tolerance, step)
             seen.add(got[0])
     assert seen == {"OK", "NO_NEW_DATA", "CRC_ERROR", "SYNC", "INITIAL", "REPEATED", "SOME_LOST", "WRONG_SEQUENCE"}
+
+
+def test_the_tolerance_stops_at_fifteen(codec: Codec) -> None:
+    receiver = codec.receiver(BASE, 1, 15, 0)
+    codec.check(receiver, codec.protect(bytes(8), BASE, 0))
+    for _ in range(300):
+        codec.check(receiver, None)
+        assert receiver.max_delta <= 15
+        assert receiver.no_new_or_repeated <= 15
 
 
 @pytest.mark.parametrize("missing", range(1, 15))

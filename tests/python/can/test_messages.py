@@ -265,8 +265,25 @@ def test_unknown_model_is_refused(codec: Codec, name: str) -> None:
         assert codec.decode(name, bytes([0, model << 4, 0, 0, 0, 0, 0, 0])) is None
 
 
+@pytest.mark.parametrize("page", range(3, 16))
+def test_an_unknown_page_is_refused(codec: Codec, page: int) -> None:
+    assert codec.encode("IDENTITY", {"page": page}) is None
+    assert codec.decode("IDENTITY", bytes([0, page << 4, 0, 0, 0, 0, 0, 0])) is None
+
+
 @pytest.mark.parametrize("message", MESSAGES)
-def test_wrong_length_is_refused(codec: Codec, message: Message) -> None:
+def test_another_length_or_identifier_is_refused(codec: Codec, message: Message) -> None:
     assert codec.decode(message.name, bytes(8)) is not None
     for length in range(8):
         assert codec.decode(message.name, bytes(length)) is None
+    for other in {0, 1, message.frame_id ^ 1, 0x7FF, *(each.frame_id for each in DBC.messages)} - {message.frame_id}:
+        assert codec.decode(message.name, bytes(8), other) is None
+
+
+def test_just_below_half_a_count_is_zero(codec: Codec) -> None:
+    """Adding one half in single precision and cutting off would give one."""
+    theta = float(np.nextafter(np.float32(0.5 * 1e-4), np.float32(0.0)))
+    for value in (theta, -theta):
+        data = codec.encode("LEVER_SAMPLE", {"theta": value, "theta_valid": True})
+        assert data is not None
+        assert data[2:4] == bytes(2)

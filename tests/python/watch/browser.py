@@ -16,7 +16,7 @@ from typing import Any
 from lever_cdkf.host_tools.report import picture
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-PATIENCE = 30.0
+PATIENCE = 120.0
 """[s] that a browser may take to start, or a page to become what is waited for."""
 _OPTIONS = [option for option in picture.OFFLINE if "virtual-time" not in option]
 

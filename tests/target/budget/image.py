@@ -36,7 +36,7 @@ FORMS = ("update", "tick")
 CALLED_ONCE = ("lever_init", "lever_command", "lever_platform", "lever_estimate", "lever_health")
 
 _TOOLCHAIN_PACKAGES = "gcc-arm-none-eabi libnewlib-arm-none-eabi"
-_TIME_LIMIT_S = 120.0
+_TIME_LIMIT_S = 1800.0
 _INTRO = struct.Struct("<10I")
 _RECORD = np.dtype([("ticks", "<u4"), ("faults", "<u4"), ("stack", "<u2"), ("mode", "u1"), ("frames", "u1")])
 

@@ -64,30 +64,6 @@ static void test_a_dither_that_is_no_amplitude_is_refused(void)
     }
 }
 
-static void test_a_command_that_keeps_everything_changes_no_estimate(void)
-{
-    lever_memory_t other_memory;
-    rig_t same = rig_typical();
-    lever_t *other = lever_init(&other_memory, &config);
-    (void)rig_run(&same, other, 3000u);
-    const lever_command_t command = rig_command();
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    (void)rig_run(&rig, lever, 1000u);
-    (void)rig_run(&same, other, 1000u);
-    rig_assert_same_estimates(lever, other);
-}
-
-static void test_choosing_what_is_chosen_already_is_no_reset(void)
-{
-    lever_command_t command = rig_command();
-    command.model = config.model;
-    command.preload = config.preload;
-    command.estimator = config.estimator;
-    command.adaptation = config.adaptation;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_health(lever).mode);
-}
-
 static void test_reset_goes_back_to_the_first_guess(void)
 {
     rig_request(lever, LEVER_REQUEST_RESET);
@@ -128,29 +104,6 @@ static void test_reset_unfreezes(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
 }
 
-static void test_a_change_of_preload_resets(void)
-{
-    lever_command_t command = rig_command();
-    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    TEST_ASSERT_EQUAL(LEVER_MODE_INIT, rig_health(lever).mode);
-    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p, rig_estimate(lever).parameter[2]);
-}
-
-static void test_a_changed_preload_is_the_one_that_is_used(void)
-{
-    lever_memory_t other_memory;
-    lever_command_t command = rig_command();
-    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    config.preload = (uint8_t)LEVER_PRELOAD_FIXED;
-    lever_t *other = lever_init(&other_memory, &config);
-    rig_t same = rig;
-    (void)rig_run(&rig, lever, 2000u);
-    (void)rig_run(&same, other, 2000u);
-    rig_assert_same_estimates(lever, other);
-}
-
 static void test_freeze_and_a_change_in_one_command_start_over_frozen(void)
 {
     lever_command_t command = rig_command();
@@ -158,17 +111,6 @@ static void test_freeze_and_a_change_in_one_command_start_over_frozen(void)
     command.request = (uint8_t)LEVER_REQUEST_FREEZE;
     TEST_ASSERT_TRUE(lever_command(lever, &command));
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 400u));
-}
-
-static void test_a_change_of_adaptation_does_not_reset(void)
-{
-    lever_command_t command = rig_command();
-    const lever_estimate_t before = rig_estimate(lever);
-    command.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_health(lever).mode);
-    const lever_estimate_t after = rig_estimate(lever);
-    TEST_ASSERT_EQUAL_MEMORY(before.parameter, after.parameter, sizeof before.parameter);
 }
 
 static void test_dither_of_keep_or_more_stays_as_it_is(void)
@@ -233,40 +175,19 @@ static void test_a_chosen_adaptation_starts_its_walk_anew(void)
     TEST_ASSERT_TRUE(sigma_with(LEVER_ADAPTATION_ANNEALING) > (1.001f * sigma_with(LEVER_ADAPTATION_FIXED)));
 }
 
-static void test_a_chosen_adaptation_is_the_one_that_is_used(void)
-{
-    lever_memory_t other_memory;
-    lever_command_t command = rig_command();
-    command.request = (uint8_t)LEVER_REQUEST_RESET;
-    command.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    config.adaptation = (uint8_t)LEVER_ADAPTATION_ANNEALING;
-    lever_t *other = lever_init(&other_memory, &config);
-    rig_t same = rig;
-    (void)rig_run(&rig, lever, 2000u);
-    (void)rig_run(&same, other, 2000u);
-    rig_assert_same_estimates(lever, other);
-}
-
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_unknown_codes_are_refused_and_change_nothing);
     RUN_TEST(test_a_command_with_one_unknown_part_is_refused_as_a_whole);
     RUN_TEST(test_a_dither_that_is_no_amplitude_is_refused);
-    RUN_TEST(test_a_command_that_keeps_everything_changes_no_estimate);
-    RUN_TEST(test_choosing_what_is_chosen_already_is_no_reset);
     RUN_TEST(test_reset_goes_back_to_the_first_guess);
     RUN_TEST(test_after_a_reset_it_is_like_new_but_for_its_counts);
     RUN_TEST(test_reset_accepts_a_time_that_starts_anew);
     RUN_TEST(test_reset_unfreezes);
-    RUN_TEST(test_a_change_of_preload_resets);
-    RUN_TEST(test_a_changed_preload_is_the_one_that_is_used);
     RUN_TEST(test_freeze_and_a_change_in_one_command_start_over_frozen);
-    RUN_TEST(test_a_change_of_adaptation_does_not_reset);
     RUN_TEST(test_dither_of_keep_or_more_stays_as_it_is);
     RUN_TEST(test_reset_ends_dither_and_the_next_run_is_the_first_one_again);
     RUN_TEST(test_a_chosen_adaptation_starts_its_walk_anew);
-    RUN_TEST(test_a_chosen_adaptation_is_the_one_that_is_used);
     return UNITY_END();
 }

@@ -66,72 +66,6 @@ static void test_jitter_of_less_than_half_a_period_is_no_gap(void)
     TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).faults & (uint32_t)LEVER_FAULT_GAP);
 }
 
-/* As if samples without outputs had come, with inputs on a straight line; and as the plant did, noise aside. */
-static void test_prediction_through_a_gap_takes_inputs_on_a_straight_line_and_follows_the_motion(void)
-{
-    static lever_memory_t other_memory;
-    run_for(30000u);
-    other_memory = memory;
-    lever_t *other = (lever_t *)(void *)&other_memory;
-    const double z_ddot = rig.simulation.z_ddot;
-    const double tau_m = rig.simulation.tau_m;
-    const uint32_t time_us = rig.time_us;
-    lever_sample_t sample = rig_sample_after(&rig, 12u);
-    sample.theta_valid = false;
-    sample.theta_dot_valid = false;
-    (void)lever_update(lever, &sample);
-    for (uint32_t k = 1u; k <= 12u; k++) {
-        lever_sample_t between = sample;
-        between.time_us = time_us + (1000u * k);
-        between.z_ddot = (float)(z_ddot + ((double)k / 12.0 * ((double)sample.z_ddot - z_ddot)));
-        between.tau_m = (float)(tau_m + ((double)k / 12.0 * ((double)sample.tau_m - tau_m)));
-        (void)lever_update(other, &between);
-    }
-    const lever_estimate_t estimate = rig_estimate(lever);
-    const lever_estimate_t wanted = rig_estimate(other);
-    const plant_t *plant = &rig.simulation.plant;
-    TEST_ASSERT_FLOAT_WITHIN(2.0e-6f, wanted.theta, estimate.theta);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, wanted.theta_dot, estimate.theta_dot);
-    TEST_ASSERT_DOUBLE_WITHIN(4.0 * (double)estimate.theta_sigma, plant->theta, (double)estimate.theta);
-    TEST_ASSERT_DOUBLE_WITHIN(4.0 * (double)estimate.theta_dot_sigma, plant->theta_dot, (double)estimate.theta_dot);
-}
-
-/* What the base did in a gap is not known; the parameters must not get the blame for what the lever did meanwhile, and
- * the innovation after it must be no larger than predicted (2 in the mean; 0 if the state starts anew). */
-static void assert_parameters_survive_gaps_of(uint32_t missing)
-{
-    const plant_t *plant = &rig.simulation.plant;
-    const double truth[3] = {plant->m_p, plant->c_p, plant->k_p};
-    double nis = 0.0;
-    run_for(20000u);
-    for (uint32_t k = 0u; k < 20u; k++) {
-        const lever_sample_t sample = rig_sample_after(&rig, missing + 1u);
-        (void)lever_update(lever, &sample);
-        nis += (double)rig_estimate(lever).nis;
-        for (uint32_t tenth = 0u; tenth < 10u; tenth++) {
-            (void)rig_run(&rig, lever, 100u);
-            rig_assert_within(4.0, truth, rig_estimate(lever));
-        }
-    }
-    TEST_ASSERT_DOUBLE_WITHIN(4.0, 0.0, nis / 20.0);
-}
-
-static void test_parameters_survive_gaps_of_any_length_that_is_coasted_through(void)
-{
-    const uint32_t missing[] = {10u, 100u, 300u, 300u};
-    for (uint32_t k = 0u; k < 4u; k++) {
-        setUp();
-        if (k == 3u) {
-            config.preload = (uint8_t)LEVER_PRELOAD_FIXED;
-            config.settings.arm_preload_angle = 0.4f;
-            rig.simulation.plant.follows_trim = false;
-            rig.simulation.plant.arm_preload_angle = 0.4;
-            lever = lever_init(&memory, &config);
-        }
-        assert_parameters_survive_gaps_of(missing[k]);
-    }
-}
-
 /* A gap is predicted in a bounded number of steps, which therefore get long; averages are shorter than that. */
 static void test_the_longest_gaps_that_the_settings_let_coast_need_no_restart(void)
 {
@@ -168,8 +102,6 @@ int main(void)
     RUN_TEST(test_a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew);
     RUN_TEST(test_a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk);
     RUN_TEST(test_jitter_of_less_than_half_a_period_is_no_gap);
-    RUN_TEST(test_prediction_through_a_gap_takes_inputs_on_a_straight_line_and_follows_the_motion);
-    RUN_TEST(test_parameters_survive_gaps_of_any_length_that_is_coasted_through);
     RUN_TEST(test_the_longest_gaps_that_the_settings_let_coast_need_no_restart);
     RUN_TEST(test_a_sample_much_too_early_is_taken);
     return UNITY_END();

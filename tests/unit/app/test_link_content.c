@@ -86,24 +86,6 @@ static void test_every_estimate_says_whether_it_may_be_used(void)
     }
 }
 
-static void test_parameters_and_sigma_say_what_the_estimate_says(void)
-{
-    const double half[3] = {5.1e-4, 5.1e-3, 5.1e-2};
-    const double half_sigma[3] = {5.1e-5, 1.1e-3, 2.6e-2};
-    message_pilot_parameters_t parameters;
-    message_pilot_sigma_t sigma;
-    publish_always();
-    (void)sender_run(&sender, lever, 2000u);
-    (void)answers();
-    const lever_estimate_t estimate = rig_estimate(lever);
-    TEST_ASSERT_TRUE(message_pilot_parameters_decode(&parameters, &frames[0]));
-    TEST_ASSERT_TRUE(message_pilot_sigma_decode(&sigma, &frames[1]));
-    for (uint32_t i = 0u; i < 3u; i++) {
-        TEST_ASSERT_DOUBLE_WITHIN(half[i], (double)estimate.parameter[i], (double)parameters.parameter[i]);
-        TEST_ASSERT_DOUBLE_WITHIN(half_sigma[i], (double)estimate.parameter_sigma[i], (double)sigma.sigma[i]);
-    }
-}
-
 static void test_dynamics_say_what_the_estimate_says(void)
 {
     message_pilot_dynamics_t message;
@@ -139,21 +121,6 @@ static void test_feedthrough_says_one_frequency_after_the_other(void)
         TEST_ASSERT_DOUBLE_WITHIN(1.1e-3, (double)feedthrough.gain_sigma, (double)message.gain_sigma);
         TEST_ASSERT_DOUBLE_WITHIN(1.1e-3, (double)feedthrough.phase_sigma, (double)message.phase_sigma);
     }
-}
-
-/* c_p with a standard deviation of 200 was sent as 131. */
-static void test_a_sigma_that_does_not_fit_is_not_available(void)
-{
-    message_pilot_sigma_t sigma;
-    config.settings.c_p = 400.0f;
-    config.settings.c_p_sigma = 0.5f;
-    publish_always();
-    (void)answers();
-    (void)answers();
-    TEST_ASSERT_TRUE(rig_estimate(lever).parameter_sigma[1] > 131.07f);
-    TEST_ASSERT_TRUE(message_pilot_sigma_decode(&sigma, &frames[1]));
-    TEST_ASSERT_TRUE(isnan(sigma.sigma[1]));
-    TEST_ASSERT_FALSE(isnan(sigma.sigma[0]));
 }
 
 static void test_health_says_mode_faults_and_excitation(void)
@@ -229,39 +196,6 @@ static void test_motor_command_says_the_torque_of_health(void)
     TEST_ASSERT_EQUAL_UINT16(sender.rig.time_us & 0xFFFFu, message.time_low);
 }
 
-static void test_identity_says_version_settings_and_choices(void)
-{
-    message_identity_t pages[MESSAGE_PAGE_COUNT];
-    config.model = (uint8_t)LEVER_MODEL_LINEAR_PHYSICAL;
-    config.settings.k = 1400.0f;
-    start();
-    dither(0.2f);
-    for (uint32_t page = 0u; page < (uint32_t)MESSAGE_PAGE_COUNT; page++) {
-        const lever_frame_t frame = next_with(0x217u);
-        TEST_ASSERT_TRUE(message_identity_decode(&pages[page], &frame));
-        TEST_ASSERT_EQUAL_UINT8(page, pages[page].page);
-    }
-    TEST_ASSERT_EQUAL_UINT8(LEVER_VERSION_MAJOR, pages[0].firmware_major);
-    TEST_ASSERT_EQUAL_UINT8(LEVER_VERSION_MINOR, pages[0].firmware_minor);
-    TEST_ASSERT_EQUAL_UINT8(LEVER_VERSION_PATCH, pages[0].firmware_patch);
-    TEST_ASSERT_EQUAL_UINT8(2u, pages[0].contract);
-    TEST_ASSERT_EQUAL_HEX32(lever_settings_crc(&config.settings), pages[1].settings_crc);
-    TEST_ASSERT_EQUAL_UINT8(LEVER_MODEL_LINEAR_PHYSICAL, pages[2].model);
-    TEST_ASSERT_EQUAL_UINT8(LEVER_PRELOAD_TRIM, pages[2].preload);
-    TEST_ASSERT_EQUAL_UINT8(LEVER_ESTIMATOR_DUAL, pages[2].estimator);
-    TEST_ASSERT_EQUAL_UINT8(LEVER_ADAPTATION_ROBBINS_MONRO, pages[2].adaptation);
-    TEST_ASSERT_EQUAL_FLOAT(0.2f, pages[2].dither_rms);
-    lever_command_t command = rig_command();
-    TEST_ASSERT_TRUE(lever_command(lever, &command)); /* changes nothing, so is not told */
-    command.adaptation = (uint8_t)LEVER_ADAPTATION_FIXED;
-    (void)answers();
-    TEST_ASSERT_TRUE(frames[0].id != 0x217u);
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    const lever_frame_t frame = next_with(0x217u);
-    TEST_ASSERT_TRUE(message_identity_decode(&pages[2], &frame));
-    TEST_ASSERT_EQUAL_UINT8(LEVER_ADAPTATION_FIXED, pages[2].adaptation);
-}
-
 /* --- what the port reports ---------------------------------------------------------------------------------------- */
 
 static void test_platform_health_is_sent_from_the_first_report_on(void)
@@ -302,15 +236,12 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_state_estimate_says_what_the_estimate_says);
     RUN_TEST(test_every_estimate_says_whether_it_may_be_used);
-    RUN_TEST(test_parameters_and_sigma_say_what_the_estimate_says);
     RUN_TEST(test_dynamics_say_what_the_estimate_says);
     RUN_TEST(test_feedthrough_says_one_frequency_after_the_other);
-    RUN_TEST(test_a_sigma_that_does_not_fit_is_not_available);
     RUN_TEST(test_health_says_mode_faults_and_excitation);
     RUN_TEST(test_health_has_every_fault_since_the_last_one);
     RUN_TEST(test_link_health_has_the_counts);
     RUN_TEST(test_motor_command_says_the_torque_of_health);
-    RUN_TEST(test_identity_says_version_settings_and_choices);
     RUN_TEST(test_platform_health_is_sent_from_the_first_report_on);
     RUN_TEST(test_a_fault_of_the_platform_is_one_of_health_as_long_as_it_is_reported);
     return UNITY_END();

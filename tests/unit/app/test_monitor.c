@@ -2,20 +2,19 @@
  * that is not about once what it should be. Each must be found, and none where nothing is wrong. */
 #include "app/monitor.h"
 
-#include "../filter/pair.h"
+#include "../math/random.h"
+#include "unity.h"
 
 enum { SAMPLES = 20 }; /* in a block */
 
 #define PERIOD 1.0e-3f
 
 static monitor_t monitor;
-static pair_t pair;
 static random_source_t source;
 
 void setUp(void)
 {
     monitor_start(&monitor);
-    pair = pair_random(11u);
     source.state = 21u;
 }
 
@@ -135,22 +134,25 @@ static void test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second(void)
 
 /* --- spikes ------------------------------------------------------------------------------------------------------- */
 
-/* Output i so many standard deviations off. */
-static bool is_spike(uint32_t i, double sigmas, float level)
+/* Output i so many standard deviations off: of its state 3 in the directions of the parameters and 4 in its own, so 5,
+ * and 12 of its noise, so 13 in all; in mrad, or 0.01 rad/s. */
+static bool is_spike(uint32_t i, float sigmas, float level)
 {
-    const double noise = (double)pair.cdkf.output_noise[i];
-    const double variance = pair.reference.p.at[PAIR_W + i][PAIR_W + i] + (noise * noise);
-    const double y = pair.reference.x.at[PAIR_W + i][0] + (sigmas * sqrt(variance));
-    return monitor_is_spike(&monitor, &pair.cdkf, i, (float)y, level, PERIOD);
+    static const cdkf_t cdkf = {.x = {0.1f, -0.2f},
+        .s = {[9] = 2.0e-3f, 1.0e-3f, 2.0e-3f, 0.02f, 0.01f, 0.02f},
+        .s_xx = {4.0e-3f, 0.0f, 0.0f, 0.04f},
+        .output_noise = {12.0e-3f, 0.12f}};
+    const float sigma = (i == 0u) ? 13.0e-3f : 0.13f;
+    return monitor_is_spike(&monitor, &cdkf, i, cdkf.x[i] + (sigmas * sigma), level, PERIOD);
 }
 
 static void test_an_output_beyond_eight_standard_deviations_is_refused(void)
 {
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
-        TEST_ASSERT_TRUE(!is_spike(i, 7.9, 1.0f) && !is_spike(i, -7.9, 1.0f));
-        TEST_ASSERT_TRUE(is_spike(i, 8.1, 1.0f) && is_spike(i, -8.1, 1.0f));
+        TEST_ASSERT_TRUE(!is_spike(i, 7.9f, 1.0f) && !is_spike(i, -7.9f, 1.0f));
+        TEST_ASSERT_TRUE(is_spike(i, 8.1f, 1.0f) && is_spike(i, -8.1f, 1.0f));
         TEST_ASSERT_TRUE(
-            !is_spike(i, 15.8, 4.0f) && is_spike(i, 16.2, 4.0f)); /* innovations are twice as large anyway */
+            !is_spike(i, 15.8f, 4.0f) && is_spike(i, 16.2f, 4.0f)); /* innovations are twice as large anyway */
     }
 }
 
@@ -158,14 +160,14 @@ static void test_what_lasts_for_20_ms_is_no_spike(void)
 {
     for (uint32_t repeat = 0u; repeat < 3u; repeat++) {
         for (uint32_t k = 0u; k < 19u; k++) {
-            TEST_ASSERT_TRUE(is_spike(0u, 100.0, 1.0f));
-            TEST_ASSERT_FALSE(is_spike(1u, 1.0, 1.0f));
+            TEST_ASSERT_TRUE(is_spike(0u, 100.0f, 1.0f));
+            TEST_ASSERT_FALSE(is_spike(1u, 1.0f, 1.0f));
         }
-        TEST_ASSERT_FALSE(is_spike(0u, (repeat == 1u) ? 1.0 : 100.0, 1.0f) && (repeat == 1u));
-        (void)is_spike(0u, 100.0, 1.0f);
-        TEST_ASSERT_EQUAL(repeat == 1u, is_spike(0u, 100.0, 1.0f));
-        TEST_ASSERT_TRUE(is_spike(1u, 100.0, 1.0f)); /* each output for itself */
-        TEST_ASSERT_FALSE(is_spike(0u, 1.0, 1.0f) || is_spike(1u, 1.0, 1.0f));
+        TEST_ASSERT_FALSE(is_spike(0u, (repeat == 1u) ? 1.0f : 100.0f, 1.0f) && (repeat == 1u));
+        (void)is_spike(0u, 100.0f, 1.0f);
+        TEST_ASSERT_EQUAL(repeat == 1u, is_spike(0u, 100.0f, 1.0f));
+        TEST_ASSERT_TRUE(is_spike(1u, 100.0f, 1.0f)); /* each output for itself */
+        TEST_ASSERT_FALSE(is_spike(0u, 1.0f, 1.0f) || is_spike(1u, 1.0f, 1.0f));
     }
 }
 

@@ -54,101 +54,6 @@ static double largest_difference(void)
     return largest;
 }
 
-/* --- what the settings know --------------------------------------------------------------------------------------- */
-
-/* A sample as sensors with errors and a lever with friction give it. */
-typedef void distort_t(lever_sample_t *sample);
-
-/* The same flight with exact samples into the other and distorted ones into the lever. */
-static double difference_after(uint32_t samples, distort_t *distort)
-{
-    for (uint32_t k = 0u; k < samples; k++) {
-        lever_sample_t sample = rig_sample(&rig);
-        (void)lever_update(other, &sample);
-        distort(&sample);
-        (void)lever_update(lever, &sample);
-    }
-    return largest_difference();
-}
-
-static void distort_gains(lever_sample_t *sample)
-{
-    sample->z_ddot *= 1.1f;
-    sample->tau_m *= 0.8f;
-}
-
-static void distort_delay(lever_sample_t *sample)
-{
-    static float past[DELAY];
-    const float now = sample->z_ddot;
-    sample->z_ddot = past[DELAY - 1];
-    for (uint32_t k = (uint32_t)DELAY - 1u; k > 0u; k--) {
-        past[k] = past[k - 1u];
-    }
-    past[0] = now;
-}
-
-/* Of the motor's torque 0.2 N m go into Coulomb friction before the lever moves. */
-static void distort_friction(lever_sample_t *sample)
-{
-    const double rate = rig.simulation.plant.theta_dot;
-    sample->tau_m += (float)(0.2 * rate / (fabs(rate) + 0.002));
-}
-
-/* With the setting, estimates are as with an exact sensor; without, some are standard deviations off. */
-static void test_what_the_settings_know_of_sensors_and_lever_is_made_up_for(void)
-{
-    distort_t *const distort[] = {distort_gains, distort_delay, distort_friction};
-    for (uint32_t k = 0u; k < 6u; k++) {
-        setUp();
-        rig_trust_calibration(&config);
-        config.settings.change_threshold = 0.0f;
-        exact = config;
-        other = lever_init(&other_memory, &exact);
-        if (k < 3u) {
-            config.settings.z_ddot_gain = (k == 0u) ? 1.1f : 1.0f;
-            config.settings.tau_m_gain = (k == 0u) ? 0.8f : 1.0f;
-            config.settings.z_ddot_delay = (k == 1u) ? 3.0e-3f : 0.0f;
-            config.settings.lever_friction = (k == 2u) ? 0.2f : 0.0f;
-        }
-        start();
-        const double difference = difference_after(30000u, distort[k % 3u]);
-        TEST_ASSERT_EQUAL(k >= 3u, difference > 1.0);
-        TEST_ASSERT_TRUE((k >= 3u) || (difference < 0.4));
-    }
-}
-
-/* The lever of an arm is known to a part of its standard deviation that what is stated of the sensors adds. */
-static void test_what_is_not_certain_of_them_widens_the_estimates(void)
-{
-    float *const stated[] = {&config.settings.z_ddot_gain_sigma, &config.settings.z_ddot_delay_sigma,
-        &config.settings.tau_m_gain_sigma, &config.settings.lever_friction_sigma};
-    const float values[] = {0.05f, 2.0e-3f, 0.1f, 0.2f};
-    for (uint32_t k = 0u; k < 4u; k++) {
-        setUp();
-        rig_trust_calibration(&config);
-        config.settings.change_threshold = 0.0f;
-        exact = config;
-        other = lever_init(&other_memory, &exact);
-        *stated[k] = values[k];
-        start();
-        for (uint32_t n = 0u; n < 10000u; n++) {
-            const lever_sample_t sample = rig_sample(&rig);
-            (void)lever_update(lever, &sample);
-            (void)lever_update(other, &sample);
-        }
-        const lever_estimate_t with = rig_estimate(lever);
-        const lever_estimate_t without = rig_estimate(other);
-        double widest = 0.0;
-        TEST_ASSERT_EQUAL_MEMORY(without.parameter, with.parameter, sizeof with.parameter);
-        for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
-            TEST_ASSERT_TRUE(with.parameter_sigma[i] >= without.parameter_sigma[i]);
-            widest = fmax(widest, (double)(with.parameter_sigma[i] / without.parameter_sigma[i]));
-        }
-        TEST_ASSERT_TRUE(widest > 1.2);
-    }
-}
-
 /* --- what is missing ---------------------------------------------------------------------------------------------- */
 
 /* What was asked of the motor until the sample is what a perfect torque sensor would have said. */
@@ -312,8 +217,6 @@ static void test_hands_off_is_flagged_and_not_learnt(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_what_the_settings_know_of_sensors_and_lever_is_made_up_for);
-    RUN_TEST(test_what_is_not_certain_of_them_widens_the_estimates);
     RUN_TEST(test_without_measured_torque_the_torque_asked_for_counts);
     RUN_TEST(test_it_aligns_and_learns_by_the_rate_alone);
     RUN_TEST(test_a_signal_that_is_wrong_but_valid_is_flagged_and_not_learnt);

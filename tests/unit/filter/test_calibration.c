@@ -2,7 +2,7 @@
  * distributed: vector = information b + noise of variance information. */
 #include "filter/calibration.h"
 
-#include "../math/dense.h"
+#include "../math/random.h"
 #include "unity.h"
 
 enum { C = CDKF_CALIBRATION };

@@ -1,7 +1,6 @@
-/* Detection of sudden changes: what is white is none, what drifts is one as soon as its chi-square says so. */
+/* Detection of sudden changes: a drift is one as soon as its chi-square says so. */
 #include "filter/change_detection.h"
 
-#include "../math/dense.h"
 #include "unity.h"
 
 enum { L = MODEL_PARAMETERS };
@@ -10,13 +9,11 @@ enum { L = MODEL_PARAMETERS };
 #define MEMORY 0.3f
 #define THRESHOLD 30.0f
 
-static random_source_t source;
 static change_detection_t change;
 static const double sigma[L] = {1.0e-3, 3.0e-4, 2.0e-2}; /* of a correction: scales do not matter */
 
 void setUp(void)
 {
-    source.state = 99u;
     change_detection_init(&change);
 }
 
@@ -24,27 +21,19 @@ void tearDown(void)
 {
 }
 
-/* How many of so many corrections are changes; each is `drift` sigmas off on average and `scale` times as large as it
- * should. */
-static uint32_t detections(uint32_t steps, double drift, double scale, float threshold)
+/* How many of so many corrections are changes; each is `drift` sigmas off. */
+static uint32_t detections(uint32_t steps, double drift, float threshold)
 {
     uint32_t count = 0u;
     for (uint32_t k = 0u; k < steps; k++) {
         correction_t correction;
         for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-            correction.w[i] = (float)(sigma[i] * ((scale * random_normal(&source)) + drift));
+            correction.w[i] = (float)(sigma[i] * drift);
             correction.variance[i] = (float)(sigma[i] * sigma[i]);
         }
         count += change_detection_step(&change, &correction, PERIOD, MEMORY, threshold) ? 1u : 0u;
     }
     return count;
-}
-
-/* Chi-square with three degrees of freedom exceeds 30 with a probability of 1.4e-6; half an hour has 6,000 memories. */
-static void test_white_corrections_are_no_change(void)
-{
-    TEST_ASSERT_EQUAL_UINT32(0u, detections(180000u, 0.0, 1.0, THRESHOLD));
-    TEST_ASSERT_FLOAT_WITHIN(0.3f, 1.0f, change.average);
 }
 
 /* Without noise the sum of n corrections of d sigmas has the statistic 3 (d sum r^k)^2 / sum r^2k, r = 1 -
@@ -62,9 +51,9 @@ static void test_a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts
         wanted++;
     }
     TEST_ASSERT_TRUE((wanted > 3u) && (wanted < 30u));
-    TEST_ASSERT_EQUAL_UINT32(0u, detections(wanted - 1u, drift, 0.0, THRESHOLD));
+    TEST_ASSERT_EQUAL_UINT32(0u, detections(wanted - 1u, drift, THRESHOLD));
     uint32_t late = 0u; /* the long average has risen a little, too */
-    while (detections(1u, drift, 0.0, THRESHOLD) == 0u) {
+    while (detections(1u, drift, THRESHOLD) == 0u) {
         late++;
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(1u, late);
@@ -73,28 +62,11 @@ static void test_a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts
     }
 }
 
-static void test_a_drift_in_noise_is_found_within_a_second(void)
-{
-    for (uint32_t repeat = 0u; repeat < 200u; repeat++) {
-        change_detection_init(&change);
-        (void)detections(200u, 0.0, 1.0, THRESHOLD);
-        TEST_ASSERT_TRUE(detections(100u, 1.5, 1.0, THRESHOLD) > 0u);
-    }
-}
-
-/* Noise that is set wrongly makes every correction too large: that becomes the average, and no change. */
-static void test_corrections_that_are_always_too_large_become_the_average(void)
-{
-    (void)detections(30000u, 0.0, 5.0, THRESHOLD);
-    TEST_ASSERT_EQUAL_UINT32(0u, detections(30000u, 0.0, 5.0, THRESHOLD));
-    TEST_ASSERT_FLOAT_WITHIN(8.0f, 25.0f, change.average);
-}
-
 /* Nor is it evidence when nothing was learnt, or when rounding let a variance grow. */
 static void test_a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_not_count(void)
 {
     const correction_t correction = {.w = {1.0f, 1.0f, 1.0f}, .variance = {0.0f, -1.0e-9f, 0.0f}};
-    TEST_ASSERT_EQUAL_UINT32(0u, detections(1000u, 100.0, 1.0, 0.0f));
+    TEST_ASSERT_EQUAL_UINT32(0u, detections(1000u, 100.0, 0.0f));
     change_detection_init(&change);
     TEST_ASSERT_TRUE(change.average == 1.0f);
     for (uint32_t k = 0u; k < 1000u; k++) {
@@ -106,10 +78,7 @@ static void test_a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_white_corrections_are_no_change);
     RUN_TEST(test_a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts_anew);
-    RUN_TEST(test_a_drift_in_noise_is_found_within_a_second);
-    RUN_TEST(test_corrections_that_are_always_too_large_become_the_average);
     RUN_TEST(test_a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_not_count);
     return UNITY_END();
 }

@@ -1,7 +1,7 @@
 /* Whiteness: white innovations stay white however long, coloured ones are found; against their known correlations. */
 #include "filter/whiteness.h"
 
-#include "../math/dense.h"
+#include "../math/random.h"
 #include "unity.h"
 
 enum { SAMPLES = 20 }; /* in a block */

@@ -74,20 +74,6 @@ static size_t some_text(char *text)
     return size;
 }
 
-static void test_whole_lines_are_frames(void)
-{
-    bulk_frame_t frames[8];
-    bulk_parsed_t parsed;
-    for (size_t i = 0u; i < (sizeof lines / sizeof lines[0]); i++) {
-        const uint64_t expected = (lines[i][0] == '(') ? 1u : 0u;
-        TEST_ASSERT_EQUAL_UINT64_MESSAGE(expected, parse(lines[i], strlen(lines[i]), frames, 8u, &parsed), lines[i]);
-        TEST_ASSERT_EQUAL_UINT64(0u, parsed.damaged);
-        TEST_ASSERT_EQUAL_UINT64(strlen(lines[i]), parsed.used);
-    }
-    (void)parse(lines[4], strlen(lines[4]), frames, 8u, &parsed);
-    TEST_ASSERT_EQUAL_INT64(12345678901123456, frames[0].time_us);
-}
-
 static void test_any_damage_is_a_frame_or_a_damaged_line(void)
 {
     char text[512];
@@ -103,29 +89,6 @@ static void test_any_damage_is_a_frame_or_a_damaged_line(void)
         TEST_ASSERT_EQUAL_UINT64(parsed.lines, count + parsed.damaged);
         TEST_ASSERT_TRUE(parsed.used <= size);
         TEST_ASSERT_NULL(memchr(&text[parsed.used], '\n', size - parsed.used));
-    }
-}
-
-static void test_what_is_written_is_read_again(void)
-{
-    char text[BULK_BUS_NAME + 64];
-    for (int round = 0; round < 2000; round++) {
-        bulk_frame_t frame = {0};
-        bulk_frame_t again;
-        bulk_parsed_t parsed;
-        frame.time_us = (int64_t)random_below(0xFFFFFFFFu) * (int64_t)(1u + random_below(1000000u));
-        frame.id = random_below(0x800u);
-        frame.length = (uint8_t)random_below(9u);
-        frame.flags = (uint8_t)(random_below(2u) * (uint32_t)BULK_ANSWER);
-        for (uint8_t i = 0u; i < frame.length; i++) {
-            frame.data[i] = (uint8_t)random_below(256u);
-        }
-        const uint64_t size = bulk_format(&frame, 1u, "a_bus_with_a_long_name_of_31_ch", text);
-        TEST_ASSERT_TRUE(size <= sizeof text);
-        TEST_ASSERT_EQUAL_CHAR((frame.flags != 0u) ? 'R' : 'T', text[size - 2u]);
-        TEST_ASSERT_EQUAL_UINT64(1u, parse(text, size, &again, 1u, &parsed));
-        again.flags = frame.flags;
-        TEST_ASSERT_EQUAL_MEMORY(&frame, &again, sizeof frame);
     }
 }
 
@@ -161,9 +124,7 @@ static void test_more_buses_than_there_is_room_for_are_damage(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_whole_lines_are_frames);
     RUN_TEST(test_any_damage_is_a_frame_or_a_damaged_line);
-    RUN_TEST(test_what_is_written_is_read_again);
     RUN_TEST(test_room_that_ends_is_gone_on_from);
     RUN_TEST(test_more_buses_than_there_is_room_for_are_damage);
     return UNITY_END();

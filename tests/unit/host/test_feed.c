@@ -96,82 +96,9 @@ static void test_room_makes_no_difference(void)
     TEST_ASSERT_EQUAL_MEMORY(much.row, little.row, (size_t)much.rows * sizeof much.row[0]);
 }
 
-static void test_a_row_has_its_own_sample_and_answer(void)
-{
-    static bulk_frame_t frames[FRAMES];
-    static result_t result;
-    make_frames(frames);
-    run(frames, MOST_OUT, SAMPLES, &result);
-    for (uint64_t k = 0u; k < result.rows; k++) {
-        TEST_ASSERT_EQUAL_INT64(1000 * (int64_t)k, result.row[k].time_us);
-        TEST_ASSERT_EQUAL_HEX16(7u, result.row[k].fresh & 7u);
-        TEST_ASSERT_EQUAL_HEX8_ARRAY(frames[2u * k].data, result.row[k].data[0], 8);
-        TEST_ASSERT_EQUAL_HEX8_ARRAY(frames[(2u * k) + 1u].data, result.row[k].data[1], 8);
-    }
-}
-
-/* One frame to a fresh estimator; returns how many came out, and its faults. */
-static uint64_t feed_one(const lever_frame_t *made, bulk_frame_t *out, uint32_t *faults)
-{
-    static lever_memory_t memory;
-    lever_config_t config;
-    lever_config_default(&config);
-    lever_t *lever = lever_init(&memory, &config);
-    TEST_ASSERT_NOT_NULL(lever);
-    bulk_feeder_t feeder = {
-        .lever_id = MESSAGE_LEVER_SAMPLE_ID, .base_id = MESSAGE_BASE_SAMPLE_ID, .command_id = MESSAGE_COMMAND_ID};
-    bulk_frame_t frame;
-    bulk_row_t row;
-    bulk_fed_t fed;
-    lever_health_t health;
-    put(&frame, made, 5);
-    bulk_feed(&feeder, lever, &frame, 1u, out, BULK_OUT_ROOM, &row, 1u, &fed);
-    lever_health(lever, &health);
-    TEST_ASSERT_EQUAL_UINT64(1u, fed.taken);
-    TEST_ASSERT_EQUAL_UINT64(0u, fed.rows);
-    *faults = health.faults;
-    return fed.out;
-}
-
-/* IDENTITY of the recorded estimator would stand for a second one on the bus. */
-static void test_recorded_answers_are_not_fed(void)
-{
-    const message_identity_t identity = {.page = MESSAGE_PAGE_VERSION};
-    lever_frame_t made;
-    bulk_frame_t out[BULK_OUT_ROOM];
-    uint32_t faults;
-    TEST_ASSERT_TRUE(message_identity_encode(&made, &identity));
-    e2e_protect(&made, MESSAGE_IDENTITY_DATA_ID, 0u);
-    TEST_ASSERT_EQUAL_UINT64(0u, feed_one(&made, out, &faults));
-    TEST_ASSERT_EQUAL_HEX32(0u, faults);
-}
-
-/* Without waiting for a sample. */
-static void test_a_command_is_followed_by_its_acknowledgement(void)
-{
-    const message_command_t command = {.request = LEVER_REQUEST_RESET,
-        .model = LEVER_KEEP,
-        .preload = LEVER_KEEP,
-        .estimator = LEVER_KEEP,
-        .adaptation = LEVER_KEEP,
-        .dither_rms = 0.0f};
-    lever_frame_t made;
-    bulk_frame_t out[BULK_OUT_ROOM];
-    uint32_t faults;
-    TEST_ASSERT_TRUE(message_command_encode(&made, &command));
-    e2e_protect(&made, MESSAGE_COMMAND_DATA_ID, 0u);
-    TEST_ASSERT_EQUAL_UINT64(2u, feed_one(&made, out, &faults));
-    TEST_ASSERT_EQUAL_HEX32(MESSAGE_COMMAND_ACK_ID, out[1].id);
-    TEST_ASSERT_EQUAL_INT64(5, out[1].time_us);
-    TEST_ASSERT_EQUAL_HEX8(BULK_ANSWER, out[1].flags);
-}
-
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_room_makes_no_difference);
-    RUN_TEST(test_a_row_has_its_own_sample_and_answer);
-    RUN_TEST(test_recorded_answers_are_not_fed);
-    RUN_TEST(test_a_command_is_followed_by_its_acknowledgement);
     return UNITY_END();
 }

@@ -1,11 +1,12 @@
-/* The kernels of factor.h against plain algebra on covariances in double. Errors are in units of sigma_i sigma_j. */
-#include "dense.h"
+/* The kernels of factor.h at their limits: rows without rank, no noise, no information, too much of either. */
 #include "math/factor.h"
+#include "random.h"
 #include "unity.h"
 
+#include <float.h>
 #include <string.h>
 
-enum { MOST_N = 5, MOST_ROWS = FACTOR_ROWS_MOST, MOST_COLUMNS = 10, REPEATS = 100 };
+enum { MOST_N = 5, MOST_ROWS = FACTOR_ROWS_MOST, OUTPUTS_MOST = 4, REPEATS = 100 };
 
 #define EPSILON ((double)FLT_EPSILON)
 
@@ -20,55 +21,31 @@ void tearDown(void)
 {
 }
 
-/* Covariance that `rows` of n columns stand for. */
-static matrix_t covariance_of(const float *s, uint32_t rows, uint32_t n)
+static double dot(const float *a, const float *b, uint32_t n)
 {
-    return matrix_gram(matrix_of(s, rows, n));
-}
-
-static void assert_covariance(double tolerance, matrix_t wanted, matrix_t found)
-{
-    TEST_ASSERT_DOUBLE_WITHIN(tolerance, 0.0, covariance_difference(&found, &wanted, &wanted));
+    double sum = 0.0;
+    for (uint32_t k = 0u; k < n; k++) {
+        sum += (double)a[k] * (double)b[k];
+    }
+    return sum;
 }
 
 /* --- tria of two rows --------------------------------------------------------------------------------------------- */
 
-static void assert_factorises(const float *a, const float *b, uint32_t m, float s[4])
+static void assert_factorises(const float a[3], const float b[3], float s[4])
 {
-    float both[2 * MOST_COLUMNS];
-    float used_up[MOST_COLUMNS];
-    for (uint32_t k = 0u; k < m; k++) {
-        both[k] = a[k];
-        both[m + k] = b[k];
-        used_up[k] = a[k];
-    }
+    float used_up[3];
+    (void)memcpy(used_up, a, sizeof used_up);
     for (uint32_t k = 0u; k < 4u; k++) {
         s[k] = NAN; /* every entry must be written */
     }
-    factor_tria_two(used_up, b, m, s);
-    assert_covariance(8.0 * EPSILON, covariance_of(both, 2u, m), covariance_of(s, 2u, 2u));
+    factor_tria_two(used_up, b, 3u, s);
+    const double variance[2] = {dot(a, a, 3u), dot(b, b, 3u)};
+    const double tolerance = 8.0 * EPSILON;
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance * variance[0], variance[0], dot(s, s, 2u));
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance * variance[1], variance[1], dot(&s[2], &s[2], 2u));
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance * sqrt(variance[0] * variance[1]), dot(a, b, 3u), dot(s, &s[2], 2u));
     TEST_ASSERT_TRUE((s[0] >= 0.0f) && (s[1] == 0.0f) && (s[3] >= 0.0f));
-}
-
-/* Rows, and entries of a row, of very different size. */
-static void test_tria_of_rows_of_any_scale_has_their_covariance(void)
-{
-    const double row_decades[] = {0.0, 8.0, 0.0};
-    const double entry_decades[] = {0.0, 0.0, 8.0};
-    for (uint32_t repeat = 0u; repeat < 30u * (uint32_t)REPEATS; repeat++) {
-        const uint32_t kind = repeat % 3u;
-        const uint32_t m = 2u + (repeat % 9u);
-        float rows[2][MOST_COLUMNS];
-        float s[4];
-        for (uint32_t r = 0u; r < 2u; r++) {
-            const double scale = pow(10.0, row_decades[kind] * random_between(&source, -1.0, 1.0));
-            for (uint32_t k = 0u; k < m; k++) {
-                const double entry = pow(10.0, entry_decades[kind] * random_between(&source, -1.0, 1.0));
-                random_floats(&source, &rows[r][k], 1u, scale * entry);
-            }
-        }
-        assert_factorises(rows[0], rows[1], m, s);
-    }
 }
 
 /* What is left of a row beside the other comes from a sum of squares, so it is right to its own last digits. */
@@ -78,7 +55,7 @@ static void test_tria_of_nearly_dependent_rows_keeps_what_is_different(void)
         const float a[3] = {1.0f, 0.0f, 0.0f};
         const float b[3] = {2.0f, (float)difference, 0.0f};
         float s[4];
-        assert_factorises(a, b, 3u, s);
+        assert_factorises(a, b, s);
         TEST_ASSERT_DOUBLE_WITHIN(4.0 * EPSILON * difference, difference, (double)s[3]);
     }
 }
@@ -87,9 +64,9 @@ static void test_tria_of_dependent_or_zero_rows_is_deficient_not_nan(void)
 {
     const float rows[3][3] = {{1.0f, 2.0f, 2.0f}, {-2.0f, -4.0f, -4.0f}, {0.0f, 0.0f, 0.0f}};
     float s[4];
-    assert_factorises(rows[0], rows[1], 3u, s);
+    assert_factorises(rows[0], rows[1], s);
     TEST_ASSERT_DOUBLE_WITHIN(8.0 * EPSILON, 0.0, (double)s[3]);
-    assert_factorises(rows[0], rows[2], 3u, s);
+    assert_factorises(rows[0], rows[2], s);
     TEST_ASSERT_TRUE((s[0] == 3.0f) && (s[2] == 0.0f) && (s[3] == 0.0f));
     float zero[3] = {0.0f, 0.0f, 0.0f};
     factor_tria_two(zero, rows[0], 3u, s);
@@ -97,38 +74,6 @@ static void test_tria_of_dependent_or_zero_rows_is_deficient_not_nan(void)
 }
 
 /* --- noise -------------------------------------------------------------------------------------------------------- */
-
-/* Covariance of all rows, with what a noise column leaves in those below the factor. */
-static matrix_t covariance_with(const float *s, uint32_t rows, uint32_t n, const float *rest)
-{
-    matrix_t column = matrix_zero(rows, 1u);
-    for (uint32_t r = n; r < rows; r++) {
-        column.at[r][0] = (double)rest[r - n];
-    }
-    return matrix_sum(covariance_of(s, rows, n), 1.0, matrix_gram(column));
-}
-
-static void test_noise_adds_to_one_variance_and_the_rest_is_what_other_rows_lose(void)
-{
-    const double scales[] = {1.0e-3, 1.0, 1.0e3, 1.0e12};
-    for (uint32_t repeat = 0u; repeat < 20u * (uint32_t)REPEATS; repeat++) {
-        const uint32_t n = 1u + (repeat % (uint32_t)MOST_N);
-        const uint32_t rows = n + (repeat % (1u + (uint32_t)MOST_ROWS - n));
-        float s[MOST_ROWS * MOST_N];
-        random_factor(&source, s, rows, n);
-        for (uint32_t i = 0u; i < n; i++) {
-            float rest[MOST_ROWS];
-            const float noise = (float)(scales[repeat % 4u] * random_unit(&source));
-            matrix_t wanted = covariance_of(s, rows, n);
-            wanted.at[i][i] += (double)noise * (double)noise;
-            factor_add_noise(s, rows, n, i, noise, rest);
-            assert_covariance(16.0 * EPSILON, wanted, covariance_with(s, rows, n, rest));
-            for (uint32_t j = i + 1u; j < n; j++) {
-                TEST_ASSERT_TRUE(s[(i * n) + j] == 0.0f);
-            }
-        }
-    }
-}
 
 /* As for parameters that do not walk, for minutes. */
 static void test_no_noise_changes_nothing_to_the_bit(void)
@@ -163,15 +108,17 @@ static void test_noise_on_nothing_is_the_noise(void)
 static void test_tiny_noise_adds_up_or_leaves_the_rest_as_it_is(void)
 {
     const float noises[] = {5.0e-4f, 1.0e-6f};
+    const double tolerances[] = {5.0e-3, 1.0e-5};
     for (uint32_t k = 0u; k < 2u; k++) {
         float s[4] = {0.5f, 0.0f, 0.3f, 0.4f};
-        matrix_t wanted = covariance_of(s, 2u, 2u);
         for (uint32_t step = 0u; step < 200000u; step++) {
             float rest[1];
             factor_add_noise(s, 2u, 2u, step % 2u, noises[k], rest);
-            wanted.at[step % 2u][step % 2u] += (double)noises[k] * (double)noises[k];
         }
-        assert_covariance((k == 0u) ? 5.0e-3 : 1.0e-5, wanted, covariance_of(s, 2u, 2u));
+        const double variance = 0.25 + (100000.0 * (double)noises[k] * (double)noises[k]); /* of each */
+        TEST_ASSERT_DOUBLE_WITHIN(tolerances[k] * variance, variance, dot(s, s, 2u));
+        TEST_ASSERT_DOUBLE_WITHIN(tolerances[k] * variance, variance, dot(&s[2], &s[2], 2u));
+        TEST_ASSERT_DOUBLE_WITHIN(tolerances[k] * variance, 0.15, dot(s, &s[2], 2u));
     }
 }
 
@@ -181,8 +128,8 @@ static void test_tiny_noise_adds_up_or_leaves_the_rest_as_it_is(void)
 typedef struct known {
     uint32_t n;
     uint32_t outputs;
-    float c[DENSE_MOST * MOST_N];
-    float nu[DENSE_MOST];
+    float c[OUTPUTS_MOST * MOST_N];
+    float nu[OUTPUTS_MOST];
     float information[MOST_N * MOST_N];
     float vector[MOST_N];
 } known_t;
@@ -224,46 +171,6 @@ static void condition(known_t known, float *s, uint32_t rows, double *mean)
         for (uint32_t k = 0u; k < n; k++) {
             mean[r] += (double)s[(r * n) + k] * (double)known.vector[k];
         }
-    }
-}
-
-/* P - P H^T (H P H^T + I)^-1 H P and the gain times nu, where H P H^T = c c^T and P H^T = s c^T. */
-static void assert_is_the_textbook_update(uint32_t n, uint32_t rows, uint32_t outputs, double scale)
-{
-    float s[MOST_ROWS * MOST_N];
-    double mean[MOST_ROWS];
-    const known_t known = draw_known(n, outputs, scale);
-    random_factor(&source, s, rows, n);
-    const matrix_t prior = covariance_of(s, rows, n);
-    const matrix_t c = matrix_of(known.c, outputs, n);
-    const matrix_t covariance = matrix_sum(matrix_gram(c), 1.0, matrix_identity(outputs));
-    const matrix_t cross = matrix_product(matrix_of(s, rows, n), matrix_transposed(c));
-    const matrix_t gain = matrix_product(cross, matrix_inverse(covariance));
-    const matrix_t wanted = matrix_sum(prior, -1.0, matrix_congruence(gain, covariance));
-    const matrix_t wanted_mean = matrix_product(gain, matrix_of(known.nu, outputs, 1u));
-    condition(known, s, rows, mean);
-    const matrix_t found = covariance_of(s, rows, n);
-    const double tolerance = 32.0 * EPSILON * (1.0 + (scale * scale * (double)(n * outputs)));
-    TEST_ASSERT_DOUBLE_WITHIN(tolerance, 0.0, covariance_difference(&found, &wanted, &prior));
-    for (uint32_t r = 0u; r < rows; r++) {
-        const double unit = sqrt(prior.at[r][r]) * (1.0 + fabs(wanted_mean.at[r][0]));
-        TEST_ASSERT_DOUBLE_WITHIN(tolerance * unit, wanted_mean.at[r][0], mean[r]);
-    }
-    for (uint32_t i = 0u; i < n; i++) {
-        TEST_ASSERT_TRUE(s[(i * n) + i] > 0.0f);
-        for (uint32_t j = i + 1u; j < n; j++) {
-            TEST_ASSERT_TRUE(s[(i * n) + j] == 0.0f);
-        }
-    }
-}
-
-static void test_conditioning_is_the_kalman_update_of_the_textbook(void)
-{
-    const double scales[] = {1.0e-18, 1.0e-3, 1.0, 10.0, 100.0};
-    for (uint32_t repeat = 0u; repeat < 60u * (uint32_t)REPEATS; repeat++) {
-        const uint32_t n = 1u + (repeat % (uint32_t)MOST_N);
-        const uint32_t rows = n + (repeat % 3u);
-        assert_is_the_textbook_update(n, rows, 1u + (repeat % 7u), scales[(repeat / 7u) % 5u]);
     }
 }
 
@@ -336,14 +243,11 @@ static void test_sigma_is_the_norm_of_the_row_up_to_the_diagonal(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_tria_of_rows_of_any_scale_has_their_covariance);
     RUN_TEST(test_tria_of_nearly_dependent_rows_keeps_what_is_different);
     RUN_TEST(test_tria_of_dependent_or_zero_rows_is_deficient_not_nan);
-    RUN_TEST(test_noise_adds_to_one_variance_and_the_rest_is_what_other_rows_lose);
     RUN_TEST(test_no_noise_changes_nothing_to_the_bit);
     RUN_TEST(test_noise_on_nothing_is_the_noise);
     RUN_TEST(test_tiny_noise_adds_up_or_leaves_the_rest_as_it_is);
-    RUN_TEST(test_conditioning_is_the_kalman_update_of_the_textbook);
     RUN_TEST(test_no_information_changes_nothing_to_the_bit);
     RUN_TEST(test_any_information_leaves_a_factor);
     RUN_TEST(test_a_precise_measurement_of_one_element_leaves_its_noise);

@@ -1,10 +1,12 @@
 /* Rounding, exponential, logarithm, sine and cosine against libm in double: the error bounds and domains that their
  * headers state. */
-#include "dense.h"
 #include "math/exponential.h"
 #include "math/rounding.h"
 #include "math/trigonometry.h"
+#include "random.h"
 #include "unity.h"
+
+#include <float.h>
 
 enum { GRID = 300000 };
 

@@ -141,37 +141,4 @@ static inline void plant_runge_kutta(plant_t *plant, double h, double z_ddot, do
     plant->theta_dot += h / 6.0 * (a1 + (2.0 * a2) + (2.0 * a3) + a4);
 }
 
-/* The plant linearised numerically at its trim: theta_ddot + damping theta_dot + stiffness theta = forcing z_ddot.
- * Stiffness [1/s^2], damping [1/s], forcing [1/m]. */
-static inline double plant_stiffness(const plant_t *plant)
-{
-    const double h = 1.0e-5;
-    const double above = plant_acceleration(plant, plant->trim + h, 0.0, 0.0, 0.0);
-    const double below = plant_acceleration(plant, plant->trim - h, 0.0, 0.0, 0.0);
-    return (below - above) / (2.0 * h);
-}
-
-static inline double plant_damping(const plant_t *plant)
-{
-    return plant_acceleration(plant, plant->trim, 0.0, 0.0, 0.0) -
-           plant_acceleration(plant, plant->trim, 1.0, 0.0, 0.0);
-}
-
-static inline double plant_forcing(const plant_t *plant)
-{
-    return plant_acceleration(plant, plant->trim, 0.0, 1.0, 0.0) -
-           plant_acceleration(plant, plant->trim, 0.0, 0.0, 0.0);
-}
-
-/* Natural frequency [Hz], and damping ratio. */
-static inline double plant_natural_frequency(const plant_t *plant)
-{
-    return sqrt(plant_stiffness(plant)) / 6.283185307179586;
-}
-
-static inline double plant_damping_ratio(const plant_t *plant)
-{
-    return plant_damping(plant) / (2.0 * sqrt(plant_stiffness(plant)));
-}
-
 #endif

@@ -3,7 +3,7 @@
 #ifndef UNIT_MODEL_SIMULATION_H
 #define UNIT_MODEL_SIMULATION_H
 
-#include "../math/dense.h"
+#include "../math/random.h"
 #include "plant.h"
 
 enum { SIMULATION_SUBSTEPS = 4 };

@@ -1,0 +1,103 @@
+"""The linters and how each is called. A check returns its findings as text, which is empty where there are none."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = ROOT / "firmware"
+PYTHON_FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
+
+MISRA = (FIRMWARE / "MISRA.md").read_text(encoding="utf-8")
+NOT_APPLIED = {f"misra-c2012-{rule}" for rule in re.findall(r"^\| (\d+\.\d+) \|", MISRA, re.MULTILINE)}
+DEVIATIONS: dict[str, str] = dict(re.findall(r"^\| (D\d+) \| (\d+\.\d+) \|", MISRA, re.MULTILINE))
+"""Number and rule of each."""
+MISRA_FINDING = re.compile(r"^\S+?:\d+: \S+ (?P<rule>misra-[\w.-]+|unmatchedSuppression)$", re.MULTILINE)
+
+
+def _run(tool: str, *arguments: str | Path, environment: dict[str, str] | None = None) -> tuple[bool, str]:
+    """Whether a tool of the virtual environment exits with 0, and what it says."""
+    command = [str(Path(sys.executable).with_name(tool)), *map(str, arguments)]
+    result = subprocess.run(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, env=environment
+    )
+    return result.returncode == 0, result.stdout
+
+
+def _said(passed: bool, output: str) -> str:
+    return "" if passed else output or "it failed without a word\n"
+
+
+def layout(*files: str | Path) -> str:
+    """C files are laid out as .clang-format says."""
+    return _said(*_run("clang-format", "--dry-run", "--Werror", f"--style=file:{ROOT}/.clang-format", *files))
+
+
+def tidy(database: str | Path, file: str | Path, *options: str) -> str:
+    """A C file of a compilation database is clean under .clang-tidy."""
+    configuration = f"--config-file={ROOT}/.clang-tidy"
+    return _said(*_run("clang-tidy", "--quiet", configuration, "-p", database, *options, file))
+
+
+def tidy_cross(database: str | Path, file: str | Path) -> str:
+    """The same of a file for the microcontroller: clang speaks for its processor, and reads the C library of gcc."""
+    gcc = ["arm-none-eabi-gcc", "-print-sysroot"]
+    sysroot = subprocess.run(gcc, capture_output=True, text=True, check=True).stdout.strip()
+    headers = (f"{sysroot}/include/newlib", f"{sysroot}/include", "/usr/include/newlib")
+    options = ("--target=thumbv7em-none-eabihf", *(f"-isystem{folder}" for folder in headers))
+    return tidy(database, file, *(f"--extra-arg={option}" for option in options))
+
+
+def misra(*files: str | Path) -> str:
+    """C files keep to MISRA C:2012, by cppcheck's add-on, but for what firmware/MISRA.md names.
+
+    That says which advisory rules are not applied, and numbers each deviation from the others. A deviation is
+    suppressed on the line where it is, with its number. cppcheck's exit status says nothing reliable, so its output is
+    read.
+    """
+    options = ("--addon=misra", "--std=c99", "--quiet", "--inline-suppr", "--enable=style,information")
+    template = "--template={file}:{line}: {severity} {id}"
+    with tempfile.TemporaryDirectory() as scratch:  # otherwise its dumps are written beside the sources
+        _, output = _run("cppcheck", *options, f"--cppcheck-build-dir={scratch}", template, "-I", FIRMWARE, *files)
+    found = [match[0] for match in MISRA_FINDING.finditer(output) if match["rule"] not in NOT_APPLIED]
+    return "\n".join(["fix, or suppress as firmware/MISRA.md says:", *found, ""]) if found else ""
+
+
+def python() -> str:
+    """The Python files are laid out by ruff, and clean under its checks."""
+    return _said(*_run("ruff", "format", "--check", "--diff", *PYTHON_FOLDERS)) + _said(
+        *_run("ruff", "check", *PYTHON_FOLDERS)
+    )
+
+
+def types(build_dir: str | Path) -> str:
+    """The Python files are fully typed; the packages under the names by which they are imported, as in the wheel."""
+    if sys.version_info < (3, 11):
+        return "the numpy for Python 3.10 declares other types\n" if os.environ.get("LEVER_REQUIRE_ALL") == "1" else ""
+    package = Path(build_dir) / "package_tree/lever_cdkf"
+    package.mkdir(parents=True, exist_ok=True)
+    for part in ("host_tools", "sil", "api/lever_cdkf/__init__.py"):
+        link = package / Path(part).name
+        link.unlink(missing_ok=True)
+        link.symlink_to(ROOT / part)
+    options = (f"--config-file={ROOT}/pyproject.toml", f"--cache-dir={build_dir}/mypy", "--explicit-package-bases")
+    environment = {"MYPYPATH": f"{package.parent}:{ROOT / 'tests'}"}
+    return _said(*_run("mypy", *options, package.parent, "firmware", "tests", environment=environment))
+
+
+def suppressed(texts: Iterable[str]) -> tuple[dict[str, str], int]:
+    """Number and rule of the MISRA deviations that C texts suppress, and how many suppressions have no number."""
+    numbered = re.compile(r"cppcheck-suppress\s+misra-c2012-(?P<rule>\d+\.\d+)\s*;\s*(?P<number>D\d+)\s*\*/")
+    found: dict[str, str] = {}
+    without = 0
+    for text in texts:
+        matches = list(numbered.finditer(text))
+        found |= {match["number"]: match["rule"] for match in matches}
+        without += text.count("cppcheck-suppress") - len(matches)
+    return found, without

@@ -1,0 +1,50 @@
+"""The linters find what they are there to find, and look at every file that they should."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from lint import checks
+
+
+def test_a_file_in_another_layout_is_found(tmp_path: Path) -> None:
+    seeded = tmp_path / "seeded.c"
+    seeded.write_text("int  seeded( void ) {return 1;}\n")
+    assert "clang-format-violations" in checks.layout(seeded)
+
+
+def test_clang_tidy_finds_a_seeded_violation(tmp_path: Path) -> None:
+    seeded = tmp_path / "seeded.c"
+    declared = "#include <stdlib.h>\nint seeded(const char *text);\n"
+    seeded.write_text(declared + "int seeded(const char *text)\n{\n    return atoi(text);\n}\n")
+    entry = {"directory": str(tmp_path), "file": str(seeded), "arguments": ["cc", "-std=c99", "-c", str(seeded)]}
+    (tmp_path / "compile_commands.json").write_text(json.dumps([entry]))
+    assert "cert-err34-c" in checks.tidy(tmp_path, seeded)
+
+
+def test_seeded_violations_of_misra_are_found(tmp_path: Path) -> None:
+    seeded = tmp_path / "seeded.c"
+    seeded.write_text(
+        "#include <stdint.h>\n"
+        "extern uint32_t seeded(uint32_t x);\n"
+        "uint32_t seeded(uint32_t x)\n"
+        "{\n"
+        "    uint32_t y = 010;\n"
+        "    if (x > 1u)\n"
+        "        y = seeded(x - 1u);\n"
+        "    return y;\n"
+        "}\n"
+    )
+    findings = checks.misra(seeded)
+    assert all(f"misra-c2012-{rule}\n" in findings for rule in ("7.1", "15.6", "17.2"))
+
+
+def test_every_deviation_from_misra_is_documented_and_used() -> None:
+    files = (file for suffix in "ch" for file in checks.FIRMWARE.rglob(f"*.{suffix}"))
+    assert checks.suppressed(file.read_text(encoding="utf-8") for file in files) == (checks.DEVIATIONS, 0)
+
+
+def test_every_folder_of_python_files_is_looked_at() -> None:
+    top = {path.relative_to(checks.ROOT).parts[0] for path in checks.ROOT.glob("[!.]*/**/*.py")}
+    assert top - {"build"} <= set(checks.PYTHON_FOLDERS)
