@@ -31,12 +31,12 @@ float hands_predict(
 void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts)
 {
     hands->elapsed += period;
-    hands->dull = hands->dull || !counts;
+    hands->idle = hands->idle || !counts;
     hands->ended = 0.0f;
     if (hands->elapsed > BLOCK) {
         const float change = theta_dot - hands->begin;
         const float residual = change - (hands->impulse / constants->inertia);
-        if (!hands->dull) {
+        if (!hands->idle) {
             const float share = share_of(hands->elapsed, MEMORY);
             hands->change += share * ((change * change) - hands->change);
             hands->residual += share * ((residual * residual) - hands->residual);
@@ -44,12 +44,12 @@ void hands_step(hands_t *hands, const model_constants_t *constants, float theta_
         }
         hands->of_hand = residual * constants->inertia;
         hands->driven = hands->drive;
-        hands->counted = !hands->dull;
+        hands->counted = !hands->idle;
         hands->ended = hands->elapsed;
         hands->begin = theta_dot;
         hands->impulse = 0.0f;
         hands->drive = 0.0f;
         hands->elapsed = 0.0f;
-        hands->dull = false;
+        hands->idle = false;
     }
 }

@@ -22,7 +22,7 @@ typedef struct hands {
     float of_hand;  /* what the lever alone does not explain of it: the hand's impulse [N m s] */
     float driven;   /* drive of that block */
     bool counted;   /* there was motion enough in all of it */
-    bool dull;      /* there was not motion enough in all of this one */
+    bool idle;      /* there was not motion enough in all of this one */
     bool off;       /* the verdict */
 } hands_t;
 

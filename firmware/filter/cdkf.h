@@ -59,15 +59,9 @@ typedef struct considered {
 } considered_t;
 
 /* The last is no calibration error but a constant acceleration from one moment on, which is estimated for a while. */
-enum considered_error {
-    CDKF_BASE_GAIN,
-    CDKF_BASE_DELAY,
-    CDKF_TORQUE_GAIN,
-    CDKF_FRICTION,
-    CDKF_STEP,
-    CDKF_CONSIDERED,
-    CDKF_CALIBRATION = CDKF_STEP
-};
+enum considered_error { CDKF_BASE_GAIN, CDKF_BASE_DELAY, CDKF_TORQUE_GAIN, CDKF_FRICTION, CDKF_STEP, CDKF_CONSIDERED };
+
+enum { CDKF_CALIBRATION = CDKF_STEP };
 
 /* What samples say of w in coordinates of the columns of S_ww. */
 typedef struct information {

@@ -76,6 +76,7 @@ class Learning:
         self.ceiling = self.floor * settings["walk_ceiling"] ** 2
         self.greatest_sigma = scale.sigma
         self.bounds = scale.scaled(bounds)
+        self.growth = 0.0  # [1/s]
         self._start_walk()
         self.disturbance = 0.0  # process noise of θ̇ besides [rad/s/√s]
         self.trust = seconds(0.0)  # part of the information that counts [1], counted like time
@@ -215,7 +216,7 @@ class Learning:
     def _start_walk(self) -> None:
         self.walk = (self.ceiling if self.adaptation == "annealing" else self.floor).copy()  # q [1/s]
         self.drift: Array = np.zeros(3)  # leaky sum of corrections
-        self.growth = self._growth(excited=True)  # [1/s]
+        self.growth = self._growth(excited=True)
 
     def _growth(self, excited: bool) -> float:
         """Forgetting: the covariance grows by 1/λ = 1 + growth dt."""
