@@ -151,4 +151,5 @@ def _simulated(batch: Sequence[Job], tick: Tick) -> Iterator[tuple[Job, Recordin
         own = slice(first, first + len(job.seeds))
         first = own.stop
         signals = (theta[:, own], theta_dot[:, own], part.tau_m, part.z_ddot)
-        yield job, Recording(job.group.motion.time, *signals, truth(part))
+        force = plant.grip_force(part, *signals[:2])
+        yield job, Recording(job.group.motion.time, *signals, truth(part), grip_force=force)

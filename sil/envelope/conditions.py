@@ -234,6 +234,46 @@ _CALIBRATION = (
 )
 
 
+_CALIBRATED = {"z_ddot_gain_sigma": 2e-3, "z_ddot_delay_sigma": 5e-5, "lever_friction_sigma": 5e-3}
+
+
+def _gripped(
+    name: str, title: str, gain: float, limits: tuple[Limit, ...], unless: tuple[Limit, ...] = ()
+) -> Condition:
+    """With base motion alone, a calibrated accelerometer, and a sensor of the grip force."""
+    return Condition(
+        name,
+        title,
+        replace(_NO_DITHER, duration=120.0),
+        limits,
+        sensors=Sensors(z_ddot_gain_sigma=2e-3, grip_gain=gain, grip_gain_sigma=0.02),
+        settings={**_CALIBRATED, "grip_force_noise": 0.5},
+        start=60.0,
+        also=_OF_PARAMETERS,
+        against="grip_none",
+    )
+
+
+_GRIP_FORCE = (
+    Condition(
+        "grip_none",
+        "no dither, accelerometer calibrated to 0.2 %, no force sensor",
+        replace(_NO_DITHER, duration=120.0),
+        sensors=Sensors(z_ddot_gain_sigma=2e-3),
+        settings=_CALIBRATED,
+        start=60.0,
+        also=_OF_PARAMETERS,
+    ),
+    _gripped(
+        "grip_force",
+        "the same with a sensor of the grip force, gain 2 %",
+        1.0,
+        (_most("σ(k_p) ratio", 0.5), _least("k_p covered", 90.0)),
+    ),
+    _gripped("grip_gain_wrong", "the same, its gain 50 % wrong", 1.5, (_most("k_p ratio", 1.0),)),
+)
+
+
 def _pilot(name: str, title: str, dither: float) -> Condition:
     """A pilot whose arm is not the lever model's."""
     limits = (_most("θ/z̈ rms", 10.0), _least("θ/z̈ covered", 85.0))
@@ -266,5 +306,8 @@ _PILOTS = (
     _reported(_pilot("reflex", "arm with a stretch reflex after 35 ms", 0.3)),
 )
 
-CONDITIONS = {row.name: row for row in (*_STEADY, *_MOVEMENT, *_TORQUES, *_OUTAGES, *_FAULTS, *_CALIBRATION, *_PILOTS)}
+CONDITIONS = {
+    row.name: row
+    for row in (*_STEADY, *_MOVEMENT, *_TORQUES, *_OUTAGES, *_FAULTS, *_CALIBRATION, *_GRIP_FORCE, *_PILOTS)
+}
 """All by name, in the order of the table."""

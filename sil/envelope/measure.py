@@ -181,6 +181,13 @@ def _relative_sigma(outcome: Outcome) -> FloatArray:
     return mean
 
 
+def _mean_sigma(quantity: str, outcome: Outcome) -> Values:
+    """Stated standard deviation, relative, mean over time."""
+    relative = outcome.track.sigma[quantity] / outcome.track.value[quantity]
+    mean: Values = relative[outcome.judged].mean(axis=0)
+    return mean
+
+
 def _sigma_ratio(outcome: Outcome) -> Values:
     widest: Values = _against(_relative_sigma, outcome).max(axis=-1)
     return widest
@@ -247,6 +254,9 @@ def _figures() -> dict[str, Figure]:
             "%", f"share of time with the true {name} within ±2σ", partial(_covered, name), _mean, False
         )
         found[f"{name} largest"] = Figure("σ", f"largest error of {name}", partial(_largest, name), _max)
+        found[f"σ({name}) ratio"] = Figure(
+            "1", f"σ of {name} ÷ that of the reference", partial(_against, partial(_mean_sigma, name)), _mean
+        )
         found[f"{name} ratio"] = Figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
     return found | {
         "flagged": Figure("%", "share of time with a fault that forbids trust", partial(_share, FLAGS), _mean),

@@ -83,6 +83,8 @@ class Recording:
     """f_n [Hz], zeta [1], m_p [kg], c_p [N s/m], k_p [N/m]; nothing for pilots that have no such parameters."""
     response: NDArray[np.complex128] | None = None
     """theta/z_ddot at FREQUENCIES, (runs, frequencies), where it stays the same."""
+    grip_force: FloatArray | None = None
+    """Of the hand on the lever, mean since the last sample [N]; None where it is not known."""
 
 
 def stream(what: str, seed: int) -> np.random.Generator:

@@ -140,6 +140,25 @@ class Plant:
         return acceleration
 
 
+def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatArray:
+    """What the arm does to the lever, mean since the last sample [N]; of its weight, which the rest angle balances,
+    nothing. Process noise and disturbance act on the lever."""
+
+    def since(values: FloatArray) -> FloatArray:
+        earlier = np.concatenate((values[:1], values[:-1])) if len(values) > 1 else values
+        middle: FloatArray = 0.5 * (values + earlier)
+        return middle
+
+    length, angle, rate, trim = lanes.hardware.length, since(theta), since(theta_dot), since(lanes.trim)
+    acceleration = np.diff(theta_dot, axis=0, prepend=theta_dot[:1]) / lanes.period
+    inertial = lanes.m_p * (length * acceleration + since(lanes.z_ddot) * np.cos(angle))
+    spring = length * lanes.k_p * (np.sin(angle) - np.sin(trim))
+    spring = spring - lanes.hardware.stiffness * (trim - lanes.trim[0]) / (length * np.cos(trim))
+    damper = length * lanes.c_p * np.cos(angle) * rate
+    force: FloatArray = -inertial - np.cos(angle) * (spring + damper)
+    return force
+
+
 def run(lanes: Lanes, tick: Callable[[], None] = lambda: None) -> tuple[FloatArray, FloatArray]:
     """theta [rad] and theta_dot [rad/s] of every lane at every sample; `tick` is called now and then."""
     plant = Plant(lanes)

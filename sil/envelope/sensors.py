@@ -12,6 +12,8 @@ from .motions import PERIOD, Recording, columns, stream
 
 NOISE: Mapping[str, float] = {"theta": 1e-3, "theta_dot": 1e-2, "tau_m": 2e-3, "z_ddot": 0.01}
 """Standard deviation of a sample [rad, rad/s, N m, m/s^2], as in sil/plants/sensors.py."""
+GRIP_NOISE, GRIP_BIAS = 0.3, 2.0
+"""Of the force sensor [N]."""
 SPIKE = 0.3
 """[rad]"""
 
@@ -42,11 +44,14 @@ class Sensors:
     z_ddot_gain_sigma: float = 0.0
     z_ddot_delay_sigma: float = 0.0
     tau_m_gain_sigma: float = 0.0
+    grip_gain: float | None = None
+    """Of the sensor of the grip force; None: there is none."""
+    grip_gain_sigma: float = 0.0
     faults: tuple[Fault, ...] = ()
 
 
 def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> dict[str, FloatArray]:
-    """The four signals, (samples, runs)."""
+    """The signals that there are sensors of, (samples, runs)."""
 
     def drawn(mean: float, sigma: float, what: str) -> FloatArray:
         values: FloatArray = mean + sigma * columns(what, seeds, 1)[0]
@@ -64,6 +69,10 @@ def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> di
         true: FloatArray = getattr(recording, what)
         late = _delayed(true, delay) if what == "z_ddot" and delay.any() else true
         signals[what] = gain[what] * late + noise * columns(f"noise of {what}", seeds, len(true))
+    if sensors.grip_gain is not None and recording.grip_force is not None:
+        noise = GRIP_NOISE * columns("noise of grip_force", seeds, len(recording.time))
+        gains = drawn(sensors.grip_gain, sensors.grip_gain_sigma, "grip gain")
+        signals["grip_force"] = gains * recording.grip_force + GRIP_BIAS + noise
     for fault in sensors.faults:
         _spoil(signals[fault.what], fault, recording.time, seeds)
     return signals
