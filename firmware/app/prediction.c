@@ -5,6 +5,7 @@
 
 #define MISSING 10.0f     /* process noise for a base acceleration that is missing, in those that are set, */
 #define WRONG 3.0f        /* and for a wrong one, so that it is noticed when it is right again */
+#define UNSETTLED 4.0f    /* innovations while levels settle, in squares: as much larger as they may be */
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
 #define RATE_MOST 1.0e4f  /* [rad/s] */
 #define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
@@ -114,7 +115,8 @@ static void follow_base(estimator_t *estimator, bool valid, float elapsed)
 static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elapsed)
 {
     const float average = estimator->averages.innovation;
-    const float level = (average > 1.0f) ? average : 1.0f;
+    const float least = (estimator->trim.unsettled > 0.0f) ? UNSETTLED : 1.0f;
+    const float level = (average > least) ? average : least;
     monitor_t *monitor = &estimator->learning.monitor;
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
         const float y = sample->y[i] - (estimator->trim.origin[i] + estimator->trim.ahead[i]);

@@ -33,6 +33,7 @@ UNKNOWN = 10.0  # process noise for an unknown base acceleration, in those that 
 SPIKE = 8.0  # standard deviations
 SURPRISE_TIME = 0.1  # [s] of the shorter average of normalised innovations
 SURPRISE_MOST = 100.0  # of a single sample
+UNSETTLED = 4.0  # innovations while levels settle, in squares: as much larger as they may be
 SPIKE_TIME = 0.02  # [s] longer than this it is no spike
 STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
 CONSIDERED = ("z_ddot_gain", "z_ddot_delay", "tau_m_gain", "lever_friction")
@@ -188,7 +189,8 @@ class Estimator:
         """Outputs far from what is expected, until they have been for SPIKE_TIME. After an outage nothing is."""
         noise = self.learning.noise.output_noise
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
-        expected = np.maximum(max(self.average_nis, 1.0) * (state**2 + noise**2), noise**2)
+        least = UNSETTLED if self.unsettled > 0.0 else 1.0
+        expected = np.maximum(max(self.average_nis, least) * (state**2 + noise**2), noise**2)
         known = valid & (np.array(self.missing) <= OUTAGE)
         far = known & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
         for i in np.flatnonzero(known):

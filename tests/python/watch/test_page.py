@@ -74,7 +74,7 @@ def test_a_session(desktop: Browser, start_lever: Start, tmp_path: Path) -> None
     assert 500 < float(value) < 5000
     assert re.fullmatch(r"± \d+", sigma)
     assert (unit, truth) == ("N/m", "(2100)")  # steady.toml
-    desktop.wait("document.querySelectorAll('#messages tr').length == 15")
+    desktop.wait("document.querySelectorAll('#messages tr').length == 16")
     desktop.wait("Array.from(document.querySelectorAll('#messages td'), e => Number(e.textContent)).some(n => n > 900)")
     for canvas in ("#magnitude", "#phase", "#coherence", "#magnitude-map", "#bands canvas", "#health canvas"):
         assert drawn(desktop, canvas) > 20, canvas

@@ -9,12 +9,12 @@ from lever_cdkf.host_tools.can import codec
 from target.bxcan.board import Board
 from target.bxcan.frame import Frame
 
-LEVER_SAMPLE, BASE_SAMPLE, COMMAND, STATE_ESTIMATE, HEALTH, PLATFORM_HEALTH = (
+LEVER_SAMPLE, BASE_SAMPLE, GRIP_SAMPLE, COMMAND, STATE_ESTIMATE, HEALTH, PLATFORM_HEALTH = (
     codec.message(name).frame_id
-    for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND", "STATE_ESTIMATE", "HEALTH", "PLATFORM_HEALTH")
+    for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND", "STATE_ESTIMATE", "HEALTH", "PLATFORM_HEALTH")
 )
 IDENTITY = 0x217
-INPUTS = {LEVER_SAMPLE, BASE_SAMPLE, COMMAND, IDENTITY}
+INPUTS = {LEVER_SAMPLE, BASE_SAMPLE, GRIP_SAMPLE, COMMAND, IDENTITY}
 _encode_lever, _encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
 
 

@@ -157,7 +157,7 @@ def test_filters_pass_our_identifiers_and_nothing_else(board: Board) -> None:
 
 
 def test_foreign_frames_never_reach_software(talk: Talk, board: Board) -> None:
-    foreign = [Frame(each, bytes(8)) for each in (0x10F, 0x112, 0x121, 0x210, 0x7FF, 0)]
+    foreign = [Frame(each, bytes(8)) for each in (0x10F, 0x113, 0x121, 0x210, 0x7FF, 0)]
     foreign += [Frame(each, remote=True, dlc=8) for each in INPUTS]
     foreign += [Frame(each << 18, bytes(8), extended=True) for each in INPUTS]
     foreign += [Frame(each, bytes(8), extended=True) for each in INPUTS]

@@ -23,7 +23,7 @@ URGENT = Frame(0x010, b"\x55" * 8)
         ("steady", ["duration=3 s"]),
         ("steady", ["duration=1 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
         ("linear_black_box", ["duration=1 s", "estimator.estimator=joint"]),
-        ("linear_physical", ["duration=1 s"]),
+        ("linear_physical", ["duration=1 s", "settings={}"]),  # the image has its own
     ],
 )
 def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
