@@ -74,8 +74,10 @@ void considered_correct_by(considered_t considered[CDKF_CONSIDERED], uint32_t co
             for (uint32_t i = 0u; i < L; i++) {
                 of->cross[i] += row[i] * share;
             }
-            of->vector += nu * share;
-            of->information += share * share;
+            if (c != (uint32_t)CDKF_BASE_GAIN) { /* whether the base is wrong must not depend on the force */
+                of->vector += nu * share;
+                of->information += share * share;
+            }
         }
     }
 }

@@ -33,6 +33,7 @@ TORQUE = {"lever": 0.3, "linear_physical": 1.6, "linear_black_box": 0.0, "hand":
 UNADAPTED = {"change_threshold": 0.0, "noise_window": 0.0, "caution_time": 0.0}  # as the augmented filter is
 CALIBRATED = (("z_ddot_gain", 1.05), ("z_ddot_delay", 2e-3), ("tau_m_gain", 0.9), ("lever_friction", 0.1))
 QUIET = (("theta_noise", 2e-4), ("theta_dot_noise", 2e-3))  # a fifth of what it is
+FORCE = (("grip_force_noise", 0.5),)
 PRELOADED = {"arm_preload_angle": 0.4, "lever_preload_angle": 0.36}
 EVERY = 7  # samples from one comparison to the next: all phases of a block of samples
 
@@ -141,8 +142,8 @@ CASES = (
     *(Case(estimator=e, adaptation=a) for e, a in (("dual", "annealing"), ("joint", "forgetting"))),
     Case(adaptation="robbins_monro", seconds=10.0, block=20, flags=("change",)),
     Case(estimator="joint", adaptation="robbins_monro", seconds=10.0, settings=CALIBRATED),
-    Case(seconds=10.0, force=True),
-    Case(estimator="joint", preload="fixed", seconds=10.0, force=True),
+    Case(seconds=10.0, force=True, settings=FORCE),
+    Case(estimator="joint", preload="fixed", seconds=10.0, force=True, settings=FORCE),
     Case(model="hand", force=True),
     Case(adaptation="robbins_monro", seconds=10.0, settings=QUIET, flags=("change", "innovation")),
 )
@@ -188,11 +189,12 @@ def test_float_agrees_with_double(case: Case) -> None:
 def test_a_grip_force_is_used_when_it_agrees_and_changes_nothing_when_it_does_not() -> None:
     samples = recorded("lever", "trim", 10.0)
     without = {name: values for name, values in samples.items() if name != "grip_force"}
-    expected, right = run_samples(Config(), without), run_samples(Config(), samples)
+    config = Config(settings={"grip_force_noise": 0.5})
+    expected, right = run_samples(Config(), without), run_samples(config, samples)
     assert right["natural_frequency_sigma"][-1] < 0.9 * expected["natural_frequency_sigma"][-1]
     calibration = next(bit for bit, name in enum_names("lever_fault").items() if name == "calibration")
     for wrong in (1.5 * samples["grip_force"], -samples["grip_force"], 0.0 * samples["grip_force"]):
-        got = run_samples(Config(), samples | {"grip_force": wrong})
+        got = run_samples(config, samples | {"grip_force": wrong})
         assert got["faults"][-1] & calibration
         for name in ("theta", "parameter", "parameter_sigma", "natural_frequency"):
             np.testing.assert_array_equal(got[name], expected[name])
