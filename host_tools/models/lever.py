@@ -1,4 +1,4 @@
-"""The lever and arm of DESIGN section 3, for many sigma points at once.
+"""The lever and arm of firmware/THEORY.md, for many sigma points at once.
 
     M(m_p) θ̈ + (c_p l² cos²θ + c_l) θ̇ + g l μ cosθ + l² k_p (sinθ - sinθ_arm) cosθ + k_l (θ - θ_lever)
         = -l μ cosθ z̈ + τ_m,            M = l²(η² m_l + m_p) + J_l,    μ = η m_l + m_p

@@ -19,7 +19,7 @@ def transfer(model: str, lever: Lever, parameters: Array, trim: Array) -> Transf
 
 
 def _of_lever(lever: Lever, parameters: Array, trim: Array) -> Transfer:
-    """About the trim the lever of DESIGN section 3 is M θ̈ + D θ̇ + K θ = -l μ cos(trim) z̈.
+    """About the trim the lever of firmware/THEORY.md is M θ̈ + D θ̇ + K θ = -l μ cos(trim) z̈.
 
     Where the trunk gives way by s on its seat, s̈ + 2 ζ ω ṡ + ω² s = -z̈, the arm adds l cos(trim) (c_p ṡ + k_p s).
     """

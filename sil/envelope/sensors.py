@@ -70,9 +70,9 @@ def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> di
         late = _delayed(true, delay) if what == "z_ddot" and delay.any() else true
         signals[what] = gain[what] * late + noise * columns(f"noise of {what}", seeds, len(true))
     if sensors.grip_gain is not None and recording.grip_force is not None:
-        noise = GRIP_NOISE * columns("noise of grip_force", seeds, len(recording.time))
+        errors = GRIP_BIAS + GRIP_NOISE * columns("noise of grip_force", seeds, len(recording.time))
         gains = drawn(sensors.grip_gain, sensors.grip_gain_sigma, "grip gain")
-        signals["grip_force"] = gains * recording.grip_force + GRIP_BIAS + noise
+        signals["grip_force"] = gains * recording.grip_force + errors
     for fault in sensors.faults:
         _spoil(signals[fault.what], fault, recording.time, seeds)
     return signals

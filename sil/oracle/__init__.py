@@ -1,8 +1,8 @@
 """A float64 oracle for the firmware's estimator, written from the equations and not from the C.
 
-It does what the firmware does (DESIGN sections 3 and 4) the plain way: full sigma-point sets, every matrix a numpy
-array, LAPACK's QR for every factor. It shares no code and no shortcut with the firmware, so where both agree both are
-probably right. It is also the readable version of the estimator:
+It does what the firmware does (firmware/THEORY.md, sections 1 and 2) the plain way: full sigma-point sets, every matrix
+a numpy array, LAPACK's QR for every factor. It shares no code and no shortcut with the firmware, so where both agree
+both are probably right. It is also the readable version of the estimator:
 
 - `cdkf`             the square-root Central Difference Kalman Filter for any model: draw, predict, measure, update;
 - `lever` `linear`   the models: the step of the motion, natural frequency and damping ratio;

@@ -4,7 +4,7 @@
       + l^2 k_p (sin theta - sin theta_a) cos theta + k_l (theta - theta_l) = -l mu cos theta z_ddot + tau_m + tau_d
     M = l^2 (eta^2 m_l + m_p) + J_l,  mu = eta m_l + m_p
 
-(DESIGN section 3; tests/python/plants/test_lever_plant derives it from the energies.) T_f: Coulomb friction;
+(firmware/THEORY.md; tests/python/plants/test_lever_plant derives it from the energies.) T_f: Coulomb friction;
 tau_d a disturbance. Preload fixed: theta_a and theta_l are given. Preload trim: theta_l = theta_0 and sin theta_a =
 sin theta_0 + g mu / (k_p l), theta_0 a trajectory, so that the lever always rests at theta_0. Weight has no part in the
 motion then, so nothing falls when the hand lets go (m_p = c_p = k_p = 0): a balance carries the lever, and its own

@@ -99,7 +99,7 @@ class HandsOff:
 
 @dataclass(frozen=True, kw_only=True)
 class LeverPilot(ArmPilot):
-    """The arm of DESIGN section 3 on the lever."""
+    """The arm of firmware/THEORY.md on the lever."""
 
     model = "lever"
     about = "a rigid lever with the arm as mass, damper and spring at its end"
@@ -202,7 +202,7 @@ class HystereticPilot(Pilot):
 
 @dataclass(frozen=True, kw_only=True)
 class ReflexPilot(ArmPilot):
-    """The arm of DESIGN section 3, and a stretch reflex."""
+    """The arm of firmware/THEORY.md, and a stretch reflex."""
 
     model = "reflex"
     about = "an arm with a stretch reflex, which pulls against the motion a few hundredths of a second late"

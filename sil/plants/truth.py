@@ -1,6 +1,6 @@
 """What every truth has: a pilot with his lever as a run needs them, and how they move from sample to sample.
 
-One module each: plant.py (the lever of DESIGN section 3), linear_plant.py, two_dof_plant.py, mayo_plant.py,
+One module each: plant.py (the lever of firmware/THEORY.md), linear_plant.py, two_dof_plant.py, mayo_plant.py,
 hysteretic_plant.py, reflex_plant.py.
 """
 

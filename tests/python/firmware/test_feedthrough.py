@@ -15,7 +15,7 @@ DRAWS = 40_000
 
 
 def responses(model: str, p: NDArray[np.float64], trim: float, frequency: float) -> ComplexArray:
-    """θ/z̈ [rad/(m/s²)] of each row of parameters, from the equations of DESIGN section 3 with its working values."""
+    """θ/z̈ [rad/(m/s²)] of each row of parameters, from the equations of firmware/THEORY.md with its working values."""
     s = 2j * math.pi * frequency
     first, second, third = p.T
     if model == "linear_physical":

@@ -155,7 +155,7 @@ def test_square_root_form_equals_the_form_on_covariances() -> None:
 
 
 def acceleration(lever: Lever, p: Array, state: Array, u: tuple[float, float], trim: float) -> float:
-    """θ̈ from the equation of DESIGN section 3, written out."""
+    """θ̈ from the equation of firmware/THEORY.md, written out."""
     (theta, rate), (m_p, c_p, k_p), (z_ddot, tau_m), g = state, p, u, 9.80665
     length = lever.length
     mu = lever.mass_position * lever.mass + m_p

@@ -172,7 +172,7 @@ def test_a_jump_is_drawn_where_it_is_and_marked(page: Reader) -> None:
 
 
 def test_maps_and_slices_are_the_response_of_the_parameters(page: Reader, result: Result) -> None:
-    """Against the transfer function by scipy, from the columns of the trace and DESIGN section 3."""
+    """Against the transfer function by scipy, from the columns of the trace and firmware/THEORY.md."""
     signal = pytest.importorskip("scipy.signal")
     s = result.summary.estimator.settings
     heat = figures(page)["figure-map-truth"]["data"][0]

@@ -207,7 +207,7 @@ def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable
 
 
 def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(load: Callable[..., Scenario]) -> None:
-    """The pilot tightens his c_p at 4 s; against M, D, K and the forcing of DESIGN section 3 worked out here."""
+    """The pilot tightens his c_p at 4 s; against M, D, K and the forcing of firmware/THEORY.md worked out here."""
     scenario = load(TEXT, "estimator.model=linear_physical", "limits={}")
     recording = loop.Recording(scenario, loop.prepare(scenario))
     told = summary.build(recording, perfect(recording)).truth

@@ -243,7 +243,7 @@ def test_dynamics_are_as_uncertain_as_a_cloud_of_parameters() -> None:
 
 
 def test_a_known_torque_makes_the_scale_known() -> None:
-    """Base motion alone leaves the common scale of m_p, c_p, k_p open (DESIGN section 3), and frequency known."""
+    """Base motion alone leaves the common scale of m_p, c_p, k_p open (firmware/THEORY.md), and frequency known."""
     at = np.array([9999])
     shares = {}
     for dither in (0.0, 0.3):

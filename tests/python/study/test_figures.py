@@ -158,7 +158,7 @@ def test_names_are_put_in_order_and_unknown_ones_refused() -> None:
 
 
 def lever_terms(p: Array) -> tuple[float, float, float, float]:
-    """Inertia, damping, stiffness and forcing of the lever of DESIGN section 3 about where p holds it."""
+    """Inertia, damping, stiffness and forcing of the lever of firmware/THEORY.md about where p holds it."""
     s, g = DEFAULTS, 9.80665
     m_p, c_p, k_p = p.tolist()
     length, moment = s["lever_length"], s["lever_mass_position"] * s["lever_mass"] + m_p

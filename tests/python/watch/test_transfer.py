@@ -17,7 +17,7 @@ SENT = [Feedthrough(f, complex(math.nan), 0.01 * f, 0.002 * f) for f in range(2,
 
 
 def lever_response(frequency: float, m_p: float, c_p: float, k_p: float, trim: float) -> complex:
-    """DESIGN section 3 linearised by hand, with the working values of the lever [rad/(m/s²)]."""
+    """firmware/THEORY.md linearised by hand, with the working values of the lever [rad/(m/s²)]."""
     length, mass, place, inertia, c_l, k_l, g = 0.45, 1.2, 0.5, 0.020, 0.5, 5.0, 9.80665
     moment = place * mass + m_p
     s = 2j * math.pi * frequency

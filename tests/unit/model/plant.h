@@ -1,4 +1,4 @@
-/* The lever and the pilot's arm in double precision: the truth of the tests. The equation of DESIGN section 3
+/* The lever and the pilot's arm in double precision: the truth of the tests. The equation of firmware/THEORY.md
  * as it stands, gravity and preload spelt out, integrated by Runge and Kutta's fourth-order rule; or a linear
  * system instead. */
 #ifndef UNIT_MODEL_PLANT_H
@@ -40,7 +40,7 @@ typedef struct plant {
     double z_dot;               /* of the base [m/s] */
 } plant_t;
 
-/* The working values of DESIGN section 3, at rest at 20 degrees. */
+/* The working values of firmware/THEORY.md, at rest at 20 degrees. */
 static inline plant_t plant_typical(void)
 {
     const plant_t plant = {.length = 0.45,
