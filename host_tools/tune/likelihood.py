@@ -37,7 +37,7 @@ class Likelihood:
 
     def __post_init__(self) -> None:
         """Raises LeverError for a recording that is too short."""
-        duration = self.recording.duration
+        duration = self.recording.duration + self.recording.period  # n samples last n periods
         if duration < SHORTEST:
             raise LeverError(f"too short to tune on: {duration:.1f} s of samples; at least {SHORTEST:.0f} s are needed")
         time, begin = self.recording.time, min(START, START_SHARE * duration)

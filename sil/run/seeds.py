@@ -141,9 +141,8 @@ def verdict(summaries: Sequence[SimulationSummary]) -> str:
     if not covered:
         return "Too short to judge: the runs end before the estimates were to have converged."
     least = min(covered, key=lambda key: covered[key])
-    told.append(
-        f"Over all runs ±2σ covers every truth for at least {covered[least]:.0f} % of the time (least: {least})."
-    )
+    percent = math.floor(covered[least] + 1e-9)
+    told.append(f"Over all runs ±2σ covers every truth for at least {percent} % of the time (least: {least}).")
     tested = [summary.whiteness.white for summary in summaries if summary.whiteness is not None]
     if tested:
         told.append(f"Residuals of {sum(tested)} of {len(tested)} runs pass the test for whiteness. {CANNOT_SEE}")

@@ -262,7 +262,7 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
     if not covered:
         return ""
     worst = min(covered, key=lambda name: covered[name])
-    percent = f"{100.0 * covered[worst]:.0f} % of the time"
+    percent = f"{math.floor(100.0 * covered[worst] + 1e-9)} % of the time"  # "at least" is not rounded up
     if covered[worst] >= LEAST_COVERAGE:
         return f"In this run ±2σ covers every truth for at least {percent}."
     return f"In this run the stated σ of {_words(worst)} is too small: ±2σ covers the truth for {percent}."
