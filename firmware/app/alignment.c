@@ -52,6 +52,7 @@ void alignment_begin_grip(estimator_t *estimator, const checked_t *sample)
 {
     static const float origin[MODEL_STATES] = {0.0f, 0.0f};
     cdkf_t *cdkf = &estimator->cdkf;
+    const bool rigid = (estimator->setup.constants.seat_stiffness <= 0.0f);
     const float x[MODEL_STATES] = {
         sample->valid[0] ? sample->y[0] : cdkf->x[0], sample->valid[1] ? sample->y[1] : cdkf->x[1]};
     trim_begin(&estimator->trim, x);
@@ -59,8 +60,7 @@ void alignment_begin_grip(estimator_t *estimator, const checked_t *sample)
     cdkf_begin_step(cdkf);
     estimator->z_ddot = 0.0f;
     estimator->tau_m = 0.0f;
-    if (estimator->setup.constants.seat_stiffness <=
-        0.0f) { /* the velocity of the base until now acts as a step, too */
+    if (rigid) { /* the velocity of the base until now acts as a step, too */
         estimator->base_motion.seat_dot = 0.0f;
     }
 }

@@ -25,14 +25,10 @@ static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, cons
         grip->seen = true;
         grip->missing = 0.0f;
         if (starts) {
-            trim_start_input(trim, 3u, grip->raw);
+            trim_start_input(trim, TRIM_GRIP_FORCE, grip->raw);
             grip->settling = trim->deviations ? trim->settling_time : 0.0f;
-            grip->compared = 0.0f;
             grip->right = false;
-            grip->measured = 0.0f;
-            grip->expected = 0.0f;
-            grip->drive_square = 0.0f;
-            grip->difference_square = 0.0f;
+            (void)memset(&grip->means, 0, sizeof grip->means);
         }
     } else {
         grip->missing += period;
@@ -73,7 +69,7 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
     receive(grip, setup, trim, force, period);
     const bool known = (force != NULL) && grip->right && !grip->wrong;
     if (grip->seen) {
-        const float now = trim_input(trim, 3u, grip->raw, period);
+        const float now = trim_input(trim, TRIM_GRIP_FORCE, grip->raw, period);
         grip->impulse += (period * setup->constants.length) * now;
         grip->square += share_of(period, MEMORY) * ((now * now) - grip->square);
         grip->settling -= (grip->settling > 0.0f) ? period : 0.0f;
@@ -88,19 +84,19 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
  * torque that nobody knows moves lever and force differently. */
 static void compare(grip_force_t *grip, const lever_settings_t *s, const hands_t *hands)
 {
-    const float period = hands->ended;
-    grip->compared += (grip->compared < MEMORY) ? period : 0.0f;
-    const float share = period / grip->compared; /* a mean first, and then one with exponential forgetting */
+    grip_comparison_t *means = &grip->means;
+    means->time += (means->time < MEMORY) ? hands->ended : 0.0f;
+    const float share = hands->ended / means->time; /* a mean first, and then one with exponential forgetting */
     const float difference = grip->impulse - hands->of_hand;
-    grip->measured += share * ((grip->impulse * hands->driven) - grip->measured);
-    grip->expected += share * ((hands->of_hand * hands->driven) - grip->expected);
-    grip->drive_square += share * ((hands->driven * hands->driven) - grip->drive_square);
-    grip->difference_square += share * ((difference * difference) - grip->difference_square);
-    const float limit = ((2.0f * s->grip_force_gain_sigma) + TOLERATED) * fabsf(grip->expected);
-    const float off = fabsf(grip->measured - grip->expected);
-    const float sure = SURE * sqrtf(grip->drive_square * (grip->difference_square * share));
+    means->measured += share * ((grip->impulse * hands->driven) - means->measured);
+    means->expected += share * ((hands->of_hand * hands->driven) - means->expected);
+    means->drive_square += share * ((hands->driven * hands->driven) - means->drive_square);
+    means->difference_square += share * ((difference * difference) - means->difference_square);
+    const float limit = ((2.0f * s->grip_force_gain_sigma) + TOLERATED) * fabsf(means->expected);
+    const float off = fabsf(means->measured - means->expected);
+    const float sure = SURE * sqrtf(means->drive_square * (means->difference_square * share));
     grip->right = ((off + sure) < limit);
-    grip->wrong = grip->wrong || ((off > (limit + sure)) && (grip->compared > LEAST));
+    grip->wrong = grip->wrong || ((off > (limit + sure)) && (means->time > LEAST));
 }
 
 bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands)

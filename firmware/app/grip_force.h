@@ -16,20 +16,26 @@
 
 #include <stdbool.h>
 
+/* Means over blocks (hands.h), of the hand's impulse times the drive: what the force sensor and what the lever's motion
+ * say of it. Their ratio is the sensor's gain error. */
+typedef struct grip_comparison {
+    float measured;
+    float expected;
+    float difference_square; /* of both impulses, and of the drive: how certain that is */
+    float drive_square;
+    float time; /* compared so far, up to the memory of the means [s] */
+} grip_comparison_t;
+
 typedef struct grip_force {
     float raw;      /* the last valid one, compensated for gain and bias [N] */
     float missing;  /* time since then [s] */
     float settling; /* time until its slow part is known [s] */
     float square;   /* mean square of the same without its slow part [N^2] */
     float impulse;  /* of the force since the beginning of the block of hands_t [N m s] */
-    float measured; /* mean product of that and the block's drive (hands.h), */
-    float expected; /* and of what the lever's motion says of the hand: the ratio is the sensor's gain error */
-    float drive_square;
-    float difference_square; /* of the latter two, and of the drive: how certain that is */
-    float compared;          /* time for which both have been compared, up to the memory of the means [s] */
-    bool seen;               /* a force has come */
-    bool right;              /* its gain is certain to be what the settings say, about */
-    bool wrong;              /* its gain is not what the settings say; until a reset */
+    grip_comparison_t means;
+    bool seen;  /* a force has come */
+    bool right; /* its gain is certain to be what the settings say, about */
+    bool wrong; /* its gain is not what the settings say; until a reset */
 } grip_force_t;
 
 void grip_force_start(grip_force_t *grip);

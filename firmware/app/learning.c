@@ -147,7 +147,8 @@ static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *c
     }
 }
 
-/* What the block says against sensors, settings and model, before it is learnt; the score of a step. Returns true when it teaches. */
+/* What the block says against sensors, settings and model, before it is learnt, and of a step. Returns true when it
+ * teaches. */
 static bool judge(
     learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float period, score_t *step)
 {

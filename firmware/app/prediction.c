@@ -40,9 +40,9 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     const setup_t *setup = &estimator->setup;
     const lever_settings_t *s = setup->settings;
     const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
-    const float stop = trim_input(trim, 2u, friction(trim->origin[1] + cdkf->x[1]), period);
-    const float next_z_ddot = trim_input(trim, 0u, z_ddot, period);
-    const float next_tau_m = trim_input(trim, 1u, tau_m, period) - (s->lever_friction * stop);
+    const float stop = trim_input(trim, TRIM_FRICTION, friction(trim->origin[1] + cdkf->x[1]), period);
+    const float next_z_ddot = trim_input(trim, TRIM_Z_DDOT, z_ddot, period);
+    const float next_tau_m = trim_input(trim, TRIM_TAU_M, tau_m, period) - (s->lever_friction * stop);
     float error[CDKF_CONSIDERED];
     cdkf_grip_t grip;
     trim_set_origin(trim);
@@ -65,7 +65,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     considered_errors(estimator, next_z_ddot, stop, error);
     error[CDKF_STEP] = 0.0f;
     if (cdkf->acting > (uint32_t)CDKF_STEP) {
-        error[CDKF_STEP] = trim_input(trim, 4u, 1.0f, period);
+        error[CDKF_STEP] = trim_input(trim, TRIM_STEP, 1.0f, period);
         cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
     }
     const bool gripped =

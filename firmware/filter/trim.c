@@ -65,10 +65,10 @@ void trim_begin(trim_t *trim, const float x[MODEL_STATES])
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         begin(&trim->output[i], trim->origin[i] + trim->ahead[i] + x[i]);
     }
-    for (uint32_t i = 0u; i < ((uint32_t)TRIM_INPUTS - 1u); i++) {
+    for (uint32_t i = 0u; i < (uint32_t)TRIM_STEP; i++) {
         begin(&trim->input[i], level_of(&trim->input[i]));
     }
-    begin(&trim->input[TRIM_INPUTS - 1], 0.0f);
+    begin(&trim->input[TRIM_STEP], 0.0f);
     trim->begin_rate = trim->output[1].section[0].level;
     (void)memset(trim->ahead, 0, sizeof trim->ahead);
     trim_set_origin(trim);
@@ -88,16 +88,14 @@ static float pass(const trim_t *trim, level_t *level, float value, float period)
     return trim->deviations ? deviation : value;
 }
 
-float trim_input(trim_t *trim, uint32_t i, float value, float period)
+float trim_input(trim_t *trim, enum trim_signal input, float value, float period)
 {
-    return pass(trim, &trim->input[i], value, period);
+    return pass(trim, &trim->input[input], value, period);
 }
 
-void trim_start_input(trim_t *trim, uint32_t i, float value)
+void trim_start_input(trim_t *trim, enum trim_signal input, float value)
 {
-    level_t *level = &trim->input[i];
-    (void)memset(level, 0, sizeof *level);
-    level->section[0].level = value;
+    begin(&trim->input[input], value);
 }
 
 bool trim_is_waiting(const trim_t *trim, uint32_t i)

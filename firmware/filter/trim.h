@@ -42,7 +42,16 @@ float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t 
 
 #define TRIM_OUTAGE 0.0205f /* a signal missing for longer is out [s]; not a whole number of periods */
 
-enum { TRIM_INPUTS = 5, TRIM_SECTIONS = 3 };
+enum { TRIM_SECTIONS = 3 };
+
+enum trim_signal {
+    TRIM_Z_DDOT,
+    TRIM_TAU_M,
+    TRIM_FRICTION,   /* of a newton metre */
+    TRIM_GRIP_FORCE, /* [N] */
+    TRIM_STEP,       /* of 1, when levels are begun anew */
+    TRIM_INPUTS
+};
 
 /* A signal's slow part. */
 typedef struct level {
@@ -51,7 +60,7 @@ typedef struct level {
 
 typedef struct trim {
     level_t output[MODEL_STATES]; /* theta, whose level is the trim angle [rad], and theta_dot */
-    level_t input[TRIM_INPUTS];   /* z_ddot, tau_m, friction of a newton metre, grip force, a step of 1 */
+    level_t input[TRIM_INPUTS];   /* of enum trim_signal */
     float origin[MODEL_STATES];   /* of the state: the levels in preload trim, otherwise 0 */
     float begin_rate;             /* theta_dot when the levels were begun anew last [rad/s] */
     float missing[MODEL_STATES];  /* time since the last sample of each output [s] */
@@ -73,11 +82,11 @@ void trim_begin(trim_t *trim, const float x[MODEL_STATES]);
 /* The trim angle [rad]. */
 float trim_angle(const trim_t *trim);
 
-/* Input i (0 z_ddot, 1 tau_m, 2 friction, 3 grip force, 4 step) after `period` seconds: its deviation in preload trim. */
-float trim_input(trim_t *trim, uint32_t i, float value, float period);
+/* An input after `period` seconds: its deviation in preload trim. */
+float trim_input(trim_t *trim, enum trim_signal input, float value, float period);
 
-/* Input i starts at a level that is `value`. */
-void trim_start_input(trim_t *trim, uint32_t i, float value);
+/* An input starts at a level that is `value`. */
+void trim_start_input(trim_t *trim, enum trim_signal input, float value);
 
 /* Sets the origin of the state to the levels: before a prediction. */
 void trim_set_origin(trim_t *trim);

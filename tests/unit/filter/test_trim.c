@@ -50,8 +50,8 @@ static void pass_all(float signal, float deviation[4])
     TEST_ASSERT_FALSE(trim_outputs(&trim, x, y, valid, PERIOD));
     deviation[0] = y[0];
     deviation[1] = y[1];
-    deviation[2] = trim_input(&trim, 0u, signal, PERIOD);
-    deviation[3] = trim_input(&trim, 1u, signal, PERIOD);
+    deviation[2] = trim_input(&trim, TRIM_Z_DDOT, signal, PERIOD);
+    deviation[3] = trim_input(&trim, TRIM_TAU_M, signal, PERIOD);
 }
 
 /* Outputs and inputs of a linear system obey it after the same high-pass, too: all four must pass the same. */
@@ -77,7 +77,7 @@ static void test_in_preload_fixed_signals_stay_and_only_the_trim_angle_follows(v
     for (uint32_t k = 0u; k < 5000u; k++) {
         float y[MODEL_STATES] = {0.5f, 0.25f};
         (void)trim_outputs(&trim, x, y, valid, PERIOD);
-        TEST_ASSERT_TRUE((y[0] == 0.5f) && (y[1] == 0.25f) && (trim_input(&trim, 0u, 3.0f, PERIOD) == 3.0f));
+        TEST_ASSERT_TRUE((y[0] == 0.5f) && (y[1] == 0.25f) && (trim_input(&trim, TRIM_Z_DDOT, 3.0f, PERIOD) == 3.0f));
     }
     trim_set_origin(&trim);
     TEST_ASSERT_TRUE((trim.origin[0] == 0.0f) && (trim.origin[1] == 0.0f));
