@@ -174,14 +174,7 @@ def _against(compute: Callable[[Outcome], Values], outcome: Outcome) -> Values:
     return ratio
 
 
-def _relative_sigma(outcome: Outcome) -> FloatArray:
-    """Stated standard deviations of the three parameters, relative, mean over time (runs, 3)."""
-    relative = outcome.track.parameters("sigma") / outcome.track.parameters("value")
-    mean: FloatArray = relative[outcome.judged].mean(axis=0)
-    return mean
-
-
-def _mean_sigma(quantity: str, outcome: Outcome) -> Values:
+def _relative_sigma(quantity: str, outcome: Outcome) -> Values:
     """Stated standard deviation, relative, mean over time."""
     relative = outcome.track.sigma[quantity] / outcome.track.value[quantity]
     mean: Values = relative[outcome.judged].mean(axis=0)
@@ -189,7 +182,8 @@ def _mean_sigma(quantity: str, outcome: Outcome) -> Values:
 
 
 def _sigma_ratio(outcome: Outcome) -> Values:
-    widest: Values = _against(_relative_sigma, outcome).max(axis=-1)
+    ratios = [_against(partial(_relative_sigma, name), outcome) for name in PARAMETERS]
+    widest: Values = np.max(ratios, axis=0)
     return widest
 
 
@@ -255,7 +249,7 @@ def _figures() -> dict[str, Figure]:
         )
         found[f"{name} largest"] = Figure("σ", f"largest error of {name}", partial(_largest, name), _max)
         found[f"σ({name}) ratio"] = Figure(
-            "1", f"σ of {name} ÷ that of the reference", partial(_against, partial(_mean_sigma, name)), _mean
+            "1", f"σ of {name} ÷ that of the reference", partial(_against, partial(_relative_sigma, name)), _mean
         )
         found[f"{name} ratio"] = Figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
     return found | {

@@ -17,16 +17,14 @@ from numpy.typing import NDArray
 
 from . import cdkf
 from .belief import STEP, Augmented, Belief, Force, TwoStage
-from .grip import Grip
+from .grip import OUTAGE, SETTLING, Grip
 from .learning import ADAPTATIONS, STEP_SIGMA, Learning, Lesson, counted, seconds
 from .scale import Scale
 
 ESTIMATORS = ("dual", "joint", "augmented")
-OUTAGE = 0.0205  # [s] an output missing for longer is out
 MOST_SUBSTEPS = 12  # predictions through a gap
 MOST_STEPS = 24  # of a level, when an output is back
 LEVEL_NOISE = 22.2  # noise bandwidth of a level, in corners
-SETTLING = 0.9  # [1] time that levels need, in periods of the corner
 MOTION_TIME = 0.1  # [s] of the shorter average of motion
 VELOCITY_KEPT = 0.99998  # of the base's, in a step
 UNKNOWN = 10.0  # process noise for an unknown base acceleration, in those that are set

@@ -23,7 +23,7 @@ LEAST = 2.0  # [s] of comparison before the force is wrong
 TOLERATED = 0.2  # [1] what the lever's own equation may be off
 SURE = 2.0  # standard deviations of the comparison
 WALK_LEAST = 1e-3  # [1/√s]
-OUTAGE = 0.0205  # [s]
+OUTAGE = 0.0205  # [s] a signal missing for longer is out
 SETTLING = 0.9  # [1] time that a level needs, in periods of the corner
 
 
@@ -67,7 +67,7 @@ class Grip:
         self.rest, weight = (0.0, 0.0) if self.detrended else (lever.lever_preload_angle, GRAVITY)
         self.known = u[1] - self.first_moment * cosine * (u[0] + weight)  # torque on the lever
         self.drive += dt * self.known
-        self.alone += dt * (self.known - lever.damping * x[1] - lever.stiffness * (x[0] - self.rest))
+        self.alone += dt * (self.known - float(self._own(x)))
         self._receive(measured, dt)
         if self.level is None:
             return None
@@ -82,9 +82,13 @@ class Grip:
 
     def expected(self, before: Array, after: Array, dt: float) -> Array:
         """The forces (N,) of states (2, N) before and after the step."""
-        own = self.lever.damping * before[1] + self.lever.stiffness * (before[0] - self.rest)
-        needed: Array = self.inertia * (after[1] - before[1]) / dt + own - self.known
+        needed: Array = self.inertia * (after[1] - before[1]) / dt + self._own(before) - self.known
         return needed / self.lever.length
+
+    def _own(self, x: Array) -> Array:
+        """Torque of the lever's own damper and spring [N m]."""
+        torque: Array = self.lever.damping * x[1] + self.lever.stiffness * (x[0] - self.rest)
+        return torque
 
     def _receive(self, measured: float | None, dt: float) -> None:
         if measured is None:

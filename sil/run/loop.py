@@ -96,13 +96,12 @@ class Recording:
     def frames(self) -> Frames:
         """All frames, with the time of their sample."""
         identifier = np.array(self.identifier, dtype=np.uint16)
-        outgoing = [codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")]
         period_us = round(self.scenario.period * 1e6)
         return Frames(
             np.array(self.sample, dtype=np.int64) * period_us,
             identifier,
             np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8),
-            ~np.isin(identifier, outgoing),
+            np.isin(identifier, list(_from_estimator())),
         )
 
 
@@ -189,8 +188,7 @@ class _Link:
         self._motor_time = codec.raw_field("MOTOR_COMMAND", "time_low")
         self._estimate_time = codec.raw_field("STATE_ESTIMATE", "time_low")
         self._unanswered_in_a_row = 0
-        incoming = [message for message in codec.database().messages if message.senders == ["ESTIMATOR"]]
-        self._incoming = frozenset(message.frame_id for message in incoming)
+        self._incoming = _from_estimator()
 
     def sender(self, name: str) -> Callable[[int, bytes], None]:
         """A function that sends a frame of the message `name`: called with the sample and the 8 bytes."""
@@ -294,6 +292,12 @@ class _Link:
             )
 
 
+def _from_estimator() -> frozenset[int]:
+    """Identifiers of what an estimator sends."""
+    messages = codec.database().messages
+    return frozenset(message.frame_id for message in messages if message.senders == ["ESTIMATOR"])
+
+
 def _signed_field(name: str, signal: str) -> Callable[[bytes | bytearray], float]:
     """A fast reader of one signed, scaled field of an 8-byte frame, which is always available."""
     layout = codec.message(name).get_signal_by_name(signal)
@@ -310,7 +314,7 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
     encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    thetas, theta_dots, torques = recording.theta, recording.theta_dot, recording.tau_m
+    thetas, theta_dots, torques, forces = recording.theta, recording.theta_dot, recording.tau_m, recording.grip_force
     measure = [_reader_of(recording, name) for name in ("theta", "theta_dot", "tau_m")]
     send_grip = _grip_sender(recording, link)
     no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
@@ -322,9 +326,9 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
         thetas.append(body.theta)
         theta_dots.append(body.theta_dot)
         torques.append(body.tau_m)
+        forces.append(body.grip_force)
         if sample in commands:
             link.command(sample, commands[sample])
-        recording.grip_force.append(body.grip_force)
         if not no_lever[sample]:
             send_lever(sample, encode_lever(sample, *(read(sample) for read in measure)))
         if send_grip is not None:
