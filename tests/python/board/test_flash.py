@@ -190,8 +190,9 @@ def test_probe_is_checked(probe: str, image: Path, capsys: pytest.CaptureFixture
 
 @pytest.mark.usefixtures("stand_in")
 def test_without_a_tool_it_says_how_to_get_one(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert 'apt install openocd, or pip install "lever-cdkf[flash]"' in error_of(capsys, str(image))
-    assert "no pyocd here" in error_of(capsys, str(image), "--tool", "pyocd")
+    install = f'apt install openocd, or {sys.executable} -m pip install "lever-cdkf[flash]"'
+    assert install in error_of(capsys, str(image))
+    assert "no pyocd is installed" in error_of(capsys, str(image), "--tool", "pyocd")
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ def test_a_log_that_is_there_is_not_written_over(tmp_path: Path, capsys: pytest.
     for name in ("a.log", "a.log.partial"):
         (tmp_path / name).write_text("precious")
         assert record(tmp_path / "a.log", 0.2) == 2
-        assert f"{name} is there already" in capsys.readouterr().err
+        assert f"{name} exists already" in capsys.readouterr().err
         assert (tmp_path / name).read_text() == "precious"
         (tmp_path / name).unlink()
 
@@ -158,7 +158,7 @@ def test_a_bus_on_which_nobody_else_is_is_refused(
 ) -> None:
     monkeypatch.undo()
     assert cli.main(["record", "--interface", interface, "--channel", "x", "-o", str(tmp_path / "a.log")]) == 2
-    assert f"lever: error: interface {interface} is inside one process, " in capsys.readouterr().err
+    assert f"lever: error: interface {interface} stays inside one process, " in capsys.readouterr().err
     assert os.listdir(tmp_path) == []
 
 

@@ -94,7 +94,7 @@ def test_a_missing_extra(without: Without, extra: str, arguments: str, tmp_path:
     done = without(extra)(*LEVER, *arguments.split())
     assert (done.returncode, done.stdout) == (2, "")
     names = " and ".join(PACKAGES[extra])
-    assert done.stderr == f'lever: error: this needs {names}: pip install "lever-cdkf[{extra}]"\n'
+    assert done.stderr == f'lever: error: this needs {names}: {sys.executable} -m pip install "lever-cdkf[{extra}]"\n'
 
 
 def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path) -> None:
@@ -112,8 +112,9 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
         assert (done.returncode, done.stderr) == (0, "")
     (tmp_path / "sim").mkdir()
     (tmp_path / "sim/report.html").touch()
-    report = 'lever: warning: no report.html: this needs plotly: pip install "lever-cdkf[report]"\n'
-    mf4 = 'lever: warning: no signals.mf4: this needs asammdf: pip install "lever-cdkf[mf4]"\n'
+    pip = f"{sys.executable} -m pip"
+    report = f'lever: warning: no report.html: this needs plotly: {pip} install "lever-cdkf[report]"\n'
+    mf4 = f'lever: warning: no signals.mf4: this needs asammdf: {pip} install "lever-cdkf[mf4]"\n'
     for name in ("unknown_torque", "steady"):
         done = lever("sim", name, "--set", "duration=3 s", "--set", "limits={}", "--out", "sim")
         assert (done.returncode, done.stderr) == (0, report)

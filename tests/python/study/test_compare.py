@@ -246,8 +246,8 @@ def test_winner_and_who_may_be_as_good() -> None:
 @pytest.mark.parametrize(
     ("probability", "said"),
     [
-        (0.001, "Ours is not best: joint has 20 % larger errors (15 to 25 %)."),
-        (0.3, "Ours is not best, but that may be chance: joint has 20 % larger errors (15 to 25 %)."),
+        (0.001, "The firmware is not best: joint has 20 % larger errors (15 to 25 %)."),
+        (0.3, "The firmware is not best, but that may be chance: joint has 20 % larger errors (15 to 25 %)."),
     ],
 )
 def test_says_so_when_ours_is_not_best(probability: float, said: str) -> None:
@@ -258,8 +258,8 @@ def test_says_so_when_ours_is_not_best(probability: float, said: str) -> None:
 def test_who_broke_down_is_not_ranked() -> None:
     said = verdicts.verdict([row("joint", 0.12), row("lms", 0.01, failures=2)], {}, {})
     assert said.startswith("Smallest errors: joint")
-    assert said.endswith("Broke down, and so not ranked: lms in 2 of 20 runs.")
-    assert verdicts.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("Nobody did all runs.")
+    assert said.endswith("Diverged, and so not ranked: lms in 2 of 20 runs.")
+    assert verdicts.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("No estimator completed all runs.")
 
 
 def test_seven_runs_are_too_few() -> None:

@@ -98,7 +98,7 @@ def test_what_is_off_or_kept_is_not_looked_for() -> None:
     ("low", "high", "after", "verdict"),
     [
         (0.5, 2.0, 1.0, "kept: not contradicted"),
-        (None, None, 1.0, "kept: the log does not tell"),
+        (None, None, 1.0, "kept: the log does not determine it"),
         (None, 2.0, 1.0, "kept: not contradicted"),
         (1.5, 4.0, 3.0, "too small"),
         (1.5, None, 3.0, "too small"),

@@ -85,7 +85,7 @@ def test_a_command_gets_the_channel_and_its_status_is_passed_on(slcan_image: Pat
 
 
 @QEMU
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 128 + signal.SIGTERM)])
 def test_it_ends_with_its_board(slcan_image: Path, number: signal.Signals, status: int) -> None:
     process = subprocess.Popen([LEVER, "qemu", str(slcan_image)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -110,7 +110,7 @@ def says(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 def test_no_qemu(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
-    expected = "lever: error: qemu-system-arm is not here: install it (Debian: apt install qemu-system-arm)\n"
+    expected = "lever: error: qemu-system-arm is not installed: install it (Debian: apt install qemu-system-arm)\n"
     assert says(capsys, "some.elf") == expected
 
 
