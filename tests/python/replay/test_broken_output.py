@@ -11,22 +11,24 @@ from pathlib import Path
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.replay.outputs import FILES
-from processes import LEVER, small_files
+from processes import LEVER, full_disk
 from python.conftest import Session
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of the file that cannot be closed
 @pytest.mark.parametrize("size", [10_000, 500_000, 1_000_000, 2_500_000], ids=lambda size: f"{size} bytes")
-def test_a_full_disk_is_one_line_and_no_file(size: int, session: Session, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert cli.main(["replay", str(session.log), "-o", str(out)]) == 0
-    before = {path.name: path.read_bytes() for path in out.iterdir()}
-    command = [LEVER, "replay", str(session.log), "-o", str(out), "--set", "m_p=3"]
-    done = subprocess.run(command, preexec_fn=small_files(size), capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr.startswith("lever: error: cannot write ")
-    assert done.stderr.count("\n") == 1, done.stderr
-    assert str(out) in done.stderr
-    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+def test_a_full_disk_is_one_line_and_no_file(
+    size: int, session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in FILES:
+        (tmp_path / name).write_text("of an earlier run")
+    with full_disk(size):
+        assert cli.main(["replay", str(session.log), "-o", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("lever: error: cannot write ")
+    assert error.count("\n") == 1
+    assert str(tmp_path) in error
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(FILES, "of an earlier run")
 
 
 def test_ctrl_c_leaves_nothing(session: Session, tmp_path: Path) -> None:
