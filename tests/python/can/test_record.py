@@ -10,6 +10,7 @@ import sys
 import time
 from collections import deque
 from pathlib import Path
+from typing import ClassVar
 
 import can
 import pytest
@@ -24,7 +25,7 @@ class Line(can.BusABC):
     """A bus on which `frames` come, and then Ctrl-C."""
 
     channel_info = "a bus in a test"
-    frames: deque[can.Message] = deque()
+    frames: ClassVar[deque[can.Message]] = deque()
 
     def __init__(self, channel: str) -> None:
         super().__init__(channel)
