@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from lever_cdkf.host_tools.report import picture
+from python.watch.conftest import PATIENCE
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-PATIENCE = 120.0
-"""[s] that a browser may take to start, or a page to become what is waited for."""
 _OPTIONS = [option for option in picture.OFFLINE if "virtual-time" not in option]
 
 
@@ -50,7 +49,7 @@ class Browser:
         finally:
             self._loop.close()
             self._process.terminate()
-            self._process.wait(timeout=10)
+            self._process.wait(PATIENCE)
             shutil.rmtree(self._profile, ignore_errors=True)
 
     async def _detach(self) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from lever_cdkf.host_tools.report import picture
 from python.watch.browser import Browser
+from python.watch.conftest import PATIENCE
 
 pytestmark = pytest.mark.requires("|".join(picture.BROWSERS))
 
@@ -31,7 +32,7 @@ def address(process: subprocess.Popen[str]) -> str:
 
 def end(process: subprocess.Popen[str]) -> None:
     process.send_signal(signal.SIGINT)
-    assert process.communicate(timeout=20)[1] == ""
+    assert process.communicate(timeout=PATIENCE)[1] == ""
 
 
 def estimates(browser: Browser) -> dict[str, list[str]]:

@@ -11,6 +11,7 @@ import socket
 import subprocess
 import threading
 from collections.abc import Awaitable, Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,7 +21,7 @@ from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.watch.server import Server
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.state import State, command_of
-from python.watch.conftest import Flight
+from python.watch.conftest import PATIENCE, Flight
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.websocket import websocket_connect
 
@@ -69,7 +70,7 @@ def on_server(flight: Flight) -> Callable[..., FlightSource]:
             stop = asyncio.Event()
             task = asyncio.create_task(server.run(stop))
             try:
-                await asyncio.wait_for(story(server), 30.0)
+                await asyncio.wait_for(story(server), PATIENCE)
             finally:
                 stop.set()
                 await task
@@ -298,7 +299,12 @@ def test_commands_reach_the_estimator(on_server: Callable[..., FlightSource]) ->
     on_server(story)
 
 
-def test_dither_is_kept_alive_as_long_as_a_page_is_open(on_server: Callable[..., FlightSource]) -> None:
+def test_dither_is_kept_alive_as_long_as_a_page_is_open(
+    on_server: Callable[..., FlightSource], flight: Flight, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = SimpleNamespace(monotonic=lambda: flight.sample * 1e-3)
+    monkeypatch.setattr("lever_cdkf.host_tools.watch.sources.time", clock)
+
     async def story(server: Server) -> None:
         async with Visitor(server) as visitor:
             await visitor.ask('{"dither_rms": 0.3}')
@@ -306,7 +312,6 @@ def test_dither_is_kept_alive_as_long_as_a_page_is_open(on_server: Callable[...,
                 await visitor.hear("update")
         while server.pages:
             await asyncio.sleep(0.05)
-        await asyncio.sleep(0.3)
 
     first, *kept, last = on_server(story).commanded
     assert (first, last) == ({"dither_rms": 0.3}, {"dither_rms": 0.0})
@@ -323,7 +328,7 @@ def test_a_full_bus_keeps_nobody_waiting_but_who_asked(on_server: Callable[..., 
 
         def transmit(identifier: int, data: bytes) -> None:
             full.clear()
-            assert room.wait(20.0)
+            assert room.wait(PATIENCE)
             send(identifier, data)
 
         server.source._transmit = transmit  # type: ignore[method-assign]
@@ -459,7 +464,7 @@ def test_ends_cleanly_when_interrupted(number: int, start_lever: Callable[..., s
         r"simulation of steady: open http://127\.0\.0\.1:\d+/ \(Ctrl-C ends\)\n", process.stdout.readline()
     )
     process.send_signal(number)
-    assert process.communicate(timeout=20) == ("", "")
+    assert process.communicate(timeout=PATIENCE) == ("", "")
     assert process.returncode == 130
 
 
