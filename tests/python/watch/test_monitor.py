@@ -62,7 +62,7 @@ def test_everything_fits_on_the_screen(size: tuple[int, int], flight: Flight) ->
         source = Fed()
         app = Monitor(source)
         async with app.run_test(size=size) as pilot:
-            fly(app, source, flight, 80)
+            fly(app, source, flight, 50)
             await pilot.pause()
             lines = screen(app)
         text = "\n".join(lines)
