@@ -18,7 +18,7 @@ from can.interfaces import BACKENDS
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can.recorder import Recorder
 from processes import full_disk
-from python.conftest import Session
+from python.conftest import Refused, Session
 
 
 class Line(can.BusABC):
@@ -145,18 +145,14 @@ def test_a_recording_ends_after_its_duration(
 
 
 @pytest.mark.parametrize("interface", ["lever", "virtual"])
-def test_a_bus_on_which_nobody_else_is_is_refused(
-    interface: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.main(["record", "--interface", interface, "--channel", "x", "-o", str(tmp_path / "a.log")]) == 2
-    assert f"lever: error: interface {interface} is inside one process, " in capsys.readouterr().err
+def test_a_bus_on_which_nobody_else_is_is_refused(interface: str, tmp_path: Path, refused: Refused) -> None:
+    line = refused("record", "--interface", interface, "--channel", "x", "-o", tmp_path / "a.log")
+    assert f"interface {interface} is inside one process, " in line
     assert os.listdir(tmp_path) == []
 
 
-def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["record", "--interface", "socketcan", "--channel", "can77", "-o", str(tmp_path / "a.log")]
-    assert cli.main(command) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, refused: Refused) -> None:
+    assert "can77" in refused("record", "--interface", "socketcan", "--channel", "can77", "-o", tmp_path / "a.log")
     assert os.listdir(tmp_path) == []
 
 

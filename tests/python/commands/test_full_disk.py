@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
 from processes import full_disk
+from python.conftest import Run
 
 COMPARE = ["compare", "--scenarios", "step_up", "--estimators", "joint_ekf", "--seeds", "1", "--duration", "2"]
 
@@ -21,18 +21,15 @@ COMPARE = ["compare", "--scenarios", "step_up", "--estimators", "joint_ekf", "--
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
-def test_all_files_or_none(
-    command: list[str], size: int, fits: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_files_or_none(command: list[str], size: int, fits: str, tmp_path: Path, refused: Refused) -> None:
     """`fits` would go in."""
     (tmp_path / fits).write_text("of an earlier run")
     with full_disk(size):
-        assert cli.main([*command, str(tmp_path)]) == 2
-    error = capsys.readouterr().err
+        status, _, error = lever(*command, tmp_path)
+    assert (status, error.count("\n")) == (2, 1)
     assert error.startswith(f"lever: error: cannot write {tmp_path}/")
-    assert error.count("\n") == 1
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(fits, "of an earlier run")]
-    assert cli.main([*command, str(tmp_path)]) == 0
+    assert lever(*command, tmp_path)[0] == 0
     assert 10 < (tmp_path / fits).stat().st_size <= size
     assert max(path.stat().st_size for path in tmp_path.iterdir()) > size
     assert not any(path.name.startswith(".") for path in tmp_path.iterdir())

@@ -18,7 +18,7 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.replay import reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
-from python.conftest import Session, simulated
+from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, read
 
 Summary = dict[str, Any]
@@ -268,12 +268,9 @@ def test_a_sender_that_never_counts_fails_and_is_told_why(
     assert "11998" in row
 
 
-def test_settings_that_the_firmware_refuses_are_one_line(
-    session: Session, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refused: Refused, tmp_path: Path) -> None:
     for bad in (["--set", "m_p=1000"], ["--model", "elastic"], ["--set", "k_q=1"], ["--settings", "absent"]):
-        assert cli.main(["replay", str(session.log), *bad, "-o", str(tmp_path / "out")]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+        assert refused("replay", session.log, *bad, "-o", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

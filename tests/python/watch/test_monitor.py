@@ -16,6 +16,7 @@ from lever_cdkf.host_tools.watch import panels
 from lever_cdkf.host_tools.watch.model import Frame
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.terminal import SPANS, TALL, Monitor
+from python.conftest import Refused
 from python.watch.conftest import LEVER, PATIENCE, Flight
 from rich.segment import Segment
 
@@ -194,13 +195,8 @@ def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
         (["--duration", "soon"], "'soon' is not a number of seconds above 0"),
     ],
 )
-def test_bad_input_is_one_line(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["monitor", *arguments]) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err.startswith("lever: error: ")
-    assert text in shown.err
-    assert shown.err.count("\n") == 1
+def test_bad_input_is_one_line(arguments: list[str], text: str, refused: Refused) -> None:
+    assert text in refused("monitor", *arguments)
 
 
 @pytest.mark.requires("tmux")

@@ -10,7 +10,7 @@ import signal
 import socket
 import subprocess
 import threading
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,6 +21,7 @@ from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.watch.server import Server
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.state import State, command_of
+from python.conftest import Refused
 from python.watch.conftest import PATIENCE, Flight
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.websocket import websocket_connect
@@ -427,17 +428,11 @@ def test_read_only_sends_nothing(on_server: Callable[..., FlightSource]) -> None
 # --- as a command ----------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def taken() -> Iterator[int]:
-    """A port that somebody else has."""
+def test_a_port_in_use_is_one_line(refused: Refused) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
-        yield other.getsockname()[1]
-
-
-def test_a_port_in_use_is_one_line(taken: int, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["live", "--scenario", "steady", "--port", str(taken)]) == 2
-    text = f"lever: error: port {taken} of 127.0.0.1 is in use: give another --port, or 0\n"
-    assert capsys.readouterr() == ("", text)
+        port = other.getsockname()[1]
+        line = refused("live", "--scenario", "steady", "--port", str(port))
+    assert line == f"lever: error: port {port} of 127.0.0.1 is in use: give another --port, or 0\n"
 
 
 @pytest.mark.parametrize(
@@ -449,11 +444,8 @@ def test_a_port_in_use_is_one_line(taken: int, capsys: pytest.CaptureFixture[str
         ([], "nothing to watch"),
     ],
 )
-def test_bad_input_is_one_line(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["live", *arguments]) == 2
-    shown = capsys.readouterr()
-    assert text in shown.err
-    assert shown.err.count("\n") == 1
+def test_bad_input_is_one_line(arguments: list[str], text: str, refused: Refused) -> None:
+    assert text in refused("live", *arguments)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
