@@ -21,7 +21,7 @@ COMPARE = ["compare", "--scenarios", "step_up", "--estimators", "joint_ekf", "--
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
-def test_all_files_or_none(command: list[str], size: int, fits: str, tmp_path: Path, refused: Refused) -> None:
+def test_all_files_or_none(command: list[str], size: int, fits: str, tmp_path: Path, lever: Run) -> None:
     """`fits` would go in."""
     (tmp_path / fits).write_text("of an earlier run")
     with full_disk(size):
