@@ -82,7 +82,8 @@ def test_all_that_is_kept_is_not_looked_for(wrong: Recording) -> None:
     [
         (1.03, 0.005, True, 1.03, 0.005),
         (1.03, 0.03, True, 1.0, 0.02),  # known better before
-        (1.20, 0.03, True, 1.20, 0.03),  # but contradicted
+        (1.10, 0.03, True, 1.0, 0.02),
+        (1.12, 0.03, True, 1.12, 0.03),  # but contradicted: by more than three of both standard deviations
         (1.03, 0.005, False, 1.0, 0.02),
     ],
 )
