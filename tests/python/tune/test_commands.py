@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.firmware.settings_file import make_config, read_assignments
 from lever_cdkf.host_tools.tune import calibration
 from python.conftest import Refused, Run
+from python.report.reading import figures, read, unpack
 from python.tune.conftest import NOISE, Simulate
 
 FEW = ("--keep", "m_p_walk", "--keep", "c_p_walk", "--keep", "k_p_walk", "--keep", "walk_ceiling", "--keep")
@@ -68,18 +70,41 @@ def test_calibration_goes_into_the_settings_file(tuned: Path) -> None:
 
 
 def test_the_page_holds_the_same(tuned: Path) -> None:
-    page = (tuned / "tune.html").read_text()
-    for text in (
+    page = read(tuned / "tune.html")
+    text = "".join(page.text)
+    for words in (
         "Lever CDKF: settings from a log",
-        "theta_dot_process_noise",
         "What the log says",
         "held out",
         "From the dither (± one standard deviation): z_ddot_gain",
-        "<td>lever_friction</td>",
     ):
-        assert text in page
-    for figure in ("intervals", "sizes", "correlation"):
-        assert f'id="{figure}"' in page
+        assert words in text
+    assert {"theta_dot_process_noise", "lever_friction"} <= {row[0] for table in page.tables for row in table}
+    drawn = figures(page)
+    assert list(drawn) == ["intervals", "sizes", "correlation"]
+    rows = json.loads((tuned / "tune.json").read_text())["settings"][::-1]
+    intervals: dict[str, list[dict[str, Any]]] = {"not contradicted": [], "before": [], "after": []}
+    for trace in drawn["intervals"]["data"]:
+        intervals[trace["name"]].append(trace)
+    for lane, (row, bar, before, after) in enumerate(zip(rows, *intervals.values(), strict=True)):
+        assert unpack(before["x"]) == 1.0
+        assert unpack(after["x"]) == pytest.approx(row["after"] / row["before"], rel=1e-4)
+        ends = [end and end / row["before"] for end in (row["95 % from"], row["to"])]
+        assert all(
+            end is None or end == pytest.approx(x, rel=1e-4) for end, x in zip(ends, unpack(bar["x"]), strict=True)
+        )
+        assert {*unpack(bar["y"]), *unpack(before["y"]), *unpack(after["y"])} == {lane}
+    held = {row["noise"]: row for row in json.loads((tuned / "tune.json").read_text())["before and after"][::-1]}[
+        "as set"
+    ]
+    sizes = {name: [t for t in drawn["sizes"]["data"] if t["name"] == name] for name in ("before", "after")}
+    for name, (theta, theta_dot) in sizes.items():
+        assert unpack(theta["x"])[:3] == pytest.approx([0.5, 1.5, 2.5])
+        mean = np.mean([np.square(unpack(curve["y"])) for curve in (theta, theta_dot)])
+        assert mean == pytest.approx(held[f"NIS {name}"], rel=0.02)
+    correlation = [trace for trace in drawn["correlation"]["data"] if trace["name"] == "after"]
+    assert unpack(correlation[0]["x"]) == pytest.approx(0.02 * np.arange(1, 26))
+    assert np.abs(unpack(correlation[0]["y"])).max() == pytest.approx(abs(held["corr. after"]), abs=1e-3)
 
 
 def test_sim_and_the_process_take_the_file(tuned: Path, lever: Run, build_dir: Path, tmp_path: Path) -> None:

@@ -69,6 +69,7 @@ def test_a_session(desktop: Browser, start_lever: Start) -> None:
     url = address(process)
     desktop.open(url)
     desktop.wait(f"{CONDITION}.startsWith('run')")
+    desktop.wait("document.querySelector('#estimates td').nextElementSibling.textContent != '–'")
     shown = estimates(desktop)
     assert list(shown) == ["mp mass", "cp damping", "kp stiffness", "fn natural frequency", "ζ damping ratio"]
     value, sigma, unit, truth = shown["kp stiffness"]

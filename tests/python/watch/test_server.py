@@ -267,12 +267,14 @@ def test_a_page_that_does_not_read_piles_nothing_up(on_server: Callable[..., Fli
             while not server.pages:
                 await asyncio.sleep(0.01)
             (page,) = server.pages
-            sent, tell = [], page.tell
+            sent, let_go, tell = [], [], page.tell
             page.tell = lambda message: (sent.append(message), tell(message))[1]  # type: ignore[method-assign, func-returns-value]
-            for _ in range(200):
+            page.close = lambda *why: let_go.append(why)  # type: ignore[method-assign]
+            while not let_go:
                 page.update(["x" * 100_000])
                 await asyncio.sleep(0)
-            assert 1 <= len(sent) < 100  # what the kernel's buffers take, and no more
+            assert let_go[0] == (1013, "too slow")
+            assert 1 <= len(sent) < 200  # what the kernel's buffers take, and no more
 
     on_server(story)
 
