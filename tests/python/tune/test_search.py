@@ -94,6 +94,11 @@ def test_what_is_off_or_kept_is_not_looked_for() -> None:
     assert wanted == {"noise": ("theta_noise", "theta_dot_noise"), "walk": ("a21_walk", "b21_walk")}
 
 
+@pytest.mark.parametrize(("mean", "clear"), [(2.9, False), (3.1, True), (-2.9, False), (-3.1, True)])
+def test_a_gain_is_clear_beyond_three_standard_errors(mean: float, clear: bool) -> None:
+    assert validation.Gain(mean, 1.0).is_clear is clear
+
+
 @pytest.mark.parametrize(
     ("low", "high", "after", "verdict"),
     [

@@ -18,6 +18,8 @@ from lever_cdkf.host_tools.watch.picture import Frame
 from lever_cdkf.host_tools.watch.sources import as_frame
 
 LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
+PATIENCE = 120.0
+"""[s] for what hangs; nothing is expected to be fast."""
 
 
 class Flight:
