@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools import cli, interrupts
 from lever_cdkf.host_tools.firmware.native import enum_names, settings_table
 from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.study.baselines import BASELINES
@@ -533,7 +533,9 @@ def test_list(lever: Lever, capsys: pytest.CaptureFixture[str]) -> None:
     assert all(name in out for name in (*cases(), *BASELINES))
 
 
-def test_a_small_campaign(lever: Lever, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_small_campaign(
+    lever: Lever, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Two cases in two processes; the same figures as in one process."""
     chosen = ("--scenarios", "lever_fixed_dither_rough", "step_up", "--estimators", "joint", "dual_shipped", "rls")
     brief = ("--seeds", "2", "--duration", "3")
@@ -551,6 +553,7 @@ def test_a_small_campaign(lever: Lever, tmp_path: Path, capsys: pytest.CaptureFi
     assert {"linearised-lever", "bound-lever", "settling-step_up", "following-step_up"} <= figures.keys()
     assert all(f'id="{key}"' in page for key in figures)
     assert len(json.loads(tables.read_text())) == 2
+    monkeypatch.setattr(interrupts, "worker_pool", None)  # not called for one process
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
