@@ -40,6 +40,10 @@ REQUIRED: dict[str, tuple[dict[str, Any], str]] = {
     "wander_3deg_base_only": ({"wander": 3.0, "dither": 0.0}, "f_n rms ≤ 3, f_n covered ≥ 90"),
     "retrim": ({"retrim": 8.0}, "f_n rms ≤ 1.2"),
     "grip_step": ({"grip": 1.3, "events": ((30.0, 30.0),)}, "settled median ≤ 0.9, settled worst ≤ 2"),
+    "grip_slow": (
+        {"grip": 1.5, "grip_moves": (3.0, 0.5), "events": ((30.0, 30.5),), "start": 30.0},
+        "settled median ≤ 2, f_n covered ≥ 90",
+    ),
     "slow_torque": ({"slow_torque": 1.0}, "f_n rms ≤ 3, f_n covered ≥ 85" + FLAGGED),
     "tremor": ({"tremor": 0.2}, "f_n rms ≤ 3, f_n covered ≥ 85" + FLAGGED),
     "rough_told": ({"process_noise": 0.5}, ""),
@@ -66,6 +70,13 @@ REQUIRED: dict[str, tuple[dict[str, Any], str]] = {
     "only_rate": ({}, "running ≥ 99, f_n rms ≤ 3, f_n covered ≥ 85"),
     "hands_off": (HANDS_OFF, "to HANDS_OFF ≤ 1, settled ≤ 2"),
     "hands_off_base_only": (HANDS_OFF | {"dither": 0.0}, "to HANDS_OFF ≤ 1, settled ≤ 2"),
+    **{
+        name: (
+            {"duration": 40.0, "released": gap, "next_pilot": 2.0, "events": (gap,), "start": gap[1]},
+            "settled median ≤ 2, f_n covered ≥ 90",
+        )
+        for name, gap in (("next_pilot_0.3s", (25.0, 25.3)), ("next_pilot_2s", (25.0, 27.0)))
+    },
     "base_gain_up": ({"z_ddot_gain": 1.05}, COVERED + FLAGGED),
     "base_gain_down": ({"z_ddot_gain": 0.95}, COVERED + FLAGGED),
     "base_late_1ms": ({"z_ddot_delay": 1e-3}, COVERED + FLAGGED),

@@ -128,12 +128,14 @@ def test_what_the_pilot_does_is_as_asked() -> None:
     np.testing.assert_allclose(
         retrimmed, np.interp(time, (30.0, 34.0), (0.0, 8.0))[:, None] + np.zeros((1, 4)), atol=1e-9
     )
-    gripped, moment = given(grip=1.3), np.interp(time, (30.0, 30.05), (0.0, 1.0))[:, None]
-    factor = np.array((1.0 / 1.3, 1.3, 1.0 / 1.3, 1.3))
-    for name in ("c_p", "k_p"):
-        changed = getattr(gripped, name) / getattr(still, name)
-        np.testing.assert_allclose(changed, 1.0 + (factor - 1.0) * moment, rtol=1e-9)
-    np.testing.assert_allclose(np.degrees(gripped.trim - still.trim), moment + np.zeros((1, 4)), atol=1e-9)
+    factor = np.array((1.0, -1.0, 1.0, -1.0))
+    for asked, angle, seconds in (({"grip": 1.3}, 1.0, 0.05), ({"grip": 1.3, "grip_moves": (3.0, 0.5)}, 3.0, 0.5)):
+        gripped, moment = given(**asked), np.interp(time, (30.0, 30.0 + seconds), (0.0, 1.0))[:, None]
+        for name in ("c_p", "k_p"):
+            changed = getattr(gripped, name) / getattr(still, name)
+            np.testing.assert_allclose(changed, 1.0 + (1.3**-factor - 1.0) * moment, rtol=1e-9)
+        moved = np.degrees(gripped.trim - still.trim)
+        np.testing.assert_allclose(moved, angle * moment + np.zeros((1, 4)), atol=1e-9)
     ramp = np.interp(time, (20.0, 35.0), (42.0, 18.0))[:, None] + np.zeros((1, 4))
     np.testing.assert_allclose(given(damping=(42.0, 18.0, 20.0, 35.0)).c_p, ramp)
     swaying = np.degrees(given(sway=(2.0, 0.3)).trim - still.trim)
@@ -144,8 +146,11 @@ def test_what_the_pilot_does_is_as_asked() -> None:
     paused, moving = given(pause=(20.0, 30.0)), (time < 20.0) | (time >= 30.0)
     for signal, other in ((paused.z_ddot, still.z_ddot), (paused.tau_m, still.tau_m), (paused.kick, still.kick)):
         np.testing.assert_array_equal(signal, other * moving[:, None])
-    released = given(released=(20.0, 30.0))
-    np.testing.assert_array_equal(released.k_p, still.k_p * moving[:, None])
+    for asked, later in (({}, 1.0), ({"next_pilot": 2.0}, 2.0**-factor)):
+        released, held = given(released=(20.0, 30.0), **asked), np.where(time[:, None] < 20.0, 1.0, later)
+        for name in ("c_p", "k_p"):
+            np.testing.assert_allclose(getattr(released, name), getattr(still, name) * held * moving[:, None])
+        np.testing.assert_array_equal(released.m_p, still.m_p * moving[:, None])
     drawn = np.array([motions.lanes(Motion(duration=1.0, friction_sigma=0.05), range(200)).friction])
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(0.05, rel=0.15)
     assert (drawn > 0.0).all()

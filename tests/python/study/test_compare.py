@@ -77,12 +77,12 @@ def test_walks_and_steps_are_as_the_comparison_was_asked_for() -> None:
                 noise = 0.1 if rough else 0.01
             assert (case.preload, case.dither_rms) == ("fixed" if fixed else "trim", 0.3 if dithered else 0.0)
             assert case.noise == {"theta_dot_process_noise": noise}
-            assert sorted(case.known.values()) == ([] if case.model == "linear_black_box" else [0.25, 0.3, 0.3])
+            assert sorted(case.own_settings.values()) == ([] if case.model == "linear_black_box" else [0.25, 0.3, 0.3])
             assert (case.duration, case.every) == (60.0, 0.1)
         elif isinstance(case, Stepped):
             assert (case.step.factor, case.step.at) == (0.7 if "down" in name else 1.3, 25.0)
             assert case.noise == {"theta_dot_process_noise": 0.1 if "rough" in name else 0.05}
-            assert (case.duration, case.every, case.known) == (45.0, 0.02, {})
+            assert (case.duration, case.every, case.own_settings) == (45.0, 0.02, {})
     assert len([case for case in cases().values() if case.kind == "matched"]) == 2 * 2 * (2 + 2 + 1)
     assert len([case for case in cases().values() if case.kind == "step"]) == 2 * 3
 
@@ -91,7 +91,7 @@ def test_a_scenario_is_judged_as_it_judges_itself() -> None:
     case, time = cases()["sudden_grip"], np.arange(0.0, 60.0, 0.5)
     wanted = scenario.load("sudden_grip")
     jump = wanted.changes()[-1]
-    assert (case.known, case.change(Plan())) == (wanted.settings or {}, jump)
+    assert (case.own_settings, case.change(Plan())) == (wanted.settings or {}, jump)
     assert case.change(Plan(duration=0.5 * jump)) is None
     assert (case.runs(Plan(7)), case.runs(Plan(40))) == (7, 20)
     converging = [(time >= start) & (time < start + wanted.converged_after) for start in wanted.changes()]
@@ -457,6 +457,7 @@ def test_claims_stand_in_table_and_page() -> None:
     assert [trace["name"] for trace in shown["data"]] == ["m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"]
     np.testing.assert_allclose([unpack(trace["x"])[0] for trace in shown["data"]], fives(1.4 * 1.5))
     assert not any("error_x" in trace for trace in shown["data"])
+    assert [shape["x0"] for shape in shown["layout"]["shapes"]] == [1.0, 1.5]
 
 
 def test_a_chart_shows_each_estimator_in_each_case_with_its_standard_error() -> None:
@@ -482,7 +483,6 @@ def test_a_chart_shows_each_estimator_in_each_case_with_its_standard_error() -> 
         np.testing.assert_allclose(unpack(only["x"]), [value], rtol=1e-6)
         assert [shape["x0"] for shape in shown.shapes] == marks
     assert charts.bound(rows, "linear_physical", "fixed") is None
-    assert [shape["x0"] for shape in shown["layout"]["shapes"]] == [1.0, 1.5]
 
 
 def test_csv_has_every_figure_with_all_digits() -> None:
