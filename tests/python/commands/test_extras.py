@@ -135,7 +135,7 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
     pip = f"{sys.executable} -m pip"
     report = f'lever: warning: no report.html: this needs plotly: {pip} install "lever-cdkf[report]"\n'
     mf4 = f'lever: warning: no signals.mf4: this needs asammdf: {pip} install "lever-cdkf[mf4]"\n'
-    refused = "lever: error: interface lever is inside one process"  # not: is missing
+    refused = "lever: error: interface lever stays inside one process"  # not: is missing
     assert done.stderr.partition(refused)[:2] == (2 * report + mf4 + report, refused)
     assert "Written to sim: summary.json, trace.csv, bus.log\n" in done.stdout
     for folder in ("sim", "replay"):
