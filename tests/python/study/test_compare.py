@@ -296,7 +296,7 @@ def test_who_broke_down_is_not_ranked() -> None:
     assert said.endswith("Diverged, and so not ranked: lms in 2 of 20 runs.")
     assert verdicts.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("No estimator completed all runs.")
     missing = verdicts.verdict([row("joint", 0.1, runs=19), row("lms", 0.2)], {}, {})
-    assert missing.endswith("None of ours took part with all runs.")
+    assert missing.endswith("No estimator of the firmware completed all runs.")
 
 
 def test_seven_runs_are_too_few() -> None:
@@ -318,7 +318,7 @@ def test_fastest_after_a_step() -> None:
     for times in (against("joint_ekf", 3.75, 0.2, "step_up"), {}):
         assert verdicts.verdict(rows, errors, times).endswith(f"{fastest}, which may be chance.")
     never = [dataclasses.replace(each, settled_median=math.inf) for each in rows]
-    assert verdicts.verdict(never, errors, {}).endswith("After the step nobody finds the natural frequency for good.")
+    assert verdicts.verdict(never, errors, {}).endswith("After the step no estimator settles on the natural frequency.")
     rows[0] = dataclasses.replace(rows[0], settled_median=2.0, settled_worst=math.inf)
     other = "joint_ekf (baseline) (median 1.50 s, not in every run); the fastest of ours, dual_shipped: 2.00 s"
     assert f"Fastest after the step: {other}" in verdicts.verdict(rows, errors, {})
@@ -443,7 +443,7 @@ def test_claims_stand_in_table_and_page() -> None:
     rows = everything(1.5)
     claims = verdicts.claims(rows)
     *_, last = table.tables(rows, claims).items()
-    assert last[0] == "what the firmware has to show"
+    assert last[0] == "claims about the firmware"
     first = {"claim": claims[0].text, "limit": "≤ 1.1", "measured": 1.58, "±": None, "kept": "no"}
     assert last[1][0] == first | {"worst in": claims[0].where}
     assert [line["limit"] for line in last[1] if "lower" in str(line["claim"])] == ["≥ 1"]
