@@ -93,7 +93,7 @@ def test_a_log_that_is_there_is_not_written_over(tmp_path: Path, capsys: pytest.
     for name in ("a.log", "a.log.partial"):
         (tmp_path / name).write_text("precious")
         assert record(tmp_path / "a.log", []) == 2
-        assert f"{name} is there already" in capsys.readouterr().err
+        assert f"{name} exists already" in capsys.readouterr().err
         assert (tmp_path / name).read_text() == "precious"
         (tmp_path / name).unlink()
 
@@ -147,7 +147,7 @@ def test_a_recording_ends_after_its_duration(
 @pytest.mark.parametrize("interface", ["lever", "virtual"])
 def test_a_bus_on_which_nobody_else_is_is_refused(interface: str, tmp_path: Path, refused: Refused) -> None:
     line = refused("record", "--interface", interface, "--channel", "x", "-o", tmp_path / "a.log")
-    assert f"interface {interface} is inside one process, " in line
+    assert f"interface {interface} stays inside one process, " in line
     assert os.listdir(tmp_path) == []
 
 

@@ -110,7 +110,10 @@ def test_a_missing_extra(
     (tmp_path / "session.mf4").write_text("a log")
     assert cli.main(arguments.split()) == 2
     names = " and ".join(PACKAGES[extra])
-    assert capsys.readouterr() == ("", f'lever: error: this needs {names}: pip install "lever-cdkf[{extra}]"\n')
+    assert capsys.readouterr() == (
+        "",
+        f'lever: error: this needs {names}: {sys.executable} -m pip install "lever-cdkf[{extra}]"\n',
+    )
 
 
 def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path) -> None:
@@ -129,9 +132,10 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
     )
     done = without(*PACKAGES)(_STATUSES, json.dumps([line.split() for line in lines]))
     assert done.stdout.splitlines()[-1] == " ".join([*"0" * (len(lines) - 1), "2"])
-    report = 'lever: warning: no report.html: this needs plotly: pip install "lever-cdkf[report]"\n'
-    mf4 = 'lever: warning: no signals.mf4: this needs asammdf: pip install "lever-cdkf[mf4]"\n'
-    refused = "lever: error: interface lever is inside one process"  # not: is missing
+    pip = f"{sys.executable} -m pip"
+    report = f'lever: warning: no report.html: this needs plotly: {pip} install "lever-cdkf[report]"\n'
+    mf4 = f'lever: warning: no signals.mf4: this needs asammdf: {pip} install "lever-cdkf[mf4]"\n'
+    refused = "lever: error: interface lever stays inside one process"  # not: is missing
     assert done.stderr.partition(refused)[:2] == (2 * report + mf4 + report, refused)
     assert "Written to sim: summary.json, trace.csv, bus.log\n" in done.stdout
     for folder in ("sim", "replay"):

@@ -111,7 +111,7 @@ def test_a_gain_is_clear_beyond_three_standard_errors(mean: float, clear: bool) 
     ("low", "high", "after", "verdict"),
     [
         (0.5, 2.0, 1.0, "kept: not contradicted"),
-        (None, None, 1.0, "kept: the log does not tell"),
+        (None, None, 1.0, "kept: the log does not determine it"),
         (None, 2.0, 1.0, "kept: not contradicted"),
         (1.5, 4.0, 3.0, "too small"),
         (1.5, None, 3.0, "too small"),

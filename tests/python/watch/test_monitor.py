@@ -137,7 +137,7 @@ def test_before_the_first_estimate_and_after_the_last(flight: Flight) -> None:
             app.advance()
             await pilot.pause()
             text = "\n".join(screen(app))
-            assert "the estimator has said nothing for 5 s: what is shown is old" in text
+            assert "no frame from the estimator for 5 s: what is shown is old" in text
             assert re.search(r"m_p +– +± – ", text)
             source.error = "Network is down"
             app.advance()
@@ -189,7 +189,7 @@ def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
         (["--once", "a.log", "--scenario", "demo"], "log and scenario at once: give a LOG, "),
         (["--once", "no.log"], "cannot read no.log: No such file or directory"),
         (["--once", "--scenario", "none"], "no scenario 'none'; there are "),
-        (["--once", "--interface", "lever"], "interface lever is inside one process, with nobody else to be heard: "),
+        (["--once", "--interface", "lever"], "interface lever stays inside one process, "),
         (["--once", "--interface", "socketcan", "--channel", "no0"], "cannot open socketcan channel no0: "),
         (["--once", "--interface", "slcan", "--bus-option", "x"], "--bus-option x: must be KEY=VALUE"),
         (["--duration", "soon"], "'soon' is not a number of seconds above 0"),

@@ -115,7 +115,7 @@ def test_it_says_that_the_server_is_gone_and_finds_it_again(desktop: Browser, st
     desktop.wait(f"{CONDITION}.startsWith('run')")
     assert not desktop.run("document.body.classList.contains('stale')")
     end(process)
-    desktop.wait(f"{CONDITION} == 'The server is gone; this page tries to reach it again.'")
+    desktop.wait(f"{CONDITION} == 'The connection to the server is lost; this page keeps trying.'")
     assert desktop.run("document.body.classList.contains('stale')")
     desktop.click("[data-request=freeze]")
     assert desktop.run("document.getElementById('answer').textContent") == "Not sent: there is no connection."
@@ -131,7 +131,7 @@ def test_a_server_that_hangs_is_told(desktop: Browser, start_lever: Start) -> No
     desktop.open(address(process))
     desktop.wait(f"{CONDITION}.startsWith('run')")
     process.send_signal(signal.SIGSTOP)
-    desktop.wait(f"{CONDITION}.startsWith('Nothing has come from the server')")
+    desktop.wait(f"{CONDITION}.startsWith('No data from the server')")
     assert desktop.run("document.body.classList.contains('stale')")
     process.send_signal(signal.SIGCONT)
     desktop.wait("!document.body.classList.contains('stale')")

@@ -422,7 +422,7 @@ def test_read_only_sends_nothing(on_server: Callable[..., FlightSource]) -> None
         async with Visitor(server) as visitor:
             assert (await visitor.hear("start"))["controls"] is False
             await visitor.ask('{"request": "freeze"}')
-            assert await visitor.hear("refused") == "this page only shows: no commands"
+            assert await visitor.hear("refused") == "this page is read-only: no commands"
 
     assert on_server(story, read_only=True).commanded == []
 

@@ -116,7 +116,8 @@ def test_an_interface_that_lacks_a_package_says_which(monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "msgpack", None)
     with pytest.raises(LeverError) as caught:
         BusSource("udp_multicast", "239.74.163.2")
-    assert str(caught.value) == "interface udp_multicast needs the Python package msgpack: pip install msgpack"
+    install = f'{sys.executable} -m pip install "msgpack"'
+    assert str(caught.value) == f"interface udp_multicast needs the Python package msgpack: {install}"
 
 
 def test_an_interface_that_breaks_down_is_an_error_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -208,7 +209,7 @@ def test_a_clock_that_jumps_is_not_waited_for(tmp_path: Path) -> None:
     ("name", "content", "text"),
     [
         ("missing.log", None, "cannot read .*missing.log: No such file or directory"),
-        ("a.unknown", b"x", "a.unknown: .unknown is no format of CAN logs that is known"),
+        ("a.unknown", b"x", "a.unknown: .unknown is not a known format of CAN logs"),
         ("empty.log", b"", "empty.log: holds no CAN frame"),
         (
             "garbage.log",
