@@ -18,8 +18,6 @@ from lever_cdkf.host_tools.watch.sources import as_frame
 from python.conftest import swing
 
 LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
-PATIENCE = 120.0
-"""[s] for what hangs; nothing is expected to be fast."""
 
 
 class Flight:

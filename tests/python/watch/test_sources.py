@@ -18,7 +18,8 @@ from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
 from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
 from lever_cdkf.sil.run.live_source import SimulationSource
 from lever_cdkf.sil.scenarios.scenario import load
-from python.watch.conftest import PATIENCE, Flight
+from processes import PATIENCE
+from python.watch.conftest import Flight
 
 
 def wait_for(source: Source, count: int) -> list[Frame]:
