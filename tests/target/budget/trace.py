@@ -118,7 +118,7 @@ class Trace:
         """Of each sample, by the model of cycles.py."""
 
     def _costs(self) -> NDArray[np.int64]:
-        """A row of _Code.cost() for each sample: a block costs what it does before the next one, the last one nothing."""
+        """A row of _Code.cost() for each sample, whose last block is not measured."""
         blocks, kinds = np.unique(np.concatenate(self._paths), return_inverse=True)
         ends = np.cumsum([len(path) for path in self._paths])
         steps = kinds * len(blocks) + np.roll(kinds, -1)
