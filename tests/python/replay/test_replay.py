@@ -154,16 +154,6 @@ def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
     assert time == sorted(time)
 
 
-def test_the_rotated_pieces_of_a_log_are_one(session: Session, tmp_path: Path) -> None:
-    pieces = [tmp_path / f"{name}.log" for name in "ca"]
-    lines = session.lines
-    for piece, part in zip(pieces, (lines[:9000], lines[9000:]), strict=True):
-        piece.write_text("".join(f"{line}\n" for line in part))
-    summary = replayed(tmp_path / "out", *reversed(pieces))
-    assert summary["recording"]["logs"] == ["c.log", "a.log"]
-    assert (tmp_path / "out/bus.log").read_bytes() == session.log.read_bytes()
-
-
 # --- other settings --------------------------------------------------------------------------------------------------
 
 
@@ -330,5 +320,6 @@ def test_the_page_has_all_but_truth(replay: tuple[Path, Summary]) -> None:
     curves = {trace["name"] for figure in figures(page).values() for trace in figure["data"]}
     assert {"recorded", "replayed", "measured", "estimate"} <= curves
     assert "truth" not in curves
+    assert "Estimates at the end" in "".join(page.text)
     cells = {row[0]: row[1:] for table in page.tables for row in table}
     assert cells["theta"][1:3] == ["5\u2009700", "5\u2009700"]
