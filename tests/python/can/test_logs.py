@@ -175,7 +175,7 @@ def test_other_failures_are_one_line_each(tmp_path: Path, refused: Refused) -> N
     assert "No such file" in refused("replay", tmp_path / "absent.log")
     assert "it is a folder" in refused("replay", tmp_path)
     (tmp_path / "a.xyz").touch()
-    assert ".xyz is no format" in refused("replay", tmp_path / "a.xyz")
+    assert ".xyz is not a known format" in refused("replay", tmp_path / "a.xyz")
     foreign = tmp_path / "foreign.log"
     foreign.write_text("(1.0) can0 123#00\n(1.1) can1 124#00\n")
     told = refused("replay", foreign)
