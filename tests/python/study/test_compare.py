@@ -320,7 +320,7 @@ def test_fastest_after_a_step() -> None:
     never = [dataclasses.replace(each, settled_median=math.inf) for each in rows]
     assert verdicts.verdict(never, errors, {}).endswith("After the step no estimator settles on the natural frequency.")
     rows[0] = dataclasses.replace(rows[0], settled_median=2.0, settled_worst=math.inf)
-    other = "joint_ekf (baseline) (median 1.50 s, not in every run); the fastest of ours, dual_shipped: 2.00 s"
+    other = "joint_ekf (baseline) (median 1.50 s, not in every run); the fastest of the firmware, dual_shipped: 2.00 s"
     assert f"Fastest after the step: {other}" in verdicts.verdict(rows, errors, {})
 
 
@@ -449,7 +449,7 @@ def test_claims_stand_in_table_and_page() -> None:
     assert [line["limit"] for line in last[1] if "lower" in str(line["claim"])] == ["≥ 1"]
     page = compare_page.build(Results(Plan(20), {}, {}), rows, {}, claims, {})
     kept = sum(claim.kept is True for claim in claims)
-    assert f'<p class="verdict bad">{kept} of {len(claims)} things that the firmware has to show are shown.' in page
+    assert f'<p class="verdict bad">{kept} of {len(claims)} claims about the firmware hold.' in page
     cells = ("<strong>no</strong>", "1.58", "≤ 1.1", claims[0].where)
     assert "".join(f"<td>{cell}</td>" for cell in cells) in page.replace(' class="num"', "")
     figures = json.loads(page.split('<script type="application/json" id="figures">')[1].split("</script>")[0])
