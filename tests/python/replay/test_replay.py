@@ -18,6 +18,7 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.replay import reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
+from lever_cdkf.host_tools.replay.summary import verdict
 from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, read
 
@@ -262,6 +263,28 @@ def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refus
     for bad in (["--set", "m_p=1000"], ["--model", "elastic"], ["--set", "k_q=1"], ["--settings", "absent"]):
         assert refused("replay", session.log, *bad, "-o", tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "value", "words"),
+    [
+        ("modes_s", "fault", 2.5, "Trouble: the estimator was in fault for 2.5 s."),
+        ("recording", "ends_early", ["a.log: cut"], "The log is incomplete: a.log: cut."),
+        ("recording", "damaged_lines", 3, "3 of its lines are not frames."),
+        ("recording", "clock_restarts", 2, "The sender's clock started over 2 times."),
+        ("recording", "model_changes", 1, "changes the model on the way"),
+        ("recording", "typical_step_s", 1.41e-3, "Samples come every 1.41 ms, but sample_period is 1 ms: set it."),
+        ("recording", "typical_step_s", 0.69e-3, "Samples come every 0.69 ms"),
+    ],
+)
+def test_the_verdict_begins_with_what_is_wrong(
+    part: str, key: str, value: object, words: str, replay: tuple[Path, Summary]
+) -> None:
+    summary = replay[1]
+    assert words not in verdict(summary)
+    assert words in verdict(summary | {part: summary[part] | {key: value}})
+    for step in (0.71e-3, 1.39e-3, 0.0):
+        assert "Samples come" not in verdict(summary | {"recording": summary["recording"] | {"typical_step_s": step}})
 
 
 # --- the files -------------------------------------------------------------------------------------------------------

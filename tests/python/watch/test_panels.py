@@ -6,8 +6,9 @@ import cmath
 import math
 
 import pytest
+from lever_cdkf.host_tools.firmware.library import ffi, lib
 from lever_cdkf.host_tools.watch import panels
-from lever_cdkf.host_tools.watch.picture import Estimated, Picture
+from lever_cdkf.host_tools.watch.picture import ERROR, Estimated, Picture
 from lever_cdkf.host_tools.watch.sources import Source
 from python.watch.conftest import Flight
 from rich.table import Table
@@ -68,6 +69,23 @@ def test_sparkline() -> None:
     assert set(panels.sparkline([1.0, 1.01, 0.99, 1.0], 1.0, 4)) <= set("▄▅")  # within sigma: flat
     assert len(panels.sparkline(list(range(1000)), 0.0, 20)) == 20
     assert panels.sparkline([], 0.0, 5) == panels.sparkline([float("nan")], 0.0, 5) == ""
+
+
+def test_the_machine_and_what_else_is_on_the_bus_have_rows(flight: Flight) -> None:
+    picture, source = Picture(), Quiet()
+    for overruns in (250, 262):
+        report = {"transmit_errors": 96, "receive_errors": 3, "bus_offs": 1, "overruns": overruns}
+        lib.lever_platform(flight.bus.estimator.pointer, ffi.new("lever_platform_t *", report))
+        for _ in range(3):
+            picture.take(flight.frames(100), flight.sample * 1e-3)
+    picture.take([(0x123, b""), (ERROR, b"")], flight.sample * 1e-3)
+    source.dropped = 7
+    table = rows(panels.health(picture, source))
+    assert table["TEC, REC"][0] == ["96, 3; off bus 0"]
+    assert table["machine"][0] == ["12 lost, 0 dropped"]
+    assert (table["other frames"][0], table["error frames"][0]) == (["1"], ["1"])
+    assert ["7"] in [cells for cells, _ in table.values()]
+    assert "restarts" not in table
 
 
 @pytest.mark.parametrize("lost", [0, 10])
