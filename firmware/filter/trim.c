@@ -3,8 +3,12 @@
 #include <math.h>
 #include <string.h>
 
+#define SECTIONS ((uint32_t)TRIM_SECTIONS)
 #define TURN 6.28318531f
 #define STEPS_MOST 24.0f /* of that line */
+
+/* The sections in units of the corner: 2 cos(pi / 12), 2 cos(3 pi / 12), 2 cos(5 pi / 12). */
+static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f};
 
 high_pass_corner_t high_pass_corner(float frequency, float damping)
 {
@@ -34,11 +38,8 @@ float trim_angle(const trim_t *trim)
 
 void trim_start(trim_t *trim, float angle, float corner, bool deviations)
 {
-    static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f}; /* 2 cos(pi / 12), ... */
     (void)memset(trim, 0, sizeof *trim);
-    for (uint32_t i = 0u; i < (uint32_t)TRIM_SECTIONS; i++) {
-        trim->corner[i] = high_pass_corner(corner, damping[i]);
-    }
+    trim->corner = TURN * corner;
     trim->settling_time = 0.9f / corner;
     trim->deviations = deviations;
     trim->output[0].section[0].level = angle;
@@ -79,18 +80,41 @@ void trim_unsettle(trim_t *trim)
     trim->unsettled = trim->deviations ? trim->settling_time : 0.0f;
 }
 
-static float pass(const trim_t *trim, level_t *level, float value, float period)
+/* What high_pass_step() takes of a period, for all sections. */
+typedef struct sections {
+    float period;
+    float pull;
+    float damping[TRIM_SECTIONS];
+} sections_t;
+
+static inline sections_t sections_of(const trim_t *trim, float period)
 {
-    float deviation = value;
-    for (uint32_t i = 0u; i < (uint32_t)TRIM_SECTIONS; i++) {
-        deviation = high_pass_step(&level->section[i], deviation, &trim->corner[i], period);
-    }
-    return trim->deviations ? deviation : value;
+    const float rate = trim->corner * period;
+    const sections_t sections = {
+        period, trim->corner * rate, {rate * damping[0], rate * damping[1], rate * damping[2]}};
+    return sections;
 }
 
-float trim_input(trim_t *trim, enum trim_signal input, float value, float period)
+/* As high_pass_step() in all sections; returns the deviation. */
+static inline float pass(level_t *level, float value, const sections_t *of)
 {
-    return pass(trim, &trim->input[input], value, period);
+    float deviation = value;
+    for (uint32_t i = 0u; i < SECTIONS; i++) {
+        high_pass_t *section = &level->section[i];
+        deviation -= section->level;
+        section->slope += of->pull * deviation;
+        section->level += (of->period * section->slope) + (of->damping[i] * deviation);
+    }
+    return deviation;
+}
+
+void trim_inputs(trim_t *trim, float value[], enum trim_signal first, uint32_t count, float period)
+{
+    const sections_t sections = sections_of(trim, period);
+    for (uint32_t i = 0u; i < count; i++) {
+        const float deviation = pass(&trim->input[(uint32_t)first + i], value[i], &sections);
+        value[i] = trim->deviations ? deviation : value[i];
+    }
 }
 
 void trim_start_input(trim_t *trim, enum trim_signal input, float value)
@@ -110,10 +134,11 @@ static float pass_line(trim_t *trim, uint32_t i, float value, float period)
     const float whole = (elapsed < (STEPS_MOST * period)) ? ((elapsed / period) + 0.5f) : STEPS_MOST;
     const uint32_t steps = (uint32_t)whole;
     const float part = 1.0f / (float)steps;
+    const sections_t sections = sections_of(trim, part * elapsed);
     float deviation = 0.0f;
     for (uint32_t k = 1u; k <= steps; k++) {
         const float between = trim->last[i] + ((part * (float)k) * (value - trim->last[i]));
-        deviation = pass(trim, &trim->output[i], between, part * elapsed);
+        deviation = pass(&trim->output[i], between, &sections);
     }
     return deviation;
 }
@@ -125,10 +150,10 @@ static void follow(trim_t *trim, uint32_t i, float x, float period)
     const bool waiting = trim_is_waiting(trim, i);
     float deviation = (fabsf(x) <= MODEL_THETA_MOST) ? x : 0.0f;
     float rate = 0.0f;
-    for (uint32_t left = (uint32_t)TRIM_SECTIONS; left > 0u; left--) {
+    for (uint32_t left = SECTIONS; left > 0u; left--) {
         high_pass_t *section = &trim->output[i].section[left - 1u];
         section->slope = waiting ? 0.0f : section->slope;
-        rate += section->slope + (trim->corner[left - 1u].damping * deviation);
+        rate += section->slope + ((trim->corner * damping[left - 1u]) * deviation);
         deviation += section->level;
     }
     if (trim->deviations && !waiting) {
@@ -140,6 +165,7 @@ static void follow(trim_t *trim, uint32_t i, float x, float period)
 bool trim_outputs(
     trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period)
 {
+    const sections_t sections = sections_of(trim, period);
     bool back = false;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         const float value = y[i];
@@ -148,8 +174,10 @@ bool trim_outputs(
             follow(trim, i, x[i], period);
         } else {
             const bool line = (trim->missing[i] > 0.0f) && !waiting;
+            const float deviation =
+                line ? pass_line(trim, i, value, period) : pass(&trim->output[i], value, &sections);
             back = back || waiting;
-            y[i] = line ? pass_line(trim, i, value, period) : pass(trim, &trim->output[i], value, period);
+            y[i] = trim->deviations ? deviation : value;
             trim->last[i] = value;
             trim->ahead[i] = 0.0f;
             trim->missing[i] = 0.0f;

@@ -45,9 +45,9 @@ float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t 
 enum { TRIM_SECTIONS = 3 };
 
 enum trim_signal {
+    TRIM_FRICTION, /* of a newton metre */
     TRIM_Z_DDOT,
     TRIM_TAU_M,
-    TRIM_FRICTION,   /* of a newton metre */
     TRIM_GRIP_FORCE, /* [N] */
     TRIM_STEP,       /* of 1, when levels are begun anew */
     TRIM_INPUTS
@@ -67,9 +67,9 @@ typedef struct trim {
     float last[MODEL_STATES];     /* value of that sample */
     float ahead[MODEL_STATES];    /* by which the level of a missing output has moved since */
     float unsettled;              /* time until the levels have settled: nothing can be learnt before [s] */
-    high_pass_corner_t corner[TRIM_SECTIONS];
-    float settling_time; /* [s] */
-    bool deviations;     /* preload trim */
+    float corner;                 /* [rad/s] */
+    float settling_time;          /* [s] */
+    bool deviations;              /* preload trim */
 } trim_t;
 
 /* Starts at a trim angle, at rest; corner [Hz]. */
@@ -82,8 +82,8 @@ void trim_begin(trim_t *trim, const float x[MODEL_STATES]);
 /* The trim angle [rad]. */
 float trim_angle(const trim_t *trim);
 
-/* An input after `period` seconds: its deviation in preload trim. */
-float trim_input(trim_t *trim, enum trim_signal input, float value, float period);
+/* `count` inputs from `first` on after `period` seconds: replaced by their deviations in preload trim. */
+void trim_inputs(trim_t *trim, float value[], enum trim_signal first, uint32_t count, float period);
 
 /* An input starts at a level that is `value`. */
 void trim_start_input(trim_t *trim, enum trim_signal input, float value);
