@@ -49,16 +49,30 @@ static void predict_mean_and_parameter_columns(cdkf_t *cdkf, const model_respons
 }
 
 /* S_xx: its own columns; process noise, and second differences along the parameters in the direction [T/2; 1] of its
- * first column; what theta has beside it. */
+ * first column; what theta has beside it. As factor_tria_two() with these as columns, without their roots. */
 static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period)
 {
+    float *s = cdkf->s_xx;
     const step_noise_t noise = step_noise(cdkf, response, period);
-    const float rate = sqrtf(noise.variance + noise.second);
-    float theta[4] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, noise.angle};
-    float theta_dot[4] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f};
+    const float half = 0.5f * period;
+    const float rate = noise.variance + noise.second;
+    float theta[2] = {s[0], 0.0f};
+    float theta_dot[2] = {s[2], s[3]};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);
-    factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
+    const float square = (theta[0] * theta[0]) + (theta[1] * theta[1]) + (half * half * rate) + noise.angle;
+    const float product = (theta[0] * theta_dot[0]) + (theta[1] * theta_dot[1]) + (half * rate);
+    const float own = (theta[0] * theta_dot[1]) - (theta[1] * theta_dot[0]); /* minors: of both columns, */
+    const float first = theta[0] - (half * theta_dot[0]); /* of each with the walk */
+    const float second = theta[1] - (half * theta_dot[1]);
+    const float minors =
+        (own * own) + (rate * ((first * first) + (second * second))) +
+        (noise.angle * ((theta_dot[0] * theta_dot[0]) + (theta_dot[1] * theta_dot[1]) + rate));
+    const float norm = sqrtf(square);
+    const float inverse = (norm > 0.0f) ? (1.0f / norm) : 0.0f;
+    s[0] = norm;
+    s[2] = product * inverse;
+    s[3] = sqrtf(minors) * inverse;
 }
 
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,

@@ -54,7 +54,7 @@ bool grip_predict_state_columns(cdkf_t *cdkf, const model_response_t *response, 
     const float rate = sqrtf(noise.variance);
     const float second = sqrtf(noise.second);
     const float column[COLUMNS] = {seen->column[0], seen->column[1], seen->walk * rate, second, 0.0f};
-    float theta[COLUMNS + 1u] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, noise.angle, 0.0f};
+    float theta[COLUMNS + 1u] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, sqrtf(noise.angle), 0.0f};
     float theta_dot[COLUMNS + 1u] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, second, 0.0f, 0.0f};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);
