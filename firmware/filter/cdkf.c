@@ -75,11 +75,25 @@ static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response
     s[3] = sqrtf(minors) * inverse;
 }
 
+/* The first cdkf->acting of the considered errors act. */
+static void predict_considered(cdkf_t *cdkf, const float input[CDKF_CONSIDERED], const model_response_t *response,
+    float period, const float error[CDKF_CONSIDERED])
+{
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+        float *x = cdkf->considered[c].x;
+        const float change = input[c] * error[c];
+        response_move(response, period, &x[0], &x[1]);
+        x[0] += 0.5f * (period * change);
+        x[1] += change;
+    }
+}
+
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
     const float error[CDKF_CONSIDERED], const cdkf_grip_t *grip)
 {
     model_points_t points;
     model_response_t response;
+    float input[CDKF_CONSIDERED];
     grip_seen_t seen;
     bool taken = false;
     points.coefficients = cdkf->points;
@@ -99,7 +113,8 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
     } else {
         predict_state_columns(cdkf, &response, step->period);
     }
-    considered_predict(cdkf->considered, cdkf->acting, &response, step->period, error);
+    considered_inputs(&response, step->period, input);
+    predict_considered(cdkf, input, &response, step->period, error);
     response_move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
     if (taken) {
         grip_take(cdkf, grip, &seen);
@@ -165,6 +180,24 @@ static inline gain_t take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, 
     return gain;
 }
 
+/* After the update of the filter: gain, what each output saw of S_ww, innovation. */
+static void correct_considered(cdkf_t *cdkf, const gain_t gain[CDKF_OUTPUTS],
+    float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
+{
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+        considered_t *of = &cdkf->considered[c];
+        const float first = gain_correct(&gain[0], of->x[0], &of->x[0], &of->x[1]);
+        const float second = gain_correct(&gain[1], of->x[1], &of->x[0], &of->x[1]);
+        if (learn) {
+            for (uint32_t i = 0u; i < L; i++) {
+                of->cross[i] += (row[0][i] * first) + (row[1][i] * second);
+            }
+            of->vector += (innovation[0].value * first) + (innovation[1].value * second);
+            of->information += (first * first) + (second * second);
+        }
+    }
+}
+
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS])
 {
@@ -179,7 +212,7 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
         information_add(&cdkf->pending, row[0], innovation[0].value);
         information_add(&cdkf->pending, row[1], innovation[1].value);
     }
-    considered_correct(cdkf->considered, cdkf->acting, gain, row, innovation, learn);
+    correct_considered(cdkf, gain, row, innovation, learn);
     /* w makes both uncertain together: I + R R^T = L D L^T, and the second innovation is then given the first */
     const float covariance = factor_dot_three(row[0], row[1]);
     innovation[0].inverse_variance = 1.0f / (1.0f + factor_dot_three(row[0], row[0]));
