@@ -162,6 +162,23 @@ static void follow(trim_t *trim, uint32_t i, float x, float period)
     trim->missing[i] += period;
 }
 
+/* An output that is missing, or was. Returns the deviation of a valid one. */
+static float irregular(trim_t *trim, uint32_t i, float x, float value, bool valid, float period, bool *back)
+{
+    float deviation = value;
+    if (!valid) {
+        follow(trim, i, x, period);
+    } else {
+        const bool waiting = trim_is_waiting(trim, i);
+        const sections_t sections = sections_of(trim, period);
+        deviation = waiting ? pass(&trim->output[i], value, &sections) : pass_line(trim, i, value, period);
+        *back = *back || waiting;
+        trim->ahead[i] = 0.0f;
+        trim->missing[i] = 0.0f;
+    }
+    return deviation;
+}
+
 bool trim_outputs(
     trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period)
 {
@@ -169,19 +186,11 @@ bool trim_outputs(
     bool back = false;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         const float value = y[i];
-        const bool waiting = trim_is_waiting(trim, i);
-        if (!valid[i]) {
-            follow(trim, i, x[i], period);
-        } else {
-            const bool line = (trim->missing[i] > 0.0f) && !waiting;
-            const float deviation =
-                line ? pass_line(trim, i, value, period) : pass(&trim->output[i], value, &sections);
-            back = back || waiting;
-            y[i] = trim->deviations ? deviation : value;
-            trim->last[i] = value;
-            trim->ahead[i] = 0.0f;
-            trim->missing[i] = 0.0f;
-        }
+        const bool regular = valid[i] && (trim->missing[i] <= 0.0f);
+        const float deviation = regular ? pass(&trim->output[i], value, &sections)
+                                        : irregular(trim, i, x[i], value, valid[i], period, &back);
+        y[i] = (valid[i] && trim->deviations) ? deviation : value;
+        trim->last[i] = valid[i] ? value : trim->last[i];
     }
     return back;
 }
