@@ -80,39 +80,24 @@ void trim_unsettle(trim_t *trim)
     trim->unsettled = trim->deviations ? trim->settling_time : 0.0f;
 }
 
-/* What high_pass_step() takes of a period, for all sections. */
-typedef struct sections {
-    float period;
-    float pull;
-    float damping[TRIM_SECTIONS];
-} sections_t;
-
-static inline sections_t sections_of(const trim_t *trim, float period)
-{
-    const float rate = trim->corner * period;
-    const sections_t sections = {
-        period, trim->corner * rate, {rate * damping[0], rate * damping[1], rate * damping[2]}};
-    return sections;
-}
-
-/* As high_pass_step() in all sections; returns the deviation. */
-static inline float pass(level_t *level, float value, const sections_t *of)
+/* As high_pass_step() in all sections, after `turn` = corner times period; returns the deviation. */
+static inline float pass(level_t *level, float value, float turn)
 {
     float deviation = value;
     for (uint32_t i = 0u; i < SECTIONS; i++) {
-        high_pass_t *section = &level->section[i];
+        section_t *section = &level->section[i];
         deviation -= section->level;
-        section->slope += of->pull * deviation;
-        section->level += (of->period * section->slope) + (of->damping[i] * deviation);
+        section->slope += turn * deviation;
+        section->level += turn * (section->slope + (damping[i] * deviation));
     }
     return deviation;
 }
 
 void trim_inputs(trim_t *trim, float value[], enum trim_signal first, uint32_t count, float period)
 {
-    const sections_t sections = sections_of(trim, period);
+    const float turn = trim->corner * period;
     for (uint32_t i = 0u; i < count; i++) {
-        const float deviation = pass(&trim->input[(uint32_t)first + i], value[i], &sections);
+        const float deviation = pass(&trim->input[(uint32_t)first + i], value[i], turn);
         value[i] = trim->deviations ? deviation : value[i];
     }
 }
@@ -134,11 +119,11 @@ static float pass_line(trim_t *trim, uint32_t i, float value, float period)
     const float whole = (elapsed < (STEPS_MOST * period)) ? ((elapsed / period) + 0.5f) : STEPS_MOST;
     const uint32_t steps = (uint32_t)whole;
     const float part = 1.0f / (float)steps;
-    const sections_t sections = sections_of(trim, part * elapsed);
+    const float turn = trim->corner * (part * elapsed);
     float deviation = 0.0f;
     for (uint32_t k = 1u; k <= steps; k++) {
         const float between = trim->last[i] + ((part * (float)k) * (value - trim->last[i]));
-        deviation = pass(&trim->output[i], between, &sections);
+        deviation = pass(&trim->output[i], between, turn);
     }
     return deviation;
 }
@@ -151,13 +136,13 @@ static void follow(trim_t *trim, uint32_t i, float x, float period)
     float deviation = (fabsf(x) <= MODEL_THETA_MOST) ? x : 0.0f;
     float rate = 0.0f;
     for (uint32_t left = SECTIONS; left > 0u; left--) {
-        high_pass_t *section = &trim->output[i].section[left - 1u];
+        section_t *section = &trim->output[i].section[left - 1u];
         section->slope = waiting ? 0.0f : section->slope;
-        rate += section->slope + ((trim->corner * damping[left - 1u]) * deviation);
+        rate += section->slope + (damping[left - 1u] * deviation);
         deviation += section->level;
     }
     if (trim->deviations && !waiting) {
-        trim->ahead[i] += period * rate;
+        trim->ahead[i] += (trim->corner * period) * rate;
     }
     trim->missing[i] += period;
 }
@@ -170,8 +155,7 @@ static float irregular(trim_t *trim, uint32_t i, float x, float value, bool vali
         follow(trim, i, x, period);
     } else {
         const bool waiting = trim_is_waiting(trim, i);
-        const sections_t sections = sections_of(trim, period);
-        deviation = waiting ? pass(&trim->output[i], value, &sections) : pass_line(trim, i, value, period);
+        deviation = waiting ? pass(&trim->output[i], value, trim->corner * period) : pass_line(trim, i, value, period);
         *back = *back || waiting;
         trim->ahead[i] = 0.0f;
         trim->missing[i] = 0.0f;
@@ -182,12 +166,12 @@ static float irregular(trim_t *trim, uint32_t i, float x, float value, bool vali
 bool trim_outputs(
     trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period)
 {
-    const sections_t sections = sections_of(trim, period);
+    const float turn = trim->corner * period;
     bool back = false;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         const float value = y[i];
         const bool regular = valid[i] && (trim->missing[i] <= 0.0f);
-        const float deviation = regular ? pass(&trim->output[i], value, &sections)
+        const float deviation = regular ? pass(&trim->output[i], value, turn)
                                         : irregular(trim, i, x[i], value, valid[i], period, &back);
         y[i] = (valid[i] && trim->deviations) ? deviation : value;
         trim->last[i] = valid[i] ? value : trim->last[i];

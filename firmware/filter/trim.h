@@ -53,9 +53,15 @@ enum trim_signal {
     TRIM_INPUTS
 };
 
+/* A section of them, in time of 1 / corner. */
+typedef struct section {
+    float level; /* [unit of the signal] */
+    float slope; /* [unit corner] */
+} section_t;
+
 /* A signal's slow part. */
 typedef struct level {
-    high_pass_t section[TRIM_SECTIONS];
+    section_t section[TRIM_SECTIONS];
 } level_t;
 
 typedef struct trim {
