@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 
 from . import interrupts
 from .errors import LeverError
+from .exit_status import INTERRUPTED
 from .extras import hide_mf4, reveal_mf4
-from .start import INTERRUPTED
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has

@@ -162,18 +162,18 @@ def _run(command: list[str]) -> tuple[int, str]:
 
 def _advice(tool: str, output: str) -> str:
     """What to do about a failure, by what the tool has said (in lower case)."""
-    if any(words in output for words in NO_PERMISSION):
+    if any(phrase in output for phrase in NO_PERMISSION):
         return (
             f"{tool} may not open the probe: install its udev rules (Debian's openocd has them), and plug it in again"
         )
-    if any(words in output for words in NO_PROBE):
+    if any(phrase in output for phrase in NO_PROBE):
         return (
             f"no probe answers {tool}: connect an ST-LINK by USB, or name another with --probe KIND[:SERIAL] "
             "(lsusb lists what is connected)"
         )
-    if any(words in output for words in NO_PACK):
+    if any(phrase in output for phrase in NO_PACK):
         return f"this pyOCD does not know the chip yet: pyocd pack install {TARGET}"
-    if any(words in output for words in NO_TARGET):
+    if any(phrase in output for phrase in NO_TARGET):
         return (
             f"the probe is there, but no STM32F405 answers {tool}: is the board powered, and are SWDIO, SWCLK and GND "
             "connected?"

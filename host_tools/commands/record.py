@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         finally:
             line.end()
     print_tables({"recorded": _rows(recorder)}, args.json)
-    print(f"{out}: {_told(recorder)}")
+    print(f"{out}: {_summary(recorder)}")
     return 0
 
 
@@ -98,18 +98,18 @@ class _Line:
 
     def __init__(self) -> None:
         self._on_terminal = sys.stderr.isatty()
-        self._told = time.monotonic()
+        self._printed_at = time.monotonic()
         self._last = 0
         self._at = 0.0
 
     def show(self, recorder: Recorder) -> None:
         rate = (recorder.frames - self._last) / max(recorder.elapsed - self._at, 1e-9)
         self._last, self._at = recorder.frames, recorder.elapsed
-        text = f"{recorder.elapsed:.0f} s, {rate:.0f} frames/s, {_told(recorder)}"
+        text = f"{recorder.elapsed:.0f} s, {rate:.0f} frames/s, {_summary(recorder)}"
         if self._on_terminal:
             print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-        elif time.monotonic() - self._told >= self._BETWEEN_LINES:
-            self._told = time.monotonic()
+        elif time.monotonic() - self._printed_at >= self._BETWEEN_LINES:
+            self._printed_at = time.monotonic()
             print(f"lever: record: {text}", file=sys.stderr)
 
     def end(self) -> None:
@@ -117,8 +117,8 @@ class _Line:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _told(recorder: Recorder) -> str:
-    told = [
+def _summary(recorder: Recorder) -> str:
+    parts = [
         f"{recorder.frames} frames",
         f"{recorder.lost} lost",
         f"{recorder.corrupt} corrupt",
@@ -126,10 +126,10 @@ def _told(recorder: Recorder) -> str:
         f"controller {recorder.bus_state}",
     ]
     if recorder.left_active:
-        told.append(f"not active {recorder.left_active} times")
+        parts.append(f"not active {recorder.left_active} times")
     if recorder.overflows:
-        told.append(f"{recorder.overflows} overflows of the controller")
-    return ", ".join(told)
+        parts.append(f"{recorder.overflows} overflows of the controller")
+    return ", ".join(parts)
 
 
 def _rows(recorder: Recorder) -> list[Row]:

@@ -64,11 +64,11 @@ def replay(
     traffic = Traffic(Recording(logs), options.channel)
     with ExitStack() as stack:
         outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs, FILES))
-        made = _Replay(traffic, options, outputs)
-        made.run(progress)
-        summary = made.summary()
+        replayed = _Replay(traffic, options, outputs)
+        replayed.run(progress)
+        summary = replayed.summary()
         if outputs is not None:
-            made.finish(outputs, summary)
+            replayed.finish(outputs, summary)
         return summary
 
 

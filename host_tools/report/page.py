@@ -3,7 +3,7 @@
 import html
 from importlib.resources import files
 
-from . import models, summary_html
+from . import captions, summary_html
 from .charts import comparison, health, signals, tracking, transfer
 from .document import document
 from .figure import Figure
@@ -64,7 +64,7 @@ def _subtitle(run: Run) -> str:
 
 def _explained(page: Page, run: Run) -> None:
     checked = " The truth is known in a simulation: this page holds the claims against it." if run.has_truth else ""
-    about = "".join(f"<p>{paragraph}</p>" for paragraph in models.about(run))
+    about = "".join(f"<p>{paragraph}</p>" for paragraph in captions.about(run))
     svg = (files(__package__) / "schematic.svg").read_text(encoding="utf-8")
     page.section(
         "explained",
@@ -90,7 +90,7 @@ def _estimates(page: Page, run: Run) -> None:
         page.figure(
             "figure-parameters",
             tracking.parameters(run),
-            f"{models.parameters_caption(run)}{marks}",
+            f"{captions.parameters_caption(run)}{marks}",
         ),
     )
     page.section(
@@ -100,7 +100,7 @@ def _estimates(page: Page, run: Run) -> None:
         page.figure(
             "figure-dynamics",
             tracking.dynamics(run),
-            models.dynamics_caption(run),
+            captions.dynamics_caption(run),
         ),
     )
 
@@ -126,13 +126,13 @@ def _transfer(page: Page, run: Run) -> None:
         "Brightness is how many degrees the lever moves for 1 m/s² of floor motion, over time and frequency. The white "
         "line is the natural frequency."
     )
-    captions = {"truth": f"<strong>Truth.</strong> {meaning}", "estimate": f"<strong>Estimate.</strong> {meaning}"}
+    sentences = {"truth": f"<strong>Truth.</strong> {meaning}", "estimate": f"<strong>Estimate.</strong> {meaning}"}
     if "truth" in maps:
-        captions["estimate"] = (
+        sentences["estimate"] = (
             "<strong>Estimate.</strong> The same of the estimated parameters, same colours: the closer it looks to the "
             "truth, the better."
         )
-    pair = "".join(page.figure(f"figure-map-{name}", figure, captions[name]) for name, figure in maps.items())
+    pair = "".join(page.figure(f"figure-map-{name}", figure, sentences[name]) for name, figure in maps.items())
     page.section(
         "bode",
         "Bode diagram",
@@ -141,7 +141,7 @@ def _transfer(page: Page, run: Run) -> None:
         page.figure(
             "figure-slices",
             transfer.slices(run),
-            models.feedthrough_caption(run),
+            captions.feedthrough_caption(run),
         ),
     )
 
@@ -171,7 +171,7 @@ def _signals(page: Page, run: Run) -> None:
             "expected to be wrong by. Dots inside the band around 1 are what chance alone gives; above it the "
             "estimator is over-confident, below it too cautious.",
         ),
-        page.figure("figure-whiteness", signals.whiteness(run), models.whiteness_caption(run)),
+        page.figure("figure-whiteness", signals.whiteness(run), captions.whiteness_caption(run)),
     )
     page.section(
         "excitation",
@@ -180,7 +180,7 @@ def _signals(page: Page, run: Run) -> None:
         page.figure(
             "figure-excitation",
             signals.excitation(run),
-            models.excitation_caption(run),
+            captions.excitation_caption(run),
         ),
         page.figure(
             "figure-spectra",
@@ -215,6 +215,6 @@ def _numbers(page: Page, run: Run) -> None:
     rows = [(html.escape(key), html.escape(value)) for key, value in summary_html.flat(scenario)]
     estimator = {**vars(run.summary.estimator), "settings": None} if run.summary else {}
     rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in summary_html.flat(estimator)]
-    made = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
+    details = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
     settings = f"<details><summary>Settings of the estimator</summary>{summary_html.settings_table(run)}</details>"
-    page.section("made", "Settings", "How this run was made", made, settings)
+    page.section("made", "Settings", "How this run was made", details, settings)

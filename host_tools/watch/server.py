@@ -34,7 +34,7 @@ import tornado.websocket
 from .. import report
 from ..errors import LeverError
 from ..firmware.config import Config
-from .model import STEP
+from .picture import STEP
 from .sources import Source
 from .state import State, command_of
 

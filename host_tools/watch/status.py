@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .model import Picture
+from .picture import Picture
 
 MODES = {
     "init": "waits for the first sample",
@@ -69,8 +69,8 @@ def condition(picture: Picture) -> tuple[str, str]:
     if mode is None:
         return "watch", "the estimator is there; no HEALTH from it yet"
     level = {"run": "good", "fault": "bad"}.get(mode, "watch")
-    if level == "good" and (told := faults(picture)):
-        return "watch", f"{mode}, but: {'; '.join(told)}"
+    if level == "good" and (present := faults(picture)):
+        return "watch", f"{mode}, but: {'; '.join(present)}"
     return level, f"{mode}: the estimator {MODES.get(mode, 'is in a mode that this program does not know')}"
 
 
@@ -78,5 +78,5 @@ def faults(picture: Picture) -> list[str]:
     """The faults of the estimator and its machine, in words."""
     machine = picture.platform_faults()
     named = [name for name in picture.faults() if not (machine and name == "platform")]
-    told = [FAULTS.get(name, name) for name in named]
-    return told + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in machine or ()]
+    texts = [FAULTS.get(name, name) for name in named]
+    return texts + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in machine or ()]

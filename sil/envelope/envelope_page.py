@@ -73,9 +73,9 @@ def _legend(results: Sequence[Result]) -> str:
 def _chart(shown: Excerpt, result: Result) -> Figure:
     """Natural frequency over time; dots at the foot where the firmware says: do not trust this."""
     low, high = shown.value - 2.0 * shown.sigma, shown.value + 2.0 * shown.sigma
-    known = np.concatenate((shown.truth[shown.truth > 2.0], shown.value))
-    known = known[np.isfinite(known)] if np.isfinite(known).any() else np.ones(1)
-    floor, ceiling = 0.85 * float(np.percentile(known, 1.0)), 1.15 * float(np.percentile(known, 99.0))
+    values = np.concatenate((shown.truth[shown.truth > 2.0], shown.value))
+    values = values[np.isfinite(values)] if np.isfinite(values).any() else np.ones(1)
+    floor, ceiling = 0.85 * float(np.percentile(values, 1.0)), 1.15 * float(np.percentile(values, 99.0))
     figure = Figure([axis("natural frequency [Hz]", range=[floor, ceiling])], time_axis(shown.time[-1]), height=260)
     figure.add(*band(shown.time, low, high, "estimate ±2σ", "estimate-band"))
     if shown.truth.size:

@@ -138,6 +138,6 @@ def settling_times(relative: Array, elapsed: Array, within: float = 0.05) -> Arr
 
 def median_and_worst(times: Array) -> tuple[float, float]:
     """Of settling times (B,) with NaN for never: each is NaN when it is never."""
-    known = np.where(np.isnan(times), np.inf, times)
-    middle, worst = float(np.median(known)), float(known.max())
+    settled = np.where(np.isnan(times), np.inf, times)
+    middle, worst = float(np.median(settled)), float(settled.max())
     return (middle if math.isfinite(middle) else math.nan), (worst if math.isfinite(worst) else math.nan)

@@ -138,12 +138,12 @@ def _table(lines: Sequence[TableRow]) -> str:
 
 
 def _assembled(page: Page, results: Results, claims: Sequence[Claim]) -> str:
-    kept, known = (sum(claim.kept is value for claim in claims) for value in (True, False))
-    known += kept
-    mood = "good" if kept == known else "bad"
+    kept, decided = (sum(claim.kept is value for claim in claims) for value in (True, False))
+    decided += kept
+    mood = "good" if kept == decided else "bad"
     said = (
-        f"{kept} of {known} things that the firmware has to show are shown."
-        if known
+        f"{kept} of {decided} things that the firmware has to show are shown."
+        if decided
         else "A preview: what the firmware has to show takes 20 whole runs of each case."
     )
     plan = results.plan

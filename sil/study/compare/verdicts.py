@@ -65,10 +65,10 @@ def _behind(ranked: Sequence[Row], errors: Differences) -> str:
     ours = next((row for row in ranked if row.ours), None)
     if ours is None:
         return "None of ours took part with all runs."
-    found = errors[ours.case, ours.estimator]
-    low, high = (100.0 * (edge - 1.0) for edge in found.interval())
-    more = f"{_name(ours)} has {100.0 * math.expm1(found.more):.0f} % larger errors ({low:.0f} to {high:.0f} %)"
-    if found.significant:
+    difference = errors[ours.case, ours.estimator]
+    low, high = (100.0 * (edge - 1.0) for edge in difference.interval())
+    more = f"{_name(ours)} has {100.0 * math.expm1(difference.more):.0f} % larger errors ({low:.0f} to {high:.0f} %)"
+    if difference.significant:
         return f"Ours is not best: {more}."
     return f"Ours is not best, but that may be chance: {more}."
 
@@ -84,8 +84,8 @@ def _fastest(rows: Sequence[Row], times: Differences) -> str:
     if others:
         second = min(others, key=lambda row: row.settled_median)
         who = "baseline" if best.ours else "of ours"
-        found = times.get((best.case, second.estimator))  # None: as fast
-        chance = "" if found is not None and found.significant else ", which may be chance"
+        difference = times.get((best.case, second.estimator))  # None: as fast
+        chance = "" if difference is not None and difference.significant else ", which may be chance"
         beside = f"; the fastest {who}, {second.estimator}: {second.settled_median:.2f} s{chance}"
     return f"Fastest after the step: {_name(best)} (median {best.settled_median:.2f} s, {worst}){beside}."
 
@@ -138,12 +138,12 @@ Value = tuple[float, str, float]
 
 def claims(rows: Sequence[Row]) -> list[Claim]:
     """All of them, with what was measured."""
-    found: list[Claim] = []
+    collected: list[Claim] = []
 
     def add(text: str, limit: float, values: Iterable[Value], below: bool = True) -> None:
-        known = [value for value in values if not math.isnan(value[0])]
-        worst = (max if below else min)(known, key=lambda value: value[0], default=(math.nan, "not run", math.nan))
-        found.append(Claim(text, limit, *worst, below=below, by_chance=_by_chance(known, limit, below)))
+        finite = [value for value in values if not math.isnan(value[0])]
+        worst = (max if below else min)(finite, key=lambda value: value[0], default=(math.nan, "not run", math.nan))
+        collected.append(Claim(text, limit, *worst, below=below, by_chance=_by_chance(finite, limit, below)))
 
     walks = {preload: [row for row in rows if _is_walk(row, preload)] for preload in ("fixed", "trim")}
     joint = [row for row in walks["fixed"] if row.estimator == "joint"]
@@ -170,7 +170,7 @@ def claims(rows: Sequence[Row]) -> list[Claim]:
         0.0,
         _of((row for row in rows if row.ours), lambda row: float(row.failures)),
     )
-    return found
+    return collected
 
 
 def _by_chance(values: Sequence[Value], limit: float, below: bool) -> bool:

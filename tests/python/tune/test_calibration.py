@@ -28,7 +28,7 @@ def wrong(simulate: Simulate) -> Recording:
 @pytest.mark.parametrize("start", [{}, {name: 2.0 * value for name, value in NOISE.items()} | {"z_ddot_delay": 5e-3}])
 def test_it_is_found_wherever_the_search_starts(wrong: Recording, start: dict[str, float]) -> None:
     """Noise that is set wrong, by a factor of two both ways, must not look like a gain."""
-    found = calibrate(Likelihood(wrong, held_out=0.0), start).found
+    found = calibrate(Likelihood(wrong, held_out=0.0), start).entries
     assert [entry.name for entry in found] == list(NAMES)
     for entry, true, within in zip(found, TRUTH, WITHIN, strict=True):
         assert abs(entry.best - true) < min(within, 3.0 * entry.sigma), entry
@@ -38,7 +38,7 @@ def test_it_is_found_wherever_the_search_starts(wrong: Recording, start: dict[st
 def test_a_torque_gain_that_is_not_known_makes_the_gain_less_certain(wrong: Recording) -> None:
     """By 0.06 times its own standard deviation (d ln b / d ln m_p), as far as a minute tells."""
     exact, stated = (
-        calibrate(Likelihood(wrong), {**NOISE, "tau_m_gain_sigma": sigma}, ("z_ddot_delay", *NOISE)).found[0].sigma
+        calibrate(Likelihood(wrong), {**NOISE, "tau_m_gain_sigma": sigma}, ("z_ddot_delay", *NOISE)).entries[0].sigma
         for sigma in (0.0, 0.2)
     )
     assert math.sqrt(stated**2 - exact**2) == pytest.approx(0.06 * 0.2, rel=0.6)
@@ -56,21 +56,21 @@ def test_what_cannot_be_known_stays(
     loads: dict[str, float], settings: dict[str, float | str], words: str, simulate: Simulate
 ) -> None:
     calibration = calibrate(Likelihood(recording.read([simulate(21.0, **loads)])), settings)
-    assert (calibration.found, calibration.assignments) == ((), {})
-    assert f"lever_friction stay as they are: {words}" in calibration.words
+    assert (calibration.entries, calibration.assignments) == ((), {})
+    assert f"lever_friction stay as they are: {words}" in calibration.text
 
 
 def test_torque_that_nobody_knows_is_not_taken_for_it(simulate: Simulate) -> None:
     calibration = calibrate(Likelihood(recording.read([simulate(30.0, tremor=0.3)]), held_out=0.0), {})
     assert calibration.assignments == {}
-    assert {entry.verdict for entry in calibration.found} == {"kept: innovations not white"}
-    assert calibration.words.startswith("The calibration stays as it is: the innovations are not white")
+    assert {entry.verdict for entry in calibration.entries} == {"kept: innovations not white"}
+    assert calibration.text.startswith("The calibration stays as it is: the innovations are not white")
 
 
 def test_all_that_is_kept_is_not_looked_for(wrong: Recording) -> None:
     likelihood = Likelihood(wrong)
     calibration = calibrate(likelihood, {}, NAMES)
-    assert (calibration.found, calibration.words, likelihood.runs) == ((), "", 0)
+    assert (calibration.entries, calibration.text, likelihood.runs) == ((), "", 0)
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.tune import recording, validation
 from lever_cdkf.host_tools.tune.likelihood import Likelihood
-from lever_cdkf.host_tools.tune.search import Found, Search, groups
+from lever_cdkf.host_tools.tune.search import Search, Tuned, groups
 from python.tune.conftest import NOISE, WALK, Simulate
 
 
-def found_in(likelihood: Likelihood, *kept: str, **settings: float | str) -> dict[str, Found]:
+def found_in(likelihood: Likelihood, *kept: str, **settings: float | str) -> dict[str, Tuned]:
     return {entry.name: entry for entry in Search(likelihood, settings).run(groups(settings, kept))}
 
 
@@ -107,5 +107,5 @@ def test_what_is_off_or_kept_is_not_looked_for() -> None:
     ],
 )
 def test_decision(low: float | None, high: float | None, after: float, verdict: str) -> None:
-    found = Found("theta_noise", before=1.0, best=3.0, low=low, high=high)
+    found = Tuned("theta_noise", before=1.0, best=3.0, low=low, high=high)
     assert (found.after, found.verdict) == (after, verdict)

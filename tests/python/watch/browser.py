@@ -13,12 +13,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lever_cdkf.host_tools.report import picture
+from lever_cdkf.host_tools.report import screenshot
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 PATIENCE = 120.0
 """[s] that a browser may take to start, or a page to become what is waited for."""
-_OPTIONS = [option for option in picture.OFFLINE if "virtual-time" not in option]
+_OPTIONS = [option for option in screenshot.OFFLINE if "virtual-time" not in option]
 
 
 class Browser:
@@ -34,7 +34,7 @@ class Browser:
 
     def __enter__(self) -> Browser:
         self._profile = tempfile.mkdtemp(prefix="lever-browser-")
-        program = next(found for name in picture.BROWSERS if (found := shutil.which(name)))
+        program = next(found for name in screenshot.BROWSERS if (found := shutil.which(name)))
         options = [*_OPTIONS, "--remote-debugging-port=0", f"--user-data-dir={self._profile}", "about:blank"]
         self._process = subprocess.Popen([program, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:

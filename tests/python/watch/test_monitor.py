@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.watch import panels
-from lever_cdkf.host_tools.watch.model import Frame
+from lever_cdkf.host_tools.watch.picture import Frame
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.terminal import SPANS, TALL, Monitor
 from python.watch.conftest import LEVER, Flight

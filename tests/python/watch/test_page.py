@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lever_cdkf.host_tools.report import picture
+from lever_cdkf.host_tools.report import screenshot
 from python.watch.browser import Browser
 
-pytestmark = pytest.mark.requires("|".join(picture.BROWSERS))
+pytestmark = pytest.mark.requires("|".join(screenshot.BROWSERS))
 
 Start = Callable[..., "subprocess.Popen[str]"]
 CONDITION = "document.getElementById('condition').textContent"

@@ -13,7 +13,7 @@ import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.watch import sources
-from lever_cdkf.host_tools.watch.model import ERROR, FOREIGN, Frame, Picture
+from lever_cdkf.host_tools.watch.picture import ERROR, FOREIGN, Frame, Picture
 from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
 from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
 from lever_cdkf.sil.run.live_source import SimulationSource
