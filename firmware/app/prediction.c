@@ -40,8 +40,9 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     const setup_t *setup = &estimator->setup;
     const lever_settings_t *s = setup->settings;
     const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
-    float input[] = {friction(trim->origin[1] + cdkf->x[1]), z_ddot, tau_m}; /* in the order of enum trim_signal */
-    trim_inputs(trim, input, TRIM_FRICTION, 3u, period);
+    const bool steps = (cdkf->acting > (uint32_t)CDKF_STEP);
+    float input[] = {friction(trim->origin[1] + cdkf->x[1]), z_ddot, tau_m, 1.0f}; /* as in enum trim_signal */
+    trim_inputs(trim, input, TRIM_FRICTION, steps ? 4u : 3u, period);
     const float stop = input[0];
     const float next_z_ddot = input[1];
     const float next_tau_m = input[2] - (s->lever_friction * stop);
@@ -66,9 +67,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     }
     considered_errors(estimator, next_z_ddot, stop, error);
     error[CDKF_STEP] = 0.0f;
-    if (cdkf->acting > (uint32_t)CDKF_STEP) {
-        error[CDKF_STEP] = 1.0f;
-        trim_inputs(trim, &error[CDKF_STEP], TRIM_STEP, 1u, period);
+    if (steps) {
+        error[CDKF_STEP] = input[3];
         cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
     }
     const bool gripped =

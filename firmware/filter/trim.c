@@ -66,10 +66,9 @@ void trim_begin(trim_t *trim, const float x[MODEL_STATES])
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         begin(&trim->output[i], trim->origin[i] + trim->ahead[i] + x[i]);
     }
-    for (uint32_t i = 0u; i < (uint32_t)TRIM_STEP; i++) {
-        begin(&trim->input[i], level_of(&trim->input[i]));
+    for (uint32_t i = 0u; i < (uint32_t)TRIM_INPUTS; i++) {
+        begin(&trim->input[i], (i == (uint32_t)TRIM_STEP) ? 0.0f : level_of(&trim->input[i]));
     }
-    begin(&trim->input[TRIM_STEP], 0.0f);
     trim->begin_rate = trim->output[1].section[0].level;
     (void)memset(trim->ahead, 0, sizeof trim->ahead);
     trim_set_origin(trim);
@@ -96,9 +95,10 @@ static inline float pass(level_t *level, float value, float turn)
 void trim_inputs(trim_t *trim, float value[], enum trim_signal first, uint32_t count, float period)
 {
     const float turn = trim->corner * period;
-    for (uint32_t i = 0u; i < count; i++) {
-        const float deviation = pass(&trim->input[(uint32_t)first + i], value[i], turn);
-        value[i] = trim->deviations ? deviation : value[i];
+    if (trim->deviations) {
+        for (uint32_t i = 0u; i < count; i++) {
+            value[i] = pass(&trim->input[(uint32_t)first + i], value[i], turn);
+        }
     }
 }
 

@@ -45,11 +45,11 @@ float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t 
 enum { TRIM_SECTIONS = 3 };
 
 enum trim_signal {
-    TRIM_FRICTION, /* of a newton metre */
+    TRIM_FRICTION,   /* of a newton metre */
     TRIM_Z_DDOT,
     TRIM_TAU_M,
-    TRIM_GRIP_FORCE, /* [N] */
     TRIM_STEP,       /* of 1, when levels are begun anew */
+    TRIM_GRIP_FORCE, /* [N] */
     TRIM_INPUTS
 };
 
