@@ -128,7 +128,7 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
  * is only ever multiplied by factors in (0, 1], so it cannot fail. */
 static inline gain_t condition_on(float *s, uint32_t i, float noise)
 {
-    gain_t gain = {{0.0f, 0.0f}, 0.0f};
+    gain_t gain = {{0.0f, 0.0f}, 0.0f, 1.0f};
     float root = noise; /* of the variance of the output, in the columns so far */
     for (uint32_t left = i + 1u; left > 0u; left--) {
         const uint32_t j = left - 1u;
@@ -147,6 +147,7 @@ static inline gain_t condition_on(float *s, uint32_t i, float noise)
     }
     gain.k[0] *= gain.inverse * gain.inverse;
     gain.k[1] *= gain.inverse * gain.inverse;
+    gain.kept = (noise * gain.inverse) * (noise * gain.inverse);
     return gain;
 }
 
@@ -155,20 +156,19 @@ static inline gain_t condition_on(float *s, uint32_t i, float noise)
 static inline gain_t take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, float row[MODEL_PARAMETERS],
     innovation_t *innovation, float step[MODEL_STATES])
 {
-    gain_t gain = {{0.0f, 0.0f}, 0.0f};
+    gain_t gain = {{0.0f, 0.0f}, 0.0f, 1.0f};
     if (valid) {
         gain = condition_on(cdkf->s_xx, i, cdkf->output_noise[i]);
-        float *theta = &cdkf->s[L * L];
-        float *theta_dot = &cdkf->s[(L + 1u) * L];
-        const float *seen = (i == 0u) ? theta : theta_dot;
-        for (uint32_t j = 0u; j < L; j++) {
-            row[j] = gain_correct(&gain, seen[j], &theta[j], &theta_dot[j]);
+        const uint32_t j = N - 1u - i; /* the other state */
+        float *own = &cdkf->s[(L + i) * L];
+        float *other = &cdkf->s[(L + j) * L];
+        for (uint32_t k = 0u; k < L; k++) {
+            row[k] = gain_correct_own(&gain, gain.k[j], &own[k], &other[k]);
         }
         const float nu = y - cdkf->x[i];
-        const float share = cdkf->output_noise[i] * gain.inverse;
         innovation->value = gain.inverse * nu;
-        innovation->noise_variance = share * share;
-        innovation->response = gain_correct(&gain, cdkf->response[i], &cdkf->response[0], &cdkf->response[1]);
+        innovation->noise_variance = gain.kept;
+        innovation->response = gain_correct_own(&gain, gain.k[j], &cdkf->response[i], &cdkf->response[j]);
         for (uint32_t k = 0u; k < N; k++) {
             cdkf->x[k] += gain.k[k] * nu;
             step[k] += gain.k[k] * nu;
@@ -186,8 +186,8 @@ static void correct_considered(cdkf_t *cdkf, const gain_t gain[CDKF_OUTPUTS],
 {
     for (uint32_t c = 0u; c < cdkf->acting; c++) {
         considered_t *of = &cdkf->considered[c];
-        const float first = gain_correct(&gain[0], of->x[0], &of->x[0], &of->x[1]);
-        const float second = gain_correct(&gain[1], of->x[1], &of->x[0], &of->x[1]);
+        const float first = gain_correct_own(&gain[0], gain[0].k[1], &of->x[0], &of->x[1]);
+        const float second = gain_correct_own(&gain[1], gain[1].k[0], &of->x[1], &of->x[0]);
         if (learn) {
             for (uint32_t i = 0u; i < L; i++) {
                 of->cross[i] += (row[0][i] * first) + (row[1][i] * second);

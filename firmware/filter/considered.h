@@ -6,10 +6,11 @@
 
 #include "filter/cdkf.h"
 
-/* Gain of one output on the state for given w, and the innovation's standard deviation; all 0 when it is not valid. */
+/* Gain of one output on the state for given w, and the innovation's standard deviation; 0 when it is not valid. */
 typedef struct gain {
     float k[MODEL_STATES];
     float inverse; /* 1 / S_y */
+    float kept;    /* R / S_y^2, what is left of a deviation of the output itself; 1 when it is not valid */
 } gain_t;
 
 /* Takes from a deviation of the state what the correction by an output takes, I - K H; returns what the output saw of
@@ -18,6 +19,15 @@ static inline float gain_correct(const gain_t *gain, float seen, float *theta, f
 {
     *theta -= gain->k[0] * seen;
     *theta_dot -= gain->k[1] * seen;
+    return gain->inverse * seen;
+}
+
+/* The same by an output that is `own` of the states `own` and `other`, whose gain is `k`. */
+static inline float gain_correct_own(const gain_t *gain, float k, float *own, float *other)
+{
+    const float seen = *own;
+    *own = gain->kept * seen;
+    *other -= k * seen;
     return gain->inverse * seen;
 }
 
