@@ -4,27 +4,10 @@
 #include <string.h>
 
 #define SECTIONS ((uint32_t)TRIM_SECTIONS)
-#define TURN 6.28318531f
 #define STEPS_MOST 24.0f /* of that line */
 
 /* The sections in units of the corner: 2 cos(pi / 12), 2 cos(3 pi / 12), 2 cos(5 pi / 12). */
 static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f};
-
-high_pass_corner_t high_pass_corner(float frequency, float damping)
-{
-    const float w = TURN * frequency;
-    const high_pass_corner_t corner = {w * w, damping * w};
-    return corner;
-}
-
-/* level/signal = (d w s + w^2) / (s^2 + d w s + w^2), by semi-implicit Euler. */
-float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period)
-{
-    const float deviation = value - filter->level;
-    filter->slope += period * (corner->square * deviation);
-    filter->level += period * (filter->slope + (corner->damping * deviation));
-    return deviation;
-}
 
 static float level_of(const level_t *level)
 {
@@ -39,7 +22,7 @@ float trim_angle(const trim_t *trim)
 void trim_start(trim_t *trim, float angle, float corner, bool deviations)
 {
     (void)memset(trim, 0, sizeof *trim);
-    trim->corner = TURN * corner;
+    trim->corner = HIGH_PASS_TURN * corner;
     trim->settling_time = 0.9f / corner;
     trim->deviations = deviations;
     trim->output[0].section[0].level = angle;
@@ -79,15 +62,12 @@ void trim_unsettle(trim_t *trim)
     trim->unsettled = trim->deviations ? trim->settling_time : 0.0f;
 }
 
-/* As high_pass_step() in all sections, after `turn` = corner times period; returns the deviation. */
+/* The deviation of a value, `turn` = corner times period after the last one. */
 static inline float pass(level_t *level, float value, float turn)
 {
     float deviation = value;
     for (uint32_t i = 0u; i < SECTIONS; i++) {
-        section_t *section = &level->section[i];
-        deviation -= section->level;
-        section->slope += turn * deviation;
-        section->level += turn * (section->slope + (damping[i] * deviation));
+        deviation = high_pass_step(&level->section[i], deviation, turn, damping[i]);
     }
     return deviation;
 }
@@ -136,7 +116,7 @@ static void follow(trim_t *trim, uint32_t i, float x, float period)
     float deviation = (fabsf(x) <= MODEL_THETA_MOST) ? x : 0.0f;
     float rate = 0.0f;
     for (uint32_t left = SECTIONS; left > 0u; left--) {
-        section_t *section = &trim->output[i].section[left - 1u];
+        high_pass_t *section = &trim->output[i].section[left - 1u];
         section->slope = waiting ? 0.0f : section->slope;
         rate += section->slope + (damping[left - 1u] * deviation);
         deviation += section->level;

@@ -20,25 +20,24 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Of a corner w [rad/s] and a damping d (twice the damping ratio): w^2 and d w. */
-typedef struct high_pass_corner {
-    float square;
-    float damping;
-} high_pass_corner_t;
-
-/* A section of second order. */
+/* A section of second order, in time of 1 / corner. */
 typedef struct high_pass {
     float level; /* [unit of the signal] */
-    float slope; /* [unit / s] */
+    float slope; /* [unit corner] */
 } high_pass_t;
 
-#define HIGH_PASS_BUTTERWORTH 1.41421356f /* damping of one section alone */
+#define HIGH_PASS_TURN 6.28318531f        /* [rad] */
+#define HIGH_PASS_BUTTERWORTH 1.41421356f /* damping, twice the damping ratio, of one section alone */
 
-/* Of a corner frequency [Hz] and a damping. */
-high_pass_corner_t high_pass_corner(float frequency, float damping);
-
-/* One value after `period` seconds. Returns its deviation from the level before it. */
-float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period);
+/* One value; `turn`: the corner [rad/s] times the time since the last one. Returns its deviation from the level before
+ * it. level / signal = (damping s + 1) / (s^2 + damping s + 1), by semi-implicit Euler. */
+static inline float high_pass_step(high_pass_t *filter, float value, float turn, float damping)
+{
+    const float deviation = value - filter->level;
+    filter->slope += turn * deviation;
+    filter->level += turn * (filter->slope + (damping * deviation));
+    return deviation;
+}
 
 #define TRIM_OUTAGE 0.0205f /* a signal missing for longer is out [s]; not a whole number of periods */
 
@@ -53,15 +52,9 @@ enum trim_signal {
     TRIM_INPUTS
 };
 
-/* A section of them, in time of 1 / corner. */
-typedef struct section {
-    float level; /* [unit of the signal] */
-    float slope; /* [unit corner] */
-} section_t;
-
 /* A signal's slow part. */
 typedef struct level {
-    section_t section[TRIM_SECTIONS];
+    high_pass_t section[TRIM_SECTIONS];
 } level_t;
 
 typedef struct trim {
