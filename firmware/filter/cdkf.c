@@ -63,11 +63,10 @@ static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response
     const float square = (theta[0] * theta[0]) + (theta[1] * theta[1]) + (half * half * rate) + noise.angle;
     const float product = (theta[0] * theta_dot[0]) + (theta[1] * theta_dot[1]) + (half * rate);
     const float own = (theta[0] * theta_dot[1]) - (theta[1] * theta_dot[0]); /* minors: of both columns, */
-    const float first = theta[0] - (half * theta_dot[0]); /* of each with the walk */
+    const float first = theta[0] - (half * theta_dot[0]);                    /* of each with the walk */
     const float second = theta[1] - (half * theta_dot[1]);
-    const float minors =
-        (own * own) + (rate * ((first * first) + (second * second))) +
-        (noise.angle * ((theta_dot[0] * theta_dot[0]) + (theta_dot[1] * theta_dot[1]) + rate));
+    const float minors = (own * own) + (rate * ((first * first) + (second * second))) +
+                         (noise.angle * ((theta_dot[0] * theta_dot[0]) + (theta_dot[1] * theta_dot[1]) + rate));
     const float norm = sqrtf(square);
     const float inverse = (norm > 0.0f) ? (1.0f / norm) : 0.0f;
     s[0] = norm;
@@ -181,8 +180,8 @@ static inline gain_t take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, 
 }
 
 /* After the update of the filter: gain, what each output saw of S_ww, innovation. */
-static void correct_considered(cdkf_t *cdkf, const gain_t gain[CDKF_OUTPUTS],
-    float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
+static void correct_considered(cdkf_t *cdkf, const gain_t gain[CDKF_OUTPUTS], float row[CDKF_OUTPUTS][MODEL_PARAMETERS],
+    const innovation_t innovation[CDKF_OUTPUTS], bool learn)
 {
     for (uint32_t c = 0u; c < cdkf->acting; c++) {
         considered_t *of = &cdkf->considered[c];

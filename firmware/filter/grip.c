@@ -21,8 +21,7 @@ void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float 
     considered_inputs(response, period, input);
     for (uint32_t c = 0u; c < cdkf->acting; c++) {
         const float *x = cdkf->considered[c].x;
-        seen->considered[c] = (slope[0] * x[0]) + (slope[1] * x[1]) +
-                              ((input[c] * error[c]) - grip->error[c]);
+        seen->considered[c] = (slope[0] * x[0]) + (slope[1] * x[1]) + ((input[c] * error[c]) - grip->error[c]);
     }
     seen->column[0] = (slope[0] * own[0]) + (slope[1] * own[2]);
     seen->column[1] = slope[1] * own[3];
@@ -56,7 +55,8 @@ bool grip_predict_state_columns(cdkf_t *cdkf, const model_response_t *response, 
     const float rate = sqrtf(noise.variance);
     const float second = sqrtf(noise.second);
     const float column[COLUMNS] = {seen->column[0], seen->column[1], seen->walk * rate, second, 0.0f};
-    float theta[COLUMNS + 1u] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, sqrtf(noise.angle), 0.0f};
+    float theta[COLUMNS + 1u] = {
+        cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, sqrtf(noise.angle), 0.0f};
     float theta_dot[COLUMNS + 1u] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, second, 0.0f, 0.0f};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);

@@ -151,8 +151,8 @@ bool trim_outputs(
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         const float value = y[i];
         const bool regular = valid[i] && (trim->missing[i] <= 0.0f);
-        const float deviation = regular ? pass(&trim->output[i], value, turn)
-                                        : irregular(trim, i, x[i], value, valid[i], period, &back);
+        const float deviation =
+            regular ? pass(&trim->output[i], value, turn) : irregular(trim, i, x[i], value, valid[i], period, &back);
         y[i] = (valid[i] && trim->deviations) ? deviation : value;
         trim->last[i] = valid[i] ? value : trim->last[i];
     }

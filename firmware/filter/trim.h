@@ -44,7 +44,7 @@ static inline float high_pass_step(high_pass_t *filter, float value, float turn,
 enum { TRIM_SECTIONS = 3 };
 
 enum trim_signal {
-    TRIM_FRICTION,   /* of a newton metre */
+    TRIM_FRICTION, /* of a newton metre */
     TRIM_Z_DDOT,
     TRIM_TAU_M,
     TRIM_STEP,       /* of 1, when levels are begun anew */
