@@ -1,4 +1,4 @@
-"""How far a command is, told on standard error once it takes longer than a moment."""
+"""The progress of a command, shown on standard error once it takes longer than a moment."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from . import interrupts
 
 PATIENCE = 2.0
 """[s] before anything is said."""
-_BETWEEN_LINES = 30.0  # [s] where nobody looks
+_BETWEEN_LINES = 30.0  # [s] where standard error is not a terminal
 
 
 class Progress:

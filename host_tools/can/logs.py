@@ -221,7 +221,7 @@ def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
             require("mf4")
         return Recording._python_can
     formats = ", ".join((*filter(None, _CANDUMP), *_OTHERS))
-    raise LogError(f"{path}: {suffix} is no format of CAN logs that is known: {formats}, each also with {_COMPRESSED}")
+    raise LogError(f"{path}: {suffix} is not a known format of CAN logs: {formats}, each also with {_COMPRESSED}")
 
 
 def _is_file(path: str) -> bool:

@@ -70,7 +70,7 @@ class Recorder:
         """Records until `ended` is true, asked ten times a second; `tell` is called each second. Raises LeverError."""
         for path in (self._path, self.partial):
             if path.exists():
-                raise LeverError(f"{path} is there already: choose another name, or move it away")
+                raise LeverError(f"{path} exists already: choose another name, or move it away")
         self._start = time.monotonic()
         try:
             with self.partial.open("w", encoding="ascii", errors="replace") as file:

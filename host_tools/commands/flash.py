@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LeverError
+from ..extras import pip_install
 
 IMAGES = Path("build/stm32f4")
 DEFAULT_IMAGE = IMAGES / "lever_stm32f4_can.elf"
@@ -108,9 +109,7 @@ def run(args: argparse.Namespace) -> int:
     installed = [name for name in TOOLS if _find(name)]
     if not installed or (args.tool or installed[0]) not in installed:
         missing = args.tool or " and no ".join(TOOLS)
-        raise LeverError(
-            f'no {missing} here to write flash with: apt install openocd, or pip install "lever-cdkf[flash]"'
-        )
+        raise LeverError(f"no {missing} is installed: apt install openocd, or {pip_install('lever-cdkf[flash]')}")
     tool = args.tool or installed[0]
     command = [_find(tool), *TOOLS[tool](image, kind, serial)]
     print(f"{image}: {size} bytes of flash, whole\n{shlex.join(command)}", flush=True)

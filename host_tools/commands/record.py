@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
 _DESCRIPTION = """\
 Records everything on a CAN bus, through any interface of python-can, into a log in the format of candump -L, for
-`lever replay`, `lever tune`, canplayer and the like. Frames that were lost before they came here are told from the E2E
-counters of the messages of lever.dbc, damaged ones from their CRC. Ctrl-C ends the recording.
+`lever replay`, `lever tune`, canplayer and the like. Lost frames are detected by the E2E counters of the messages of
+lever.dbc, damaged ones by their CRC. Ctrl-C ends the recording.
 
-Until it has ended the log is called FILE.partial. What keeps that name broke off: the disk was full, the bus failed.
+Until it has ended the log is called FILE.partial. A file that keeps that name is incomplete: the disk was full, or the
+bus failed.
 """
 _EPILOG = """\
 examples:
@@ -31,7 +32,7 @@ examples:
   lever record --interface socketcan --channel can0 -o flight.log --duration 3600
   lever record --interface slcan --channel /dev/ttyACM0 --bitrate 1000000 -o bench.log
 
-Exit status: 0 when FILE is complete (losses on the bus are told, but are no error), 2 when the recording broke off.
+Exit status: 0 when FILE is complete (losses on the bus are reported, but are no error), 2 when the recording failed.
 """
 
 
@@ -94,7 +95,7 @@ def _stopping() -> Iterator[list[int]]:
 class _Line:
     """How it goes: one line that is written over on a terminal, a line now and then elsewhere."""
 
-    _BETWEEN_LINES = 30.0  # [s] where nobody looks
+    _BETWEEN_LINES = 30.0  # [s] where standard error is not a terminal
 
     def __init__(self) -> None:
         self._on_terminal = sys.stderr.isatty()

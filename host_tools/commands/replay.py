@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from ..replay.engine import Options
 
 _DESCRIPTION = """\
-Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints what it makes of them; with --out
-also writes into DIR
+Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints its estimates; with --out also
+writes into DIR
 
   bus.log       what the estimator got and what it answered, in the format of candump, on recorded time
   trace.csv     measured, estimated, standard deviations and health, a row for each sample

@@ -30,7 +30,7 @@ likely: the firmware's own filter runs through it some hundred times, and the de
 With dither in the log (a motor torque of 0.05 N m rms or more) it first finds the calibration: gain and delay of the
 accelerometer (z_ddot_gain, z_ddot_delay) and Coulomb friction of the lever (lever_friction), each with its standard
 deviation (_sigma). Two minutes with 0.3 N m of dither and 0.1 g of vibration give them within 1 %, 0.3 ms and 0.03 N m.
-Without dither they cannot be known. tau_m_gain never can: measure it.
+Without dither they cannot be known. tau_m_gain cannot be found in a log at all: measure it.
 
 Noise, walks and adaptation are changed only where the log contradicts them (95 % likelihood interval). The last part of
 the log is held out: the search never sees it, and before and after are compared on it. Noise that the firmware
@@ -38,7 +38,7 @@ estimates while running (noise_window) is off during the search, and on again wh
 
 What is printed: the settings with units (sigma: standard deviation), and for both parts, before and after,
   lnL     log-likelihood per sample of angle [rad] and rate [rad/s], given all before [nat]; more is better
-  NIS     normalised innovation squared per output [1]: 1 where the filter is as certain as it may be, more: too certain
+  NIS     normalised innovation squared per output [1]: 1 where the stated uncertainty is right, above: too certain
   corr.   largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
 """
 _EPILOG = """\

@@ -116,9 +116,9 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
         why = why_refused(summary["corrupt"], summary["late"])
         troubles.append(f"{recording['refused']:,} frames were refused: {why}.")
     if recording["ends_early"]:
-        troubles.append(f"The log is not whole: {'; '.join(recording['ends_early'])}.")
+        troubles.append(f"The log is incomplete: {'; '.join(recording['ends_early'])}.")
     if recording["damaged_lines"]:
-        troubles.append(f"{recording['damaged_lines']} of its lines are no frames.")
+        troubles.append(f"{recording['damaged_lines']} of its lines are not frames.")
     if recording["gaps"]:
         gaps, longest = recording["gaps"], recording["longest_gap_s"]
         troubles.append(f"Samples are missing in {gaps} places, the longest gap {longest:.3g} s.")
@@ -137,7 +137,8 @@ def _recorded_estimates(recording: dict[str, Any]) -> list[str]:
     troubles = []
     if recording["answers_of_other_contract"]:
         troubles.append(
-            "The estimates in the log are of another contract, or none that it tells (IDENTITY): they are not compared."
+            "The estimates in the log are of another version of lever.dbc, or of an unknown one (IDENTITY): they are "
+            "not compared."
         )
     if recording["misplaced_answers"]:
         troubles.append(f"{recording['misplaced_answers']} recorded estimates do not belong to the sample before them.")

@@ -1,4 +1,4 @@
-"""What a reader is told of the estimator's model, and of a truth that is of another kind."""
+"""The captions of the report: what its charts show, of which model, and against which truth."""
 
 from ..results import whiteness
 from .charts import transfer
@@ -41,12 +41,12 @@ def parameters_caption(run: Run) -> str:
     shown = f"{PARAMETERS[run.model]}, with a band of ±2σ"
     if run.mismatch is not None:
         return (
-            f"{shown}. There is no truth to hold them against: the pilot of this run is not of this kind, and these "
-            "are the values with which the model imitates him."
+            f"{shown}. They have no true values: the pilot of this run is not one that the model can represent, and "
+            "these are the values with which it fits the motion best."
         )
     if not run.has_truth:
         return f"{shown}."
-    return f"{shown}: the blue line should follow the dashed one, and the band hold it about 95 % of the time."
+    return f"{shown}: the blue line should follow the dashed one, which the band should contain about 95 % of the time."
 
 
 def dynamics_caption(run: Run) -> str:
@@ -84,13 +84,13 @@ def excitation_caption(run: Run) -> str:
     sentences = ["What shakes the lever. Without motion there is nothing to learn from."]
     if _has_scale(run):
         sentences.append(
-            "Without motor torque only ratios of the three parameters can be told, and the bands above must be wide."
+            "Without motor torque only ratios of the three parameters can be known, and the bands above must be wide."
         )
     return " ".join(sentences)
 
 
 def _has_scale(run: Run) -> bool:
-    """Whether the parameters have a common scale that base motion alone does not tell."""
+    """Whether the parameters have a common scale that base motion alone does not determine."""
     return run.model in ("lever", "linear_physical")
 
 

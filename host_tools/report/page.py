@@ -63,7 +63,9 @@ def _subtitle(run: Run) -> str:
 
 
 def _explained(page: Page, run: Run) -> None:
-    checked = " The truth is known in a simulation: this page holds the claims against it." if run.has_truth else ""
+    checked = (
+        " In a simulation the truth is known, and this page compares the estimates with it." if run.has_truth else ""
+    )
     about = "".join(f"<p>{paragraph}</p>" for paragraph in captions.about(run))
     svg = (files(__package__) / "schematic.svg").read_text(encoding="utf-8")
     page.section(
@@ -74,7 +76,7 @@ def _explained(page: Page, run: Run) -> None:
         "<p>A helicopter pilot's left arm rests on the collective lever. The cabin shakes, the arm moves the lever, "
         "the lever moves the rotor, and the rotor shakes the cabin: a loop that can grow by itself. How close it is "
         "to that depends on the arm, which acts like a mass m<sub>p</sub> on a spring k<sub>p</sub> with a damper "
-        "c<sub>p</sub>, and which changes as the pilot grips, relaxes or tires.</p><p>Nobody can measure these three. "
+        "c<sub>p</sub>, and which changes as the pilot grips, relaxes or tires.</p><p>No sensor measures these three. "
         "The estimator works them out on line, many times a second, from the lever's angle θ and rate, the "
         "acceleration of the floor z̈ and the torque τ<sub>m</sub> of the lever's own motor, and says how sure it is: "
         f"the shaded bands are ±2 standard deviations (σ).{checked}</p>{about}</div>{svg}</div>",
@@ -148,7 +150,7 @@ def _transfer(page: Page, run: Run) -> None:
 
 def _signals(page: Page, run: Run) -> None:
     true = run.first_name("theta_true_rad", "theta_dot_true_rad_s")
-    lies = f"Estimate and {'measurement' if true is None else 'truth'} lie on each other unless something is wrong."
+    lies = f"Estimate and {'measurement' if true is None else 'truth'} coincide unless something is wrong."
     page.section(
         "states",
         "States",
@@ -156,8 +158,8 @@ def _signals(page: Page, run: Run) -> None:
         page.figure(
             "figure-detail",
             signals.detail(run),
-            "A close look at angle and rate of the lever: grey dots are what the sensors said, the blue line what the "
-            "estimator makes of it. The buttons choose the moment.",
+            "Angle and rate of the lever in detail: grey dots are the samples of the sensors, the blue line is the "
+            "estimate. The buttons choose the moment.",
         ),
         page.figure(
             "figure-motion",
@@ -198,8 +200,8 @@ def _health(page: Page, run: Run) -> None:
         page.figure(
             "figure-health",
             health.timeline(run),
-            "What the estimator said of itself: its mode (blue) and the faults it noticed (orange). Below, how many "
-            "frames were lost, corrupt or late on the bus. What is not shown did not happen.",
+            "The mode of the estimator (blue) and the faults that it reported (orange). Below, how many frames were "
+            "lost, corrupt or late on the bus. What is not shown did not occur.",
         ),
     )
 

@@ -51,7 +51,7 @@ def figures_of(run: Run, quantity: Quantity) -> Quality | None:
 def verdict(run: Run) -> str:
     """The headline."""
     if run.summary is None:
-        text, mood = "A recorded run, with no truth to compare with: what the estimator made of it.", ""
+        text, mood = "A recorded run, whose truth is not known: the estimates from it.", ""
     else:
         text = run.summary.verdict
         mood = "bad" if not run.summary.passed else "" if _in_doubt(run) else "good"
@@ -98,7 +98,7 @@ def _accuracy_cards(run: Run, judged: list[Quantity]) -> list[str]:
             "Coverage of ±2σ",
             rows("coverage_2sigma", percent),
             "Of the time the truth lay within ±2σ: 95 % of Gaussian errors do. Errors last for seconds, so a single "
-            "run is partly luck; lever sim --seeds tells of many.",
+            "run is partly luck; lever sim --seeds shows many.",
         ),
         _card(
             "How fast",

@@ -81,7 +81,7 @@ class Calibrated:
         """In words."""
         if not self.white:
             return "kept: innovations not white"
-        return "found" if self.is_taken else "kept: the log does not tell it better"
+        return "found" if self.is_taken else "kept: the log does not determine it better"
 
     @property
     def assignments(self) -> dict[str, float]:

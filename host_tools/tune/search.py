@@ -66,7 +66,7 @@ class Tuned:
     def verdict(self) -> str:
         """In words."""
         if self.low is None and self.high is None:
-            return "kept: the log does not tell"
+            return "kept: the log does not determine it"
         if self.after == self.before:
             return "kept: not contradicted"
         if self.low is None:

@@ -147,14 +147,14 @@ class Picture:
         return self.values[message][name] if self.is_fresh(message) and message in self.values else NAN
 
     def wrong_contract(self) -> str | None:
-        """Why what is shown may be misread: the estimator speaks another contract, or none that it tells."""
+        """Why what is shown may be misread: the estimator speaks another version of lever.dbc, or an unknown one."""
         contract = self.identity.contract
         if contract is not None:
             mismatch = f"contract {contract} of lever.dbc, this program {codec.contract()}: what is shown is wrong"
             return None if contract == codec.contract() else f"the estimator speaks {mismatch}"
         if self._first_estimate is None or self.now - self._first_estimate <= _PATIENCE:
             return None
-        return "the estimator does not tell its version (IDENTITY): of an old one, what is shown is wrong"
+        return "the estimator does not send its version (IDENTITY): if it is an old one, what is shown is wrong"
 
     def parameters(self) -> list[Estimated]:
         """The parameters of the model; none before it is known."""

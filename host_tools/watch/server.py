@@ -228,7 +228,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
         """The next one is not read before this one is answered."""
         try:
             if not self.server.state.controls:
-                raise LeverError("this page only shows: no commands")
+                raise LeverError("this page is read-only: no commands")
             command = command_of(json.loads(message), self.server.config)
             self._count_command(_now())
             await self.server.command(command)

@@ -1,4 +1,4 @@
-"""Modes and faults in words, for people who do not have the façade header open (which defines them)."""
+"""Modes and faults in words; the façade header defines them."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ SILENT_AFTER = 1.0
 
 
 def condition(picture: Picture) -> tuple[str, str]:
-    """How it stands in one line: ("good", "watch" or "bad", text)."""
+    """The state of the estimator in one line: ("good", "watch" or "bad", text)."""
     silence = picture.silence()
     if silence > SILENT_AFTER:
         if silence != float("inf"):
-            return "bad", f"the estimator has said nothing for {silence:.0f} s: what is shown is old"
+            return "bad", f"no frame from the estimator for {silence:.0f} s: what is shown is old"
         if picture.is_fresh("BASE_SAMPLE"):
             return "bad", "samples pass, but no estimator answers: is the firmware running?"
         if any(entry.frames for entry in picture.traffic.values()) or picture.foreign:

@@ -16,7 +16,7 @@ from lever_cdkf.host_tools.tables import Row, add_json_option
 from .names import check_names
 
 _DESCRIPTION = """\
-Runs the firmware's estimators and other people's on the same data and says who is best where: errors, errors against
+Runs the firmware's estimators and published ones on the same data and ranks them in each case: errors, errors against
 those of a Kalman filter linearised at the truth and against the posterior Cramér-Rao bound, consistency of the stated
 uncertainty (NEES, NIS), time to follow a step, time a step takes. Cases are matched random walks, sudden changes of the
 pilot's grip, wrong settings of the noise, and the scenarios of `lever sim`. A difference is called significant by

@@ -81,7 +81,7 @@ _TORQUES = (
         _FLAGGED,
     ),
     Condition("tremor", "tremor of 0.2 N m, 3–5 Hz", Motion(tremor=0.2), _right(3.0, 85.0), _FLAGGED),
-    Condition("rough_told", "process noise 0.5, told", _ROUGH, settings={"theta_dot_process_noise": 0.5}),
+    Condition("rough_told", "process noise 0.5, as set", _ROUGH, settings={"theta_dot_process_noise": 0.5}),
     Condition(
         "rough",
         "rough air: process noise 0.5, set 0.05",

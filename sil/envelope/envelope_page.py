@@ -16,14 +16,14 @@ from .campaign import Result
 from .measure import FIGURES, FLAGS, Excerpt
 from .table import MISSED, figures, lines, state
 
-_TITLE = "Lever CDKF: what a collective meets every minute"
+_TITLE = "Lever CDKF: the conditions that a collective meets"
 _STYLE = ".missed { color: var(--bad); } #table :is(td, th):nth-child(3) { text-align: left; white-space: normal; }"
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
     """The whole page."""
     page = Page()
-    page.section("table", "Table", "Measured against what must hold", _table(lines(results)), _legend(results))
+    page.section("table", "Table", "Measured values against their limits", _table(lines(results)), _legend(results))
     for result in results:
         name, chart = result.condition.name, None if result.excerpt is None else _chart(result.excerpt, result)
         title = f"{html.escape(result.condition.title)}: {state(result)}"

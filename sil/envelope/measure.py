@@ -46,7 +46,7 @@ class Outcome:
     events: tuple[tuple[float, float], ...] = ()
     """Faults or changes, from and to [s]."""
     reference: Outcome | None = None
-    """The same where it does not happen, or is told."""
+    """The same where it does not happen, or is given in the settings."""
 
     def during(self, start: float, end: float) -> BoolArray:
         """Which estimates are of this time [s]."""

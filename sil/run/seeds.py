@@ -139,7 +139,7 @@ def verdict(summaries: Sequence[SimulationSummary]) -> str:
     sentences = [f"Limits missed: {'; '.join(reasons)}." if reasons else kept]
     covered = {key: float(np.mean(coverage(summaries, key))) for key in judged(summaries)}
     if not covered:
-        return "Too short to judge: the runs end before the estimates were to have converged."
+        return "Too short to judge: the runs end before converged_after."
     least = min(covered, key=lambda key: covered[key])
     percent = math.floor(covered[least] + 1e-9)
     sentences.append(f"Over all runs ±2σ covers every truth for at least {percent} % of the time (least: {least}).")

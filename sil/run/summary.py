@@ -200,7 +200,7 @@ def missed_limits(
 
 
 def _verdict(summary: SimulationSummary) -> str:
-    """The run in a few sentences, for somebody who has not seen a Kalman filter before."""
+    """The run in a few sentences, for a reader who does not know Kalman filters."""
     return " ".join(
         sentence
         for sentence in (
@@ -221,7 +221,7 @@ def _verdict_run(summary: SimulationSummary) -> str:
     if summary.unanswered:
         troubles.append(f"{summary.unanswered} samples got no answer")
     if summary.misplaced:
-        troubles.append(f"{summary.misplaced} estimates came that belong to other samples")
+        troubles.append(f"{summary.misplaced} estimates belong to other samples")
     if "fault" in summary.modes_s:
         troubles.append(f"the estimator was in fault for {summary.modes_s['fault']:g} s")
     return f"Trouble: {' and '.join(troubles)}." if troubles else ""
@@ -231,15 +231,15 @@ def _verdict_settings(summary: SimulationSummary) -> str:
     """A run on other settings is refused; one of less than a second may not learn which they are."""
     if summary.firmware.settings_as_scenario is not None:
         return ""
-    return "The estimator has not said which settings it has (IDENTITY): those of the scenario are assumed."
+    return "The estimator has not sent its settings (IDENTITY): those of the scenario are assumed."
 
 
 def _verdict_truth(summary: SimulationSummary) -> str:
     if summary.truth.model == summary.estimator.model:
         return ""
     return (
-        f"The pilot ({summary.truth.model}) is not of the estimator's kind ({summary.estimator.model}): "
-        "only natural frequency and damping ratio can be held against the truth."
+        f"The pilot ({summary.truth.model}) is not of the estimator's model ({summary.estimator.model}): "
+        "only natural frequency and damping ratio can be compared with the truth."
     )
 
 
@@ -250,7 +250,7 @@ def _verdict_limits(summary: SimulationSummary) -> str:
         if entry.rms_percent is not None
     )
     if not errors:
-        return "Too short to judge: the run ends before the estimates were to have converged."
+        return "Too short to judge: the run ends before converged_after."
     if summary.missed:
         return f"Limits missed: {'; '.join(summary.missed)}. Rms errors after convergence: {errors}."
     kept = "All limits kept. " if summary.scenario.limits else ""

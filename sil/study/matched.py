@@ -79,7 +79,7 @@ class Condition:
 
 
 def knowledge(settings: Mapping[str, float], kind: Kind) -> Knowledge:
-    """What a filter with these settings is told."""
+    """What a filter with these settings is given."""
     return Knowledge(
         guess=np.array([settings[name] for name in kind.parameters]),
         sigma=np.array([settings[f"{name}_sigma"] for name in kind.parameters]),

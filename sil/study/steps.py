@@ -51,7 +51,7 @@ class Step:
 
 
 def stepped(step: Step, runs: int, seed: int) -> Batch:
-    """`runs` runs; run i is the same, to the bit, whatever `runs` is. Signals are detrended for whoever does not."""
+    """`runs` runs, detrended; run i is the same, to the bit, whatever `runs` is."""
     settings = {row.name: row.default for row in settings_table()} | {"theta_dot_process_noise": step.process_noise}
     kind, lever, period = KINDS[step.model], Lever.from_settings(settings, "trim"), settings["sample_period"]
     assumed = knowledge(settings, kind)

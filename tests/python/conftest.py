@@ -12,6 +12,7 @@ from typing import Any
 
 import can
 import pytest
+from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware.library import enum_names
@@ -80,6 +81,35 @@ def health(mode: str = "run", *faults: str, restarts: int = 0, excitation: float
     return "HEALTH", {"mode": mode, "restarts": restarts, "excitation": excitation, **flags}
 
 
+Run = Callable[..., tuple[int, str, str]]
+Refused = Callable[..., str]
+
+
+@pytest.fixture
+def lever(capsys: pytest.CaptureFixture[str]) -> Run:
+    """lever(*arguments): exit status, standard output, standard error."""
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = cli.main([str(argument) for argument in arguments])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def refused(lever: Run) -> Refused:
+    """refused(*arguments): the one line that the command `lever` says when it does nothing, with exit status 2."""
+
+    def line(*arguments: str | Path) -> str:
+        status, out, err = lever(*arguments)
+        assert (status, out, err.count("\n")) == (2, "", 1), err
+        assert err.startswith("lever: error: ")
+        return err
+
+    return line
+
+
 @pytest.fixture
 def load(tmp_path: Path) -> Callable[..., Scenario]:
     """load(text, *overrides): the scenario of a TOML text."""
@@ -116,21 +146,22 @@ Frame = tuple[int, bytes]
 Samples = Callable[[int, int], list[tuple[Frame, Frame]]]
 
 
+def swing(first: int, count: int) -> list[tuple[Frame, Frame]]:
+    """The LEVER_SAMPLE and BASE_SAMPLE of a swinging lever, at 1 kHz from sample `first`."""
+    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    frames = []
+    for k in range(first, first + count):
+        phase = 2.0 * math.pi * 3.0 * k * 1e-3
+        theta, theta_dot = 0.35 + 0.02 * math.sin(phase), 0.02 * 6.0 * math.pi * math.cos(phase)
+        motion = lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase))
+        frames.append(((0x110, motion), (0x111, base(k, 0.8 * math.sin(phase + 1.0), 1000 * k))))
+    return frames
+
+
 @pytest.fixture
 def samples() -> Samples:
-    """samples(first, count): the LEVER_SAMPLE and BASE_SAMPLE of a swinging lever, at 1 kHz from sample `first`."""
-    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-
-    def make(first: int, count: int) -> list[tuple[Frame, Frame]]:
-        frames = []
-        for k in range(first, first + count):
-            phase = 2.0 * math.pi * 3.0 * k * 1e-3
-            theta, theta_dot = 0.35 + 0.02 * math.sin(phase), 0.02 * 6.0 * math.pi * math.cos(phase)
-            motion = lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase))
-            frames.append(((0x110, motion), (0x111, base(k, 0.8 * math.sin(phase + 1.0), 1000 * k))))
-        return frames
-
-    return make
+    """samples(first, count): swing()."""
+    return swing
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ def tables(rows: Sequence[Row], claims: Sequence[Claim]) -> dict[str, list[Table
         by_title[f"{name}: {cases()[name].title}"] = [{column: line[column] for column in filled} for line in lines]
     if not claims:
         return by_title
-    by_title["what the firmware has to show"] = [
+    by_title["claims about the firmware"] = [
         {
             "claim": claim.text,
             "limit": f"{'≤' if claim.below else '≥'} {claim.limit:g}",

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import pytest
 import serial
 from lever_cdkf.host_tools.can.protocol_ahead import read_ahead
+from processes import PATIENCE
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def test_bytes_come_in_order_and_in_the_pieces_asked_for(line: tuple[int, str]) 
     end, path = line
     with serial.serial_for_url(read_ahead(path), timeout=1.0) as port:
         os.write(end, b"abcdefgh")
-        assert [port.read(1), port.read(2), port.read(3)] == [b"a", b"bc", b"def"]
+        assert [port.read(), port.read(2), port.read(3)] == [b"a", b"bc", b"def"]
         assert port.in_waiting == 2
         os.write(end, b"ijk")
         assert port.read(5) == b"ghijk"
@@ -39,7 +40,7 @@ def test_it_waits_for_what_is_missing_and_no_longer_than_the_timeout(line: tuple
         os.write(end, b"ab")
         began = time.monotonic()
         assert port.read(3) == b"ab"
-        assert 0.1 <= time.monotonic() - began < 5.0
+        assert 0.1 <= time.monotonic() - began < PATIENCE
         port.timeout = 0.0
         assert port.read(1) == b""
 

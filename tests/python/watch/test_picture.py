@@ -124,7 +124,7 @@ def test_what_is_old_is_not_shown_as_present(flight: Flight) -> None:
     assert all(math.isnan(entry.value) for entry in (*picture.parameters(), *picture.dynamics()))
     assert picture.mode is None
     assert picture.faults() == []
-    assert status.condition(picture) == ("bad", "the estimator has said nothing for 2 s: what is shown is old")
+    assert status.condition(picture) == ("bad", "no frame from the estimator for 2 s: what is shown is old")
     assert math.isnan(picture.history["k_p"][-1])
 
 
@@ -261,7 +261,7 @@ def test_an_estimator_that_does_not_tell_its_contract_is_told(flight: Flight) ->
         picture.take([frame for frame in flight.frames(100) if frame[0] != 0x217], flight.sample * 1e-3)
         told = status.condition(picture)
         assert (told[0] == "bad") is (picture.now > 3.1 + 1e-9)
-    assert told[1].startswith("the estimator does not tell its version (IDENTITY): ")
+    assert told[1].startswith("the estimator does not send its version (IDENTITY): ")
 
 
 def test_a_second_estimator_on_the_bus_is_told(make_flight: Callable[..., Flight]) -> None:
