@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 from ..extras import warn_of_left_out
 from ..files import check_not_input
 from ..tables import Row, Tables, add_json_option
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
 
 if TYPE_CHECKING:
     from ..replay.engine import Options
 
-_DESCRIPTION = """\
+_DESCRIPTION = f"""\
 Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints what it makes of them; with --out
 also writes into DIR
 
@@ -30,8 +31,9 @@ messages, other buses, damaged lines, is counted and left out. If it holds estim
 it was recorded, and of this version of lever.dbc (IDENTITY says so), they are compared with the new ones, signal by
 signal.
 
+{MAP_HELP}
 The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
-choice (model, preload, estimator, adaptation) that is made here.
+choice (model, preload, estimator, adaptation) that is made here. sample_period is that of mapped signals.
 """
 _EPILOG = """\
 examples:
@@ -40,6 +42,8 @@ examples:
   lever replay session.log --model linear_physical --set theta_noise=0.002 -o out/other
   lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
   candump -L can0 | lever replay - -o out/live
+  lever replay flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o out/flight
+  lever replay flight.csv --map theta=angle z_ddot=acc,unit=g -o out/flight
 
 Exit status: 0 when the log was replayed; 1 when the estimator was in fault or published no estimate, with one line on
 standard error.
@@ -65,6 +69,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         default=[],
         help="set one value; may be repeated, the last counts",
     )
+    add_signal_options(parser)
     add_json_option(parser)
 
 
@@ -102,7 +107,8 @@ def _options(args: argparse.Namespace) -> Options:
             assignments |= dict([parse_assignment(f"{what}={chosen}")])
     config = make_config(assignments)
     chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
-    return Options(config, chosen_here, args.channel)
+    reading = chosen_reading(args, args.logs[0])
+    return Options(config, chosen_here, args.channel, reading, *check_part(args))
 
 
 def _tables(summary: dict[str, Any]) -> Tables:
@@ -133,6 +139,8 @@ def _tables(summary: dict[str, Any]) -> Tables:
             }
             for name, told in summary["comparison"]["signals"].items()
         ]
+    if mapping := summary["recording"]["mapping"]:
+        tables["signals"] = [{"input": key, **row} for key, row in mapping["inputs"].items()]
     return tables | {"recording": [_recording_row(summary)]}
 
 

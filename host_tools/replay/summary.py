@@ -112,6 +112,9 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
     told, recording = [], summary["recording"]
     if failure(summary):
         told.append(f"Trouble: {failure(summary)}.")
+    if mapping := recording.get("mapping"):
+        told += [f"{note}." for note in mapping["notes"]]
+        told += _protection(mapping)
     if recording["refused"]:
         why = why_refused(summary["corrupt"], summary["late"])
         told.append(f"{recording['refused']:,} frames were refused: {why}.")
@@ -130,6 +133,20 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
     if step and not 0.7 < step / period < 1.4:
         told.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
     return told + _recorded_estimates(recording)
+
+
+def _protection(mapping: dict[str, Any]) -> list[str]:
+    """What E2E protection has found, or that there was none."""
+    told = []
+    for name, counts in mapping["messages"].items():
+        wrong = [f"{counts[what]:,} {what}" for what in ("corrupt", "lost", "repeated", "undecoded") if counts[what]]
+        if wrong:
+            told.append(f"Of {counts['frames']:,} frames of {name}: {', '.join(wrong)}.")
+    if mapping["unprotected_frames"]:
+        told.append(
+            f"{mapping['unprotected_frames']:,} frames are unprotected: the mapping names no E2E profile for them."
+        )
+    return told
 
 
 def _recorded_estimates(recording: dict[str, Any]) -> list[str]:
