@@ -12,9 +12,8 @@ from ..errors import LeverError
 from .mapping import Source
 from .recorded import Signal
 from .resample import Samples, sample
+from .slope import slope_ratio
 from .units import GRAVITY, KINDS, check_plausible, factor, gravity_in, guess
-
-_INDEPENDENT = 0.8  # least correlation of an angle's slope and a rate that are compared
 
 
 @dataclass(frozen=True)
@@ -109,37 +108,12 @@ def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[S
 
 def _disagreement(inputs: Mapping[str, Input], samples: Samples) -> list[str]:
     """Whether the angular rate is the slope of the angle; where it is not, one of their units or signs is wrong."""
-    if not {"theta", "theta_dot"} <= samples.columns.keys():
+    if not {"theta", "theta_dot"} <= inputs.keys():
         return []
-    width = max(1, round(0.02 / samples.period))  # means over 20 ms: of white noise, a slope is mostly noise
-    whole = len(samples.time_us) // width * width
-    time, theta, rate = (
-        np.nanmean(each[:whole].astype(np.float64).reshape(-1, width), axis=1)
-        for each in (samples.time_us * 1e-6, _filled(samples.columns["theta"]), _filled(samples.columns["theta_dot"]))
-    )
-    if len(time) < 50:
-        return []
-    slope = (theta[2:] - theta[:-2]) / (time[2:] - time[:-2])
-    rate = rate[1:-1]
-    there = np.isfinite(slope) & np.isfinite(rate)
-    slope, rate = slope[there], rate[there] - np.mean(rate[there])
-    if len(slope) < 50 or not np.std(slope) > 0.0 or not np.std(rate) > 0.0:
-        return []
-    correlation = float(np.corrcoef(slope, rate)[0, 1])
-    ratio = float(np.std(rate) / np.std(slope))
+    ratio = slope_ratio(inputs["theta"].signal, inputs["theta_dot"].signal)
     names = f"theta_dot = {inputs['theta_dot'].signal.name} and theta = {inputs['theta'].signal.name}"
-    if correlation < -_INDEPENDENT:
+    if ratio < 0.0:
         return [f"{names}: the rate is minus the slope of the angle: one of them needs sign=-1"]
-    if correlation > _INDEPENDENT and not 0.5 < ratio < 2.0:
+    if ratio and not 0.5 < ratio < 2.0:
         return [f"{names}: the rate is {ratio:.3g} times the slope of the angle: is one of them in another unit?"]
     return []
-
-
-def _filled(values: Any) -> Any:
-    """Without missing values, for means of pieces that are all missing."""
-    valid = np.isfinite(values)
-    return (
-        values
-        if valid.all() or not valid.any()
-        else np.interp(np.arange(len(values)), np.flatnonzero(valid), values[valid])
-    )

@@ -17,6 +17,7 @@ from ..arrays import FloatArray
 from ..errors import LeverError
 from .mapping import Mapping, Source
 from .recorded import Signal
+from .slope import STEP, slope_likeness, together
 from .units import GRAVITY, INPUTS, fitting, known
 
 _UNIT_FITS, _NO_UNIT, _UNIT_DOES_NOT = 4.0, 2.0, -8.0
@@ -24,6 +25,8 @@ _IS_SLOPE = 4.0
 _MOVES_WITH_BASE = 4.0
 """Times the coherence with the acceleration, 0 to 1."""
 _HOPELESS = -4.0
+_SEGMENT = 128
+"""Means in a segment of which a coherence is made."""
 _COMPARED = 12
 """Signals of an input whose values are compared with others', the best by name and unit."""
 _HAS_GRAVITY = 3.0
@@ -103,12 +106,12 @@ def _goes_with(each: Candidate, chosen: dict[str, Candidate]) -> bool:
     """Whether a rate is the slope of the angle, perhaps with the other sign; another rate is worse than none."""
     if each.key != "theta_dot" or "theta" not in chosen:
         return True
-    return abs(_slope_likeness(chosen["theta"].signal, each.signal)) > 0.5
+    return abs(slope_likeness(chosen["theta"].signal, each.signal)) > 0.5
 
 
 def _source(each: Candidate, chosen: dict[str, Candidate]) -> Source:
     turned = each.key == "theta_dot" and "theta" in chosen
-    turned = turned and _slope_likeness(chosen["theta"].signal, each.signal) < 0.0
+    turned = turned and slope_likeness(chosen["theta"].signal, each.signal) < 0.0
     return Source(each.signal.name, each.signal.unit, sign=-1 if turned else None)
 
 
@@ -170,7 +173,7 @@ def _with_slopes(candidates: list[Candidate]) -> list[Candidate]:
     gains: dict[tuple[str, str], tuple[float, str]] = {}
     for angle in _best(candidates, "theta"):
         for rate in _best(candidates, "theta_dot"):
-            if angle.signal.name != rate.signal.name and _slope_likeness(angle.signal, rate.signal) > 0.8:
+            if angle.signal.name != rate.signal.name and slope_likeness(angle.signal, rate.signal) > 0.8:
                 gains["theta", angle.signal.name] = _IS_SLOPE, f"its slope is {rate.signal.name}"
                 gains["theta_dot", rate.signal.name] = _IS_SLOPE, f"the slope of {angle.signal.name}"
     return _gained(candidates, gains)
@@ -197,19 +200,9 @@ def _gained(candidates: list[Candidate], gains: dict[tuple[str, str], tuple[floa
     return made
 
 
-def _slope_likeness(angle: Signal, rate: Signal) -> float:
-    """Correlation of the slope of an angle with a rate."""
-    angles, rates = _together(angle, rate)
-    slope, value = angles[2:] - angles[:-2], rates[1:-1]
-    both = np.isfinite(slope) & np.isfinite(value)
-    if both.sum() < 40 or not np.std(slope[both]) > 0.0 or not np.std(value[both]) > 0.0:
-        return 0.0
-    return float(np.corrcoef(slope[both], value[both])[0, 1])
-
-
 def _coherence(base: Signal, lever: Signal) -> float:
     """Mean coherence of two signals from 2 to 8 Hz, less what chance gives."""
-    both = [np.where(np.isfinite(each), each, np.nanmean(each)) for each in _together(base, lever) if len(each)]
+    both = [np.where(np.isfinite(each), each, np.nanmean(each)) for each in together(base, lever) if len(each)]
     if len(both) < 2 or len(both[0]) < 8 * _SEGMENT:
         return 0.0
     starts = range(0, len(both[0]) - _SEGMENT + 1, _SEGMENT // 2)
@@ -221,31 +214,7 @@ def _coherence(base: Signal, lever: Signal) -> float:
         for each in both
     )
     cross, power = np.mean(x.conj() * y, axis=0), np.mean(np.abs(x) ** 2, axis=0) * np.mean(np.abs(y) ** 2, axis=0)
-    frequency = np.fft.rfftfreq(_SEGMENT, _STEP)
+    frequency = np.fft.rfftfreq(_SEGMENT, STEP)
     band = (frequency >= 2.0) & (frequency <= 8.0) & (power > 0.0)
     chance = 2.0 / len(starts)
     return max(float(np.mean(np.abs(cross[band]) ** 2 / power[band])) - chance, 0.0) if band.any() else 0.0
-
-
-_STEP, _SEGMENT = 0.02, 128
-"""[s] of a mean, and means in a segment."""
-
-
-def _together(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
-    """Means over the same 20 ms of at most a minute."""
-    first = max(one.time[0], other.time[0])
-    edges = np.arange(first, min(one.time[-1], other.time[-1], first + 60.0), _STEP)
-    return _means(one, edges), _means(other, edges)
-
-
-def _means(signal: Signal, edges: FloatArray) -> FloatArray:
-    """Means between the edges [s]; NaN where there is no value."""
-    if len(edges) < 2:
-        return np.zeros(0)
-    valid = np.isfinite(signal.values)
-    bins = np.digitize(signal.time[valid], edges) - 1
-    inside = (bins >= 0) & (bins < len(edges) - 1)
-    sums = np.bincount(bins[inside], signal.values[valid][inside], len(edges) - 1)
-    counts = np.bincount(bins[inside], minlength=len(edges) - 1)
-    means: FloatArray = sums / np.where(counts > 0, counts, np.nan)
-    return means

@@ -59,26 +59,27 @@ def read_table(path: str, time: str | None = None) -> list[Signal]:
 
 def signals_of(columns: Columns, where: str, time: str | None = None) -> list[Signal]:
     """Columns of one length as signals over their column of time. Raises LeverError."""
-    name, seconds = time_of(columns, where, time)
+    name = find_time(columns, where, time)
+    at = seconds(*columns[name], f"{where}: {name}")
     return [
-        Signal(label, seconds, np.asarray(values, np.float64), unit)
+        Signal(label, at, np.asarray(values, np.float64), unit)
         for label, (values, unit) in columns.items()
         if label != name and values.dtype.kind in "biuf"
     ]
 
 
-def time_of(columns: Columns, where: str, wanted: str | None = None) -> tuple[str, FloatArray]:
-    """The name of the column that is the time, and it in seconds. Raises LeverError."""
+def find_time(columns: Columns, where: str, wanted: str | None = None) -> str:
+    """The name of the column that is the time. Raises LeverError."""
     names = list(columns)
-    found = (
-        [name for name in names if wanted in (name, split_name(name)[0])] if wanted else [*filter(_TIME.match, names)]
-    )
-    found = found or ([] if wanted else [name for name in names if columns[name][0].dtype.kind in "mM"])
+    if wanted:
+        found = [name for name in names if wanted in (name, split_name(name)[0])]
+    else:
+        dates = [name for name in names if columns[name][0].dtype.kind in "mM"]
+        found = [*filter(_TIME.match, names), *dates]
     if not found:
         what = f"no column {wanted}" if wanted else "no column of time that is known by its name"
         raise LeverError(f"{where}: {what}: say which by --map time=COLUMN; it has {_some(names)}")
-    values, unit = columns[found[0]]
-    return found[0], seconds(values, unit, f"{where}: {found[0]}")
+    return found[0]
 
 
 def seconds(values: Array, unit: str, where: str) -> FloatArray:

@@ -152,7 +152,7 @@ def _other(name: str, flight: Flight, noise: np.random.Generator) -> FloatArray:
     """Something plausible that has nothing to do with the lever."""
     count = len(flight.time)
     if name == "AliveCounter":
-        return np.arange(count) % 1000.0
+        return np.arange(count, dtype=np.float64) % 1000.0
     slow = np.cumsum(noise.normal(0.0, 0.01, count))
     level = {"RotorSpeed": 380.0, "AirSpeed": 60.0, "BaroAltitude": 500.0, "MotorTemperature": 60.0}.get(name, 0.0)
     size = {"LongAcc": 0.05, "LatAcc": 0.05}.get(name, 1.0)
