@@ -27,7 +27,7 @@ Columns = dict[str, tuple[Array, str]]
 
 def is_table(path: str) -> bool:
     """Whether a file has columns and not CAN frames. Raises LeverError."""
-    suffix = Path(path).suffix.lower()
+    suffix = Path(path.removesuffix(".gz")).suffix.lower()
     if suffix in (".parquet", ".pq", ".mat", ".npz", ".tsv"):
         return True
     if suffix == ".csv" and Path(path).is_file():

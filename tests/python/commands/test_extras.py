@@ -78,6 +78,8 @@ def packages(extras: dict[str, list[str]], extra: str) -> list[str]:
 @pytest.mark.parametrize(
     ("extra", "arguments"),
     [
+        ("files", "replay flight.parquet"),
+        ("files", "replay flight.mat"),
         ("live", "live --scenario demo"),
         ("live", "monitor --scenario demo"),
         ("mf4", "replay session.mf4"),
@@ -122,6 +124,8 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
     done = lever("replay", "sim/bus.log", "-o", "replay")
     assert (done.returncode, done.stderr) == (0, mf4 + report)
     assert sorted(os.listdir(tmp_path / "replay")) == ["bus.log", "summary.json", "trace.csv"]
+    done = lever("replay", "sim/trace.csv", "--map", "theta=theta_measured_rad", "z_ddot=z_ddot_measured_m_s2")
+    assert (done.returncode, done.stderr) == (0, "")
     done = lever("monitor", "sim/bus.log", "--once")
     assert (done.returncode, done.stderr) == (0, "")
     done = lever("record", "--interface", "lever", "--channel", "x", "--duration", "0.5", "-o", "record.log")
