@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..arrays import FloatArray
 from ..can import codec
 from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.logs import Recording
@@ -62,11 +63,16 @@ class Options:
 
 
 def replay(
-    logs: Iterable[str | Path], options: Options, out_dir: Path | None = None, progress: Progress | None = None
+    logs: Iterable[str | Path],
+    options: Options,
+    out_dir: Path | None = None,
+    progress: Progress | None = None,
+    keep: Callable[[Mapping[str, FloatArray]], None] | None = None,
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
     trace.csv, signals.mf4, report.html and summary.json there, all or none; signals.mf4 with the extra `mf4`,
-    report.html with `report`. Raises LeverError, also rather than write over a log."""
+    report.html with `report`, and hands the trace, reduced, to `keep`. Raises LeverError, also rather than write over a
+    log."""
     logs = list(logs)
     traffic: Traffic | MappedTraffic
     if options.reading is None:
@@ -81,6 +87,8 @@ def replay(
         summary = made.summary()
         if outputs is not None:
             made.finish(outputs, summary)
+            if keep is not None:
+                keep(made.kept.stretches.rows())
         return summary
 
 
