@@ -27,10 +27,10 @@ also writes into DIR
   report.html   all of it as one page for a browser
 
 LOG is a log of candump -L (.log, or - for standard input), or .blf, .asc, .mf4, .trc, .csv or .db, compressed (.gz) or
-not. Several logs are taken one after another in the order of their first frames. Whatever else is in a log, other
-messages, other buses, damaged lines, is counted and left out. If it holds estimates too, of the firmware that ran when
-it was recorded, and of this version of lever.dbc (IDENTITY says so), they are compared with the new ones, signal by
-signal.
+not, or a file of columns (see below). Several logs are taken one after another in the order of their first frames, or
+with --each as recordings of their own. Whatever else is in a log, other messages, other buses, damaged lines, is
+counted and left out. If it holds estimates too, of the firmware that ran when it was recorded, and of this version of
+lever.dbc (IDENTITY says so), they are compared with the new ones, signal by signal.
 
 {MAP_HELP}
 The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
