@@ -37,7 +37,7 @@ def add_signal_options(parser: argparse.ArgumentParser, *, part: bool = True) ->
     options.add_argument(
         "--clock",
         metavar="KEY",
-        help="the input whose values make the samples (default: the fastest of lever and base)",
+        help="the input whose values make the samples (default: the slowest of z_ddot and tau_m)",
     )
     if part:
         add_part_options(parser)

@@ -135,7 +135,7 @@ class BusSignals:
         signals = {}
         for name in names:
             each = message.get_signal_by_name(name)
-            values = np.array([_number(each, values.get(name)) for _, values in decoded], np.float64)
+            values = np.array([number(each, values.get(name)) for _, values in decoded], np.float64)
             there = np.array([name in values for _, values in decoded], np.bool_)  # of a multiplexed one, not always
             words = each.comment or ""
             signals[name] = Signal(f"{message.name}.{name}", time[there], values[there], each.unit or "", words)
@@ -199,7 +199,7 @@ def _turn(message: Message, protection: Protection) -> int:
     return (1 << message.get_signal_by_name(protection.counter).length) - (1 if protection.profile == 1 else 0)
 
 
-def _number(signal: Field, value: Any) -> float:
+def number(signal: Field, value: Any) -> float:
     """A decoded value; NaN for none, and for a code that stands for none."""
     if isinstance(value, NamedSignalValue):
         code = signal.conversion.raw_to_scaled(value.value, decode_choices=False)

@@ -15,6 +15,9 @@ from .resample import Samples, sample
 from .slope import slope_ratio
 from .units import GRAVITY, KINDS, check_plausible, factor, gravity_in, guess
 
+_FASTER = 1.5
+"""Periods of a signal in one of the samples from which on it is told that some of it is not used."""
+
 
 @dataclass(frozen=True)
 class Input:
@@ -100,9 +103,12 @@ def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[S
     made = sample({key: each.signal for key, each in inputs.items()}, clock)
     notes = [note for each in inputs.values() for note in each.notes]
     for key, how in made.how.items():
+        period = inputs[key].signal.period
+        rates = f"{key} comes at {1.0 / period:.4g} Hz, {made.clock} and samples at {1.0 / made.period:.4g} Hz"
         if how == "slower":
-            rates = f"{1.0 / inputs[key].signal.period:.4g} Hz, samples at {1.0 / made.period:.4g} Hz"
-            notes.append(f"{key} comes at {rates}: it is missing in between (--clock {key} samples at its rate)")
+            notes.append(f"{rates}: it is missing in between (--clock {key} samples at its rate)")
+        elif period * _FASTER < made.period:
+            notes.append(f"{rates}: its values in between are not used (--clock {key} uses them)")
     return made, notes + _disagreement(inputs, made)
 
 

@@ -1,6 +1,8 @@
 """Signals with rates and clocks of their own as the firmware's samples: one clock, and NaN where a value is missing.
 
-One signal is the clock: each of its values makes a sample. Any other signal is, against it,
+One signal is the clock: each of its values makes a sample. It is the slowest of the model's inputs z_ddot and tau_m,
+unless all come at one rate: the firmware learns only where these are known, and can do without the lever's in between.
+Any other signal is, against it,
 - paired, where its values come at a constant offset from the clock's: one sender measured both, and sent one frame
   after the other;
 - interpolated, where its rate is about the clock's or above, but its clock another;
@@ -20,9 +22,7 @@ from ..errors import LeverError
 from ..firmware.config import setting
 from .recorded import Signal, ordered
 
-CLOCKS = ("theta", "theta_dot", "z_ddot")
-"""What may be the clock unless a user says otherwise: the fastest, of equally fast ones the first."""
-_AS_FAST = 0.75  # of the period: a signal has to be faster than that to be the clock in place of an earlier one
+_ALIKE = 1.33  # periods that differ by less are of one rate
 _SLOWER = 1.5  # periods of the clock: a signal with longer ones is missing in between
 _GAP = 2.5  # periods of a signal: over longer steps nothing is interpolated
 _PAIRED_OFFSET = 0.35  # of a period
@@ -33,6 +33,8 @@ _PAIRED_SPREAD = 0.1
 class Samples:
     """What the firmware takes."""
 
+    time: FloatArray
+    """Of the clock [s]."""
     time_us: IntArray
     columns: dict[str, FloatArray]
     """By input; NaN is missing."""
@@ -65,7 +67,7 @@ def sample(signals: Mapping[str, Signal], clock: str | None = None) -> Samples:
             raise LeverError(f"{key} = {signal.name}: no value of it is at the time of {clock} = {clean[clock].name}")
     time_us = np.rint((time - min(float(time[0]), 0.0)) * 1e6).astype(np.int64)
     period = float(f"{period:.4g}")
-    return Samples(time_us, columns, period, clock, how, sum(count for _, count in made.values()))
+    return Samples(time, time_us, columns, period, clock, how, sum(count for _, count in made.values()))
 
 
 def check_period(period: float, key: str, name: str) -> None:
@@ -80,12 +82,14 @@ def check_period(period: float, key: str, name: str) -> None:
 
 
 def _clock(signals: Mapping[str, Signal]) -> str:
-    candidates = [key for key in CLOCKS if key in signals]
-    best = candidates[0]
-    for key in candidates[1:]:
-        if signals[key].period < _AS_FAST * signals[best].period:
-            best = key
-    return best
+    """Which of the signals makes the samples."""
+    slowest = setting("sample_period").greatest * 1.001
+    inputs = [key for key in ("z_ddot", "tau_m") if key in signals]
+    inputs = [key for key in inputs if signals[key].period <= slowest] or inputs[:1]
+    lever = [key for key in ("theta", "theta_dot") if key in signals]
+    clock = max(inputs or lever, key=lambda key: signals[key].period)
+    alike = [key for key in lever if 1.0 / _ALIKE < signals[key].period / signals[clock].period < _ALIKE]
+    return alike[0] if alike else clock
 
 
 def _at(time: FloatArray, period: float, signal: Signal) -> tuple[FloatArray, str]:
@@ -101,6 +105,11 @@ def _at(time: FloatArray, period: float, signal: Signal) -> tuple[FloatArray, st
         if abs(middle) < _PAIRED_OFFSET * period and high - low < _PAIRED_SPREAD * period:
             return _nearest(time + middle, signal, 0.5 * period), "paired"
     return _interpolated(time, signal), "interpolated"
+
+
+def offset_between(time: FloatArray, others: FloatArray) -> float:
+    """By how much times are later than the ones next to them, usually [s]."""
+    return float(np.median(others[_next_to(time, others)] - time))
 
 
 def _next_to(time: FloatArray, others: FloatArray) -> IntArray:

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     import can
 
     from ..arrays import ComplexArray, FloatArray
+    from ..can.logs import Recording
     from ..firmware.config import Config
+    from .mapped import MappedLog
 
 MOST_WAITING = 65536
 """Frames: eight seconds of a full bus of 1 Mbit/s."""
@@ -179,14 +181,14 @@ class BusSource(Source):
 class LogSource(Source):
     """A recorded log; `channel` chooses among several in it. What is wrong in it is told in `error` at its end."""
 
-    def __init__(self, path: str, channel: str | None = None) -> None:
-        """Opens the log. Raises LeverError."""
+    def __init__(self, path: str, channel: str | None = None, log: Recording | MappedLog | None = None) -> None:
+        """Opens the log, unless `log` is it. Raises LeverError."""
         from ..can.logs import Recording
 
         super().__init__()
         self.title = path
         self._channel = channel
-        self._log = Recording([path])
+        self._log = Recording([path]) if log is None else log
 
     def run(self) -> None:
         due = time.monotonic()
