@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 
 from . import interrupts
 from .errors import LeverError
+from .exit_status import INTERRUPTED
 from .extras import hide_mf4, reveal_mf4
-from .start import INTERRUPTED
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has
@@ -37,8 +37,9 @@ a first session:
   lever settings                          every tunable number of the estimator with unit, default and range
   lever dbc                               the CAN messages
 
-`lever COMMAND --help` explains a command. Exit status: 0 when all went well, 2 with one line on standard error when the
-command line or an input is wrong, 130 after Ctrl-C.
+`lever COMMAND --help` explains a command. Exit status: 0 when all went well; 1 when the command ran, but what it checks
+does not hold (limits of a scenario, no estimate from a log, …); 2 with one line on standard error when the command line
+or an input is wrong; 130 after Ctrl-C.
 """
 
 
@@ -92,7 +93,7 @@ def _has_streams() -> bool:
 
 
 def _expected() -> tuple[type[Exception], ...]:
-    """Errors whose text tells a user enough."""
+    """Errors that are printed without a traceback."""
     can = sys.modules.get("can")
     return (LeverError, OSError) if can is None else (LeverError, OSError, can.CanError)
 

@@ -1,8 +1,9 @@
-"""What is installed on demand: the extras of pyproject.toml, and what a user is told where one is missing."""
+"""What is installed on demand: the extras of pyproject.toml, and the error text where one is missing."""
 
 from __future__ import annotations
 
 import importlib.util
+import shlex
 import sys
 from collections.abc import Iterable, Sequence
 
@@ -28,7 +29,12 @@ def missing(extra: str) -> str:
     if "asammdf" in PACKAGES[extra]:
         reveal_mf4()
     absent = [package for package in PACKAGES[extra] if not _is_installed(package)]
-    return f'this needs {" and ".join(absent)}: pip install "lever-cdkf[{extra}]"' if absent else ""
+    return f"this needs {' and '.join(absent)}: {pip_install(f'lever-cdkf[{extra}]')}" if absent else ""
+
+
+def pip_install(requirement: str) -> str:
+    """The command that installs it where this Python finds it, whatever is on PATH."""
+    return f'{shlex.quote(sys.executable)} -m pip install "{requirement}"'
 
 
 def require(extra: str) -> None:
@@ -47,7 +53,7 @@ def warn_of_left_out(files: Iterable[str]) -> None:
 def hide_mf4(arguments: Sequence[str]) -> None:
     """Hides asammdf, which python-can imports and which takes a second, from a command that reads no MF4 log.
 
-    For the process of the command `lever` alone; whoever imports this package has python-can whole.
+    For the process of the command `lever` alone; a program that imports this package has python-can whole.
     """
     if not any(".mf4" in argument.lower() for argument in arguments):
         sys.modules.setdefault("asammdf", None)  # type: ignore[arg-type]

@@ -10,8 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
-from lever_cdkf import host_tools
-
+from .. import host_tools
 from . import interrupts
 from .errors import LeverError
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from .start import exit_at_once
+from .exit_status import exit_at_once
 
 if TYPE_CHECKING:
     from multiprocessing.pool import Pool

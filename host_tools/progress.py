@@ -1,4 +1,4 @@
-"""How far a command is, told on standard error once it takes longer than a moment."""
+"""The progress of a command, shown on standard error once it takes longer than a moment."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from . import interrupts
 
 PATIENCE = 2.0
 """[s] before anything is said."""
-_BETWEEN_LINES = 30.0  # [s] where nobody looks
+_BETWEEN_LINES = 30.0  # [s] where standard error is not a terminal
 
 
 class Progress:
@@ -18,7 +18,7 @@ class Progress:
 
     def __init__(self, command: str) -> None:
         self._command = command
-        self._start = self._told = time.monotonic()
+        self._start = self._printed_at = time.monotonic()
         self._bar: Any = None
         self._task: Any = None
 
@@ -37,8 +37,8 @@ class Progress:
             return
         if sys.stderr.isatty():
             self._draw(done, total, what or self._command)
-        elif now - self._told >= _BETWEEN_LINES:
-            self._told = now
+        elif now - self._printed_at >= _BETWEEN_LINES:
+            self._printed_at = now
             last = f" ({what})" if what else ""
             print(f"lever: {self._command}: {done} of {total} after {now - self._start:.0f} s{last}", file=sys.stderr)
 

@@ -3,19 +3,12 @@
 Imports next to nothing, for the same reason.
 """
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C."""
-
 try:
-    import os
     import signal
+
+    from .exit_status import exit_at_once
 except KeyboardInterrupt:
-    raise SystemExit(INTERRUPTED) from None
-
-
-def exit_at_once(*_: object) -> None:
-    """A signal handler for as long as there is nothing to clean up."""
-    os._exit(INTERRUPTED)
+    raise SystemExit(130) from None
 
 
 def main() -> int:

@@ -1,7 +1,10 @@
 #include "app/learning.h"
 #include "math/share.h"
 
-#define REPORTED 3.0f         /* time for which a change is reported, and not followed by another [s] */
+#define REPORTED 3.0f         /* time for which a change is reported [s] */
+#define FOLLOWED_MOST 3.0f    /* changes followed before others wait until none is reported: what looks like changes */
+#define FOLLOWED_MEMORY 10.0f /* may be noise that is not known yet [s] */
+#define HELD 0.7f             /* hands_t.residual over change: with less nobody may hold the lever any more */
 #define TRANSIENT 2.0f        /* left of it when innovations are noise again, and not of the change [s] */
 #define KEEP_PERIOD 1.0f      /* [s] */
 #define UNSURPRISED 1.2f      /* monitor_t.surprise at a change from which on torque is thought to have changed, too, */
@@ -35,6 +38,8 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
     learning->wait = 0.0f;
     learning->changed = 0.0f;
     learning->gripping = 0.0f;
+    learning->followed = 0.0f;
+    learning->held_again = false;
     learning->moved = false;
     learning->bounded = false;
 }
@@ -109,6 +114,16 @@ static void follow_grip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf
     }
 }
 
+/* Another change soon after one is followed as well, but not while it may be that nobody holds the lever any more: then
+ * the hands are to be judged first. */
+static bool may_follow(const learning_t *learning, const lever_settings_t *s)
+{
+    const hands_t *hands = &learning->hands;
+    return (learning->changed <= 0.0f) ||
+           ((learning->changed <= (REPORTED - s->change_memory)) && (learning->followed < FOLLOWED_MOST) &&
+               is_known(learning) && (hands->residual > (HELD * hands->change)));
+}
+
 /* A sudden change of the pilot counts as change_walk seconds of the walk, once: a disturbance that only looks like
  * one would widen the covariance again and again. Returns those seconds. */
 static float detect_change(
@@ -117,9 +132,11 @@ static float detect_change(
     const lever_settings_t *s = setup->settings;
     const bool detected =
         change_detection_step(&learning->change, correction, period, s->change_memory, s->change_threshold);
-    const bool changed = detected && (learning->changed <= 0.0f);
+    const bool changed = detected && may_follow(learning, s);
+    learning->followed -= learning->followed * share_of(period, FOLLOWED_MEMORY);
     if (changed) {
         learning->changed = REPORTED;
+        learning->followed += 1.0f;
         if (is_known(learning) && setup->constants.trim) {
             begin_grip(learning, false);
         } else if (unknown_part(learning) > 0.0f) { /* far from the truth, or noise set far too small */
@@ -137,8 +154,12 @@ static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *c
 {
     const noise_setting_t noise = setup_noise(setup);
     const bool started = !is_known(learning);
-    if ((cdkf->trust < 1.0f) || (learning->changed > TRANSIENT)) {
+    const bool opened = learning->held_again && (learning->changed > 0.0f); /* too uncertain to tell of noise */
+    if (opened || (cdkf->trust < 1.0f) || (learning->changed > TRANSIENT)) {
         noise_estimation_begin(&learning->noise);
+        if (opened) {
+            keep(learning, cdkf, period);
+        }
     } else if (noise_estimation_step(&learning->noise, cdkf, &noise, period) &&
                (started || (learning->changed <= 0.0f))) {
         take_back(learning, cdkf);
@@ -173,6 +194,7 @@ static bool judge(
         whiteness_start(&learning->whiteness);
         take_back(learning, cdkf);
     } else if (!held && !learning->hands.off) { /* another grip */
+        cdkf_open(cdkf); /* by whomever */
         keep_only(learning, cdkf);
         begin_grip(learning, true);
     } else {
@@ -211,7 +233,6 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     score_t step;
     follow_grip(learning, setup, cdkf, period);
     const bool taught = judge(learning, setup, cdkf, lesson, period, &step);
-    const bool held_again = (learning->changed >= REPORTED);
     if (taught) {
         estimate_noise(learning, setup, cdkf, period);
     } else {
@@ -219,7 +240,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
     learning->bounded = correction.bounded;
-    float more = held_again ? s->change_walk : 0.0f;
+    float more = 0.0f;
     if (taught) {
         if (cdkf->acting > (uint32_t)CDKF_STEP) {
             cdkf_learn_step(cdkf, &step);

@@ -85,7 +85,7 @@ def one_processor() -> Iterator[None]:
 def check(image: Path) -> None:
     """Raises QemuError if there is no QEMU, or `image` is not a program for ARM."""
     if shutil.which(PROGRAM) is None:
-        raise QemuError(f"{PROGRAM} is not here: {_INSTALL}")
+        raise QemuError(f"{PROGRAM} is not installed: {_INSTALL}")
     try:
         with image.open("rb") as file:
             head = file.read(20)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..errors import LeverError
+from ..extras import pip_install
 
 if TYPE_CHECKING:
     import can
@@ -47,10 +48,10 @@ def chosen_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def check_others_can_be_heard(interface: str) -> None:
-    """Raises LeverError for an interface on which nobody but this process is."""
+    """Raises LeverError for an interface that stays inside this process."""
     if interface in _IN_PROCESS:
         raise LeverError(
-            f"interface {interface} is inside one process, with nobody else to be heard: give a bus such as "
+            f"interface {interface} stays inside one process, so there is nothing else to receive: give a bus such as "
             "--interface socketcan --channel vcan0"
         )
 
@@ -63,7 +64,7 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) ->
 
     package = _PACKAGES.get(interface)
     if package is not None and importlib.util.find_spec(package) is None:
-        raise LeverError(f"interface {interface} needs the Python package {package}: pip install {package}")
+        raise LeverError(f"interface {interface} needs the Python package {package}: {pip_install(package)}")
     given = {**_DEFAULTS.get(interface, {}), **options}
     if channel is not None:
         given["channel"] = read_ahead(channel) if interface == "slcan" else channel

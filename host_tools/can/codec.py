@@ -56,11 +56,11 @@ def contract() -> int:
 
 def message(key: str | int) -> Message:
     """A message of the DBC by name or identifier. Raises CodecError."""
-    known = _messages()
-    if key not in known:
+    messages = _messages()
+    if key not in messages:
         names = ", ".join(entry.name for entry in database().messages)
         raise CodecError(f"{key if isinstance(key, str) else hex(key)} is not a message of lever.dbc: {names}")
-    return known[key]
+    return messages[key]
 
 
 @cache
@@ -200,12 +200,12 @@ class _Layout:
 
 @cache
 def _layout(name: str) -> _Layout:
-    found = message(name)
-    signals = {signal.name: signal for signal in found.signals if signal.name not in _FRAMING}
+    definition = message(name)
+    signals = {signal.name: signal for signal in definition.signals if signal.name not in _FRAMING}
     validity = tuple(key + _VALID for key in signals if key + _VALID in signals)
     contents = {key: signal for key, signal in signals.items() if key not in validity}
-    quantisers = {key: _quantiser(found, signal) for key, signal in contents.items()}
-    return _Layout(contents, quantisers, validity, found.get_signal_by_name("counter").start)
+    quantisers = {key: _quantiser(definition, signal) for key, signal in contents.items()}
+    return _Layout(contents, quantisers, validity, definition.get_signal_by_name("counter").start)
 
 
 def _protected(word: int, identifiers: bytes) -> bytes:
@@ -295,15 +295,15 @@ def encode(name: str, counter: int, values: Mapping[str, Value]) -> bytes:
 def decode(identifier: int, data: bytes | bytearray) -> tuple[str, dict[str, float]]:
     """Name and fields of a received frame, choices as numbers, NaN for what is not available. Raises CodecError if it
     is not in the DBC or corrupt."""
-    found = message(identifier)
+    definition = message(identifier)
     if not check(identifier, data):
-        raise CodecError(f"{found.name} ({identifier:#x}) {data.hex(' ')} is corrupt: its length or CRC is wrong")
+        raise CodecError(f"{definition.name} ({identifier:#x}) {data.hex(' ')} is corrupt: its length or CRC is wrong")
     try:
-        fields = dict(found.decode_simple(bytes(data), decode_choices=False))
+        fields = dict(definition.decode_simple(bytes(data), decode_choices=False))
     except cantools.database.DecodeError as error:
-        raise CodecError(f"{found.name} ({identifier:#x}) {data.hex(' ')}: {error}") from None
-    absent = _absent(found.name)
-    return found.name, {
+        raise CodecError(f"{definition.name} ({identifier:#x}) {data.hex(' ')}: {error}") from None
+    absent = _absent(definition.name)
+    return definition.name, {
         name: math.nan if value == absent.get(name) else value  # type: ignore[misc]
         for name, value in fields.items()
     }
@@ -330,12 +330,13 @@ def decode_columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.f
     """
     import numpy as np
 
-    found = message(name)
-    if data.dtype != np.uint8 or data.ndim != 2 or data.shape[1] != found.length:
-        raise CodecError(f"{name}: data is {data.dtype} of shape {data.shape}, not uint8 of shape (N, {found.length})")
+    definition = message(name)
+    if data.dtype != np.uint8 or data.ndim != 2 or data.shape[1] != definition.length:
+        wanted = f"uint8 of shape (N, {definition.length})"
+        raise CodecError(f"{name}: data is {data.dtype} of shape {data.shape}, not {wanted}")
     words = np.ascontiguousarray(data).view("<u8")[:, 0]
     columns: dict[str, NDArray[np.float64]] = {}
-    for signal in found.signals:
+    for signal in definition.signals:
         raw = (words >> np.uint64(signal.start) & np.uint64((1 << signal.length) - 1)).astype(np.int64)
         if signal.is_signed:
             raw -= (raw >> (signal.length - 1)) << signal.length

@@ -25,19 +25,19 @@ _ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMI
 
 def columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]]:
     """Every field of N frames of one message, data as (N, 8) bytes; CRCs are not checked."""
-    found = codec.decode_columns(name, data)
+    fields = codec.decode_columns(name, data)
     if name in _ESTIMATES:
-        unusable = found["valid"] == 0.0
+        unusable = fields["valid"] == 0.0
         for signal in codec.message(name).signals:
             if codec.not_available(signal) is not None:
-                found[signal.name][unusable] = math.nan
+                fields[signal.name][unusable] = math.nan
     if name == "STATE_ESTIMATE":
-        found["nis"] = found["innovation"] ** 2
+        fields["nis"] = fields["innovation"] ** 2
     elif name == "HEALTH":
-        found["faults"] = 0.0 * found["mode"]
+        fields["faults"] = 0.0 * fields["mode"]
         for bit, fault in enum_names("lever_fault").items():
-            found["faults"] += bit * found[f"fault_{fault}"]
-    return found
+            fields["faults"] += bit * fields[f"fault_{fault}"]
+    return fields
 
 
 def belongs(fields: dict[str, NDArray[np.float64]], time_us: NDArray[np.int64]) -> NDArray[np.bool_]:

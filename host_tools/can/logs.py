@@ -220,8 +220,8 @@ def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
         if suffix == ".mf4":
             require("mf4")
         return Recording._python_can
-    known = ", ".join((*filter(None, _CANDUMP), *_OTHERS))
-    raise LogError(f"{path}: {suffix} is no format of CAN logs that is known: {known}, each also with {_COMPRESSED}")
+    formats = ", ".join((*filter(None, _CANDUMP), *_OTHERS))
+    raise LogError(f"{path}: {suffix} is not a known format of CAN logs: {formats}, each also with {_COMPRESSED}")
 
 
 def _is_file(path: str) -> bool:

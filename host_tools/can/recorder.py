@@ -70,7 +70,7 @@ class Recorder:
         """Records until `ended` is true, asked ten times a second; `tell` is called each second. Raises LeverError."""
         for path in (self._path, self.partial):
             if path.exists():
-                raise LeverError(f"{path} is there already: choose another name, or move it away")
+                raise LeverError(f"{path} exists already: choose another name, or move it away")
         self._start = time.monotonic()
         try:
             with self.partial.open("w", encoding="ascii", errors="replace") as file:
@@ -99,7 +99,7 @@ class Recorder:
     def _record(
         self, writer: can.Listener, file: Any, ended: Callable[[], bool], tell: Callable[[Recorder], None]
     ) -> None:
-        told = time.monotonic()
+        last_report = time.monotonic()
         while not ended():
             until = time.monotonic() + _LISTEN
             while (now := time.monotonic()) < until:
@@ -107,8 +107,8 @@ class Recorder:
                 if message is not None:
                     writer.on_message_received(message)
                     self._count(message)
-            if now - told >= _TELL:
-                told = now
+            if now - last_report >= _TELL:
+                last_report = now
                 file.flush()
                 self._look(now)
                 tell(self)
@@ -116,15 +116,15 @@ class Recorder:
 
     def _count(self, message: can.Message) -> None:
         self.frames += 1
-        known = self.messages.get(message.arbitration_id)
+        counts = self.messages.get(message.arbitration_id)
         if message.is_error_frame:
             self.error_frames += 1
             if self._is_socketcan:
                 self._take_error(message)
-        elif known is None or message.is_extended_id or message.is_remote_frame:
+        elif counts is None or message.is_extended_id or message.is_remote_frame:
             self.others += 1
         else:
-            known.take((message.data,), self.elapsed)
+            counts.take((message.data,), self.elapsed)
 
     def _look(self, now: float) -> None:
         """At the rates, and at the state of the controller, as far as the interface knows it."""

@@ -53,8 +53,8 @@ class Traffic:
         """Other buses that also carry samples."""
         messages = codec.database().messages
         self._answers = {m.frame_id: m.name for m in messages if m.name not in INPUTS}
-        self._known = np.zeros(0x800, np.bool_)
-        self._known[[m.frame_id for m in messages]] = True
+        self._in_dbc = np.zeros(0x800, np.bool_)
+        self._in_dbc[[m.frame_id for m in messages]] = True
         self._base = codec.message("BASE_SAMPLE").frame_id
         self._command = codec.message("COMMAND").frame_id
         self._bus: int | None = None
@@ -103,15 +103,16 @@ class Traffic:
 
     def _carrying_samples(self, frames: Frames) -> list[int]:
         """Buses with a BASE_SAMPLE that has the right CRC."""
-        found = frames[(frames["id"] == self._base) & (frames["flags"] == 0) & (frames["length"] == 8)]
-        return [int(bus) for bus in np.unique(found["bus"][codec.check_columns("BASE_SAMPLE", found["data"])])]
+        base_samples = frames[(frames["id"] == self._base) & (frames["flags"] == 0) & (frames["length"] == 8)]
+        intact = codec.check_columns("BASE_SAMPLE", base_samples["data"])
+        return [int(bus) for bus in np.unique(base_samples["bus"][intact])]
 
     def _select(self, frames: Frames) -> Frames:
-        known = self._known[np.minimum(frames["id"], 0x7FF)] & (frames["flags"] == 0)
-        ours = known & (frames["bus"] == self._bus)
+        in_dbc = self._in_dbc[np.minimum(frames["id"], 0x7FF)] & (frames["flags"] == 0)
+        ours = in_dbc & (frames["bus"] == self._bus)
         if not ours.all():
             self._count_others(frames, ours)
-            elsewhere = self._carrying_samples(frames[known & ~ours])
+            elsewhere = self._carrying_samples(frames[in_dbc & ~ours])
             names = self.recording.buses.names()
             self.other_samples.update(names[bus] for bus in elsewhere)
         selected: Frames = frames[ours]

@@ -39,7 +39,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "--wireshark",
         metavar="DIR",
         type=Path,
-        help="write a Wireshark profile with all signals, which reads no DBC, into the folder DIR",
+        help="write all signals as a Wireshark profile into the folder DIR (Wireshark reads no DBC)",
     )
     add_json_option(output)
 

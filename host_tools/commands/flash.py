@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LeverError
+from ..extras import pip_install
 
 IMAGES = Path("build/stm32f4")
 DEFAULT_IMAGE = IMAGES / "lever_stm32f4_can.elf"
@@ -108,9 +109,7 @@ def run(args: argparse.Namespace) -> int:
     installed = [name for name in TOOLS if _find(name)]
     if not installed or (args.tool or installed[0]) not in installed:
         missing = args.tool or " and no ".join(TOOLS)
-        raise LeverError(
-            f'no {missing} here to write flash with: apt install openocd, or pip install "lever-cdkf[flash]"'
-        )
+        raise LeverError(f"no {missing} is installed: apt install openocd, or {pip_install('lever-cdkf[flash]')}")
     tool = args.tool or installed[0]
     command = [_find(tool), *TOOLS[tool](image, kind, serial)]
     print(f"{image}: {size} bytes of flash, whole\n{shlex.join(command)}", flush=True)
@@ -162,18 +161,18 @@ def _run(command: list[str]) -> tuple[int, str]:
 
 def _advice(tool: str, output: str) -> str:
     """What to do about a failure, by what the tool has said (in lower case)."""
-    if any(words in output for words in NO_PERMISSION):
+    if any(phrase in output for phrase in NO_PERMISSION):
         return (
             f"{tool} may not open the probe: install its udev rules (Debian's openocd has them), and plug it in again"
         )
-    if any(words in output for words in NO_PROBE):
+    if any(phrase in output for phrase in NO_PROBE):
         return (
             f"no probe answers {tool}: connect an ST-LINK by USB, or name another with --probe KIND[:SERIAL] "
             "(lsusb lists what is connected)"
         )
-    if any(words in output for words in NO_PACK):
+    if any(phrase in output for phrase in NO_PACK):
         return f"this pyOCD does not know the chip yet: pyocd pack install {TARGET}"
-    if any(words in output for words in NO_TARGET):
+    if any(phrase in output for phrase in NO_TARGET):
         return (
             f"the probe is there, but no STM32F405 answers {tool}: is the board powered, and are SWDIO, SWCLK and GND "
             "connected?"

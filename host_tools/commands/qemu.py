@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .. import interrupts
 from ..errors import LeverError
 
 _CHANNEL = "{channel}"
@@ -20,7 +19,7 @@ is an SLCAN adapter with the estimator behind it. Waits until it answers and pri
 --interface slcan` and everything else that uses python-can's slcan. Runs until Ctrl-C; or, with a COMMAND, until that
 ends. In COMMAND, {channel} stands for the channel.
 
-The image has the default settings. Of a scenario it takes what a COMMAND message tells it (model, preload, estimator,
+The image has the default settings. From a scenario it takes what a COMMAND message can set (model, preload, estimator,
 adaptation, dither); one with other [settings] is refused, unless --set "settings={}" leaves them out.
 """
 _EPILOG = """\
@@ -29,7 +28,7 @@ examples:
   lever qemu build/stm32f4/lever_stm32f4_slcan.elf -- \\
       lever sim steady --set duration="20 s" --interface slcan --channel {channel}
 
-Exit status: that of COMMAND; without one 0.
+Exit status: that of COMMAND; without one 130, after Ctrl-C.
 """
 
 
@@ -66,14 +65,10 @@ def run(args: argparse.Namespace) -> int:
         if command:
             with one_processor():
                 return _run_command([word.replace(_CHANNEL, channel) for word in command])
-        try:
-            print(f"{args.image.name} answers on {channel} (Ctrl-C ends it); for instance:")
-            print(f"  lever sim steady --interface slcan --channel {channel}", flush=True)
-            while True:
-                time.sleep(3600.0)
-        except KeyboardInterrupt:
-            interrupts.forget()
-            return 0
+        print(f"{args.image.name} answers on {channel} (Ctrl-C ends it); for instance:")
+        print(f"  lever sim steady --interface slcan --channel {channel}", flush=True)
+        while True:
+            time.sleep(3600.0)
 
 
 def _run_command(command: list[str]) -> int:

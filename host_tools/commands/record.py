@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
 _DESCRIPTION = """\
 Records everything on a CAN bus, through any interface of python-can, into a log in the format of candump -L, for
-`lever replay`, `lever tune`, canplayer and the like. Frames that were lost before they came here are told from the E2E
-counters of the messages of lever.dbc, damaged ones from their CRC. Ctrl-C ends the recording.
+`lever replay`, `lever tune`, canplayer and the like. Lost frames are detected by the E2E counters of the messages of
+lever.dbc, damaged ones by their CRC. Ctrl-C ends the recording.
 
-Until it has ended the log is called FILE.partial. What keeps that name broke off: the disk was full, the bus failed.
+Until it has ended the log is called FILE.partial. A file that keeps that name is incomplete: the disk was full, or the
+bus failed.
 """
 _EPILOG = """\
 examples:
@@ -31,7 +32,7 @@ examples:
   lever record --interface socketcan --channel can0 -o flight.log --duration 3600
   lever record --interface slcan --channel /dev/ttyACM0 --bitrate 1000000 -o bench.log
 
-Exit status: 0 when FILE is complete (losses on the bus are told, but are no error), 2 when the recording broke off.
+Exit status: 0 when FILE is complete (losses on the bus are reported, but are no error), 2 when the recording failed.
 """
 
 
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         finally:
             line.end()
     print_tables({"recorded": _rows(recorder)}, args.json)
-    print(f"{out}: {_told(recorder)}")
+    print(f"{out}: {_summary(recorder)}")
     return 0
 
 
@@ -94,22 +95,22 @@ def _stopping() -> Iterator[list[int]]:
 class _Line:
     """How it goes: one line that is written over on a terminal, a line now and then elsewhere."""
 
-    _BETWEEN_LINES = 30.0  # [s] where nobody looks
+    _BETWEEN_LINES = 30.0  # [s] where standard error is not a terminal
 
     def __init__(self) -> None:
         self._on_terminal = sys.stderr.isatty()
-        self._told = time.monotonic()
+        self._printed_at = time.monotonic()
         self._last = 0
         self._at = 0.0
 
     def show(self, recorder: Recorder) -> None:
         rate = (recorder.frames - self._last) / max(recorder.elapsed - self._at, 1e-9)
         self._last, self._at = recorder.frames, recorder.elapsed
-        text = f"{recorder.elapsed:.0f} s, {rate:.0f} frames/s, {_told(recorder)}"
+        text = f"{recorder.elapsed:.0f} s, {rate:.0f} frames/s, {_summary(recorder)}"
         if self._on_terminal:
             print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-        elif time.monotonic() - self._told >= self._BETWEEN_LINES:
-            self._told = time.monotonic()
+        elif time.monotonic() - self._printed_at >= self._BETWEEN_LINES:
+            self._printed_at = time.monotonic()
             print(f"lever: record: {text}", file=sys.stderr)
 
     def end(self) -> None:
@@ -117,8 +118,8 @@ class _Line:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _told(recorder: Recorder) -> str:
-    told = [
+def _summary(recorder: Recorder) -> str:
+    parts = [
         f"{recorder.frames} frames",
         f"{recorder.lost} lost",
         f"{recorder.corrupt} corrupt",
@@ -126,10 +127,10 @@ def _told(recorder: Recorder) -> str:
         f"controller {recorder.bus_state}",
     ]
     if recorder.left_active:
-        told.append(f"not active {recorder.left_active} times")
+        parts.append(f"not active {recorder.left_active} times")
     if recorder.overflows:
-        told.append(f"{recorder.overflows} overflows of the controller")
-    return ", ".join(told)
+        parts.append(f"{recorder.overflows} overflows of the controller")
+    return ", ".join(parts)
 
 
 def _rows(recorder: Recorder) -> list[Row]:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from ..replay.engine import Options
 
 _DESCRIPTION = f"""\
-Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints what it makes of them; with --out
-also writes into DIR
+Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints its estimates; with --out also
+writes into DIR
 
   bus.log       what the estimator got and what it answered, in the format of candump, on recorded time
   trace.csv     measured, estimated, standard deviations and health, a row for each sample
@@ -154,29 +154,29 @@ def _tables(summary: dict[str, Any]) -> Tables:
     estimates: list[Row] = [
         {
             "quantity": name,
-            "unit": told["unit"],
-            "at end": told["last"],
-            "sigma": told["last_sigma"],
-            "least": told["least"],
-            "greatest": told["greatest"],
+            "unit": entry["unit"],
+            "at end": entry["last"],
+            "sigma": entry["last_sigma"],
+            "least": entry["least"],
+            "greatest": entry["greatest"],
         }
-        for name, told in summary["estimates"].items()
+        for name, entry in summary["estimates"].items()
     ]
     tables: dict[str, list[Row]] = {"estimates": estimates}
     if summary["comparison"] is not None:
         tables["replayed minus recorded estimates"] = [
             {
                 "signal": name,
-                "unit": told["unit"],
-                "samples": told["samples"],
-                "identical": told["identical_samples"],
-                "mean difference": told["bias"],
-                "rms difference": told["rms"],
-                "largest difference": told["largest"],
-                "at [s]": told["largest_at_s"],
-                "rms in sigma [1]": told["rms_in_sigma"],
+                "unit": entry["unit"],
+                "samples": entry["samples"],
+                "identical": entry["identical_samples"],
+                "mean difference": entry["bias"],
+                "rms difference": entry["rms"],
+                "largest difference": entry["largest"],
+                "at [s]": entry["largest_at_s"],
+                "rms in sigma [1]": entry["rms_in_sigma"],
             }
-            for name, told in summary["comparison"]["signals"].items()
+            for name, entry in summary["comparison"]["signals"].items()
         ]
     if mapping := summary["recording"]["mapping"]:
         tables["signals"] = [{"input": key, **row} for key, row in mapping["inputs"].items()]

@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         metavar="NAME=VALUE",
         action="append",
         default=[],
-        help="set one value; may be repeated, the last counts, and all count more than --settings",
+        help="set one value; may be repeated, the last counts, and all take precedence over --settings",
     )
     add_json_option(parser)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..tune.calibration import Calibrated, Calibration
     from ..tune.likelihood import Likelihood
     from ..tune.recording import Recording
-    from ..tune.search import Found
+    from ..tune.search import Tuned
     from ..tune.validation import Fit
 
 _DESCRIPTION = f"""\
@@ -31,7 +31,7 @@ likely: the firmware's own filter runs through it some hundred times, and the de
 With dither in the log (a motor torque of 0.05 N m rms or more) it first finds the calibration: gain and delay of the
 accelerometer (z_ddot_gain, z_ddot_delay) and Coulomb friction of the lever (lever_friction), each with its standard
 deviation (_sigma). Two minutes with 0.3 N m of dither and 0.1 g of vibration give them within 1 %, 0.3 ms and 0.03 N m.
-Without dither they cannot be known. tau_m_gain never can: measure it.
+Without dither they cannot be known. tau_m_gain cannot be found in a log at all: measure it.
 
 Noise, walks and adaptation are changed only where the log contradicts them (95 % likelihood interval). The last part of
 the log is held out: the search never sees it, and before and after are compared on it. Noise that the firmware
@@ -39,7 +39,7 @@ estimates while running (noise_window) is off during the search, and on again wh
 
 What is printed: the settings with units (sigma: standard deviation), and for both parts, before and after,
   lnL     log-likelihood per sample of angle [rad] and rate [rad/s], given all before [nat]; more is better
-  NIS     normalised innovation squared per output [1]: 1 where the filter is as certain as it may be, more: too certain
+  NIS     normalised innovation squared per output [1]: 1 where the stated uncertainty is right, above: too certain
   corr.   largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
 
 {MAP_HELP}"""
@@ -110,10 +110,10 @@ def run(args: argparse.Namespace) -> int:
         search = Search(likelihood, calibrated, progress.show)
         if not search.can_learn:
             _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
-        found = search.run(groups(calibrated, args.keep))
-        after = {**calibrated, **{entry.name: entry.after for entry in found if entry.after != entry.before}}
+        tuned = search.run(groups(calibrated, args.keep))
+        after = {**calibrated, **{entry.name: entry.after for entry in tuned if entry.after != entry.before}}
         fits = validation.fits(likelihood, before, after)
-    return _conclude(args, likelihood, before, after, calibration, found, fits)
+    return _conclude(args, likelihood, before, after, calibration, tuned, fits)
 
 
 def _settings(args: argparse.Namespace) -> Assignments:
@@ -156,9 +156,9 @@ def _as_recorded(assignments: Assignments, recording: Recording) -> Assignments:
     _note(
         f"the log has a sample each {1e3 * recording.period:g} ms: sample_period becomes that (was {1e3 * set_to:g} ms)"
     )
-    found = {**assignments, "sample_period": recording.period}
-    make_config(found)
-    return found
+    updated = {**assignments, "sample_period": recording.period}
+    make_config(updated)
+    return updated
 
 
 def _note(text: str) -> None:
@@ -174,7 +174,7 @@ def _conclude(
     before: Assignments,
     after: Assignments,
     calibration: Calibration,
-    found: Sequence[Found],
+    tuned: Sequence[Tuned],
     fits: Sequence[Fit],
 ) -> int:
     """Prints and writes everything; the exit status."""
@@ -182,22 +182,22 @@ def _conclude(
     from ..tables import print_tables
     from ..tune import validation
 
-    tables: Tables = {"settings": [_setting_row(entry) for entry in found], "before and after": _fit_rows(fits)}
-    if calibration.found:
-        tables = {"calibration": [_calibration_row(entry) for entry in calibration.found], **tables}
-    changed = sum(entry.after != entry.before for entry in found) + len(calibration.assignments)
-    told = validation.verdict(fits, changed)
+    tables: Tables = {"settings": [_setting_row(entry) for entry in tuned], "before and after": _fit_rows(fits)}
+    if calibration.entries:
+        tables = {"calibration": [_calibration_row(entry) for entry in calibration.entries], **tables}
+    changed = sum(entry.after != entry.before for entry in tuned) + len(calibration.assignments)
+    verdict = validation.verdict(fits, changed)
     print_tables(tables, args.json)
-    print(f"{_subtitle(args, likelihood)} {told} {calibration.words}".rstrip())
+    print(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
     if args.page is not None:
         from ..tune.tune_page import build
 
-        write_text(args.page, build(_subtitle(args, likelihood), told, tables, calibration.words, found, fits))
+        write_text(args.page, build(_subtitle(args, likelihood), verdict, tables, calibration.text, tuned, fits))
     if validation.is_worse(fits):
         _note("the new settings do worse on the part held out, so the log changes on the way: no settings are written")
         return 1
     if args.output is not None:
-        write_text(args.output, _file(args, f"{told} {calibration.words}", before, after))
+        write_text(args.output, _file(args, f"{verdict} {calibration.text}", before, after))
     written = [str(path) for path in (args.output, args.page) if path is not None]
     if written:
         print(f"Written: {', '.join(written)}")
@@ -215,7 +215,7 @@ def _subtitle(args: argparse.Namespace, likelihood: Likelihood) -> str:
     )
 
 
-def _setting_row(entry: Found) -> Row:
+def _setting_row(entry: Tuned) -> Row:
     from ..firmware.config import setting
 
     return {
@@ -268,11 +268,11 @@ def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
     return rows
 
 
-def _file(args: argparse.Namespace, told: str, before: Assignments, after: Assignments) -> str:
+def _file(args: argparse.Namespace, text: str, before: Assignments, after: Assignments) -> str:
     """The settings file: what it was made of, and all that is not left to the firmware's defaults."""
     from ..firmware.settings_file import format_assignments, make_config
 
     was = make_config(before).settings
     notes = {name: f"was {was[name]:g}" for name in after if name in was and after[name] != was[name]}
-    lines = (line for part in (f"lever tune {' '.join(args.log)}", told) for line in textwrap.wrap(part, 110))
+    lines = (line for part in (f"lever tune {' '.join(args.log)}", text) for line in textwrap.wrap(part, 110))
     return "".join(f"# {line}\n" for line in lines) + format_assignments(after, notes)

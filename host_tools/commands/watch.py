@@ -45,7 +45,7 @@ Serves a web page that shows the estimator while it runs: the Bode diagram of it
 with their bands over time, health and message rates, and controls to run, freeze and reset it, to shake it with dither
 and to choose its model. The page comes from this computer alone, and works on a phone as well.
 
-Only this computer can open it unless --host says otherwise. There is no password: who can reach the port can send
+Only this computer can open it unless --host says otherwise. There is no password: whoever can reach the port can send
 COMMAND frames (E2E protects against faults, not people), so give --read-only with --host, or use a tunnel:
   ssh -L 8642:localhost:8642 THE_OTHER_COMPUTER
 
@@ -94,7 +94,7 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
         "log",
         nargs="?",
         metavar="LOG",
-        help="a recorded log that python-can reads; with --channel, only that one's frames",
+        help="a recorded log that python-can reads; with --channel, only the frames of that bus",
     )
     parser.add_argument("--scenario", metavar="NAME", help="simulate a scenario of `lever sim --list` or a .toml file")
     add_bus_options(parser)

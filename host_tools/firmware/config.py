@@ -77,8 +77,8 @@ def setting(name: str) -> Setting:
 
 def choice_value(enum: str, what: str, name: str) -> int:
     """The number of `name` in a façade enum. Raises SettingsError, with what is allowed for `what`."""
-    for value, known in enum_names(enum).items():
-        if known == name:
+    for value, candidate in enum_names(enum).items():
+        if candidate == name:
             return value
     raise SettingsError(f"{what} = {name!r} is not known; allowed: {', '.join(enum_names(enum).values())}")
 

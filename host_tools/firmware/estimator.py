@@ -19,7 +19,7 @@ FRAME_SAMPLE: int = lib.LEVER_FRAME_SAMPLE
 FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
 """What FEEDTHROUGH is sent for on the bus, one after the other [Hz]."""
 
-SAMPLE_VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
+_SAMPLE_VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 """What a sample may hold besides its time, each with a flag: lever_sample_t."""
 
 _MODES = enum_names("lever_mode")
@@ -133,7 +133,7 @@ class Estimator:
         """
         sample = self._sample
         sample.time_us = time_us & 0xFFFFFFFF
-        for name, value in zip(SAMPLE_VALUES, (theta, theta_dot, tau_m, z_ddot, grip_force), strict=True):
+        for name, value in zip(_SAMPLE_VALUES, (theta, theta_dot, tau_m, z_ddot, grip_force), strict=True):
             setattr(sample, name, 0.0 if value is None else value)
             setattr(sample, f"{name}_valid", value is not None)
         return _MODES[lib.lever_update(self.pointer, sample)]
@@ -174,10 +174,10 @@ class Estimator:
 
     def feedthrough(self, frequency: float) -> Feedthrough:
         """Biodynamic feedthrough θ/z̈ at a frequency [Hz] after the last sample."""
-        found = self._feedthrough
-        lib.lever_feedthrough(self.pointer, frequency, found)
-        response = complex(found.real, found.imaginary)
-        return Feedthrough(response, found.gain_sigma, found.phase_sigma, found.correlation)
+        raw = self._feedthrough
+        lib.lever_feedthrough(self.pointer, frequency, raw)
+        response = complex(raw.real, raw.imaginary)
+        return Feedthrough(response, raw.gain_sigma, raw.phase_sigma, raw.correlation)
 
     def health(self) -> Health:
         """Mode, faults and counts after the last sample."""

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LeverError
-from .estimator import SAMPLE_VALUES
 from .library import struct_dtype
 
 _GREATEST = {"theta": (math.pi, "rad"), "theta_dot": (20.0, "rad/s")}
@@ -40,7 +39,7 @@ def sample_array(samples: Mapping[str, Any], period: float) -> NDArray[Any]:
         if len(values) != len(taken):
             raise LeverError(f"samples: {name} has {len(values)} values, time_us has {len(taken)}")
     taken["time_us"] = _time_us(columns["time_us"], period)  # to 32 bits: wraps
-    for name in columns.keys() & set(SAMPLE_VALUES):
+    for name in (name for name in columns if f"{name}_valid" in fields):
         taken[name] = columns[name]
         taken[f"{name}_valid"] = columns.get(f"{name}_valid", ~np.isnan(columns[name]))
     for name, (greatest, unit) in _GREATEST.items():

@@ -53,11 +53,11 @@ class Columns:
 
     def _unwrapped(self, name: str, values: FloatArray) -> FloatArray:
         """Beyond the bits of a count, which starts at 0 in an estimator that does."""
-        known = np.isfinite(values)
-        steps = np.diff(values[known], prepend=self._counts[name]) % COUNTS[name]
-        values[known] = self._counts[name] + np.cumsum(steps)
-        if known.any():
-            self._counts[name] = int(values[known][-1])
+        finite = np.isfinite(values)
+        steps = np.diff(values[finite], prepend=self._counts[name]) % COUNTS[name]
+        values[finite] = self._counts[name] + np.cumsum(steps)
+        if finite.any():
+            self._counts[name] = int(values[finite][-1])
         return values
 
 

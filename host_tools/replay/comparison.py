@@ -24,12 +24,12 @@ class _Signal:
 def signals(model: str) -> list[_Signal]:
     """What is compared: states, NIS, and each quantity with its standard deviation."""
     units = {"theta": "rad", "theta_dot": "rad/s", "nis": "1"}
-    found = [_Signal(field, units[field], column, None) for column, _, field in ESTIMATED]
+    compared = [_Signal(field, units[field], column, None) for column, _, field in ESTIMATED]
     for each in quantities(model):
         estimate, sigma = each.column("estimate"), each.column("sigma")
-        found.append(_Signal(each.key, each.unit, estimate, sigma))
-        found.append(_Signal(f"{each.key}_sigma", each.unit, sigma, None))
-    return found
+        compared.append(_Signal(each.key, each.unit, estimate, sigma))
+        compared.append(_Signal(f"{each.key}_sigma", each.unit, sigma, None))
+    return compared
 
 
 class _Sums:
@@ -43,32 +43,32 @@ class _Sums:
 
     def add(self, trace: Trace) -> None:
         difference = trace[self.signal.column] - trace[recorded_name(self.signal.column)]
-        known = np.isfinite(difference)
-        count = int(known.sum())
+        finite = np.isfinite(difference)
+        count = int(finite.sum())
         if not count:
             return
-        told, values = self.difference, difference[known]
-        told.samples += count
-        told.identical_samples += int(np.sum(values == 0.0))
+        result, values = self.difference, difference[finite]
+        result.samples += count
+        result.identical_samples += int(np.sum(values == 0.0))
         self._sum += float(np.sum(values))
         self._squares += float(values @ values)
         farthest = int(np.argmax(np.abs(values)))
-        if told.largest is None or abs(values[farthest]) > abs(told.largest):
-            told.largest = float(values[farthest])
-            told.largest_at_s = float(trace["time_s"][known][farthest])
+        if result.largest is None or abs(values[farthest]) > abs(result.largest):
+            result.largest = float(values[farthest])
+            result.largest_at_s = float(trace["time_s"][finite][farthest])
         if self.signal.sigma is not None:
-            sigma = trace[self.signal.sigma][known]
+            sigma = trace[self.signal.sigma][finite]
             with_sigma = sigma > 0.0
             self._with_sigma += int(with_sigma.sum())
             self._in_sigma += float(np.sum(np.square(values[with_sigma] / sigma[with_sigma])))
 
     def finished(self) -> Difference:
-        told = self.difference
-        if told.samples:
-            told.bias, told.rms = self._sum / told.samples, math.sqrt(self._squares / told.samples)
+        result = self.difference
+        if result.samples:
+            result.bias, result.rms = self._sum / result.samples, math.sqrt(self._squares / result.samples)
         if self._with_sigma:
-            told.rms_in_sigma = math.sqrt(self._in_sigma / self._with_sigma)
-        return told
+            result.rms_in_sigma = math.sqrt(self._in_sigma / self._with_sigma)
+        return result
 
 
 class Comparison:
@@ -103,10 +103,10 @@ class Comparison:
         if not by_sigma:
             return "The log holds estimates too, but none of this model's parameters: only the states can be compared."
         worst = max(by_sigma, key=lambda name: by_sigma[name].rms_in_sigma or 0.0)
-        told = by_sigma[worst]
-        unit = "" if told.unit == "1" else f" {told.unit}"
+        difference = by_sigma[worst]
+        unit = "" if difference.unit == "1" else f" {difference.unit}"
         return (
             f"Against the estimates that were recorded with the log, {self._names.get(worst, worst)} differs most: rms "
-            f"{told.rms_in_sigma:.2g} σ ({told.rms:.3g}{unit}), at most {abs(told.largest or 0.0):.3g}{unit} at "
-            f"{told.largest_at_s:.1f} s."
+            f"{difference.rms_in_sigma:.2g} σ ({difference.rms:.3g}{unit}), at most "
+            f"{abs(difference.largest or 0.0):.3g}{unit} at {difference.largest_at_s:.1f} s."
         )

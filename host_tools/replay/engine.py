@@ -82,13 +82,13 @@ def replay(
         options = replace(options, config=traffic.at_its_rate(options.config))
     with ExitStack() as stack:
         outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs, FILES))
-        made = _Replay(traffic, options, outputs)
-        made.run(progress)
-        summary = made.summary()
+        replayed = _Replay(traffic, options, outputs)
+        replayed.run(progress)
+        summary = replayed.summary()
         if outputs is not None:
-            made.finish(outputs, summary)
+            replayed.finish(outputs, summary)
             if keep is not None:
-                keep(made.kept.stretches.rows())
+                keep(replayed.kept.stretches.rows())
         return summary
 
 

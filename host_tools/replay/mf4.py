@@ -89,11 +89,11 @@ class Mf4:
             if name in self._indices:
                 self._file.extend(self._indices[name], [(time, None), *((column, None) for column in values)])
             else:
-                made = [
+                group = [
                     Signal(column, time, name=named, unit=unit)
                     for column, (_, named, unit) in zip(values, signals, strict=True)
                 ]
-                self._indices[name] = self._file.append(made, acq_name=name, common_timebase=True)
+                self._indices[name] = self._file.append(group, acq_name=name, common_timebase=True)
 
     def close(self) -> None:
         """Writes the file."""

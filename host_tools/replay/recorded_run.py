@@ -78,12 +78,12 @@ class RecordedRun(Run):
 
     def innovations(self, seconds: float) -> Averages | None:
         """Longer stretches where a recording is long, so that there are no more than can be told apart."""
-        made = self._kept.nis.all()
-        if made is None:
+        groups = self._kept.nis.all()
+        if groups is None:
             return None
-        together = -(-len(made[0]) // _MOST_AVERAGES)
-        whole = len(made[0]) // together * together
-        time, total, outputs = (values[:whole].reshape(-1, together) for values in made)
+        together = -(-len(groups[0]) // _MOST_AVERAGES)
+        whole = len(groups[0]) // together * together
+        time, total, outputs = (values[:whole].reshape(-1, together) for values in groups)
         return Averages(time.mean(axis=1), total.sum(axis=1), outputs.sum(axis=1), together * _NIS_AVERAGE)
 
     def spectrum(self, name: str) -> tuple[FloatArray, FloatArray]:

@@ -111,7 +111,7 @@ class Groups:
         self._size = size
         self._of = of
         self._rest: list[FloatArray] = []
-        self._made: list[tuple[FloatArray, ...]] = []
+        self._reduced: list[tuple[FloatArray, ...]] = []
 
     def add(self, *columns: FloatArray) -> None:
         """Further samples."""
@@ -120,11 +120,11 @@ class Groups:
         whole = len(joined[0]) // self._size * self._size
         self._rest = [values[whole:].copy() for values in joined]
         if whole:
-            self._made.append(self._of(*(values[:whole] for values in joined)))
+            self._reduced.append(self._of(*(values[:whole] for values in joined)))
 
     def all(self) -> tuple[FloatArray, ...] | None:
         """What came of all groups; None if there was none."""
-        return tuple(np.concatenate(parts) for parts in zip(*self._made, strict=True)) if self._made else None
+        return tuple(np.concatenate(parts) for parts in zip(*self._reduced, strict=True)) if self._reduced else None
 
 
 class Ends:

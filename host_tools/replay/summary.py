@@ -43,25 +43,25 @@ class Figures:
             self._modes[int(mode)] = self._modes.get(int(mode), 0) + count
         columns = [each.column(kind) for each in self._quantities for kind in ("estimate", "sigma")]
         for name in columns:
-            known = trace[name][np.isfinite(trace[name])]
-            if len(known):
-                self._last[name] = float(known[-1])
+            finite = trace[name][np.isfinite(trace[name])]
+            if len(finite):
+                self._last[name] = float(finite[-1])
                 least, greatest = self._extremes.get(name, (np.inf, -np.inf))
-                self._extremes[name] = min(least, float(known.min())), max(greatest, float(known.max()))
+                self._extremes[name] = min(least, float(finite.min())), max(greatest, float(finite.max()))
 
     def estimates(self) -> dict[str, dict[str, Any]]:
         """The last estimate of each quantity with its standard deviation, and between what it was."""
-        told = {}
+        by_key = {}
         for each in self._quantities:
             least, greatest = self._extremes.get(each.column("estimate"), (None, None))
-            told[each.key] = {
+            by_key[each.key] = {
                 "unit": each.unit,
                 "last": self._last.get(each.column("estimate")),
                 "last_sigma": self._last.get(each.column("sigma")),
                 "least": least,
                 "greatest": greatest,
             }
-        return told
+        return by_key
 
     def summary(self, health: Health) -> dict[str, Any]:
         """The part of summary.json that is about all samples; `health` is the estimator's at the end."""
@@ -103,59 +103,60 @@ def verdict(summary: dict[str, Any]) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _comparison(told: dict[str, Any] | None) -> str:
-    return "" if told is None else str(told["in_words"])
+def _comparison(comparison: dict[str, Any] | None) -> str:
+    return "" if comparison is None else str(comparison["in_words"])
 
 
 def _troubles(summary: dict[str, Any]) -> list[str]:
     """What the reader has to know before believing the rest."""
-    told, recording = [], summary["recording"]
+    troubles, recording = [], summary["recording"]
     if failure(summary):
-        told.append(f"Trouble: {failure(summary)}.")
+        troubles.append(f"Trouble: {failure(summary)}.")
     if mapping := recording.get("mapping"):
-        told += [f"{note}." for note in mapping["notes"]]
-        told += _protection(mapping)
+        troubles += [f"{note}." for note in mapping["notes"]]
+        troubles += _protection(mapping)
     if recording["refused"]:
         why = why_refused(summary["corrupt"], summary["late"])
-        told.append(f"{recording['refused']:,} frames were refused: {why}.")
+        troubles.append(f"{recording['refused']:,} frames were refused: {why}.")
     if recording["ends_early"]:
-        told.append(f"The log is not whole: {'; '.join(recording['ends_early'])}.")
+        troubles.append(f"The log is incomplete: {'; '.join(recording['ends_early'])}.")
     if recording["damaged_lines"]:
-        told.append(f"{recording['damaged_lines']} of its lines are no frames.")
+        troubles.append(f"{recording['damaged_lines']} of its lines are not frames.")
     if recording["gaps"]:
         gaps, longest = recording["gaps"], recording["longest_gap_s"]
-        told.append(f"Samples are missing in {gaps} places, the longest gap {longest:.3g} s.")
+        troubles.append(f"Samples are missing in {gaps} places, the longest gap {longest:.3g} s.")
     if recording["clock_restarts"]:
-        told.append(f"The sender's clock started over {recording['clock_restarts']} times.")
+        troubles.append(f"The sender's clock started over {recording['clock_restarts']} times.")
     if recording["model_changes"]:
-        told.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
+        troubles.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
     step, period = recording["typical_step_s"], summary["estimator"]["settings"]["sample_period"]
     if step and not 0.7 < step / period < 1.4:
-        told.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
-    return told + _recorded_estimates(recording)
+        troubles.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
+    return troubles + _recorded_estimates(recording)
 
 
 def _protection(mapping: dict[str, Any]) -> list[str]:
     """What E2E protection has found, or that there was none."""
-    told = []
+    sentences = []
     for name, counts in mapping["messages"].items():
         wrong = [f"{counts[what]:,} {what}" for what in ("corrupt", "lost", "repeated", "undecoded") if counts[what]]
         if wrong:
-            told.append(f"Of {counts['frames']:,} frames of {name}: {', '.join(wrong)}.")
+            sentences.append(f"Of {counts['frames']:,} frames of {name}: {', '.join(wrong)}.")
     if mapping["unprotected_frames"]:
-        told.append(
+        sentences.append(
             f"{mapping['unprotected_frames']:,} frames are unprotected: the mapping names no E2E profile for them."
         )
-    return told
+    return sentences
 
 
 def _recorded_estimates(recording: dict[str, Any]) -> list[str]:
     """Why estimates in the log are not compared with the new ones."""
-    told = []
+    troubles = []
     if recording["answers_of_other_contract"]:
-        told.append(
-            "The estimates in the log are of another contract, or none that it tells (IDENTITY): they are not compared."
+        troubles.append(
+            "The estimates in the log are of another version of lever.dbc, or of an unknown one (IDENTITY): they are "
+            "not compared."
         )
     if recording["misplaced_answers"]:
-        told.append(f"{recording['misplaced_answers']} recorded estimates do not belong to the sample before them.")
-    return told
+        troubles.append(f"{recording['misplaced_answers']} recorded estimates do not belong to the sample before them.")
+    return troubles

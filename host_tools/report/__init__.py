@@ -5,7 +5,7 @@ JSON, so plotly's Python classes are never loaded), `summary_html` makes verdict
 special in the estimator's model and in the truth, `page` puts it together with page.html, page.css, page.js and
 plotly.js from the plotly package.
 
-The picture of a result for a README is the top of this page: see picture.py.
+The picture of a result for a README is the top of this page: see screenshot.py.
 """
 
 from __future__ import annotations

@@ -76,8 +76,8 @@ def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
 def slow_trim(time: Array, theta: Array, corner: float, longest_step: float = LONGEST_STEP) -> Array:
     """The estimator's own idea of the trim angle [rad]: the slow part of θ, held over gaps (NaN); corner [Hz]."""
     trim = np.empty(len(theta))
-    known = theta[np.isfinite(theta)]
-    level = Detrend(float(known[0]) if known.size else 0.0)
+    measured = theta[np.isfinite(theta)]
+    level = Detrend(float(measured[0]) if measured.size else 0.0)
     for index, (gap, angle) in enumerate(zip(np.diff(time, prepend=time[0]).tolist(), theta.tolist(), strict=True)):
         if angle == angle:
             level.step(angle, corner, min(gap, longest_step))

@@ -33,10 +33,10 @@ def dots(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) 
 
 def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0, **more: Any) -> list[Spec]:
     """The area between two curves."""
-    known = np.isfinite(low) & np.isfinite(high)
+    finite = np.isfinite(low) & np.isfinite(high)
     edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": name}
-    lower = _trace(x[known], low[known], name, row) | edge | {"showlegend": False}
-    upper = _trace(x[known], high[known], name, row) | edge | {"fill": "tonexty", "fillcolor": f"@{colour}"}
+    lower = _trace(x[finite], low[finite], name, row) | edge | {"showlegend": False}
+    upper = _trace(x[finite], high[finite], name, row) | edge | {"fill": "tonexty", "fillcolor": f"@{colour}"}
     return [lower, upper | more]
 
 
@@ -77,8 +77,8 @@ class Figure:
     def add(self, *traces: Spec) -> None:
         """Adds traces; a name that is there already is shown once in the legend."""
         for trace in traces:
-            known = any(trace["name"] == other["name"] and other.get("showlegend", True) for other in self.traces)
-            self.traces.append({"showlegend": False} | trace if known else trace)
+            listed = any(trace["name"] == other["name"] and other.get("showlegend", True) for other in self.traces)
+            self.traces.append({"showlegend": False} | trace if listed else trace)
 
     def mark(self, moments: list[float]) -> None:
         """Vertical lines at the times at which the truth changed."""

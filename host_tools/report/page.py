@@ -3,7 +3,7 @@
 import html
 from importlib.resources import files
 
-from . import models, summary_html
+from . import captions, summary_html
 from .charts import comparison, health, signals, tracking, transfer
 from .document import document
 from .figure import Figure
@@ -63,8 +63,10 @@ def _subtitle(run: Run) -> str:
 
 
 def _explained(page: Page, run: Run) -> None:
-    checked = " The truth is known in a simulation: this page holds the claims against it." if run.has_truth else ""
-    about = "".join(f"<p>{paragraph}</p>" for paragraph in models.about(run))
+    checked = (
+        " In a simulation the truth is known, and this page compares the estimates with it." if run.has_truth else ""
+    )
+    about = "".join(f"<p>{paragraph}</p>" for paragraph in captions.about(run))
     svg = (files(__package__) / "schematic.svg").read_text(encoding="utf-8")
     page.section(
         "explained",
@@ -74,7 +76,7 @@ def _explained(page: Page, run: Run) -> None:
         "<p>A helicopter pilot's left arm rests on the collective lever. The cabin shakes, the arm moves the lever, "
         "the lever moves the rotor, and the rotor shakes the cabin: a loop that can grow by itself. How close it is "
         "to that depends on the arm, which acts like a mass m<sub>p</sub> on a spring k<sub>p</sub> with a damper "
-        "c<sub>p</sub>, and which changes as the pilot grips, relaxes or tires.</p><p>Nobody can measure these three. "
+        "c<sub>p</sub>, and which changes as the pilot grips, relaxes or tires.</p><p>No sensor measures these three. "
         "The estimator works them out on line, many times a second, from the lever's angle θ and rate, the "
         "acceleration of the floor z̈ and the torque τ<sub>m</sub> of the lever's own motor, and says how sure it is: "
         f"the shaded bands are ±2 standard deviations (σ).{checked}</p>{about}</div>{svg}</div>",
@@ -90,7 +92,7 @@ def _estimates(page: Page, run: Run) -> None:
         page.figure(
             "figure-parameters",
             tracking.parameters(run),
-            f"{models.parameters_caption(run)}{marks}",
+            f"{captions.parameters_caption(run)}{marks}",
         ),
     )
     page.section(
@@ -100,7 +102,7 @@ def _estimates(page: Page, run: Run) -> None:
         page.figure(
             "figure-dynamics",
             tracking.dynamics(run),
-            models.dynamics_caption(run),
+            captions.dynamics_caption(run),
         ),
     )
 
@@ -126,13 +128,13 @@ def _transfer(page: Page, run: Run) -> None:
         "Brightness is how many degrees the lever moves for 1 m/s² of floor motion, over time and frequency. The white "
         "line is the natural frequency."
     )
-    captions = {"truth": f"<strong>Truth.</strong> {meaning}", "estimate": f"<strong>Estimate.</strong> {meaning}"}
+    sentences = {"truth": f"<strong>Truth.</strong> {meaning}", "estimate": f"<strong>Estimate.</strong> {meaning}"}
     if "truth" in maps:
-        captions["estimate"] = (
+        sentences["estimate"] = (
             "<strong>Estimate.</strong> The same of the estimated parameters, same colours: the closer it looks to the "
             "truth, the better."
         )
-    pair = "".join(page.figure(f"figure-map-{name}", figure, captions[name]) for name, figure in maps.items())
+    pair = "".join(page.figure(f"figure-map-{name}", figure, sentences[name]) for name, figure in maps.items())
     page.section(
         "bode",
         "Bode diagram",
@@ -141,14 +143,14 @@ def _transfer(page: Page, run: Run) -> None:
         page.figure(
             "figure-slices",
             transfer.slices(run),
-            models.feedthrough_caption(run),
+            captions.feedthrough_caption(run),
         ),
     )
 
 
 def _signals(page: Page, run: Run) -> None:
     true = run.first_name("theta_true_rad", "theta_dot_true_rad_s")
-    lies = f"Estimate and {'measurement' if true is None else 'truth'} lie on each other unless something is wrong."
+    lies = f"Estimate and {'measurement' if true is None else 'truth'} coincide unless something is wrong."
     page.section(
         "states",
         "States",
@@ -156,8 +158,8 @@ def _signals(page: Page, run: Run) -> None:
         page.figure(
             "figure-detail",
             signals.detail(run),
-            "A close look at angle and rate of the lever: grey dots are what the sensors said, the blue line what the "
-            "estimator makes of it. The buttons choose the moment.",
+            "Angle and rate of the lever in detail: grey dots are the samples of the sensors, the blue line is the "
+            "estimate. The buttons choose the moment.",
         ),
         page.figure(
             "figure-motion",
@@ -171,7 +173,7 @@ def _signals(page: Page, run: Run) -> None:
             "expected to be wrong by. Dots inside the band around 1 are what chance alone gives; above it the "
             "estimator is over-confident, below it too cautious.",
         ),
-        page.figure("figure-whiteness", signals.whiteness(run), models.whiteness_caption(run)),
+        page.figure("figure-whiteness", signals.whiteness(run), captions.whiteness_caption(run)),
     )
     page.section(
         "excitation",
@@ -180,7 +182,7 @@ def _signals(page: Page, run: Run) -> None:
         page.figure(
             "figure-excitation",
             signals.excitation(run),
-            models.excitation_caption(run),
+            captions.excitation_caption(run),
         ),
         page.figure(
             "figure-spectra",
@@ -198,8 +200,8 @@ def _health(page: Page, run: Run) -> None:
         page.figure(
             "figure-health",
             health.timeline(run),
-            "What the estimator said of itself: its mode (blue) and the faults it noticed (orange). Below, how many "
-            "frames were lost, corrupt or late on the bus. What is not shown did not happen.",
+            "The mode of the estimator (blue) and the faults that it reported (orange). Below, how many frames were "
+            "lost, corrupt or late on the bus. What is not shown did not occur.",
         ),
     )
 
@@ -215,6 +217,6 @@ def _numbers(page: Page, run: Run) -> None:
     rows = [(html.escape(key), html.escape(value)) for key, value in summary_html.flat(scenario)]
     estimator = {**vars(run.summary.estimator), "settings": None} if run.summary else {}
     rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in summary_html.flat(estimator)]
-    made = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
+    details = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
     settings = f"<details><summary>Settings of the estimator</summary>{summary_html.settings_table(run)}</details>"
-    page.section("made", "Settings", "How this run was made", made, settings)
+    page.section("made", "Settings", "How this run was made", details, settings)

@@ -114,11 +114,11 @@ class Run:
 
     def true_transfer(self, time: Array) -> Transfer | None:
         """θ/z̈ of a truth that is not of the estimator's model, at the times [s]; None where the summary has none."""
-        told = self.simulated.truth.transfer if self.simulated else None
-        if told is None:
+        transfer = self.simulated.truth.transfer if self.simulated else None
+        if transfer is None:
             return None
-        at = np.maximum(np.searchsorted(told.time_s, time, side="right") - 1, 0)
-        return Transfer(np.array(told.numerator)[at], np.array(told.denominator)[at])
+        at = np.maximum(np.searchsorted(transfer.time_s, time, side="right") - 1, 0)
+        return Transfer(np.array(transfer.numerator)[at], np.array(transfer.denominator)[at])
 
     # What takes every sample to tell; a run that has kept fewer overrides these.
 

@@ -51,11 +51,11 @@ def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: floa
     for column in columns:
         scale = np.maximum(np.abs(column[:-1]), np.finfo(np.float64).tiny)
         stepped |= np.abs(np.diff(column)) > relative * scale
-    found: list[float] = []
+    moments: list[float] = []
     for moment in time[1:][stepped].tolist():
-        if not found or moment - found[-1] > apart:
-            found.append(moment)
-    return found
+        if not moments or moment - moments[-1] > apart:
+            moments.append(moment)
+    return moments
 
 
 def runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -99,11 +99,11 @@ class Welch:
 
     def _density(self, windows: Array) -> Array:
         length = windows.shape[1]
-        known = np.isfinite(windows)
-        mean = np.where(known, windows, 0.0).sum(axis=1, keepdims=True) / np.maximum(
-            known.sum(axis=1, keepdims=True), 1
+        finite = np.isfinite(windows)
+        mean = np.where(finite, windows, 0.0).sum(axis=1, keepdims=True) / np.maximum(
+            finite.sum(axis=1, keepdims=True), 1
         )
-        detrended = np.where(known, windows - mean, 0.0)
+        detrended = np.where(finite, windows - mean, 0.0)
         shape = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
         power: Array = np.abs(np.fft.rfft(detrended * shape, axis=1)) ** 2 * (self._period / float(shape @ shape))
         power[:, 1 : (length + 1) // 2] *= 2.0

@@ -51,7 +51,7 @@ def figures_of(run: Run, quantity: Quantity) -> Quality | None:
 def verdict(run: Run) -> str:
     """The headline."""
     if run.summary is None:
-        text, mood = "A recorded run, with no truth to compare with: what the estimator made of it.", ""
+        text, mood = "A recorded run, whose truth is not known: the estimates from it.", ""
     else:
         text = run.summary.verdict
         mood = "bad" if not run.summary.passed else "" if _in_doubt(run) else "good"
@@ -71,7 +71,7 @@ def _in_doubt(run: Run) -> bool:
 def cards(run: Run) -> str:
     """The figures behind the verdict."""
     judged = [quantity for quantity in run.quantities if figures_of(run, quantity)]
-    shown = _judgement_cards(run, judged) if judged else [_last_estimates(run)]
+    shown = _accuracy_cards(run, judged) if judged else [_last_estimates(run)]
     return f'<div class="cards">{"".join(shown)}</div>'
 
 
@@ -80,7 +80,7 @@ def _card(title: str, rows: Iterable[tuple[str, str]], note: str) -> str:
     return f'<div class="card"><h3>{title}</h3><div class="figures">{lines}</div><p>{note}</p></div>'
 
 
-def _judgement_cards(run: Run, judged: list[Quantity]) -> list[str]:
+def _accuracy_cards(run: Run, judged: list[Quantity]) -> list[str]:
     def rows(key: str, show: Any) -> list[tuple[str, str]]:
         return [
             (f"{quantity.symbol} {quantity.name}", show(getattr(figures_of(run, quantity), key))) for quantity in judged
@@ -98,7 +98,7 @@ def _judgement_cards(run: Run, judged: list[Quantity]) -> list[str]:
             "Coverage of ±2σ",
             rows("coverage_2sigma", percent),
             "Of the time the truth lay within ±2σ: 95 % of Gaussian errors do. Errors last for seconds, so a single "
-            "run is partly luck; lever sim --seeds tells of many.",
+            "run is partly luck; lever sim --seeds shows many.",
         ),
         _card(
             "How fast",
@@ -136,16 +136,16 @@ def errors_table(run: Run) -> str:
     header = ("", *(f"{name}<br>[{unit}]" for name, unit in titles))
     rows = []
     for quantity in run.quantities:
-        if found := figures_of(run, quantity):
-            coverage = found.coverage_2sigma
+        if figures := figures_of(run, quantity):
+            coverage = figures.coverage_2sigma
             rows.append(
                 (
                     f"{quantity.symbol} {quantity.name}",
-                    fixed(found.rms_percent, 2),
-                    fixed(found.bias_percent, 2),
+                    fixed(figures.rms_percent, 2),
+                    fixed(figures.bias_percent, 2),
                     fixed(None if coverage is None else 100.0 * coverage, 1),
-                    _times(found.time_to_10_percent_s),
-                    _times(found.time_to_5_percent_s),
+                    _times(figures.time_to_10_percent_s),
+                    _times(figures.time_to_5_percent_s),
                 )
             )
     return table(header, rows) if rows else ""
@@ -169,11 +169,11 @@ def comparison_table(run: Run) -> str:
 
 def recorded(run: Run) -> str:
     """Where the samples come from, in a sentence; empty for a simulation."""
-    told = run.recording
-    if not told:
+    recording = run.recording
+    if not recording:
         return ""
-    start = f" from {told['start']} on" if told["start"] else ""
-    return f"A log, replayed: bus {told['channel']}{start}."
+    start = f" from {recording['start']} on" if recording["start"] else ""
+    return f"A log, replayed: bus {recording['channel']}{start}."
 
 
 _RECORDING_FIGURES = (
@@ -195,13 +195,13 @@ _RECORDING_FIGURES = (
 
 def recording_table(run: Run) -> str:
     """What was in the log."""
-    told = run.recording
-    if not told:
+    recording = run.recording
+    if not recording:
         return ""
-    rows = [(label, number(told[key]), unit) for key, label, unit in _RECORDING_FIGURES]
+    rows = [(label, number(recording[key]), unit) for key, label, unit in _RECORDING_FIGURES]
     rows += [
         (f"left out: {kind.replace('_', ' ')}", number(count), "frames")
-        for kind, count in told["frames_left_out"].items()
+        for kind, count in recording["frames_left_out"].items()
     ]
     return table(("the log", "value", "unit"), rows)
 

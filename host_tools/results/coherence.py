@@ -66,7 +66,7 @@ def _hann(length: int) -> FloatArray:
 
 
 def _without_mean(windows: FloatArray) -> FloatArray:
-    known = np.isfinite(windows)
-    count = np.maximum(known.sum(axis=-1, keepdims=True), 1)
-    mean = np.where(known, windows, 0.0).sum(axis=-1, keepdims=True) / count
-    return np.where(known, windows - mean, 0.0)
+    finite = np.isfinite(windows)
+    count = np.maximum(finite.sum(axis=-1, keepdims=True), 1)
+    mean = np.where(finite, windows, 0.0).sum(axis=-1, keepdims=True) / count
+    return np.where(finite, windows - mean, 0.0)

@@ -45,13 +45,13 @@ class Feedthrough:
         """response (complex) [rad/(m/s²)], gain_sigma [1] and phase_sigma [rad], each (times, FREQUENCIES), as last
         sent before each time [s]; NaN before the first, and where it was not available."""
         rows = np.concatenate([np.full((1, len(COLUMNS)), np.nan), *self._parts])
-        found = np.full((len(time), len(FREQUENCIES), len(COLUMNS)), np.nan)
+        latest = np.full((len(time), len(FREQUENCIES), len(COLUMNS)), np.nan)
         for index, frequency in enumerate(FREQUENCIES):
             own = rows[rows[:, 1] == frequency]
             last = np.searchsorted(own[:, 0], time, side="right") - 1
-            found[last >= 0, index] = own[last[last >= 0]]
+            latest[last >= 0, index] = own[last[last >= 0]]
         return {
-            "response": found[..., 2] + 1j * found[..., 3],
-            "gain_sigma": found[..., 4],
-            "phase_sigma": found[..., 5],
+            "response": latest[..., 2] + 1j * latest[..., 3],
+            "gain_sigma": latest[..., 4],
+            "phase_sigma": latest[..., 5],
         }

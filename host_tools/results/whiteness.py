@@ -69,15 +69,15 @@ def average_size(period: float) -> int:
 
 def of_averages(averages: FloatArray, step: float) -> Whiteness | None:
     """measure() from averages that are `step` [s] apart."""
-    known = np.isfinite(averages)
-    count = int(known.sum())
+    finite = np.isfinite(averages)
+    count = int(finite.sum())
     if count < 4 * LAGS:
         return None
-    centred = np.where(known, averages - np.mean(averages[known]), 0.0)
+    centred = np.where(finite, averages - np.mean(averages[finite]), 0.0)
     variance = float(np.sum(np.square(centred))) / count
     if variance == 0.0:
         return None
-    pairs = [max(1, int(np.sum(known[lag:] & known[:-lag]))) for lag in range(1, LAGS + 1)]
+    pairs = [max(1, int(np.sum(finite[lag:] & finite[:-lag]))) for lag in range(1, LAGS + 1)]
     products = [float(centred[lag:] @ centred[:-lag]) for lag in range(1, LAGS + 1)]
     correlation = [product / pair / variance for product, pair in zip(products, pairs, strict=True)]
     largest = max(range(LAGS), key=lambda index: abs(correlation[index]))
@@ -96,9 +96,9 @@ def of_averages(averages: FloatArray, step: float) -> Whiteness | None:
 def averages(values: FloatArray, size: int) -> FloatArray:
     """Of `size` values each; NaN where more than half are."""
     rows = values[: len(values) // size * size].reshape(-1, size)
-    known = np.isfinite(rows)
-    count = known.sum(axis=1)
-    total = np.where(known, rows, 0.0).sum(axis=1)
+    finite = np.isfinite(rows)
+    count = finite.sum(axis=1)
+    total = np.where(finite, rows, 0.0).sum(axis=1)
     means: FloatArray = np.where(2 * count >= size, total / np.maximum(count, 1), np.nan)
     return means
 

@@ -27,7 +27,7 @@ from ..firmware.config import setting
 from ..firmware.settings_file import Assignments, make_config
 from ..results import whiteness
 from .likelihood import LEARNT_LEAST, Likelihood, noise_as_set
-from .search import NOISE, Told
+from .search import NOISE, ShowProgress
 
 NAMES = ("z_ddot_gain", "z_ddot_delay", "lever_friction")
 TORQUE_GAIN = "tau_m_gain"
@@ -81,7 +81,7 @@ class Calibrated:
         """In words."""
         if not self.white:
             return "kept: innovations not white"
-        return "found" if self.is_taken else "kept: the log does not tell it better"
+        return "found" if self.is_taken else "kept: the log does not determine it better"
 
     @property
     def assignments(self) -> dict[str, float]:
@@ -93,19 +93,19 @@ class Calibrated:
 class Calibration:
     """What the log says of all of them."""
 
-    found: tuple[Calibrated, ...]
+    entries: tuple[Calibrated, ...]
     """Empty where they cannot be known."""
-    words: str
+    text: str
     """That, and why."""
 
     @property
     def assignments(self) -> dict[str, float]:
         """What to set."""
-        return {name: value for entry in self.found for name, value in entry.assignments.items()}
+        return {name: value for entry in self.entries for name, value in entry.assignments.items()}
 
 
 def calibrate(
-    likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = (), told: Told | None = None
+    likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = (), progress: ShowProgress | None = None
 ) -> Calibration:
     """Looks for all of NAMES that are not `kept`."""
     config = make_config(assignments)
@@ -116,8 +116,8 @@ def calibrate(
     if missing:
         stay = "Gain and delay of the accelerometer (z_ddot_gain, z_ddot_delay) and lever_friction stay as they are: "
         return Calibration((), stay + missing)
-    found = _Fit(likelihood, assignments, names, tuple(name for name in NOISE if name not in kept), told).run()
-    return Calibration(found, _found_words(found, config.settings[f"{TORQUE_GAIN}_sigma"]))
+    entries = _Fit(likelihood, assignments, names, tuple(name for name in NOISE if name not in kept), progress).run()
+    return Calibration(entries, _sentences(entries, config.settings[f"{TORQUE_GAIN}_sigma"]))
 
 
 def dither(likelihood: Likelihood) -> float:
@@ -146,8 +146,8 @@ def _missing(likelihood: Likelihood, assignments: Assignments) -> str:
     return ""
 
 
-def _found_words(found: Sequence[Calibrated], torque_sigma: float) -> str:
-    if not found[0].white:
+def _sentences(entries: Sequence[Calibrated], torque_sigma: float) -> str:
+    if not entries[0].white:
         return (
             "The calibration stays as it is: the innovations are not white, so that the lever is moved by torque that "
             "the model does not know, which may look like a wrong gain, delay or friction."
@@ -155,7 +155,7 @@ def _found_words(found: Sequence[Calibrated], torque_sigma: float) -> str:
     values = ", ".join(
         f"{entry.name} {entry.best:.4g} ± {entry.sigma:.2g} {setting(entry.name).unit}".removesuffix(" 1")
         + ("" if entry.is_taken else f" ({entry.verdict})")
-        for entry in found
+        for entry in entries
     )
     return (
         f"From the dither (± one standard deviation): {values}. {TORQUE_GAIN} cannot be found beside z_ddot_gain: only "
@@ -202,13 +202,13 @@ class _Fit:
         assignments: Assignments,
         names: Sequence[str],
         noise: Sequence[str],
-        told: Told | None,
+        progress: ShowProgress | None,
     ) -> None:
-        self._likelihood, self._told, self._names = likelihood, told, names
+        self._likelihood, self._progress, self._names = likelihood, progress, names
         self._base = noise_as_set(assignments)
         self._settings = make_config(assignments).settings
-        known = [name for name in noise if self._settings[name] > 0.0]
-        self._unknowns = [_Unknown(name, name in known, self._settings[name]) for name in (*names, *known)]
+        tuned_noise = [name for name in noise if self._settings[name] > 0.0]
+        self._unknowns = [_Unknown(name, name in tuned_noise, self._settings[name]) for name in (*names, *tuned_noise)]
         self._least, self._greatest = np.array([each.ends for each in self._unknowns]).T
         self._expected = likelihood.runs + _ROUNDS // 2 * (2 * len(self._unknowns) + 1)
 
@@ -228,8 +228,8 @@ class _Fit:
 
     def _each(self, at: Array, **others: float) -> Array:
         """Log-likelihood of each sample that is tuned on [nat]."""
-        found: Array = self._innovations(at, **others)["log_likelihood"]
-        return found
+        per_sample: Array = self._innovations(at, **others)["log_likelihood"]
+        return per_sample
 
     def _is_white(self, at: Array) -> bool:
         """Whether the innovations are, of theta_dot or, if that is not measured, of theta."""
@@ -244,11 +244,11 @@ class _Fit:
         values = {each.name: each.value(float(x)) for each, x in zip(self._unknowns, at, strict=True)}
         delay = values.pop("z_ddot_delay", self._settings["z_ddot_delay"])
         everything = {**self._base, **values, **others, "z_ddot_delay": 0.0}
-        found: Array = self._likelihood.run(everything, delay)[self._likelihood.tuned_on]
-        if self._told is not None:
+        innovations: Array = self._likelihood.run(everything, delay)[self._likelihood.tuned_on]
+        if self._progress is not None:
             done = self._likelihood.runs
-            self._told(min(done, self._expected - 1), self._expected, "looking for the calibration")
-        return found
+            self._progress(min(done, self._expected - 1), self._expected, "looking for the calibration")
+        return innovations
 
     def _scores(self, at: Array, now: Array) -> tuple[Array, Array]:
         """Derivatives of `now`, a column for each unknown, and their sum, by differences to both sides.
@@ -259,11 +259,11 @@ class _Fit:
         columns, gradient = [], []
         for i, each in enumerate(self._unknowns):
             sides = [h for h in (each.step, -each.step) if self._least[i] <= at[i] + h <= self._greatest[i]]
-            found = [(self._each(at + h * np.eye(len(at))[i]) - now) / h for h in sides]
-            sizes = [float(column @ column) for column in found]
+            slopes = [(self._each(at + h * np.eye(len(at))[i]) - now) / h for h in sides]
+            sizes = [float(column @ column) for column in slopes]
             best = int(np.argmin(sizes))
-            columns.append(found[best])
-            gradient.append(found[best].sum() + 0.5 * sides[best] * sizes[best])
+            columns.append(slopes[best])
+            gradient.append(slopes[best].sum() + 0.5 * sides[best] * sizes[best])
         return np.stack(columns, axis=1), np.array(gradient)
 
     def _information(self, scores: Array) -> Array:

@@ -37,12 +37,12 @@ _OFFSET = 1e3  # makes the optimiser's relative tolerance that
 _DROP = 0.5 * chi_square_quantile(0.95, 1)  # of the logarithm of the likelihood at the ends of a 95 % interval
 _RUNS_A_SETTING = 80  # about; only for the progress that is shown
 
-Told = Callable[[int, int, str], None]
+ShowProgress = Callable[[int, int, str], None]
 """Runs done, runs expected, what is being done."""
 
 
 @dataclass(frozen=True)
-class Found:
+class Tuned:
     """What the log says of one setting."""
 
     name: str
@@ -66,7 +66,7 @@ class Found:
     def verdict(self) -> str:
         """In words."""
         if self.low is None and self.high is None:
-            return "kept: the log does not tell"
+            return "kept: the log does not determine it"
         if self.after == self.before:
             return "kept: not contradicted"
         if self.low is None:
@@ -78,24 +78,25 @@ def groups(assignments: Assignments, fixed: Sequence[str] = ()) -> dict[str, tup
     """The settings that can be looked for, by group; not those that are `fixed`, or 0 and so switched off."""
     config = make_config(assignments)
     settings = config.settings
-    found = {
+    candidates = {
         "noise": NOISE,
         "walk": tuple(f"{parameter.name}_walk" for parameter in model_parameters(config.choices["model"])),
         "adaptation": _ADAPTATION[config.choices["adaptation"]],
     }
-    kept = {group: tuple(n for n in names if n not in fixed and settings[n] > 0.0) for group, names in found.items()}
+    free = {name for name, value in settings.items() if name not in fixed and value > 0.0}
+    kept = {group: tuple(name for name in names if name in free) for group, names in candidates.items()}
     return {group: names for group, names in kept.items() if names}
 
 
 class Search:
     """Looks for the settings under which the log is most likely."""
 
-    def __init__(self, likelihood: Likelihood, assignments: Assignments, told: Told | None = None) -> None:
+    def __init__(self, likelihood: Likelihood, assignments: Assignments, progress: ShowProgress | None = None) -> None:
         self._likelihood = likelihood
         self._base = noise_as_set(assignments)
         self._settings = make_config(assignments).settings
         self._learnt = likelihood.learnt(self._base)
-        self._told = told
+        self._progress = progress
         self._expected = 1
         self._doing = ""
 
@@ -104,7 +105,7 @@ class Search:
         """Whether there is enough motion in the log for the parameters to learn from."""
         return self._learnt >= LEARNT_LEAST
 
-    def run(self, wanted: dict[str, tuple[str, ...]]) -> list[Found]:
+    def run(self, wanted: dict[str, tuple[str, ...]]) -> list[Tuned]:
         """Looks for the settings in these groups; only for noise where the parameters cannot learn."""
         if not self.can_learn:
             wanted = {group: names for group, names in wanted.items() if group == "noise"}
@@ -116,14 +117,14 @@ class Search:
             best |= self._maximum(best, wanted[group])
         self._doing = "how sure that is"
         top = self._at(best)
-        return [self._found(name, best, top) for name in names]
+        return [self._tuned(name, best, top) for name in names]
 
     def _at(self, logarithms: dict[str, float]) -> float:
         values = {name: _bounded(name, math.exp(value)) for name, value in logarithms.items()}
         result = self._likelihood.of({**self._base, **values})
-        if self._told is not None:
+        if self._progress is not None:
             done = self._likelihood.runs
-            self._told(min(done, self._expected - 1), self._expected, self._doing)
+            self._progress(min(done, self._expected - 1), self._expected, self._doing)
         return result
 
     def _limits(self, name: str) -> tuple[float, float]:
@@ -138,21 +139,21 @@ class Search:
             value = _OFFSET + top - self._at(start | dict(zip(names, x.tolist(), strict=True)))
             return value if math.isfinite(value) else 1e12
 
-        found = minimize(
+        optimum = minimize(
             loss,
             np.array([start[name] for name in names]),
             method="Powell",
             bounds=[self._limits(name) for name in names],
             options={"xtol": _STEP, "ftol": _TOLERANCE / _OFFSET},
         )
-        better = found.fun < _OFFSET
-        return dict(zip(names, found.x.tolist(), strict=True)) if better else {name: start[name] for name in names}
+        better = optimum.fun < _OFFSET
+        return dict(zip(names, optimum.x.tolist(), strict=True)) if better else {name: start[name] for name in names}
 
-    def _found(self, name: str, best: dict[str, float], top: float) -> Found:
+    def _tuned(self, name: str, best: dict[str, float], top: float) -> Tuned:
         low, high = self._limits(name)
         ends = [self._end(name, best, top, limit) for limit in (low, high)]
         values = [None if end is None else _bounded(name, math.exp(end)) for end in ends]
-        return Found(name, self._settings[name], _bounded(name, math.exp(best[name])), *values)
+        return Tuned(name, self._settings[name], _bounded(name, math.exp(best[name])), *values)
 
     def _end(self, name: str, best: dict[str, float], top: float, limit: float) -> float | None:
         """Where the likelihood has fallen by _DROP on the way from the best value to a limit; None if nowhere."""

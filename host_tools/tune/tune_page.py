@@ -13,7 +13,7 @@ from ..report.page import Page
 from ..report.summary_html import number, table
 from ..results.whiteness import CANNOT_SEE
 from ..tables import Row
-from .search import Found
+from .search import Tuned
 from .validation import Fit
 
 _TITLE = "Lever CDKF: settings from a log"
@@ -28,7 +28,7 @@ def build(
     verdict: str,
     tables: Mapping[str, Sequence[Row]],
     calibration: str,
-    found: Sequence[Found],
+    tuned: Sequence[Tuned],
     fits: Sequence[Fit],
 ) -> str:
     """The whole page. `tables` are as they are printed; `calibration` says in words what is known of that."""
@@ -36,15 +36,15 @@ def build(
     calibrated, settings, numbers = (
         _table(title, tables.get(title, ())) for title in ("calibration", "settings", "before and after")
     )
-    told = page.figure(
+    chart = page.figure(
         "intervals",
-        _intervals(found),
+        _intervals(tuned),
         "Bar: what the log does not contradict (95 % likelihood interval, the other settings as found); one that runs "
         "out of the figure has no end. Hollow: before. Full: after.",
     )
-    words = f"<p>{html.escape(calibration)}</p>" if calibration else ""
-    page.section("calibration", "Calibration", "Accelerometer and friction", words, calibrated)
-    page.section("settings", "Settings", "What the log says of the settings", told, settings)
+    paragraph = f"<p>{html.escape(calibration)}</p>" if calibration else ""
+    page.section("calibration", "Calibration", "Accelerometer and friction", paragraph, calibrated)
+    page.section("settings", "Settings", "What the log says of the settings", chart, settings)
     page.section("fits", "Before and after", "Before and after", numbers, *_innovations(page, fits))
     links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
     body = (
@@ -60,14 +60,14 @@ def _table(title: str, rows: Sequence[Row]) -> str:
     return f"<h3>{html.escape(title)}</h3>{table([html.escape(column) for column in rows[0]], cells)}" if rows else ""
 
 
-def _intervals(found: Sequence[Found]) -> Figure | None:
+def _intervals(tuned: Sequence[Tuned]) -> Figure | None:
     """A lane for each setting, over its value as a part of what it was."""
-    if not found:
+    if not tuned:
         return None
-    names = [entry.name for entry in reversed(found)]
+    names = [entry.name for entry in reversed(tuned)]
     lanes = axis("", tickvals=list(range(len(names))), ticktext=names, range=[-0.6, len(names) - 0.4], automargin=True)
     figure = Figure([lanes], axis("value ÷ value before", type="log"), 90 + 30 * len(names), over_time=False)
-    for lane, entry in enumerate(reversed(found)):
+    for lane, entry in enumerate(reversed(tuned)):
         values = [value for value in (entry.low, entry.high, entry.after, entry.before) if value is not None]
         low = min(values) / _OPEN if entry.low is None else entry.low
         high = max(values) * _OPEN if entry.high is None else entry.high
@@ -118,9 +118,9 @@ def _sizes(fits: Sequence[Fit]) -> Figure:
         count = len(fit.innovations) // size
         value, sigma = (fit.innovations[field][: count * size].astype(np.float64) for field in ("value", "sigma"))
         ratio = np.divide(value, sigma, out=np.full(value.shape, np.nan), where=sigma > 0.0)
-        known = np.isfinite(ratio).reshape(count, size, -1)
-        squares = np.where(known, np.square(np.nan_to_num(ratio)).reshape(count, size, -1), 0.0).sum(axis=1)
-        level = np.sqrt(squares / np.maximum(known.sum(axis=1), 1))
+        finite = np.isfinite(ratio).reshape(count, size, -1)
+        squares = np.where(finite, np.square(np.nan_to_num(ratio)).reshape(count, size, -1), 0.0).sum(axis=1)
+        level = np.sqrt(squares / np.maximum(finite.sum(axis=1), 1))
         for row in range(len(_OUTPUTS)):
             colour = _COLOURS[fit.settings]
             figure.add(line((np.arange(count) + 0.5) * _WINDOW, level[:, row], fit.settings, colour, row))

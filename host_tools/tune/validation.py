@@ -78,20 +78,20 @@ def fits(likelihood: Likelihood, before: Assignments, after: Assignments) -> lis
     }
     if make_config(before).settings["noise_window"] > 0.0:
         ways["estimated"] = {"before": before, "after": after}
-    found = []
+    results = []
     for noise, variants in ways.items():
         for name, assignments in variants.items():
             whole = likelihood.run(assignments)
             for part, where in (("tuned on", likelihood.tuned_on), ("held out", likelihood.judged_by)):
                 if where.any():
-                    found.append(Fit(name, noise, part, whole[where], likelihood.recording.period))
-    return found
+                    results.append(Fit(name, noise, part, whole[where], likelihood.recording.period))
+    return results
 
 
-def pairs(found: Sequence[Fit]) -> list[tuple[Fit, Fit]]:
+def pairs(results: Sequence[Fit]) -> list[tuple[Fit, Fit]]:
     """Before and after, for each way to have the noise and each part."""
-    after = {(fit.noise, fit.part): fit for fit in found if fit.settings == "after"}
-    return [(fit, after[fit.noise, fit.part]) for fit in found if fit.settings == "before"]
+    after = {(fit.noise, fit.part): fit for fit in results if fit.settings == "after"}
+    return [(fit, after[fit.noise, fit.part]) for fit in results if fit.settings == "before"]
 
 
 def gain(before: Fit, after: Fit) -> Gain:
@@ -103,30 +103,30 @@ def gain(before: Fit, after: Fit) -> Gain:
     return Gain(float(np.mean(difference)), error)
 
 
-def _held_out(found: Sequence[Fit]) -> dict[str, Gain]:
+def _held_out(results: Sequence[Fit]) -> dict[str, Gain]:
     """The gain on that part, by the way to have the noise; the last is the one in flight."""
-    return {before.noise: gain(before, after) for before, after in pairs(found) if before.part == "held out"}
+    return {before.noise: gain(before, after) for before, after in pairs(results) if before.part == "held out"}
 
 
-def is_worse(found: Sequence[Fit]) -> bool:
+def is_worse(results: Sequence[Fit]) -> bool:
     """Whether the part held out clearly goes worse with the new settings, with noise as in flight."""
-    flown = list(_held_out(found).values())[-1:]
-    return any(known.is_clear and known.mean < 0.0 for known in flown)
+    flown = list(_held_out(results).values())[-1:]
+    return any(each.is_clear and each.mean < 0.0 for each in flown)
 
 
-def verdict(found: Sequence[Fit], changed: int) -> str:
+def verdict(results: Sequence[Fit], changed: int) -> str:
     """In a sentence or two."""
     if not changed:
         return "The log contradicts none of the settings: nothing to tune."
     settings = f"{changed} setting{'s' if changed > 1 else ''} changed."
-    told = [
-        f"{_words(known)} with noise {'as set' if noise == 'as set' else 'estimated while running'} ({known})"
-        for noise, known in _held_out(found).items()
+    gains = [
+        f"{_outcome(each)} with noise {'as set' if noise == 'as set' else 'estimated while running'} ({each})"
+        for noise, each in _held_out(results).items()
     ]
-    return f"{settings} On the part not tuned on: {'; '.join(told)}." if told else f"{settings} Nothing was held out."
+    return f"{settings} On the part not tuned on: {'; '.join(gains)}." if gains else f"{settings} Nothing was held out."
 
 
-def _words(known: Gain) -> str:
-    if not known.is_clear:
+def _outcome(gain: Gain) -> str:
+    if not gain.is_clear:
         return "no clear difference"
-    return "better" if known.mean > 0.0 else "worse"
+    return "better" if gain.mean > 0.0 else "worse"

@@ -9,7 +9,7 @@ from rich.console import Console, Group, RenderableType
 from rich.rule import Rule
 
 from . import panels
-from .model import STEP, Picture
+from .picture import STEP, Picture
 from .sources import LogSource, Source
 
 _SPAN = 30.0

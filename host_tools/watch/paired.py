@@ -67,9 +67,9 @@ class Paired:
         period = 1e-6 * float(np.median(np.diff(rows[:, 0]) % 2**32)) if len(rows) > 1 else 0.0
         if period <= 0.0:
             return None
-        made = Coherence(period)
-        made.add(rows[:, 1], rows[:, 2])
-        return Measured(*made.spectrum(), made.chance()) if made.windows >= _WINDOWS_LEAST else None
+        coherence = Coherence(period)
+        coherence.add(rows[:, 1], rows[:, 2])
+        return Measured(*coherence.spectrum(), coherence.chance()) if coherence.windows >= _WINDOWS_LEAST else None
 
 
 def _values(data: NDArray[np.uint8]) -> FloatArray:

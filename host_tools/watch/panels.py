@@ -12,8 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from . import status
-from .model import STEP, Estimated, Picture
 from .paired import Measured
+from .picture import STEP, Estimated, Picture
 from .sources import Source
 
 NOTHING = "–"
@@ -37,8 +37,8 @@ def headline(picture: Picture, source: Source) -> Text:
     model = f" · model {picture.model}" if picture.model else ""
     version = picture.identity.version
     firmware = f" · firmware {version}" if version else ""
-    told = f"{source.title}{model} · watching for {minutes}:{seconds:02d} min{firmware}"
-    return Text(told, style="bold", no_wrap=True)
+    text = f"{source.title}{model} · watching for {minutes}:{seconds:02d} min{firmware}"
+    return Text(text, style="bold", no_wrap=True)
 
 
 def condition(picture: Picture, source: Source) -> Text:
@@ -111,10 +111,10 @@ def sparkline(values: Sequence[float], least_range: float, width: int) -> str:
     if width < 1 or not values:
         return ""
     chosen = [values[min(len(values) - 1, int((k + 0.5) * len(values) / width))] for k in range(width)]
-    known = [value for value in chosen if math.isfinite(value)]
-    if not known:
+    finite = [value for value in chosen if math.isfinite(value)]
+    if not finite:
         return ""
-    low, high = min(known), max(known)
+    low, high = min(finite), max(finite)
     least = least_range if math.isfinite(least_range) else 0.0
     half = max(high - low, least, 1e-12 * max(abs(low), abs(high)), 1e-30) / 2.0
     bottom = (low + high) / 2.0 - half
@@ -127,8 +127,8 @@ def health(picture: Picture, source: Source) -> Table:
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
-    told = status.faults(picture)
-    style = "yellow" if told else "green"
+    faults = status.faults(picture)
+    style = "yellow" if faults else "green"
     counts = picture.counts
     table.add_row("mode", Text(picture.mode or NOTHING, style="bold"))
     chosen = [name for what, name in picture.identity.choices.items() if what != "model"]
@@ -144,8 +144,8 @@ def health(picture: Picture, source: Source) -> Table:
         errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]
         table.add_row("TEC, REC", f"{errors[0]}, {errors[1]}; off bus {counts['bus_offs']}")
         table.add_row("machine", f"{counts['overruns']} lost, {counts['dropped']} dropped")
-    faults = "; ".join(told) or ("none" if picture.mode else NOTHING)
-    table.add_row("faults", Text(faults, style=style if picture.mode else "dim"))
+    text = "; ".join(faults) or ("none" if picture.mode else NOTHING)
+    table.add_row("faults", Text(text, style=style if picture.mode else "dim"))
     others = [
         ("restarts", counts["restarts"]),
         ("other frames", picture.foreign),
@@ -193,9 +193,9 @@ def _recent(picture: Picture, key: str, span: float) -> list[float]:
 def _change(entry: Estimated, recent: Sequence[float]) -> str:
     """By how much it has changed [%], with an arrow where that is more than its sigma."""
     few = max(1, round(_TREND_MEAN / STEP))
-    known = [value for value in recent if math.isfinite(value)]
-    if len(known) < 2 * few or not entry.value or not math.isfinite(entry.value):
+    finite = [value for value in recent if math.isfinite(value)]
+    if len(finite) < 2 * few or not entry.value or not math.isfinite(entry.value):
         return NOTHING
-    difference = sum(known[-few:]) / few - sum(known[:few]) / few
+    difference = sum(finite[-few:]) / few - sum(finite[:few]) / few
     arrow = "→" if not abs(difference) > entry.sigma else "↗" if difference > 0.0 else "↘"
     return f"{100.0 * difference / abs(entry.value):+.1f} {arrow}"

@@ -34,7 +34,7 @@ import tornado.websocket
 from .. import report
 from ..errors import LeverError
 from ..firmware.config import Config
-from .model import STEP
+from .picture import STEP
 from .sources import Source
 from .state import State, command_of
 
@@ -228,7 +228,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
         """The next one is not read before this one is answered."""
         try:
             if not self.server.state.controls:
-                raise LeverError("this page only shows: no commands")
+                raise LeverError("this page is read-only: no commands")
             command = command_of(json.loads(message), self.server.config)
             self._count_command(_now())
             await self.server.command(command)

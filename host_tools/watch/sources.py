@@ -21,7 +21,7 @@ from ..can import codec
 from ..can.buses import open_bus
 from ..can.commander import KEEP_ALIVE, Commander
 from ..errors import LeverError
-from .model import ERROR, FOREIGN, STEP, Frame, Picture
+from .picture import ERROR, FOREIGN, STEP, Frame, Picture
 
 if TYPE_CHECKING:
     import can

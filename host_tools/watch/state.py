@@ -16,7 +16,7 @@ from ..firmware import quantities
 from ..firmware.config import Config, setting
 from ..firmware.library import enum_names
 from . import paired, status
-from .model import STEP, Picture
+from .picture import STEP, Picture
 from .sources import Source
 from .transfer import FREQUENCIES, SIGMAS, Geometry, Response
 
@@ -201,17 +201,17 @@ def command_of(content: Any, config: Config) -> dict[str, str | float]:
     allowed = {what: list(enum_names(f"lever_{what}").values()) for what in ("request", "model", "estimator")}
     if not isinstance(content, dict) or not content:
         raise ValueError("a command is an object of request, model, estimator, dither_rms")
-    found: dict[str, str | float] = {}
+    command: dict[str, str | float] = {}
     for key, value in content.items():
         if key in allowed:
             if value not in allowed[key]:
                 raise ValueError(f"{key} must be one of {', '.join(allowed[key])}")
-            found[key] = value
+            command[key] = value
         elif key == "dither_rms":
             limit = greatest_dither(config)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= limit:
                 raise ValueError(f"dither_rms must be a number from 0 to {limit:g} {setting('torque_rms').unit}")
-            found[key] = float(value)
+            command[key] = float(value)
         else:
             raise ValueError(f"a command has no {key!r}")
-    return found
+    return command

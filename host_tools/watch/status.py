@@ -1,8 +1,8 @@
-"""Modes and faults in words, for people who do not have the façade header open (which defines them)."""
+"""Modes and faults in words; the façade header defines them."""
 
 from __future__ import annotations
 
-from .model import Picture
+from .picture import Picture
 
 MODES = {
     "init": "waits for the first sample",
@@ -53,11 +53,11 @@ SILENT_AFTER = 1.0
 
 
 def condition(picture: Picture) -> tuple[str, str]:
-    """How it stands in one line: ("good", "watch" or "bad", text)."""
+    """The state of the estimator in one line: ("good", "watch" or "bad", text)."""
     silence = picture.silence()
     if silence > SILENT_AFTER:
         if silence != float("inf"):
-            return "bad", f"the estimator has said nothing for {silence:.0f} s: what is shown is old"
+            return "bad", f"no frame from the estimator for {silence:.0f} s: what is shown is old"
         if picture.is_fresh("BASE_SAMPLE"):
             return "bad", "samples pass, but no estimator answers: is the firmware running?"
         if any(entry.frames for entry in picture.traffic.values()) or picture.foreign:
@@ -69,8 +69,8 @@ def condition(picture: Picture) -> tuple[str, str]:
     if mode is None:
         return "watch", "the estimator is there; no HEALTH from it yet"
     level = {"run": "good", "fault": "bad"}.get(mode, "watch")
-    if level == "good" and (told := faults(picture)):
-        return "watch", f"{mode}, but: {'; '.join(told)}"
+    if level == "good" and (present := faults(picture)):
+        return "watch", f"{mode}, but: {'; '.join(present)}"
     return level, f"{mode}: the estimator {MODES.get(mode, 'is in a mode that this program does not know')}"
 
 
@@ -78,5 +78,5 @@ def faults(picture: Picture) -> list[str]:
     """The faults of the estimator and its machine, in words."""
     machine = picture.platform_faults()
     named = [name for name in picture.faults() if not (machine and name == "platform")]
-    told = [FAULTS.get(name, name) for name in named]
-    return told + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in machine or ()]
+    texts = [FAULTS.get(name, name) for name in named]
+    return texts + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in machine or ()]

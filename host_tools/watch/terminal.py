@@ -11,7 +11,7 @@ from textual.events import Resize
 from textual.widgets import Footer, Static
 
 from . import panels
-from .model import STEP, Picture
+from .picture import STEP, Picture
 from .sources import Source
 
 SPANS = (30.0, 120.0, 300.0, 10.0)

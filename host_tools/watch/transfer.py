@@ -12,7 +12,7 @@ from ..firmware.config import Config
 from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES
 from ..models.lever import Lever
 from ..report import bode
-from .model import Feedthrough
+from .picture import Feedthrough
 
 FREQUENCIES: FloatArray = np.geomspace(0.5, 12.0, 120)
 """[Hz]"""

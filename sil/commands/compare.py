@@ -13,10 +13,10 @@ from lever_cdkf.host_tools.files import make_folder
 from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, add_json_option
 
-from ..study.names import known
+from .names import check_names
 
 _DESCRIPTION = """\
-Runs the firmware's estimators and other people's on the same data and says who is best where: errors, errors against
+Runs the firmware's estimators and published ones on the same data and ranks them in each case: errors, errors against
 those of a Kalman filter linearised at the truth and against the posterior Cramér-Rao bound, consistency of the stated
 uncertainty (NEES, NIS), time to follow a step, time a step takes. Cases are matched random walks, sudden changes of the
 pilot's grip, wrong settings of the noise, and the scenarios of `lever sim`. A difference is called significant by
@@ -82,10 +82,10 @@ def run(args: argparse.Namespace) -> int:
     from ..study.compare.cases import Plan
 
     if args.envelope:
-        from . import peers
+        from . import compare_envelope
 
         _check(args.seeds, args.duration, args.jobs)
-        return peers.run(args)
+        return compare_envelope.run(args)
     if args.list:
         print_tables(_listed(), args.json)
         return 0
@@ -125,10 +125,10 @@ def _listed() -> dict[str, list[Row]]:
     from ..study.compare.cases import cases
     from ..study.compare.entrants import entrants
 
-    found = {entrant.name: entrant for case in cases().values() for entrant in entrants(case).values()}
+    by_name = {entrant.name: entrant for case in cases().values() for entrant in entrants(case).values()}
     return {
         "cases": [{"name": case.name, "duration [s]": case.duration, "title": case.title} for case in cases().values()],
-        "estimators": [{"name": entrant.name, "title": entrant.title} for entrant in found.values()],
+        "estimators": [{"name": entrant.name, "title": entrant.title} for entrant in by_name.values()],
     }
 
 
@@ -136,9 +136,9 @@ def _cases(args: argparse.Namespace) -> list[str]:
     from ..study.compare.cases import cases
 
     chosen = args.scenarios or (_QUICK_CASES if args.quick else cases())
-    known("scenario", chosen, cases(), _LIST)
+    check_names("scenario", chosen, cases(), _LIST)
     models = {case.model for case in cases().values()}
-    known("model", args.models or (), models, _LIST)
+    check_names("model", args.models or (), models, _LIST)
     return [name for name in chosen if not args.models or cases()[name].model in args.models]
 
 
@@ -147,7 +147,7 @@ def _estimators(args: argparse.Namespace) -> list[str]:
     from ..study.compare.entrants import entrants
 
     names = list(dict.fromkeys(name for case in cases().values() for name in entrants(case)))
-    known("estimator", args.estimators or (), names, _LIST)
+    check_names("estimator", args.estimators or (), names, _LIST)
     return list(args.estimators or names)
 
 

@@ -18,14 +18,15 @@ if TYPE_CHECKING:
     from ..envelope.condition import Condition
 
 _DESCRIPTION = """\
-Runs the firmware in what a real collective meets: a pilot who moves the lever, lets go or tightens the grip, unknown
-torque, rest, sensors that fail or are off, friction, pilots that no model is. Levers and pilots are simulated by a
-plant that shares nothing with the filter's model; samples go straight into the firmware, with its default settings.
+Runs the firmware in the conditions that a collective meets: a pilot who moves the lever, lets go or tightens the grip,
+unknown torque, rest, sensors that fail or are off, friction, pilots that no model can represent. Levers and pilots are
+simulated by a plant that shares nothing with the filter's model; samples go straight into the firmware, with its
+default settings.
 
 A condition holds when the natural frequency (f_n), damping ratio (zeta) and parameters are right within the limit, when
 the stated ±2σ covers the truth as often as the limit asks, or, where the limit says so, when the firmware flags that
-it is not to be trusted. "all runs" pools them (rms of errors, mean of shares, the longest time); a limit is held
-against that unless it says median or worst. The page that is written has a chart and all figures of each condition.
+it is not to be trusted. "all runs" pools them (rms of errors, mean of shares, the longest time); a limit
+applies to that unless it says median or worst. The page that is written has a chart and all figures of each condition.
 
 Exit status: 0 when all conditions hold, 1 when one misses, 2 when the command line is wrong.
 """

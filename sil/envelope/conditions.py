@@ -61,6 +61,14 @@ _MOVEMENT = (
         (_most("settled", 0.9, "median"), _most("settled", 2.0, "worst")),
         events=((EVENT, EVENT),),
     ),
+    Condition(
+        "grip_slow",
+        "grip step of 50 % that moves the rest angle by 3° in 0.5 s",
+        Motion(grip=1.5, grip_moves=(3.0, 0.5)),
+        (_most("settled", 2.0, "median"), _least("f_n covered", 90.0)),
+        events=((EVENT, EVENT + 0.5),),
+        start=EVENT,
+    ),
 )
 
 _ROUGH = Motion(process_noise=0.5)
@@ -73,7 +81,7 @@ _TORQUES = (
         _FLAGGED,
     ),
     Condition("tremor", "tremor of 0.2 N m, 3–5 Hz", Motion(tremor=0.2), _right(3.0, 85.0), _FLAGGED),
-    Condition("rough_told", "process noise 0.5, told", _ROUGH, settings={"theta_dot_process_noise": 0.5}),
+    Condition("rough_told", "process noise 0.5, as set", _ROUGH, settings={"theta_dot_process_noise": 0.5}),
     Condition(
         "rough",
         "rough air: process noise 0.5, set 0.05",
@@ -160,6 +168,18 @@ def _hands_off(name: str, title: str, dither: float) -> Condition:
     )
 
 
+def _next_pilot(name: str, title: str, seconds: float) -> Condition:
+    gap = (25.0, 25.0 + seconds)
+    return Condition(
+        name,
+        title,
+        Motion(duration=40.0, released=gap, next_pilot=2.0),
+        (_most("settled", 2.0, "median"), _least("f_n covered", 90.0)),
+        events=(gap,),
+        start=gap[1],
+    )
+
+
 _FAULTS = (
     _fault("base_stuck", "z̈ stuck but “valid” for 10 s", "z_ddot", "stuck", quick=True),
     _fault("base_zero", "z̈ zero but “valid” for 10 s", "z_ddot", "zero"),
@@ -178,6 +198,8 @@ _FAULTS = (
     replace(_missing("only_rate", "only θ̇ from the start", "theta"), quick=True),
     _hands_off("hands_off", "hands off for 10 s, then on", 0.3),
     _hands_off("hands_off_base_only", "the same, no dither", 0.0),
+    _next_pilot("next_pilot_0.3s", "hands off for 0.3 s, then on by a pilot twice or half as stiff", 0.3),
+    _next_pilot("next_pilot_2s", "the same for 2 s", 2.0),
 )
 
 

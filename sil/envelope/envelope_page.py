@@ -16,14 +16,14 @@ from .campaign import Result
 from .measure import FIGURES, FLAGS, Excerpt
 from .table import MISSED, figures, lines, state
 
-_TITLE = "Lever CDKF: what a collective meets every minute"
+_TITLE = "Lever CDKF: the conditions that a collective meets"
 _STYLE = ".missed { color: var(--bad); } #table :is(td, th):nth-child(3) { text-align: left; white-space: normal; }"
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
     """The whole page."""
     page = Page()
-    page.section("table", "Table", "Measured against what must hold", _table(lines(results)), _legend(results))
+    page.section("table", "Table", "Measured values against their limits", _table(lines(results)), _legend(results))
     for result in results:
         name, chart = result.condition.name, None if result.excerpt is None else _chart(result.excerpt, result)
         title = f"{html.escape(result.condition.title)}: {state(result)}"
@@ -73,9 +73,9 @@ def _legend(results: Sequence[Result]) -> str:
 def _chart(shown: Excerpt, result: Result) -> Figure:
     """Natural frequency over time; dots at the foot where the firmware says: do not trust this."""
     low, high = shown.value - 2.0 * shown.sigma, shown.value + 2.0 * shown.sigma
-    known = np.concatenate((shown.truth[shown.truth > 2.0], shown.value))
-    known = known[np.isfinite(known)] if np.isfinite(known).any() else np.ones(1)
-    floor, ceiling = 0.85 * float(np.percentile(known, 1.0)), 1.15 * float(np.percentile(known, 99.0))
+    values = np.concatenate((shown.truth[shown.truth > 2.0], shown.value))
+    values = values[np.isfinite(values)] if np.isfinite(values).any() else np.ones(1)
+    floor, ceiling = 0.85 * float(np.percentile(values, 1.0)), 1.15 * float(np.percentile(values, 99.0))
     figure = Figure([axis("natural frequency [Hz]", range=[floor, ceiling])], time_axis(shown.time[-1]), height=260)
     figure.add(*band(shown.time, low, high, "estimate ±2σ", "estimate-band"))
     if shown.truth.size:

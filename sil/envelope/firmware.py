@@ -53,8 +53,8 @@ class Track:
 
     def parameters(self, which: str) -> FloatArray:
         """`value` or `sigma` of the three parameters, (times, runs, 3)."""
-        found: Mapping[str, FloatArray] = getattr(self, which)
-        return np.stack([found[name] for name in PARAMETERS], axis=-1)
+        by_name: Mapping[str, FloatArray] = getattr(self, which)
+        return np.stack([by_name[name] for name in PARAMETERS], axis=-1)
 
 
 def estimates(config: Config, signals: Mapping[str, FloatArray], response: bool = False) -> Track:

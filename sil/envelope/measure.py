@@ -46,7 +46,7 @@ class Outcome:
     events: tuple[tuple[float, float], ...] = ()
     """Faults or changes, from and to [s]."""
     reference: Outcome | None = None
-    """The same where it does not happen, or is told."""
+    """The same where it does not happen, or is given in the settings."""
 
     def during(self, start: float, end: float) -> BoolArray:
         """Which estimates are of this time [s]."""
@@ -240,19 +240,19 @@ def _max(values: Values) -> float:
 
 
 def _figures() -> dict[str, Figure]:
-    found = {}
+    figures = {}
     for name in QUANTITIES:
         rms, ratio = partial(_rms, name), partial(_against, partial(_rms, name))
-        found[f"{name} rms"] = Figure("%", f"rms error of {name}", rms, _pooled_rms)
-        found[f"{name} covered"] = Figure(
+        figures[f"{name} rms"] = Figure("%", f"rms error of {name}", rms, _pooled_rms)
+        figures[f"{name} covered"] = Figure(
             "%", f"share of time with the true {name} within ±2σ", partial(_covered, name), _mean, False
         )
-        found[f"{name} largest"] = Figure("σ", f"largest error of {name}", partial(_largest, name), _max)
-        found[f"σ({name}) ratio"] = Figure(
+        figures[f"{name} largest"] = Figure("σ", f"largest error of {name}", partial(_largest, name), _max)
+        figures[f"σ({name}) ratio"] = Figure(
             "1", f"σ of {name} ÷ that of the reference", partial(_against, partial(_relative_sigma, name)), _mean
         )
-        found[f"{name} ratio"] = Figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
-    return found | {
+        figures[f"{name} ratio"] = Figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
+    return figures | {
         "flagged": Figure("%", "share of time with a fault that forbids trust", partial(_share, FLAGS), _mean),
         "mismatch": Figure("%", "share of time with MISMATCH", partial(_share, ("MISMATCH",)), _mean, False),
         "running": Figure("%", "share of time in mode RUN", _running, _mean, False),

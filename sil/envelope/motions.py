@@ -48,7 +48,9 @@ class Motion:
     retrim: float = 0.0
     """From EVENT on the trim goes up by so much [deg] in 4 s."""
     grip: float = 1.0
-    """At EVENT c_p and k_p go up by this factor in 50 ms, or down in every second run, and the rest angle by 1 deg."""
+    """At EVENT c_p and k_p go up by this factor, or down in every second run, and the rest angle with them."""
+    grip_moves: tuple[float, float] = (1.0, 0.05)
+    """By how much the rest angle then goes up [deg], and in what time all of it happens [s]."""
     slow_torque: float = 0.0
     """rms of an unknown torque [N m] with a correlation time of 0.3 s."""
     tremor: float = 0.0
@@ -59,6 +61,8 @@ class Motion:
     """Nothing moves between these times [s]."""
     released: tuple[float, float] | None = None
     """Nobody holds the lever between these times [s]."""
+    next_pilot: float = 1.0
+    """Who holds it then: c_p and k_p are so many times as large, or as small in every second run."""
     friction: float = 0.0
     """Coulomb friction [N m]."""
     friction_sigma: float = 0.0
@@ -148,7 +152,8 @@ def _moved(motion: Motion, seeds: Sequence[int], trim: FloatArray) -> FloatArray
     if motion.retrim:
         trim = trim + math.radians(motion.retrim) * _ramp(time, EVENT, 4.0)
     if motion.grip != 1.0:
-        trim = trim + math.radians(1.0) * _ramp(time, EVENT, 0.05)
+        angle, seconds = motion.grip_moves
+        trim = trim + math.radians(angle) * _ramp(time, EVENT, seconds)
     return trim
 
 
@@ -165,21 +170,25 @@ def _disturbance(motion: Motion, seeds: Sequence[int]) -> FloatArray:
     return torque
 
 
+def _up_or_down(factor: float, seeds: Sequence[int]) -> FloatArray:
+    return np.array([factor if seed % 2 else 1.0 / factor for seed in seeds])
+
+
 def lanes(motion: Motion, seeds: Sequence[int]) -> Lanes:
     """What plant.py needs."""
     time = motion.time
     z_ddot, tau_m, kick = excitation(motion, seeds)
     m_p, c_p, k_p, trim = arms(seeds)
     if motion.grip != 1.0:
-        factor = np.array([motion.grip if seed % 2 else 1.0 / motion.grip for seed in seeds])
-        change = 1.0 + (factor - 1.0) * _ramp(time, EVENT, 0.05)
+        change = 1.0 + (_up_or_down(motion.grip, seeds) - 1.0) * _ramp(time, EVENT, motion.grip_moves[1])
         c_p, k_p = c_p * change, k_p * change
     if motion.damping is not None:
         first, last, start, end = motion.damping
         c_p = first + (last - first) * _ramp(time, start, end - start) + np.zeros_like(c_p)
     if motion.released is not None:
         held = ((time < motion.released[0]) | (time >= motion.released[1]))[:, None]
-        m_p, c_p, k_p = m_p * held, c_p * held, k_p * held
+        pilot = np.where((time >= motion.released[1])[:, None], _up_or_down(motion.next_pilot, seeds), 1.0)
+        m_p, c_p, k_p = m_p * held, c_p * held * pilot, k_p * held * pilot
     friction = np.full((1, len(seeds)), motion.friction)
     if motion.friction_sigma:
         friction = motion.friction_sigma * np.abs(columns("friction", seeds, 1))

@@ -24,13 +24,13 @@ def state(result: Result) -> str:
 
 def lines(results: Sequence[Result]) -> list[Row]:
     """A line for each figure that has a limit, or for all where none has; the condition stands on its first."""
-    found: list[Row] = []
+    rows: list[Row] = []
     for result in results:
         everything = figures(result)
         for i, line in enumerate([line for line in everything if line["limit"]] or everything):
             head = (result.condition.name, state(result)) if i == 0 else ("", "")
-            found.append({"condition": head[0], "result": head[1], **line})
-    return found
+            rows.append({"condition": head[0], "result": head[1], **line})
+    return rows
 
 
 def figures(result: Result) -> list[Row]:

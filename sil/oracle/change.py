@@ -23,8 +23,8 @@ class ChangeDetection:
         share = min(period / self.memory, 1.0)
         self.sum = (1.0 - share) * self.sum + correction
         self.variance = (1.0 - share) ** 2 * self.variance + np.maximum(variance, 0.0)
-        known = self.variance > 0.0
-        statistic = float(np.sum(self.sum[known] ** 2 / self.variance[known]))
+        positive = self.variance > 0.0
+        statistic = float(np.sum(self.sum[positive] ** 2 / self.variance[positive]))
         self.average += share / LONG * (statistic / 3.0 - self.average)
         changed = 0.0 < self.threshold < statistic / max(self.average, 1.0)
         if changed:

@@ -189,9 +189,9 @@ class Estimator:
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
         least = UNSETTLED if self.unsettled > 0.0 else 1.0
         expected = np.maximum(max(self.average_nis, least) * (state**2 + noise**2), noise**2)
-        known = valid & (np.array(self.missing) <= OUTAGE)
-        far = known & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
-        for i in np.flatnonzero(known):
+        checked = valid & (np.array(self.missing) <= OUTAGE)
+        far = checked & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
+        for i in np.flatnonzero(checked):
             self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
         return spikes

@@ -47,7 +47,7 @@ class Grip:
         self.first_moment = float(lever.unbalance(np.zeros(1))[0])
         self.level: Detrend | None = None
         self.settling, self.missing = seconds(0.0), seconds(0.0)
-        self.known = self.rest = 0.0
+        self.applied_torque = self.rest = 0.0
         self.raw, self.square = 0.0, 0.0
         self.means = Means()
         self.right = self.wrong = False
@@ -65,9 +65,9 @@ class Grip:
         """
         lever, cosine = self.lever, math.cos(trim)
         self.rest, weight = (0.0, 0.0) if self.detrended else (lever.lever_preload_angle, GRAVITY)
-        self.known = u[1] - self.first_moment * cosine * (u[0] + weight)  # torque on the lever
-        self.drive += dt * self.known
-        self.alone += dt * (self.known - float(self._own(x)))
+        self.applied_torque = u[1] - self.first_moment * cosine * (u[0] + weight)  # torque on the lever
+        self.drive += dt * self.applied_torque
+        self.alone += dt * (self.applied_torque - float(self._own(x)))
         self._receive(measured, dt)
         if self.level is None:
             return None
@@ -82,7 +82,7 @@ class Grip:
 
     def expected(self, before: Array, after: Array, dt: float) -> Array:
         """The forces (N,) of states (2, N) before and after the step."""
-        needed: Array = self.inertia * (after[1] - before[1]) / dt + self._own(before) - self.known
+        needed: Array = self.inertia * (after[1] - before[1]) / dt + self._own(before) - self.applied_torque
         return needed / self.lever.length
 
     def _own(self, x: Array) -> Array:

@@ -3,7 +3,7 @@
 Soft tissue loses the same share of the energy of a cycle at every frequency (structural damping law: Fredberg and
 Stamenovic, J. Appl. Physiol. 67, 1989), where a damper loses more the faster it moves. The only causal stiffness whose
 loss factor Im / Re is constant is a power of s. On the grip's height y = l (sin theta - sin theta_0) acts, in place of
-k_p and c_p of plant.py,
+k_p and c_p of lever_plant.py,
 
     F(s) = k_p / cos(a pi / 2) (s / w)^a y(s),     tan(a pi / 2) = loss factor,     w = 2 pi 4 Hz
 
@@ -12,8 +12,8 @@ there. At lower frequencies the arm is softer. The power is a sum of Maxwell ele
 by sin(a pi) / pi times the integral of x^(a-1) s / (s + x) dx over x > 0, whose part below the slowest element is a
 spring, above the fastest a damper.
 
-Integration as in plant.py; the force of an element decays exactly in a substep, at the rate in its middle. The dynamics
-are those of the dominant mode of theta/z_ddot.
+Integration as in lever_plant.py; the force of an element decays exactly in a substep, at the rate in its middle. The
+dynamics are those of the dominant mode of theta/z_ddot.
 """
 
 from __future__ import annotations

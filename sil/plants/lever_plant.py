@@ -162,9 +162,9 @@ class LeverTruth(truths.Truth):
 
     @property
     def dynamics(self) -> Dynamics:
-        found = dynamics(self.lever, self._pilot(self._held), self.preload)
+        pilot_dynamics = dynamics(self.lever, self._pilot(self._held), self.preload)
         columns = np.full((2, len(self._held)), np.nan)
-        columns[:, self._held] = found.natural_frequency, found.damping_ratio
+        columns[:, self._held] = pilot_dynamics.natural_frequency, pilot_dynamics.damping_ratio
         return Dynamics(*columns)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:

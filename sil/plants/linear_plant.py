@@ -8,7 +8,8 @@
 with the signs of firmware/model/linear_*.c. The lever rests at the trim, a trajectory (preload trim), or at its own
 preload angle (preload fixed). Gravity has no part in it.
 
-Integration: as in plant.py, the linearly implicit midpoint rule on the same substeps, with process noise on theta_dot.
+Integration: as in lever_plant.py, the linearly implicit midpoint rule on the same substeps, with process noise on
+theta_dot.
 """
 
 from __future__ import annotations

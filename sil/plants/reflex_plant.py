@@ -1,8 +1,8 @@
-"""A truth that no model of the firmware is: the arm of plant.py, and a stretch reflex that acts late.
+"""A truth that no model of the firmware is: the arm of lever_plant.py, and a stretch reflex that acts late.
 
 The muscle's spindles feel how far and how fast the grip has moved from where the pilot wants it, and a spinal reflex
 pulls against it one delay later. With the grip's height y = l (sin theta - sin theta_0), beside all that acts in
-plant.py,
+lever_plant.py,
 
     tau_reflex(t) = -l cos(theta(t)) (k_r y(t - T) + c_r y_dot(t - T))
 

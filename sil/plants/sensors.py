@@ -47,16 +47,16 @@ class Fault(ABC):
             raise ValueError(f"start {self.start:g} s is not before end {self.end:g} s")
 
     @abstractmethod
-    def corrupt(self, inside: NDArray[np.intp], found: Corruption, rng: np.random.Generator) -> None:
-        """Adds the fault to what is `found` at the samples `inside`, at least one."""
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        """Adds the fault to `corruption` at the samples `inside`, at least one."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stuck(Fault):
     """The last reading before, noise and all, over and over."""
 
-    def corrupt(self, inside: NDArray[np.intp], found: Corruption, rng: np.random.Generator) -> None:
-        found.source[inside] = max(inside[0] - 1, 0)
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        corruption.source[inside] = max(inside[0] - 1, 0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +65,8 @@ class Scale(Fault):
 
     factor: float = quantity("1")
 
-    def corrupt(self, inside: NDArray[np.intp], found: Corruption, rng: np.random.Generator) -> None:
-        found.factor[inside] *= self.factor
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        corruption.factor[inside] *= self.factor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,9 +76,9 @@ class Spikes(Fault):
     share: float = quantity("1", above=0.0, greatest=1.0)
     size: float = quantity(SIGNAL, above=0.0)
 
-    def corrupt(self, inside: NDArray[np.intp], found: Corruption, rng: np.random.Generator) -> None:
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
         hit = rng.random(len(inside)) < self.share
-        found.offset[inside] += hit * rng.choice((-self.size, self.size), len(inside))
+        corruption.offset[inside] += hit * rng.choice((-self.size, self.size), len(inside))
 
 
 FAULTS: dict[str, type[Fault]] = {"stuck": Stuck, "scale": Scale, "spikes": Spikes}
@@ -115,12 +115,12 @@ class Sensor:
     def corruption(self, time: FloatArray, rng: np.random.Generator) -> Corruption:
         """What its faults do at the times `time` [s]."""
         count = len(time)
-        found = Corruption(np.arange(count), np.ones(count), np.zeros(count))
+        corruption = Corruption(np.arange(count), np.ones(count), np.zeros(count))
         for fault in self.fault:
             inside = np.flatnonzero((time >= fault.start) & (time < fault.end))
             if len(inside):
-                fault.corrupt(inside, found, rng)
-        return found
+                fault.corrupt(inside, corruption, rng)
+        return corruption
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """What every truth has: a pilot with his lever as a run needs them, and how they move from sample to sample.
 
-One module each: plant.py (the lever of firmware/THEORY.md), linear_plant.py, two_dof_plant.py, mayo_plant.py,
-hysteretic_plant.py, reflex_plant.py.
+A new one is a module beside lever_plant.py with the interface of Truth, and its table in pilots.py.
 """
 
 from __future__ import annotations

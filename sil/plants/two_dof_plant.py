@@ -16,14 +16,13 @@ e_0 = l sin theta_0 + g mu / k_p, s_0 = g (m_t + mu) / k_t. Lagrange's equations
     m_t s_ddot - F + c_t s_dot + k_t s = -m_t z_ddot
     F = k_p (l (sin theta - sin theta_0) - s) + c_p (l cos(theta) theta_dot - s_dot)
 
-with M, mu, tau_d and the friction beside c_l as in plant.py; a seat that does not give way (k_t without bound) makes it
-that lever.
+with M, mu, tau_d and the friction beside c_l as in lever_plant.py; a rigid seat (k_t unbounded) makes it that lever.
 
 The trunk's default is 45 kg at 4.5 Hz with a damping ratio of 0.39. On a rigid seat 60 people had their main resonance
 at 5 Hz with a damping ratio of 0.475 (Fairley and Griffin, J. Biomechanics 22, 1989); a cushion in series lowers both.
 
-The dynamics are those of the dominant mode of theta/z_ddot (transfer.py). Integration as in plant.py, the linearly
-implicit midpoint rule with a damping matrix of two by two.
+The dynamics are those of the dominant mode of theta/z_ddot (transfer.py). Integration as in lever_plant.py, the
+linearly implicit midpoint rule with a damping matrix of two by two.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ ANSWER_TIMEOUT = 5.0
 FIRST_TIMEOUT = 2.0
 """Longest wait for the first one: the other process may still be starting."""
 MOST_UNANSWERED = 20
-"""Samples without an answer in a row, after which nobody is taken to be there."""
+"""Samples without an answer in a row, after which the estimator is taken to be absent."""
 
 REST = 5.0
 """Sample time [s] after which nothing is left of an earlier torque: twenty time constants of the torque gate's rms."""

@@ -55,10 +55,10 @@ def simulate(
         recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
     frames = recording.frames()
     columns = columns_of(recording, frames)
-    made = summary.build(recording, columns)
+    untimed = summary.build(recording, columns)
     if out_dir is not None:
-        _write(Result(columns, made, frames), out_dir, channel, start)
-    return Result(columns, made.timed(clock.perf_counter() - start), frames)
+        _write(Result(columns, untimed, frames), out_dir, channel, start)
+    return Result(columns, untimed.timed(clock.perf_counter() - start), frames)
 
 
 def _write(result: Result, folder: Path, channel: str, start: float) -> None:

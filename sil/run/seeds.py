@@ -121,32 +121,32 @@ def missed(summaries: Sequence[SimulationSummary]) -> list[str]:
 
 def troubles(summaries: Sequence[SimulationSummary]) -> list[str]:
     """What went wrong in runs, whatever their estimates, in words."""
-    told = []
+    reasons = []
     for what, wrong in (
         ("samples without an answer", [summary.unanswered > 0 for summary in summaries]),
         ("estimates of other samples", [summary.misplaced > 0 for summary in summaries]),
         ("the estimator in fault", ["fault" in summary.modes_s for summary in summaries]),
     ):
         seeds = [str(each.scenario.seed) for each, bad in zip(summaries, wrong, strict=True) if bad]
-        told += [f"{what} with seed {', '.join(seeds)}"] if seeds else []
-    return told
+        reasons += [f"{what} with seed {', '.join(seeds)}"] if seeds else []
+    return reasons
 
 
 def verdict(summaries: Sequence[SimulationSummary]) -> str:
     """The runs in a few sentences."""
     reasons = troubles(summaries) + missed(summaries)
     kept = "All limits kept." if summaries[0].scenario.limits else ""
-    told = [f"Limits missed: {'; '.join(reasons)}." if reasons else kept]
+    sentences = [f"Limits missed: {'; '.join(reasons)}." if reasons else kept]
     covered = {key: float(np.mean(coverage(summaries, key))) for key in judged(summaries)}
     if not covered:
-        return "Too short to judge: the runs end before the estimates were to have converged."
+        return "Too short to judge: the runs end before converged_after."
     least = min(covered, key=lambda key: covered[key])
     percent = math.floor(covered[least] + 1e-9)
-    told.append(f"Over all runs ±2σ covers every truth for at least {percent} % of the time (least: {least}).")
+    sentences.append(f"Over all runs ±2σ covers every truth for at least {percent} % of the time (least: {least}).")
     tested = [summary.whiteness.white for summary in summaries if summary.whiteness is not None]
     if tested:
-        told.append(f"Residuals of {sum(tested)} of {len(tested)} runs pass the test for whiteness. {CANNOT_SEE}")
-    return " ".join(sentence for sentence in told if sentence)
+        sentences.append(f"Residuals of {sum(tested)} of {len(tested)} runs pass the test for whiteness. {CANNOT_SEE}")
+    return " ".join(sentence for sentence in sentences if sentence)
 
 
 # --- tables ----------------------------------------------------------------------------------------------------------

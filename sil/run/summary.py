@@ -43,7 +43,7 @@ def build(recording: Recording, trace: Trace) -> SimulationSummary:
         {name: entry.rms_percent for name, entry in quality.items()},
         {name: entry.coverage_2sigma for name, entry in quality.items()},
     )
-    found = SimulationSummary(
+    summary = SimulationSummary(
         estimator=Estimator(**scenario.config.choices, settings=dict(scenario.config.settings)),
         samples=count,
         **{name: _last(trace[name]) for name in COUNTS},
@@ -63,7 +63,7 @@ def build(recording: Recording, trace: Trace) -> SimulationSummary:
         missed=missed,
         simulated_time_s=count * scenario.period,
     )
-    return replace(found, verdict=_verdict(found))
+    return replace(summary, verdict=_verdict(summary))
 
 
 def _scenario(scenario: Scenario) -> summary.Scenario:
@@ -159,8 +159,8 @@ def _whiteness(scenario: Scenario, trace: Trace) -> Whiteness | None:
 
 
 def _last(column: FloatArray) -> int:
-    known = column[np.isfinite(column)]
-    return int(known[-1]) if len(known) else 0
+    finite = column[np.isfinite(column)]
+    return int(finite[-1]) if len(finite) else 0
 
 
 def _modes(trace: Trace) -> dict[str, float]:
@@ -199,61 +199,61 @@ def missed_limits(
     return missed
 
 
-def _verdict(found: SimulationSummary) -> str:
-    """The run in a few sentences, for somebody who has not seen a Kalman filter before."""
+def _verdict(summary: SimulationSummary) -> str:
+    """The run in a few sentences, for a reader who does not know Kalman filters."""
     return " ".join(
         sentence
         for sentence in (
-            _verdict_run(found),
-            _verdict_truth(found),
-            _verdict_limits(found),
-            _verdict_sigma(found.parameters),
-            nis.verdict(found.nis),
-            whiteness.verdict(found.whiteness),
-            _verdict_settings(found),
+            _verdict_run(summary),
+            _verdict_truth(summary),
+            _verdict_limits(summary),
+            _verdict_sigma(summary.parameters),
+            nis.verdict(summary.nis),
+            whiteness.verdict(summary.whiteness),
+            _verdict_settings(summary),
         )
         if sentence
     )
 
 
-def _verdict_run(found: SimulationSummary) -> str:
+def _verdict_run(summary: SimulationSummary) -> str:
     troubles = []
-    if found.unanswered:
-        troubles.append(f"{found.unanswered} samples got no answer")
-    if found.misplaced:
-        troubles.append(f"{found.misplaced} estimates came that belong to other samples")
-    if "fault" in found.modes_s:
-        troubles.append(f"the estimator was in fault for {found.modes_s['fault']:g} s")
+    if summary.unanswered:
+        troubles.append(f"{summary.unanswered} samples got no answer")
+    if summary.misplaced:
+        troubles.append(f"{summary.misplaced} estimates belong to other samples")
+    if "fault" in summary.modes_s:
+        troubles.append(f"the estimator was in fault for {summary.modes_s['fault']:g} s")
     return f"Trouble: {' and '.join(troubles)}." if troubles else ""
 
 
-def _verdict_settings(found: SimulationSummary) -> str:
+def _verdict_settings(summary: SimulationSummary) -> str:
     """A run on other settings is refused; one of less than a second may not learn which they are."""
-    if found.firmware.settings_as_scenario is not None:
+    if summary.firmware.settings_as_scenario is not None:
         return ""
-    return "The estimator has not said which settings it has (IDENTITY): those of the scenario are assumed."
+    return "The estimator has not sent its settings (IDENTITY): those of the scenario are assumed."
 
 
-def _verdict_truth(found: SimulationSummary) -> str:
-    if found.truth.model == found.estimator.model:
+def _verdict_truth(summary: SimulationSummary) -> str:
+    if summary.truth.model == summary.estimator.model:
         return ""
     return (
-        f"The pilot ({found.truth.model}) is not of the estimator's kind ({found.estimator.model}): "
-        "only natural frequency and damping ratio can be held against the truth."
+        f"The pilot ({summary.truth.model}) is not of the estimator's model ({summary.estimator.model}): "
+        "only natural frequency and damping ratio can be compared with the truth."
     )
 
 
-def _verdict_limits(found: SimulationSummary) -> str:
+def _verdict_limits(summary: SimulationSummary) -> str:
     errors = ", ".join(
-        f"{_words(name)} {entry.rms_percent:.1f} %"
-        for name, entry in found.parameters.items()
+        f"{_spelled(name)} {entry.rms_percent:.1f} %"
+        for name, entry in summary.parameters.items()
         if entry.rms_percent is not None
     )
     if not errors:
-        return "Too short to judge: the run ends before the estimates were to have converged."
-    if found.missed:
-        return f"Limits missed: {'; '.join(found.missed)}. Rms errors after convergence: {errors}."
-    kept = "All limits kept. " if found.scenario.limits else ""
+        return "Too short to judge: the run ends before converged_after."
+    if summary.missed:
+        return f"Limits missed: {'; '.join(summary.missed)}. Rms errors after convergence: {errors}."
+    kept = "All limits kept. " if summary.scenario.limits else ""
     return f"{kept}Rms errors after convergence: {errors}."
 
 
@@ -265,9 +265,9 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
     percent = f"{math.floor(100.0 * covered[worst] + 1e-9)} % of the time"  # "at least" is not rounded up
     if covered[worst] >= LEAST_COVERAGE:
         return f"In this run ±2σ covers every truth for at least {percent}."
-    return f"In this run the stated σ of {_words(worst)} is too small: ±2σ covers the truth for {percent}."
+    return f"In this run the stated σ of {_spelled(worst)} is too small: ±2σ covers the truth for {percent}."
 
 
-def _words(name: str) -> str:
+def _spelled(name: str) -> str:
     """A quantity as it stands in a sentence; symbols stay."""
     return {quantity.key: quantity.name for quantity in DYNAMICS}.get(name, name)

@@ -196,12 +196,12 @@ class Scenario:
                 raise ScenarioError(f"{self.file}: {key}: no torque acts on a pilot of model {truth.model}; remove it")
         if self.sensors.grip_force is not None and not truth.has_grip_force:
             raise ScenarioError(
-                f"{self.file}: sensors.grip_force: not known of a pilot of model {truth.model}; remove it"
+                f"{self.file}: sensors.grip_force: a pilot of model {truth.model} has no grip force; remove it"
             )
         judged = {quantity.key for quantity in self.judged()} | {"coverage"}
         for name in self.limits or ():
             if name not in judged:
-                raise ScenarioError(f"{self.file}: limits.{name}: has no truth in this run to be judged by")
+                raise ScenarioError(f"{self.file}: limits.{name}: this run has no true value of it")
 
     def changes(self) -> tuple[float, ...]:
         """Times [s] after which the parameters have to be found anew: the start, and every jump of one of them."""

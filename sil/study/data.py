@@ -36,7 +36,7 @@ class Model(Protocol):
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What an estimator is told before the first sample. The names are those of the firmware's settings."""
+    """What an estimator is given before the first sample. The names are those of the firmware's settings."""
 
     guess: Array
     """(3,) first guess of the parameters, physical units."""
@@ -183,7 +183,7 @@ class Estimates:
     w: Array
     """(B, T, 3) scaled parameters; NaN from where an estimator broke down."""
     covariance: Array | None
-    """(B, T, 3, 3) of w; None for an estimator that does not tell."""
+    """(B, T, 3, 3) of w; None for an estimator that states none."""
     nis: Array | None = None
     """(B, T) normalised innovation squared, chi-square with 2 degrees of freedom if consistent."""
 

@@ -79,7 +79,7 @@ class Condition:
 
 
 def knowledge(settings: Mapping[str, float], kind: Kind) -> Knowledge:
-    """What a filter with these settings is told."""
+    """What a filter with these settings is given."""
     return Knowledge(
         guess=np.array([settings[name] for name in kind.parameters]),
         sigma=np.array([settings[f"{name}_sigma"] for name in kind.parameters]),
@@ -99,21 +99,22 @@ def matched(condition: Condition, runs: int, duration: float, seed: int) -> Batc
     if condition.model not in KINDS:
         raise ValueError(f'model: "{condition.model}" is none of {", ".join(KINDS)}')
     kind, settings = KINDS[condition.model], condition.all_settings()
-    model, known, period = kind.make(settings, condition.preload), knowledge(settings, kind), settings["sample_period"]
+    model, assumed = kind.make(settings, condition.preload), knowledge(settings, kind)
+    period = settings["sample_period"]
     samples = max(2, round(duration / period))
     trim = np.full((runs, samples), condition.trim if condition.preload == "trim" else 0.0)
     drawn_from, time = streams(seed, runs), np.arange(samples, dtype=np.float64) * period
 
     rms = (condition.base_rms, condition.dither_rms)
     u = np.stack([excitation(rms, condition.band, time, own) for own in drawn_from])
-    drawn = [_parameters(model, known, _bounds(kind), trim[0], period, own["pilot"]) for own in drawn_from]
+    drawn = [_parameters(model, assumed, _bounds(kind), trim[0], period, own["pilot"]) for own in drawn_from]
     p, dynamics = (np.stack(part) for part in zip(*drawn, strict=True))
-    kicks = np.stack([_kicks(known, samples - 1, period, own["process"]) for own in drawn_from])
+    kicks = np.stack([_kicks(assumed, samples - 1, period, own["process"]) for own in drawn_from])
     x = _states(model, p, u, trim, kicks, period)
     white = np.stack([own["output"].standard_normal((samples, OUTPUTS)) for own in drawn_from])
-    raw_y = x + known.output_noise * white
+    raw_y = x + assumed.output_noise * white
     y = raw_y - np.stack((trim, np.zeros_like(trim)), axis=-1)
-    return Batch(model, period, y, u, trim, known, Truth(x, p, dynamics), raw_y, u)
+    return Batch(model, period, y, u, trim, assumed, Truth(x, p, dynamics), raw_y, u)
 
 
 def _bounds(kind: Kind) -> Array:
@@ -122,12 +123,12 @@ def _bounds(kind: Kind) -> Array:
 
 
 def _parameters(
-    model: Model, known: Knowledge, bounds: Array, trim: Array, period: float, rng: np.random.Generator
+    model: Model, assumed: Knowledge, bounds: Array, trim: Array, period: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """(K, 3) physical parameters of one run, within the bounds (3, 2), and (K, 2) their dynamics; trim (K,)."""
-    scale = np.vstack((known.sigma_w, np.tile(math.sqrt(period) * known.walk_w, (len(trim) - 1, 1))))
+    scale = np.vstack((assumed.sigma_w, np.tile(math.sqrt(period) * assumed.walk_w, (len(trim) - 1, 1))))
     for _ in range(_MOST_DRAWS):
-        p = known.physical(np.cumsum(scale * rng.standard_normal(scale.shape), axis=0))
+        p = assumed.physical(np.cumsum(scale * rng.standard_normal(scale.shape), axis=0))
         if (p >= bounds[:, 0]).all() and (p <= bounds[:, 1]).all():
             dynamics = model.dynamics(p.T, rest_angle(model, p.T, trim, period)).T
             if (dynamics > 0.0).all():
@@ -135,9 +136,9 @@ def _parameters(
     raise ValueError(f"of {_MOST_DRAWS} draws of the parameters none stays within the bounds of the model")
 
 
-def _kicks(known: Knowledge, steps: int, period: float, rng: np.random.Generator) -> Array:
+def _kicks(assumed: Knowledge, steps: int, period: float, rng: np.random.Generator) -> Array:
     """(K - 1, 2) process noise of one run: with the covariance of Knowledge.process_covariance."""
-    white = known.process_noise * math.sqrt(period) * rng.standard_normal((steps, STATES))
+    white = assumed.process_noise * math.sqrt(period) * rng.standard_normal((steps, STATES))
     rate = white[:, 0]
     return np.stack((period * (rate / 2.0 + white[:, 1] / math.sqrt(12.0)), rate), axis=-1)
 

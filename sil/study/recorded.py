@@ -47,9 +47,9 @@ def recorded(name: str, runs: int, seed: int, duration: float | None = None) -> 
     kind = KINDS[choices["model"]]
     raw_y, raw_u = _columns(traces, _MEASURED_Y), _columns(traces, _MEASURED_U)
     parameters = [quantity.column("true") for quantity in quantities.parameters(choices["model"])]
-    known = set(parameters) <= traces[0].keys()  # a pilot who is none of the model has no such parameters
+    has_parameters = set(parameters) <= traces[0].keys()  # a pilot who is none of the model has no such parameters
     dynamics = _columns(traces, [quantity.column("true") for quantity in quantities.DYNAMICS])
-    truth = Truth(_columns(traces, _STATES), _columns(traces, parameters) if known else None, dynamics)
+    truth = Truth(_columns(traces, _STATES), _columns(traces, parameters) if has_parameters else None, dynamics)
     model, trim = kind.make(settings, choices["preload"]), np.zeros(raw_y.shape[:2])
     batch = Batch(model, first.period, raw_y, raw_u, trim, knowledge(settings, kind), truth, raw_y, raw_u)
     return detrended(batch, settings["trim_corner"], settings["align_time"]) if model.preload == "trim" else batch

@@ -1,4 +1,4 @@
-"""How good estimates are: errors against references, honesty of the stated covariances, time to converge.
+"""How good estimates are: errors against references, stated against actual covariances, time to converge.
 
 All functions are pure and take arrays with runs first and times second, so that a window of time is a slice. The tests
 on normalised squares of errors (NEES) and of innovations (NIS) are those of Y. Bar-Shalom, X. R. Li, T. Kirubarajan,
@@ -73,7 +73,7 @@ def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 20
     return spread
 
 
-# --- honesty ---------------------------------------------------------------------------------------------------------
+# --- consistency -----------------------------------------------------------------------------------------------------
 
 
 def honesty(deviations: Array, variances: Array) -> Array:
@@ -138,6 +138,6 @@ def settling_times(relative: Array, elapsed: Array, within: float = 0.05) -> Arr
 
 def median_and_worst(times: Array) -> tuple[float, float]:
     """Of settling times (B,) with NaN for never: each is NaN when it is never."""
-    known = np.where(np.isnan(times), np.inf, times)
-    middle, worst = float(np.median(known)), float(known.max())
+    settled = np.where(np.isnan(times), np.inf, times)
+    middle, worst = float(np.median(settled)), float(settled.max())
     return (middle if math.isfinite(middle) else math.nan), (worst if math.isfinite(worst) else math.nan)

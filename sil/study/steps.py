@@ -51,10 +51,10 @@ class Step:
 
 
 def stepped(step: Step, runs: int, seed: int) -> Batch:
-    """`runs` runs; run i is the same, to the bit, whatever `runs` is. Signals are detrended for whoever does not."""
+    """`runs` runs, detrended; run i is the same, to the bit, whatever `runs` is."""
     settings = {row.name: row.default for row in settings_table()} | {"theta_dot_process_noise": step.process_noise}
     kind, lever, period = KINDS[step.model], Lever.from_settings(settings, "trim"), settings["sample_period"]
-    known = knowledge(settings, kind)
+    assumed = knowledge(settings, kind)
     drawn_from = streams(seed, runs)
     time = np.arange(max(2, round(step.duration / period)), dtype=np.float64) * period
 
@@ -68,11 +68,11 @@ def stepped(step: Step, runs: int, seed: int) -> Batch:
     kicks = np.stack([kick * own["process"].standard_normal((len(time) - 1, substeps)) for own in drawn_from])
     x = follow(lever, p, u, step.trim, kicks, period)
     noise = np.stack([own["output"].standard_normal((len(time), OUTPUTS)) for own in drawn_from])
-    raw_y = x + known.output_noise * noise
+    raw_y = x + assumed.output_noise * noise
     dynamics = np.moveaxis(lever.dynamics(np.moveaxis(p, -1, 0), step.trim), 0, -1)
     truth = Truth(x, p if step.model == "lever" else None, dynamics)
     trim = np.full(raw_y.shape[:2], step.trim)
-    measured = Batch(kind.make(settings, "trim"), period, raw_y, u, trim, known, truth, raw_y, u)
+    measured = Batch(kind.make(settings, "trim"), period, raw_y, u, trim, assumed, truth, raw_y, u)
     return detrended(measured, settings["trim_corner"], settings["align_time"])
 
 

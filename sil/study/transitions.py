@@ -45,12 +45,12 @@ def _block(batch: Batch, z: Array, begin: int, end: int) -> Array:
         p = np.moveaxis(batch.knowledge.physical(np.moveaxis(shifted[:PARAMETERS], 0, -1)), -1, 0)
         return batch.model.step(shifted[PARAMETERS:], p, u, trim, batch.period)
 
-    found = np.zeros((end - begin, batch.runs, SIZE, SIZE))
-    found[..., :PARAMETERS, :PARAMETERS] = np.eye(PARAMETERS)
+    jacobians = np.zeros((end - begin, batch.runs, SIZE, SIZE))
+    jacobians[..., :PARAMETERS, :PARAMETERS] = np.eye(PARAMETERS)
     for index in range(SIZE):
         slope = (moved(index, _DIFFERENCE) - moved(index, -_DIFFERENCE)) / (2.0 * _DIFFERENCE)
-        found[..., PARAMETERS:, index] = slope.transpose(2, 1, 0)
-    return found
+        jacobians[..., PARAMETERS:, index] = slope.transpose(2, 1, 0)
+    return jacobians
 
 
 def initial_covariance(batch: Batch) -> Array:

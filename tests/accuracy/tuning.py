@@ -16,7 +16,7 @@ from lever_cdkf.host_tools.firmware.innovations import SAMPLE
 from lever_cdkf.host_tools.tune import recording
 from lever_cdkf.host_tools.tune.calibration import Calibrated, calibrate
 from lever_cdkf.host_tools.tune.likelihood import Likelihood
-from lever_cdkf.host_tools.tune.search import Found, Search, groups
+from lever_cdkf.host_tools.tune.search import Search, Tuned, groups
 from lever_cdkf.sil.envelope import motions, plant, sensors
 from lever_cdkf.sil.run import buslog, runner
 from lever_cdkf.sil.scenarios import scenario
@@ -63,7 +63,7 @@ def tasks(count: int) -> list[Task]:
     return [Task(changing, seed) for changing in (False, True) for seed in range(1, count + 1)]
 
 
-def search(task: Task) -> list[Found]:
+def search(task: Task) -> list[Tuned]:
     """What is found in the log of `task`. The search starts at the defaults: half to twice the truth."""
     overrides = [f"duration={80 if task.changing else 40} s", "limits={}", f"seed={task.seed}", *_SENSORS]
     samples = _recorded([*overrides, *(_CHANGING if task.changing else ())])
@@ -83,7 +83,7 @@ def _recorded(overrides: Sequence[str]) -> recording.Recording:
         return recording.read([log])
 
 
-def text(logs: Sequence[Sequence[Found]]) -> str:
+def text(logs: Sequence[Sequence[Tuned]]) -> str:
     """The table as Markdown, from what was found in each log."""
     rows, count = [], 0
     for name, (truth, scale, unit) in TRUTH.items():
@@ -146,7 +146,7 @@ def calibration_tasks(count: int) -> list[CalibrationTask]:
 def calibrated(task: CalibrationTask) -> tuple[Calibrated, ...]:
     """What `lever tune` finds in the log of `task`, starting at the defaults."""
     samples = _of_lever_sim(task) if task.plant == _PLANTS[0] else _of_independent_plant(task)
-    return calibrate(Likelihood(samples), {}).found
+    return calibrate(Likelihood(samples), {}).entries
 
 
 def _of_lever_sim(task: CalibrationTask) -> recording.Recording:

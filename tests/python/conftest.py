@@ -12,6 +12,7 @@ from typing import Any
 
 import can
 import pytest
+from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware.library import enum_names
@@ -78,6 +79,35 @@ def health(mode: str = "run", *faults: str, restarts: int = 0, excitation: float
     """A HEALTH for a PuppetBus."""
     flags = {f"fault_{name}": int(name in faults) for name in enum_names("lever_fault").values()}
     return "HEALTH", {"mode": mode, "restarts": restarts, "excitation": excitation, **flags}
+
+
+Run = Callable[..., tuple[int, str, str]]
+Refused = Callable[..., str]
+
+
+@pytest.fixture
+def lever(capsys: pytest.CaptureFixture[str]) -> Run:
+    """lever(*arguments): exit status, standard output, standard error."""
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = cli.main([str(argument) for argument in arguments])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def refused(lever: Run) -> Refused:
+    """refused(*arguments): the one line that the command `lever` says when it does nothing, with exit status 2."""
+
+    def line(*arguments: str | Path) -> str:
+        status, out, err = lever(*arguments)
+        assert (status, out, err.count("\n")) == (2, "", 1), err
+        assert err.startswith("lever: error: ")
+        return err
+
+    return line
 
 
 @pytest.fixture

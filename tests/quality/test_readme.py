@@ -49,6 +49,10 @@ def blocks(language: str) -> list[object]:
     ]
 
 
+LINKING = [
+    tools.ROOT / "README.md",
+    *(page for folder in FOLDERS for page in sorted((tools.ROOT / folder).rglob("*.md"))),
+]
 PAGES = {
     page.name: "\n".join(scripts)
     for folder in FOLDERS
@@ -106,6 +110,20 @@ def test_whatever_a_page_has_been_built_with_makes_lever_can() -> None:
         while more := {other for each in reached for other in needs.get(each, ())} - reached:
             reached |= more
         assert "lever_can" in reached, target
+
+
+def anchors(page: Path) -> set[str]:
+    """The headings of a page as the addresses that GitHub gives them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", LINKING, ids=lambda page: str(page.relative_to(tools.ROOT)))
+def test_links_lead_to_files_and_headings(page: Path) -> None:
+    for target, anchor in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", page.read_text(encoding="utf-8")):
+        file = page.parent / target if target else page
+        assert file.exists(), target
+        assert not anchor or anchor in anchors(file), f"{target}#{anchor}"
 
 
 @pytest.mark.parametrize("script", blocks("sh"))

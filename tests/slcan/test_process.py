@@ -224,8 +224,7 @@ def test_torque_ends_when_samples_do(start: Start, link: Path) -> None:
     process = start("pty", link, supervised=True)
     there = host(link)
     there.run_with_torque()
-    asked = rig.torques(there.rest())
-    assert asked[-1] == 0.0
+    rig.wait_until(lambda: rig.torques(there.rest())[-1:] == [0.0], "no torque is asked for")
     there.bus.shutdown()
     assert process.stop()["unsent"] == 0
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import can
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.can.commander import Commander
 
 PATIENCE_S = 120.0
 """How long to wait for what must happen; a loaded machine is slow."""
@@ -140,20 +141,7 @@ class LeverCan:
 
 Starter = Callable[..., LeverCan]
 
-MOTOR_COMMAND = 0x215
-DITHER: Frame = (
-    0x120,
-    codec.encode(
-        "COMMAND",
-        0,
-        {
-            "request": "none",
-            **dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep"),
-            "dither_rms": 0.3,
-        },
-    ),
-)
-"""The command that makes the estimator ask for torque."""
+STATE_ESTIMATE, MOTOR_COMMAND = 0x210, 0x215
 
 
 def torques(answers: Iterable[Frame]) -> list[float]:
@@ -216,28 +204,49 @@ class Host:
             answers += self.answer()
         return answers
 
-    def is_answered(self) -> bool:
-        """Sends the next sample and returns whether that is answered within 0.1 s."""
-        for frame in next(samples(self.samples_sent, 1)):
-            self.send(frame)
-        self.samples_sent += 1
-        return not self.nothing_more()
+    def reach(self) -> int:
+        """Sends samples until the last one sent is answered, and returns the number of the first that was."""
+        answered: list[int] = []
+
+        def last_is_answered() -> bool:
+            for frame in next(samples(self.samples_sent, 1)):
+                self.send(frame)
+            self.samples_sent += 1
+            while not answered or answered[-1] < self.samples_sent - 1:
+                message = self.bus.recv(0.1)
+                if message is None:
+                    return False
+                if message.arbitration_id == STATE_ESTIMATE:
+                    answered.append(self._sample_of(message))
+            return True
+
+        wait_until(last_is_answered, "samples are answered")
+        return answered[0]
+
+    def _sample_of(self, estimate: can.Message) -> int:
+        """The latest sample sent whose time ends in the bits that a STATE_ESTIMATE has of it."""
+        low = codec.decode(STATE_ESTIMATE, bytes(estimate.data))[1]["time_low"]
+        return next(k for k in reversed(range(self.samples_sent)) if (1000 * k) & 0xFFFF == low)
 
     def answer(self) -> list[Frame]:
         """What comes up to and including the next STATE_ESTIMATE."""
         frames: list[Frame] = []
-        while not frames or frames[-1][0] != 0x210:
+        while not frames or frames[-1][0] != STATE_ESTIMATE:
             message = self.bus.recv(PATIENCE_S)
             assert message is not None, f"no STATE_ESTIMATE within {PATIENCE_S:g} s after {frames}"
             frames.append((message.arbitration_id, bytes(message.data)))
         return frames
 
-    def run_with_torque(self, count: int = 400) -> None:
+    def run_with_torque(self) -> None:
         """Samples until the last one is answered with torque: the estimator runs, and dither has faded in."""
-        self.run(count // 2)
-        self.send(DITHER)
-        self.run(count // 2)
-        wait_until(lambda: any(torques(self.run(1))), "torque")
+        commander = Commander()
+
+        def is_asked_for() -> bool:
+            commander.send({"dither_rms": 0.3}, lambda *frame: self.send(frame))
+            self.run(100)
+            return any(torques(self.run(1)))
+
+        wait_until(is_asked_for, "torque")
 
     def rest(self) -> list[Frame]:
         """What comes until nothing has come for 0.2 s."""

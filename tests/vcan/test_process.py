@@ -81,9 +81,9 @@ def test_a_signal_ends_it_under_full_load(start: rig.Starter, interface: str) ->
     process = start()
     flood = subprocess.Popen(["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "8"])
     try:
-        rig.wait_until(lambda: flood.poll() is None, "cangen runs")
-        time.sleep(0.5)
-        assert process.stop()["frames in"] > 100
+        sent = Path(f"/sys/class/net/{interface}/statistics/tx_packets")
+        rig.wait_until(lambda: int(sent.read_text()) > 10_000, "cangen sends")
+        assert process.stop()["frames in"] > 0
     finally:
         flood.kill()
         flood.wait()
@@ -129,14 +129,14 @@ def test_many_outages_in_a_row(start: rig.Starter, interface: str) -> None:
     process = start()
     host = rig.Host.on(interface)
     answers = []
-    for outage in range(1, 6):
+    for outage in range(1, 4):
         answers += host.run(20)
         rig.ip("link", "set", interface, "down")
         rig.ip("link", "set", interface, "up")
         process.wait_for("link restored", times=outage)
         host.reopen(interface)
-    assert answers == rig.in_process(100)
-    assert process.stop()["outages"] == 5
+    assert answers == rig.in_process(60)
+    assert process.stop()["outages"] == 3
     host.bus.shutdown()
 
 
@@ -227,9 +227,7 @@ def test_a_full_receive_buffer_is_counted(start: rig.Starter, interface: str) ->
     subprocess.run(["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "8", "-n", str(flood)], check=True)
     process.process.send_signal(signal.SIGCONT)
     host = rig.Host.on(interface)
-    rig.wait_until(host.is_answered, "an answer, which needs room for a sample")
-    while host.bus.recv(0.5) is not None:
-        pass  # until it has seen all samples that were sent meanwhile
+    host.reach()  # what was sent before is taken or lost by then
     totals = process.stop()
     assert totals["overflowed"] > 0
     assert totals["frames in"] + totals["overflowed"] == flood + 2 * host.samples_sent

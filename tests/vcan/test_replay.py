@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from processes import LEVER, lever
 from vcan import rig
 
-LEVER = str(Path(sys.executable).with_name("lever"))
-SCENARIO = ("steady", "--set=duration=3 s", "--set=converged_after=1 s", "--set=limits={}")
+SCENARIO = ("steady", "--set=duration=2 s", "--set=converged_after=1 s", "--set=limits={}")
 INPUTS = ("110", "111", "120")
 """Identifiers of what the estimator takes."""
-
-
-def lever(*arguments: str | Path) -> str:
-    """What the command prints; it must do."""
-    done = subprocess.run([LEVER, *map(str, arguments)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 @dataclass(frozen=True)
@@ -80,7 +71,7 @@ def test_the_process_answers_a_played_log_as_the_replay_does(
 
 @pytest.mark.requires("canplayer", "cansend")
 def test_record_has_every_frame_of_a_real_bus(log: Log, start: rig.Starter, interface: str, tmp_path: Path) -> None:
-    start("--settings", str(log.settings))
+    process = start("--settings", str(log.settings))
     path, partial = tmp_path / "session.log", tmp_path / "session.log.partial"
     command = [LEVER, "record", "--interface", "socketcan", "--channel", interface, "-o", str(path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
@@ -88,7 +79,9 @@ def test_record_has_every_frame_of_a_real_bus(log: Log, start: rig.Starter, inte
         play(log, interface)
         subprocess.run(["cansend", interface, "20000004#0001000000000000"], check=True)  # an overflow of the controller
         rig.wait_until(lambda: partial.read_text().count(" 210#") >= log.samples, "every answer is recorded")
-        time.sleep(1.0)
+        process.stop()
+        subprocess.run(["cansend", interface, rig.MARKER], check=True)
+        rig.wait_until(lambda: f" {rig.MARKER}" in partial.read_text(), "all that was sent before is recorded")
         recorder.send_signal(signal.SIGINT)
         output, errors = recorder.communicate(timeout=rig.PATIENCE_S)
     assert recorder.returncode == 0, errors

@@ -38,8 +38,8 @@ def put_crc(elf: Path, objcopy: str, objdump: str) -> None:
     try:
         subprocess.run([objcopy, "-O", "binary", "--remove-section=.rom_crc", elf, flash], check=True)
         contents = flash.read_bytes()
-        found = sections(elf, objdump)
-        if len(contents) != found[".rom_crc"].load_address - found[".text"].load_address:
+        by_name = sections(elf, objdump)
+        if len(contents) != by_name[".rom_crc"].load_address - by_name[".text"].load_address:
             sys.exit(f"{elf}: there is a gap between sections in flash, or between them and the CRC: see image.ld")
         crc.write_bytes(struct.pack("<I", zlib.crc32(contents)))
         subprocess.run([objcopy, f"--update-section=.rom_crc={crc}", elf], check=True)
@@ -49,13 +49,13 @@ def put_crc(elf: Path, objcopy: str, objdump: str) -> None:
 
 
 def report(elf: Path, objdump: str) -> str:
-    found = sections(elf, objdump)
-    flash = sum(found[name].size for name in IN_FLASH)
-    ram = sum(found[name].size for name in IN_RAM)
+    by_name = sections(elf, objdump)
+    flash = sum(by_name[name].size for name in IN_FLASH)
+    ram = sum(by_name[name].size for name in IN_RAM)
     return (
         f"-- {elf.name}: flash {flash} of {FLASH_BYTES} bytes ({100 * flash / FLASH_BYTES:.1f} %), "
         f"RAM {ram} of {RAM_BYTES} bytes ({100 * ram / RAM_BYTES:.1f} %), "
-        f"of which {found['.stack'].size} are reserved for the stack"
+        f"of which {by_name['.stack'].size} are reserved for the stack"
     )
 
 

@@ -21,11 +21,11 @@ FAULT_WORDS = {
     "base": "base acceleration missing",
     "gap": "samples missing",
     "communication": "frame corrupt or out of order",
-    "innovation": "surprised by measurements",
+    "innovation": "innovations larger than predicted",
     "excitation": "too little motion",
     "bound": "parameter at its bound",
     "recovered": "filter restarted",
-    "change": "sudden change noticed",
+    "change": "sudden change detected",
     "platform": "machine reports a fault",
     "clock": "sample clock stands or runs back",
     "duplicate": "second estimator on the bus",
@@ -62,9 +62,9 @@ def timeline(run: Run) -> Figure | None:
 
 
 def _modes(run: Run, mode: Array) -> list[Spec]:
-    known = native.enum_names("lever_mode")
+    names = native.enum_names("lever_mode")
     present = [int(value) for value in np.unique(mode[np.isfinite(mode)])]
-    return [_bar(run, mode == value, f"mode: {known.get(value, value)}", "estimate") for value in present]
+    return [_bar(run, mode == value, f"mode: {names.get(value, value)}", "estimate") for value in present]
 
 
 def _faults(run: Run, faults: Array) -> list[Spec]:

@@ -86,12 +86,12 @@ def _stretches(run: Run, seconds: float) -> dict[str, float]:
 def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
     """Normalised innovation squared per output, averaged over short stretches, and the band that chance alone gives."""
     averages = run.innovations(seconds)
-    if averages is None or not (known := averages.freedom > 0).any():
+    if averages is None or not (filled := averages.freedom > 0).any():
         return None
     time, freedom, ratio = (
-        averages.time[known],
-        averages.freedom[known],
-        averages.total[known] / averages.freedom[known],
+        averages.time[filled],
+        averages.freedom[filled],
+        averages.total[filled] / averages.freedom[filled],
     )
     low, high = np.array([chi_square_band(int(each)) for each in freedom]).T / freedom
     greatest = float(ratio.max())
@@ -105,15 +105,15 @@ def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
 
 def whiteness(run: Run) -> Figure | None:
     """Autocorrelation of the residual of the rate, and the band in which white noise stays."""
-    told = run.whiteness
-    if told is None:
+    result = run.whiteness
+    if result is None:
         return None
-    lag = 1000.0 * told.average_s * np.arange(1, len(told.autocorrelation) + 1)
-    correlation = np.array(told.autocorrelation)
+    lag = 1000.0 * result.average_s * np.arange(1, len(result.autocorrelation) + 1)
+    correlation = np.array(result.autocorrelation)
     end = float(lag[-1] + lag[0])
     limits = axis_range([np.append(correlation, (-0.25, 0.25))], slice(None))
     figure = Figure([axis("correlation [1]", range=limits)], axis("lag [ms]", range=[0.0, end]), 260, over_time=False)
-    edges = np.full(2, told.band_95)
+    edges = np.full(2, result.band_95)
     figure.add(*band(np.array([0.0, end]), -edges, edges, "95 % of white noise", "chance-band"))
     bar: Spec = {
         "type": "bar",

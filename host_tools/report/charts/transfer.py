@@ -23,8 +23,8 @@ DEGREES = 180.0 / np.pi
 
 def _times(run: Run, count: int) -> np.ndarray:
     """Indices of `count` samples, from the first estimate on."""
-    known = run.first_of(*(quantity.column("estimate") for quantity in run.parameters))
-    started = np.flatnonzero(np.isfinite(run.time if known is None else known))
+    estimates = run.first_of(*(quantity.column("estimate") for quantity in run.parameters))
+    started = np.flatnonzero(np.isfinite(run.time if estimates is None else estimates))
     chosen: np.ndarray = started[spread_indices(len(started), count)]
     return chosen
 
@@ -32,12 +32,12 @@ def _times(run: Run, count: int) -> np.ndarray:
 def _responses(run: Run, chosen: np.ndarray, frequencies: Array) -> dict[str, np.ndarray]:
     """The responses [deg/(m/s²)] of truth and estimate at the samples, as far as they are known."""
     followed = run.followed_trim
-    found: dict[str, np.ndarray] = {}
+    responses: dict[str, np.ndarray] = {}
     if followed is None:
-        return found
+        return responses
     true_trim = run.column("trim_true_rad")
     if (other := run.true_transfer(run.time[chosen])) is not None:
-        found["truth"] = DEGREES * other.response(frequencies)
+        responses["truth"] = DEGREES * other.response(frequencies)
     for name, columns, trim in (
         ("truth", [run.truth(q) for q in run.parameters], followed if true_trim is None else true_trim),
         ("estimate", [run.estimate(q) for q in run.parameters], followed),
@@ -45,8 +45,8 @@ def _responses(run: Run, chosen: np.ndarray, frequencies: Array) -> dict[str, np
         present = [column[chosen] for column in columns if column is not None]
         if len(present) == len(run.parameters):
             transfer = bode.transfer(run.model, run.lever, np.array(present), trim[chosen])
-            found[name] = DEGREES * transfer.response(frequencies)
-    return found
+            responses[name] = DEGREES * transfer.response(frequencies)
+    return responses
 
 
 def maps(run: Run) -> dict[str, Figure]:
@@ -137,8 +137,8 @@ def _bands(run: Run, time: Array, estimate: np.ndarray) -> list[list[tuple[Array
 
 def _shown(bands: list[list[tuple[Array, Array]]], wanted: int) -> int:
     """The time to begin with: the one nearest to `wanted` at which all of the band is known."""
-    known = [index for index, edges in enumerate(bands[0] if bands else []) if np.isfinite(edges).all()]
-    return min(known, key=lambda index: abs(index - wanted), default=wanted)
+    complete = [index for index, edges in enumerate(bands[0] if bands else []) if np.isfinite(edges).all()]
+    return min(complete, key=lambda index: abs(index - wanted), default=wanted)
 
 
 def _add_coherence(run: Run, figure: Figure) -> None:
@@ -188,8 +188,8 @@ def accuracy(run: Run) -> Accuracy | None:
     if truth is None or not np.isfinite(sent["gain_sigma"]).any():
         return None
     ratio = DEGREES * sent["response"] / truth
-    known = np.isfinite(ratio * sent["gain_sigma"] * sent["phase_sigma"])
-    gain = np.abs(np.log(np.abs(ratio)))[known] <= SIGMAS * sent["gain_sigma"][known]
-    phase = np.abs(np.angle(ratio))[known] <= SIGMAS * sent["phase_sigma"][known]
-    error = np.sqrt(np.mean(np.abs(ratio[known] - 1.0) ** 2))
+    finite = np.isfinite(ratio * sent["gain_sigma"] * sent["phase_sigma"])
+    gain = np.abs(np.log(np.abs(ratio)))[finite] <= SIGMAS * sent["gain_sigma"][finite]
+    phase = np.abs(np.angle(ratio))[finite] <= SIGMAS * sent["phase_sigma"][finite]
+    error = np.sqrt(np.mean(np.abs(ratio[finite] - 1.0) ** 2))
     return Accuracy(float(error), float(np.mean(gain)), float(np.mean(phase)))

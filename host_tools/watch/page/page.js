@@ -20,7 +20,7 @@ function connect() {
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
   socket.onmessage = (event) => hear(JSON.parse(event.data));
   socket.onclose = () => {
-    lost("The server is gone; this page tries to reach it again.");
+    lost("The connection to the server is lost; this page keeps trying.");
     setTimeout(connect, AGAIN);
   };
 }
@@ -208,6 +208,6 @@ for (const what of ["model", "estimator"])
 window.addEventListener("resize", redraw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 setInterval(() => {
-  if (socket.readyState === WebSocket.OPEN && performance.now() - lastHeard > PATIENCE) lost("Nothing has come from the server for a moment: what is shown is old.");
+  if (socket.readyState === WebSocket.OPEN && performance.now() - lastHeard > PATIENCE) lost("No data from the server: what is shown is old.");
 }, 500);
 connect();

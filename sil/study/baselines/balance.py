@@ -83,7 +83,7 @@ class Same:
 class Balance:
     """The acceleration at each sample."""
 
-    known: Array
+    offset: Array
     """(B, K) what needs no parameter [rad/s²]"""
     regressors: Array
     """(B, K, 3)"""
@@ -132,6 +132,6 @@ def _of_lever(batch: Batch, lever: Lever) -> Balance:
     drag = (lever.rotational_damping(theta, one) - own_damping) * rate
     spring = lever.restoring_torque(theta, zero, one, batch.trim) - own_spring
     own = torque + lever.unbalance(zero) * base - own_spring - own_damping * rate
-    known = push / per_mass
-    regressors = np.stack((own - inertia * known, -drag, -spring), axis=2)
-    return Balance(known, regressors, Ratios(float(inertia), float(per_mass)))
+    offset = push / per_mass
+    regressors = np.stack((own - inertia * offset, -drag, -spring), axis=2)
+    return Balance(offset, regressors, Ratios(float(inertia), float(per_mass)))

@@ -44,8 +44,8 @@ class Joint:
         self.output_noise = output_covariance(batch)
         self.process_noise = block_diagonal(walk_covariance(batch), batch.knowledge.process_covariance(batch.period))
         self.w, self.x = np.zeros((batch.runs, PARAMETERS)), batch.y[:, 0].copy()
-        known = block_diagonal(np.diag(batch.knowledge.sigma_w**2), self.output_noise)
-        self.covariance = repeated(known, batch.runs)
+        initial = block_diagonal(np.diag(batch.knowledge.sigma_w**2), self.output_noise)
+        self.covariance = repeated(initial, batch.runs)
         """(B, 5, 5) of [w; x]."""
         self.innovation, self.innovation_covariance = no_innovation(batch.runs)
 

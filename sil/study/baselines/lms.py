@@ -31,8 +31,8 @@ class Nlms:
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
         data = equations(batch, self.window, self.corner)
-        guess, known = data.first_guess(batch.knowledge)
-        scale = known.diagonal()
+        guess, covariance = data.first_guess(batch.knowledge)
+        scale = covariance.diagonal()
         q = np.empty((batch.runs, len(data.ends) + 1, PARAMETERS))
         q[:, 0] = repeated(guess, batch.runs)
         with np.errstate(over="ignore", invalid="ignore"):

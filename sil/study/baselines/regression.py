@@ -77,7 +77,7 @@ def equations(batch: Batch, window: float, corner: float) -> Equations:
     n = max(1, round(window / batch.period))
     of_samples = balance(batch)
     first = np.arange(0, batch.samples - 2 * n + 1, n)
-    right = np.concatenate((of_samples.known[:, :, np.newaxis], of_samples.regressors), axis=2)
+    right = np.concatenate((of_samples.offset[:, :, np.newaxis], of_samples.regressors), axis=2)
     right = _means(_means(0.5 * (right[:, 1:] + right[:, :-1]), n), n)[:, first]
     rate = _means(batch.y[:, :, 1:], n)
     acceleration = (rate[:, first + n] - rate[:, first]) / (n * batch.period)

@@ -38,7 +38,7 @@ class Rls:
         forget = math.exp(-data.period / self.forgetting)
         shape = (batch.runs, len(data.ends) + 1)
         q, covariance = np.empty((*shape, PARAMETERS)), np.empty((*shape, PARAMETERS, PARAMETERS))
-        q[:, 0], covariance[:, 0] = (repeated(known, batch.runs) for known in data.first_guess(batch.knowledge))
+        q[:, 0], covariance[:, 0] = (repeated(prior, batch.runs) for prior in data.first_guess(batch.knowledge))
         with np.errstate(over="ignore", invalid="ignore"):
             for j in range(len(data.ends)):
                 phi, p = data.regressors[:, j], covariance[:, j]

@@ -75,13 +75,13 @@ class Task:
 def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> list[Task]:
     """Those of the cases `chosen`, for the entrants `names` (None: all there are)."""
     wanted = None if names is None else set(names)
-    found = []
+    selected = []
     for name in chosen:
         case = cases()[name]
         taking = [entrant for entrant in entrants(case) if wanted is None or entrant in wanted]
         nobody = [None] if taking and isinstance(case, Matched) else []
-        found += [Task(name, entrant, plan) for entrant in (*nobody, *taking)]
-    return found
+        selected += [Task(name, entrant, plan) for entrant in (*nobody, *taking)]
+    return selected
 
 
 def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Results:

@@ -82,7 +82,7 @@ class Case(ABC):
         """(T,) at which of the times [s] errors count."""
 
     @property
-    def known(self) -> Mapping[str, float]:
+    def own_settings(self) -> Mapping[str, float]:
         """Settings by which this case differs from the firmware's defaults, but for noise: prior and lever."""
         return {}
 
@@ -125,7 +125,7 @@ class Matched(Case):
     process_noise: float = 0.05
 
     @property
-    def known(self) -> Mapping[str, float]:
+    def own_settings(self) -> Mapping[str, float]:
         return PRIOR[self.model]
 
     @property
@@ -151,7 +151,7 @@ class Matched(Case):
 
     def _exact(self, plan: Plan) -> Batch:
         condition = Condition(
-            self.model, self.preload, dither_rms=self.dither_rms, settings={**self.known, **self.noise}
+            self.model, self.preload, dither_rms=self.dither_rms, settings={**self.own_settings, **self.noise}
         )
         return matched(condition, self.runs(plan), self.length(plan), plan.seed)
 
@@ -200,7 +200,7 @@ class Recorded(Case):
         return scenarios.load(self.name)
 
     @property
-    def known(self) -> Mapping[str, float]:
+    def own_settings(self) -> Mapping[str, float]:
         return self._scenario.settings or {}
 
     def batch(self, plan: Plan) -> Batch:

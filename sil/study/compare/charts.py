@@ -60,8 +60,8 @@ def _walks(rows: Sequence[Row], model: str, preload: str) -> list[Row]:
 
 def _average(values: Sequence[float]) -> float:
     """Geometric mean of those that are known."""
-    known = [value for value in values if math.isfinite(value) and value > 0.0]
-    return math.exp(math.fsum(map(math.log, known)) / len(known)) if known else math.nan
+    positive = [value for value in values if math.isfinite(value) and value > 0.0]
+    return math.exp(math.fsum(map(math.log, positive)) / len(positive)) if positive else math.nan
 
 
 def _lanes(

@@ -82,7 +82,7 @@ def _references(page: Page, rows: Sequence[Row]) -> None:
             page.figure(
                 f"linearised-trim-{model}",
                 charts.linearised(rows, model, "trim"),
-                "Against the linearised filter where the angle at which the lever rests is not told: all estimators "
+                "Against the linearised filter where the angle at which the lever rests is not given: all estimators "
                 "get detrended signals, the linearised filter knows that angle, and the difference is what detrending "
                 "costs.",
             ),
@@ -122,14 +122,14 @@ def _wrong_noise(page: Page, rows: Sequence[Row]) -> None:
         page.figure(
             f"noise-{case.name}",
             charts.wrong_noise(rows, case.name),
-            f"{html.escape(case.title)}: shipped firmware that is told a measurement noise R and a process noise Q "
-            "(standard deviations) wrong by a factor, against the filter that is told the truth and adapts nothing. "
+            f"{html.escape(case.title)}: shipped firmware whose settings of measurement noise R and process noise Q "
+            "(standard deviations) are wrong by a factor, against the filter with the true values and no adaptation. "
             "The second line is at 1.5.",
         )
         for case in cases().values()
         if case.kind == "wrong noise"
     ]
-    page.section("wrong-noise", "Wrong noise", "Told the wrong noise", *figures)
+    page.section("wrong-noise", "Wrong noise", "Given the wrong noise", *figures)
 
 
 def _table(lines: Sequence[TableRow]) -> str:
@@ -138,13 +138,13 @@ def _table(lines: Sequence[TableRow]) -> str:
 
 
 def _assembled(page: Page, results: Results, claims: Sequence[Claim]) -> str:
-    kept, known = (sum(claim.kept is value for claim in claims) for value in (True, False))
-    known += kept
-    mood = "good" if kept == known else "bad"
+    kept, decided = (sum(claim.kept is value for claim in claims) for value in (True, False))
+    decided += kept
+    mood = "good" if kept == decided else "bad"
     said = (
-        f"{kept} of {known} things that the firmware has to show are shown."
-        if known
-        else "A preview: what the firmware has to show takes 20 whole runs of each case."
+        f"{kept} of {decided} claims about the firmware hold."
+        if decided
+        else "A preview: the claims about the firmware take 20 whole runs of each case."
     )
     plan = results.plan
     length = "" if plan.duration is None else f" of {plan.duration:g} s"

@@ -37,20 +37,20 @@ class Entrant:
 def entrants(case: Case) -> dict[str, Entrant]:
     """Those of a case, by name, ours first."""
     if case.kind == "wrong noise":
-        chosen = _told() + _wrong()
+        chosen = _given_noise() + _wrong()
     elif case.kind == "matched":
-        chosen = _told() + _shipped() + _baselines(case)
+        chosen = _given_noise() + _shipped() + _baselines(case)
     else:
         chosen = _shipped() + _no_change() + _baselines(case)
     return {entrant.name: entrant for entrant in chosen}
 
 
-def _told() -> list[Entrant]:
+def _given_noise() -> list[Entrant]:
     def maker(estimator: str) -> Callable[[Case], Estimator]:
         def make(case: Case) -> Estimator:
             align = {"align_time": 0.0} if case.preload == "fixed" else {}
             still = {"change_threshold": 0.0, "noise_window": 0.0, **align}
-            return Firmware(case.model, case.preload, estimator, "fixed", {**case.known, **case.noise, **still})
+            return Firmware(case.model, case.preload, estimator, "fixed", {**case.own_settings, **case.noise, **still})
 
         return make
 
@@ -59,7 +59,7 @@ def _told() -> list[Entrant]:
 
 def _with(estimator: str, settings: Mapping[str, float]) -> Callable[[Case], Estimator]:
     """The shipped firmware but for `settings`."""
-    return lambda case: Firmware(case.model, case.preload, estimator, settings={**case.known, **settings})
+    return lambda case: Firmware(case.model, case.preload, estimator, settings={**case.own_settings, **settings})
 
 
 def _shipped() -> list[Entrant]:
@@ -86,7 +86,7 @@ def _no_change() -> list[Entrant]:
 def _wrong() -> list[Entrant]:
     defaults = {row.name: row.default for row in settings_table()}
 
-    def told(r: float, q: float) -> dict[str, float]:
+    def scaled_noise(r: float, q: float) -> dict[str, float]:
         factors = {"theta_noise": r, "theta_dot_noise": r, "theta_dot_process_noise": q}
         return {name: factor * defaults[name] for name, factor in factors.items()}
 
@@ -95,7 +95,7 @@ def _wrong() -> list[Entrant]:
             f"{name}_r{r}_q{q}",
             f"firmware, {name}, as shipped, R × {r}, Q × {q}",
             True,
-            _with(name, told(r_factor, q_factor)),
+            _with(name, scaled_noise(r_factor, q_factor)),
             reference=name,
         )
         for name in OURS

@@ -129,28 +129,30 @@ def _row(case: Case, entrant: Entrant, results: Results) -> Row:
 def _intact(outcome: Outcome) -> BoolArray:
     """(B,) whether a run never broke down."""
     dynamics = outcome.errors[..., PARAMETERS:]
-    known = ~np.isnan(outcome.errors[..., :PARAMETERS]).all()
-    values = outcome.errors if known else dynamics
+    has_parameters = ~np.isnan(outcome.errors[..., :PARAMETERS]).all()
+    values = outcome.errors if has_parameters else dynamics
     return np.asarray(np.isfinite(values).all(axis=(1, 2)), dtype=np.bool_)
 
 
 def _with_errors(row: Row, outcome: Outcome, intact: BoolArray, judged: BoolArray) -> Row:
     errors = outcome.errors[intact][:, judged]
     size = rms(errors)
-    known = size[np.isfinite(size)]
-    row = replace(row, rms=_five(rms(outcome.relative[intact][:, judged])), score=math.exp(float(np.log(known).mean())))
+    finite = size[np.isfinite(size)]
+    row = replace(
+        row, rms=_five(rms(outcome.relative[intact][:, judged])), score=math.exp(float(np.log(finite).mean()))
+    )
     if outcome.stated is None:
         return row
     return replace(row, honesty=_five(honesty(errors, outcome.stated[intact][:, judged])))
 
 
-def _with_references(row: Row, errors: Array, known: References, intact: BoolArray, judged: BoolArray) -> Row:
-    linearised = known.linearised[intact][:, judged]
+def _with_references(row: Row, errors: Array, references: References, intact: BoolArray, judged: BoolArray) -> Row:
+    linearised = references.linearised[intact][:, judged]
     return replace(
         row,
         linearised=_five(ratio(errors, linearised)),
         linearised_error=_five(ratio_spread(errors, linearised, seed=0)),
-        bound=_five(ratio(errors, known.bound[judged])),
+        bound=_five(ratio(errors, references.bound[judged])),
     )
 
 
@@ -181,8 +183,8 @@ def compare(results: Results, rows: list[Row]) -> tuple[Differences, Differences
         if len(names) < 2:
             continue
         squares = {name: np.square(judged_errors(results, case, name)).mean(axis=1) for name in names}
-        known = np.isfinite(next(iter(squares.values()))).all(axis=0)
-        errors |= of_errors(case, {name: square[:, known] for name, square in squares.items()})
+        finite = np.isfinite(next(iter(squares.values()))).all(axis=0)
+        errors |= of_errors(case, {name: square[:, finite] for name, square in squares.items()})
         change = cases()[case].change(results.plan)
         if change is not None:
             times |= of_times(case, _times(results, case, names, change))
@@ -192,13 +194,13 @@ def compare(results: Results, rows: list[Row]) -> tuple[Differences, Differences
 
 def _times(results: Results, case: str, names: list[str], change: float) -> Mapping[str, Array]:
     """(B,) settling times [s]; never counts as the time that was left, at once as the time between two estimates."""
-    found = {}
+    by_name = {}
     for name in names:
         outcome = results.outcomes[case, name]
         elapsed = outcome.time - change
         times = settling_times(outcome.errors[..., FREQUENCY], elapsed)
-        found[name] = np.maximum(np.where(np.isnan(times), elapsed[-1], times), cases()[case].every)
-    return found
+        by_name[name] = np.maximum(np.where(np.isnan(times), elapsed[-1], times), cases()[case].every)
+    return by_name
 
 
 def _with_consistency(row: Row, outcome: Outcome, intact: BoolArray, judged: BoolArray) -> Row:

@@ -22,14 +22,14 @@ _QUANTITIES = ("parameter_1", "parameter_2", "parameter_3", "natural_frequency",
 
 def tables(rows: Sequence[Row], claims: Sequence[Claim]) -> dict[str, list[TableRow]]:
     """A table of each case, and one of the claims."""
-    found: dict[str, list[TableRow]] = {}
+    by_title: dict[str, list[TableRow]] = {}
     for name, group in groupby(rows, key=lambda row: row.case):
         lines = [_line(row) for row in group]
         filled = [column for column in lines[0] if any(line[column] is not None for line in lines)]
-        found[f"{name}: {cases()[name].title}"] = [{column: line[column] for column in filled} for line in lines]
+        by_title[f"{name}: {cases()[name].title}"] = [{column: line[column] for column in filled} for line in lines]
     if not claims:
-        return found
-    found["what the firmware has to show"] = [
+        return by_title
+    by_title["claims about the firmware"] = [
         {
             "claim": claim.text,
             "limit": f"{'≤' if claim.below else '≥'} {claim.limit:g}",
@@ -40,7 +40,7 @@ def tables(rows: Sequence[Row], claims: Sequence[Claim]) -> dict[str, list[Table
         }
         for claim in claims
     ]
-    return found
+    return by_title
 
 
 def _number(value: float, digits: int = 3) -> Cell:

@@ -1,4 +1,4 @@
-"""Who wins where, and whether what was promised is kept, in words. All from rows alone."""
+"""Which estimator is best in each case, and whether the claims about the firmware hold. All from rows alone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NEAR = 1.03
 """Errors of the firmware may be so many times those of the best baseline."""
 
 
-# --- who wins --------------------------------------------------------------------------------------------------------
+# --- ranking --------------------------------------------------------------------------------------------------------
 
 
 def verdicts(rows: Sequence[Row], errors: Differences, times: Differences) -> dict[str, str]:
@@ -33,7 +33,7 @@ def verdict(rows: Sequence[Row], errors: Differences, times: Differences) -> str
         return " ".join((f"Too few runs for a verdict: {runs}, at least {LEAST_RUNS} are needed.", *_unranked(rows)))
     ranked = sorted((row for row in rows if row.ranked and math.isfinite(row.score)), key=lambda row: row.score)
     when = " before the step" if isinstance(cases()[rows[0].case], Stepped) else ""
-    parts = [f"Smallest errors{when}: {_winner(ranked, errors)}"] if ranked else ["Nobody did all runs."]
+    parts = [f"Smallest errors{when}: {_winner(ranked, errors)}"] if ranked else ["No estimator completed all runs."]
     parts += [_behind(ranked, errors)] if ranked and not ranked[0].ours else []
     parts += [_fastest(rows, times)] if any(not math.isnan(row.settled_median) for row in rows) else []
     parts += _unranked(rows)
@@ -64,28 +64,28 @@ def _size(row: Row) -> str:
 def _behind(ranked: Sequence[Row], errors: Differences) -> str:
     ours = next((row for row in ranked if row.ours), None)
     if ours is None:
-        return "None of ours took part with all runs."
-    found = errors[ours.case, ours.estimator]
-    low, high = (100.0 * (edge - 1.0) for edge in found.interval())
-    more = f"{_name(ours)} has {100.0 * math.expm1(found.more):.0f} % larger errors ({low:.0f} to {high:.0f} %)"
-    if found.significant:
-        return f"Ours is not best: {more}."
-    return f"Ours is not best, but that may be chance: {more}."
+        return "No estimator of the firmware completed all runs."
+    difference = errors[ours.case, ours.estimator]
+    low, high = (100.0 * (edge - 1.0) for edge in difference.interval())
+    more = f"{_name(ours)} has {100.0 * math.expm1(difference.more):.0f} % larger errors ({low:.0f} to {high:.0f} %)"
+    if difference.significant:
+        return f"The firmware is not best: {more}."
+    return f"The firmware is not best, but that may be chance: {more}."
 
 
 def _fastest(rows: Sequence[Row], times: Differences) -> str:
     able = [row for row in rows if row.ranked and math.isfinite(row.settled_median)]
     if not able:
-        return "After the step nobody finds the natural frequency for good."
+        return "After the step no estimator settles on the natural frequency."
     best = min(able, key=lambda row: (row.settled_median, row.settled_worst))
     worst = f"worst {best.settled_worst:.2f} s" if math.isfinite(best.settled_worst) else "not in every run"
     others = [row for row in able if row.ours != best.ours]
     beside = ""
     if others:
         second = min(others, key=lambda row: row.settled_median)
-        who = "baseline" if best.ours else "of ours"
-        found = times.get((best.case, second.estimator))  # None: as fast
-        chance = "" if found is not None and found.significant else ", which may be chance"
+        who = "baseline" if best.ours else "of the firmware"
+        difference = times.get((best.case, second.estimator))  # None: as fast
+        chance = "" if difference is not None and difference.significant else ", which may be chance"
         beside = f"; the fastest {who}, {second.estimator}: {second.settled_median:.2f} s{chance}"
     return f"Fastest after the step: {_name(best)} (median {best.settled_median:.2f} s, {worst}){beside}."
 
@@ -93,10 +93,10 @@ def _fastest(rows: Sequence[Row], times: Differences) -> str:
 def _unranked(rows: Sequence[Row]) -> Iterator[str]:
     failed = [f"{row.estimator} in {row.failures} of {row.runs} runs" for row in rows if row.failures]
     if failed:
-        yield f"Broke down, and so not ranked: {', '.join(failed)}."
+        yield f"Diverged, and so not ranked: {', '.join(failed)}."
 
 
-# --- what was promised -----------------------------------------------------------------------------------------------
+# --- claims -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -138,12 +138,12 @@ Value = tuple[float, str, float]
 
 def claims(rows: Sequence[Row]) -> list[Claim]:
     """All of them, with what was measured."""
-    found: list[Claim] = []
+    collected: list[Claim] = []
 
     def add(text: str, limit: float, values: Iterable[Value], below: bool = True) -> None:
-        known = [value for value in values if not math.isnan(value[0])]
-        worst = (max if below else min)(known, key=lambda value: value[0], default=(math.nan, "not run", math.nan))
-        found.append(Claim(text, limit, *worst, below=below, by_chance=_by_chance(known, limit, below)))
+        finite = [value for value in values if not math.isnan(value[0])]
+        worst = (max if below else min)(finite, key=lambda value: value[0], default=(math.nan, "not run", math.nan))
+        collected.append(Claim(text, limit, *worst, below=below, by_chance=_by_chance(finite, limit, below)))
 
     walks = {preload: [row for row in rows if _is_walk(row, preload)] for preload in ("fixed", "trim")}
     joint = [row for row in walks["fixed"] if row.estimator == "joint"]
@@ -170,7 +170,7 @@ def claims(rows: Sequence[Row]) -> list[Claim]:
         0.0,
         _of((row for row in rows if row.ours), lambda row: float(row.failures)),
     )
-    return found
+    return collected
 
 
 def _by_chance(values: Sequence[Value], limit: float, below: bool) -> bool:

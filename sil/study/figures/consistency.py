@@ -33,7 +33,7 @@ def nees(seed: int, extent: Extent) -> Figure:
             assert estimates.covariance is not None
             squares = normalised_squares(errors(batch, estimates)[..., :PARAMETERS], estimates.covariance)
             traces.append(Curve(at * batch.period, squares.mean(axis=0), name, look))
-            said.append(f"{case}, {name}: {_words(consistency(squares, PARAMETERS))}")
+            said.append(f"{case}, {name}: {_numbers(consistency(squares, PARAMETERS))}")
         drawn[f"NEES, {case} [1]"] = tuple(traces)
     caption = (
         "Squares of the errors of m_p, c_p and k_p in units of the covariance that the firmware states, mean of "
@@ -55,6 +55,6 @@ def _expected(time: Array, runs: int) -> tuple[Trace, Trace]:
     return Band(time, low, high, "95 % by chance", "chance"), Curve(time, mean, "expected", "expected")
 
 
-def _words(found: Consistency) -> str:
-    low, high = found.mean_band
-    return f"{number(found.mean, 3)} ({number(low, 3)} to {number(high, 3)}), {percent(found.inside)}"
+def _numbers(result: Consistency) -> str:
+    low, high = result.mean_band
+    return f"{number(result.mean, 3)} ({number(low, 3)} to {number(high, 3)}), {percent(result.inside)}"

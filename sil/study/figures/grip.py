@@ -113,7 +113,7 @@ def _rows(time: Array, truth: Array, case: _Case) -> tuple[Row, ...]:
 
 
 def _caption(cases: dict[str, _Case], truth: Array, elapsed: Array) -> str:
-    said = " ".join(_words(title, case, truth, elapsed) for title, case in cases.items())
+    said = " ".join(_case_caption(title, case, truth, elapsed) for title, case in cases.items())
     watched = next(iter(cases.values())).noticed
     soon = int(watched[:, (elapsed >= 0.0) & (elapsed < _WATCHED)].any(axis=1).sum())
     before = np.diff(watched[:, elapsed < 0.0].astype(np.int64), axis=1, prepend=0)
@@ -128,7 +128,7 @@ def _caption(cases: dict[str, _Case], truth: Array, elapsed: Array) -> str:
     )
 
 
-def _words(title: str, case: _Case, truth: Array, elapsed: Array) -> str:
+def _case_caption(title: str, case: _Case, truth: Array, elapsed: Array) -> str:
     relative = (case.value / truth - 1.0)[..., _STIFFNESS]
     median, worst = median_and_worst(settling_times(relative, elapsed, _WITHIN))
     after = (elapsed >= 0.0) & (elapsed < _WATCHED)

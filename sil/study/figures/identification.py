@@ -49,12 +49,12 @@ def _case(seed: int, extent: Extent, dither: float) -> _Case:
     batch = matched(condition, 1, extent.duration, seed)
     at = shown(batch)
     assert batch.truth.p is not None
-    found: dict[str, tuple[Array, Array]] = {}
+    by_estimator: dict[str, tuple[Array, Array]] = {}
     for name in _ESTIMATORS:
-        found[name] = _quantities(estimates(matched_config(condition, name), batch, at=at))
+        by_estimator[name] = _quantities(estimates(matched_config(condition, name), batch, at=at))
     truth = np.concatenate((batch.truth.p[0, at], batch.truth.dynamics[0, at]), axis=-1)
     linearised = np.sqrt(variances(batch, at, covariances(batch, at))[0])
-    return _Case(at * batch.period, truth, linearised, found)
+    return _Case(at * batch.period, truth, linearised, by_estimator)
 
 
 def _quantities(columns: dict[str, NDArray[np.float64]]) -> tuple[Array, Array]:

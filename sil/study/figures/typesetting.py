@@ -26,7 +26,7 @@ def in_html(text: str) -> str:
 def in_mathtext(text: str) -> str:
     """m_p with an index and derivatives with their dots in place, as matplotlib wants them."""
     indexed = _INDEX.sub(r"$\1_{\2}$", unicodedata.normalize("NFD", text))
-    return _ACCENT.sub(lambda found: f"${_ACCENTS[found[2]]}{{{found[1]}}}$", indexed)
+    return _ACCENT.sub(lambda match: f"${_ACCENTS[match[2]]}{{{match[1]}}}$", indexed)
 
 
 def own_css() -> str:

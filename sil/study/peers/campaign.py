@@ -58,14 +58,14 @@ def tasks(chosen: Iterable[Condition], seeds: int, estimators: Sequence[str]) ->
 def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> list[Result]:
     """Does all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
     total, done = sum(len(task.conditions) for task in todo), 0
-    found: list[Result] = []
+    collected: list[Result] = []
     for task, results in _results(todo, jobs):
-        found += results
+        collected += results
         done += len(task.conditions)
         if progress is not None:
             progress(done, total, task.conditions[-1])
     order = list(conditions.CONDITIONS)
-    return sorted(found, key=lambda result: (order.index(result.condition), ESTIMATORS.index(result.estimator)))
+    return sorted(collected, key=lambda result: (order.index(result.condition), ESTIMATORS.index(result.estimator)))
 
 
 def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, list[Result]]]:
@@ -79,11 +79,11 @@ def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, list[Result]]]
 def do(task: Task) -> tuple[Task, list[Result]]:
     """One task."""
     ready = list(logs([conditions.CONDITIONS[name] for name in task.conditions], task.seeds))
-    found = []
+    results = []
     for name in task.estimators:
         said = [log.firmware for log in ready] if name == FIRMWARE else tracks(ready, PEERS[name])
-        found += [_result(log, name, track) for log, track in zip(ready, said, strict=True) if track is not None]
-    return task, found
+        results += [_result(log, name, track) for log, track in zip(ready, said, strict=True) if track is not None]
+    return task, results
 
 
 def _result(log: Log, estimator: str, track: Track) -> Result:

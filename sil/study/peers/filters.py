@@ -73,7 +73,7 @@ def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
         start[:, 0] = signals[: round(settings["align_time"] / PERIOD), :, 0].mean(axis=0)
         trim = low_pass(signals[..., :1], settings["trim_corner"], start[:, :1])[..., 0]
         signals = high_pass(signals, settings["trim_corner"], start)
-    told = settings | {
+    with_noise = settings | {
         "theta_noise": NOISE["theta"],
         "theta_dot_noise": NOISE["theta_dot"],
         "theta_dot_process_noise": logs[0].condition.motion.process_noise,
@@ -81,7 +81,7 @@ def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
     y, u, trim, missing = (part.swapaxes(0, 1) for part in (signals[..., :2], signals[..., 2:], trim, missing))
     kind = KINDS["lever"]
     nothing = Truth(y, None, y)
-    return Batch(kind.make(settings, "trim"), PERIOD, y, u, trim, knowledge(told, kind), nothing, y, u, missing)
+    return Batch(kind.make(settings, "trim"), PERIOD, y, u, trim, knowledge(with_noise, kind), nothing, y, u, missing)
 
 
 def held(signals: Array) -> Array:

@@ -36,15 +36,15 @@ class Log:
 
 def chunks(conditions: Iterable[Condition], seeds: int) -> list[list[Condition]]:
     """Conditions that are filtered together: as long, with the same process noise, at most LANES runs."""
-    found: dict[tuple[object, ...], list[list[Condition]]] = {}
+    by_kind: dict[tuple[object, ...], list[list[Condition]]] = {}
     for condition in conditions:
         motion = condition.motion
         kind = (motion.duration, motion.process_noise, motion.pilot == "arm", condition.closed_loop)
-        groups = found.setdefault(kind, [[]])
+        groups = by_kind.setdefault(kind, [[]])
         if groups[-1] and seeds * sum(one.runs for one in (*groups[-1], condition)) > LANES:
             groups.append([])
         groups[-1].append(condition)
-    return [group for groups in found.values() for group in groups]
+    return [group for groups in by_kind.values() for group in groups]
 
 
 def logs(chunk: Sequence[Condition], seeds: int) -> Iterator[Log]:
@@ -76,18 +76,18 @@ def _key(condition: Condition) -> _Key:
 
 def _recordings(keys: Iterable[_Key], seeds: int) -> dict[_Key, Recording]:
     """All recordings of a chunk: arms are simulated side by side, other pilots one by one."""
-    found = {key: pilots.record(key.motion, range(seeds * key.runs)) for key in keys if key.motion.pilot != "arm"}
+    recordings = {key: pilots.record(key.motion, range(seeds * key.runs)) for key in keys if key.motion.pilot != "arm"}
     given = {key: lanes(key.motion, range(seeds * key.runs)) for key in keys if key.motion.pilot == "arm"}
     if not given:
-        return found
+        return recordings
     theta, theta_dot = plant.run(plant.beside(list(given.values())))
     first = 0
     for key, part in given.items():
         own = slice(first, first + seeds * key.runs)
         first = own.stop
         signals = (theta[:, own], theta_dot[:, own], part.tau_m, part.z_ddot)
-        found[key] = Recording(key.motion.time, *signals, truth(part))
-    return found
+        recordings[key] = Recording(key.motion.time, *signals, truth(part))
+    return recordings
 
 
 def _firmware(condition: Condition, signals: Mapping[str, Array], response: bool) -> firmware.Track | None:

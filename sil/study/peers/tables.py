@@ -44,10 +44,10 @@ def _text(value: float) -> str:
 
 def rows(results: Sequence[Result]) -> list[Row]:
     """A row for each estimator in each condition, with numbers."""
-    found: list[Row] = []
+    table: list[Row] = []
     for result in results:
         (rms, worst), (covered, least) = _two(result, "rms"), _two(result, "covered")
-        found.append(
+        table.append(
             {
                 "condition": result.condition,
                 "estimator": result.estimator,
@@ -58,17 +58,17 @@ def rows(results: Sequence[Result]) -> list[Row]:
                 "covered worst [%]": least,
             }
         )
-    return found
+    return table
 
 
 def differences(results: Sequence[Result]) -> Differences:
     """Of the peers' errors against the firmware's in each condition; without those that broke down in a run."""
-    found: Differences = {}
+    compared: Differences = {}
     for condition, group in groupby(results, key=lambda result: result.condition):
         squares = {one.estimator: np.square(one.rms)[:, np.newaxis] for one in group if np.isfinite(one.rms).all()}
         if FIRMWARE in squares and len(squares) > 1:
-            found |= of_errors(condition, squares, FIRMWARE)
-    return corrected(found)[0]
+            compared |= of_errors(condition, squares, FIRMWARE)
+    return corrected(compared)[0]
 
 
 def verdicts(results: Sequence[Result]) -> Iterator[str]:
@@ -76,9 +76,9 @@ def verdicts(results: Sequence[Result]) -> Iterator[str]:
     if any(len(result.rms) < LEAST_RUNS for result in results):
         yield f"Too few runs for a verdict: at least {LEAST_RUNS} are needed."
         return
-    found = differences(results)
+    compared = differences(results)
     for peer in PEERS:
-        pairs = {condition: one for (condition, name), one in found.items() if name == peer}
+        pairs = {condition: one for (condition, name), one in compared.items() if name == peer}
         if not pairs:
             continue
         larger = [condition for condition, one in pairs.items() if one.significant and one.more < 0.0]

@@ -113,8 +113,8 @@ class Offset(Fault):
 
     by: float = quantity(SIGNAL)
 
-    def corrupt(self, inside, found, rng):
-        found.offset[inside] += self.by
+    def corrupt(self, inside, corruption, rng):
+        corruption.offset[inside] += self.by
 
 
 FAULTS: dict[str, type[Fault]] = {"offset": Offset, '''

@@ -17,6 +17,7 @@ import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.board.firmware_image import FLASH, flash_contents
 from lever_cdkf.host_tools.errors import LeverError
+from python.conftest import Refused
 
 CONTENTS = bytes(range(256)) * 300
 """More than 64 KiB, so that an Intel HEX file needs a second upper address."""
@@ -77,11 +78,6 @@ def install(folder: Path, name: str, says: str, status: int) -> Path:
     return arguments
 
 
-def error_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert cli.main(["flash", *arguments]) == 2
-    return capsys.readouterr().err.splitlines()[-1]
-
-
 # --- the image -------------------------------------------------------------------------------------------------------
 
 
@@ -116,17 +112,17 @@ def test_damaged_image_is_refused(name: str, data: bytes, tmp_path: Path) -> Non
         flash_contents(tmp_path / name)
 
 
-def test_what_is_no_image_or_not_there_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_image_or_not_there_is_refused(tmp_path: Path, refused: Refused) -> None:
     (tmp_path / "notes.txt").write_text("hello")
-    assert "neither .bin nor .hex nor a 32-bit ELF" in error_of(capsys, str(tmp_path / "notes.txt"))
-    assert "cannot read" in error_of(capsys, str(tmp_path / "none.elf"))
+    assert "neither .bin nor .hex nor a 32-bit ELF" in refused("flash", tmp_path / "notes.txt")
+    assert "cannot read" in refused("flash", tmp_path / "none.elf")
 
 
 def test_without_an_image_it_says_how_to_build_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert "cmake --preset stm32f4" in error_of(capsys)
+    assert "cmake --preset stm32f4" in refused("flash")
 
 
 # --- what is run -----------------------------------------------------------------------------------------------------
@@ -181,17 +177,18 @@ def test_dry_run_runs_nothing(image: Path, stand_in: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize("probe", ["usb", "stlink:a b", "stlink:x;shutdown"])
-def test_probe_is_checked(probe: str, image: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert f"--probe {probe}" in error_of(capsys, str(image), "--probe", probe)
+def test_probe_is_checked(probe: str, image: Path, refused: Refused) -> None:
+    assert f"--probe {probe}" in refused("flash", image, "--probe", probe)
 
 
 # --- what goes wrong -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.usefixtures("stand_in")
-def test_without_a_tool_it_says_how_to_get_one(image: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert 'apt install openocd, or pip install "lever-cdkf[flash]"' in error_of(capsys, str(image))
-    assert "no pyocd here" in error_of(capsys, str(image), "--tool", "pyocd")
+def test_without_a_tool_it_says_how_to_get_one(image: Path, refused: Refused) -> None:
+    install = f'apt install openocd, or {sys.executable} -m pip install "lever-cdkf[flash]"'
+    assert install in refused("flash", image)
+    assert "no pyocd is installed" in refused("flash", image, "--tool", "pyocd")
 
 
 @pytest.mark.parametrize(

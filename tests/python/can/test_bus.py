@@ -91,18 +91,6 @@ def test_buses_of_one_channel_share_nothing(make_bus: MakeBus, samples: Samples,
     assert other.recv(0.0) is None
 
 
-def test_hundreds_of_buses(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
-    buses = [make_bus(str(index), settings={"k_p": 800.0 + index}) for index in range(200)]
-    inputs = samples(0, 40)
-    together: list[list[can.Message]] = [[] for _ in buses]
-    for sample in inputs:
-        for bus, answers in zip(buses, together, strict=True):
-            answers += exchange(bus, sample)
-    for index in (0, 77, 199):
-        alone = make_bus(settings={"k_p": 800.0 + index})
-        assert seen([answer for sample in inputs for answer in exchange(alone, sample)]) == seen(together[index])
-
-
 # --- receiving -------------------------------------------------------------------------------------------------------
 
 

@@ -185,16 +185,6 @@ def test_choices_by_name() -> None:
         codec.encode("COMMAND", 0, {**by_name, "dither_rms": math.nan})
 
 
-def test_command_choices_are_those_of_the_firmware() -> None:
-    for key in ("model", "preload", "estimator", "adaptation"):
-        signal = MESSAGES["COMMAND"].get_signal_by_name(key)
-        names = {raw: str(name) for raw, name in (signal.choices or {}).items()}
-        assert names == {**native.enum_names(f"lever_{key}"), native.lib.LEVER_KEEP: "keep"}
-    modes = MESSAGES["HEALTH"].get_signal_by_name("mode").choices
-    assert modes is not None
-    assert {raw: str(name) for raw, name in modes.items()} == native.enum_names("lever_mode")
-
-
 @pytest.mark.parametrize("change", [{"theta": None}, {"speed": 1.0}])
 def test_missing_and_unknown_names(change: dict[str, float | None]) -> None:
     values = {"theta": 0.1, "theta_dot": 0.1, "tau_m": 0.1, **change}

@@ -15,7 +15,7 @@ from cantools.database.can import Message, Signal
 from python.can.codec import DBC, MULTIPLEXED, Codec, is_quantity, limits, not_available, scaled
 
 MESSAGES = [pytest.param(message, id=message.name) for message in DBC.messages]
-SWEEP = 5000
+SWEEP = 500
 
 
 def fields(message: Message) -> list[Signal]:

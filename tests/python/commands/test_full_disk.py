@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import pytest
-from processes import LEVER, small_files
+from processes import full_disk
+from python.conftest import Run
 
 COMPARE = ["compare", "--scenarios", "step_up", "--estimators", "joint_ekf", "--seeds", "1", "--duration", "2"]
 
@@ -21,18 +21,15 @@ COMPARE = ["compare", "--scenarios", "step_up", "--estimators", "joint_ekf", "--
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
-def test_all_files_or_none(command: list[str], size: int, fits: str, tmp_path: Path) -> None:
+def test_all_files_or_none(command: list[str], size: int, fits: str, tmp_path: Path, lever: Run) -> None:
     """`fits` would go in."""
     (tmp_path / fits).write_text("of an earlier run")
-    done = subprocess.run(
-        [LEVER, *command, str(tmp_path)], preexec_fn=small_files(size), capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith(f"lever: error: cannot write {tmp_path}/")
-    assert done.stderr.count("\n") == 1
+    with full_disk(size):
+        status, _, error = lever(*command, tmp_path)
+    assert (status, error.count("\n")) == (2, 1)
+    assert error.startswith(f"lever: error: cannot write {tmp_path}/")
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(fits, "of an earlier run")]
-    whole = subprocess.run([LEVER, *command, str(tmp_path)], capture_output=True, text=True, check=False)
-    assert whole.returncode == 0, whole.stderr
+    assert lever(*command, tmp_path)[0] == 0
     assert 10 < (tmp_path / fits).stat().st_size <= size
     assert max(path.stat().st_size for path in tmp_path.iterdir()) > size
     assert not any(path.name.startswith(".") for path in tmp_path.iterdir())

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus, LeverBusError
+from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware.native import Config
 
 pytestmark = pytest.mark.usefixtures("installed")
@@ -32,11 +32,6 @@ def test_python_can_knows_the_interface(samples: Samples) -> None:
             assert 0x210 in [answer.arbitration_id for answer in iter(bus.recv, None)]
 
 
-def test_errors_come_through_python_can() -> None:
-    with pytest.raises(LeverBusError, match=r"m_p = 100.0 is out of range"):
-        can.Bus(interface="lever", channel="x", settings={"m_p": 100.0})
-
-
 def test_can_player_plays_a_recording(samples: Samples, tmp_path: Path) -> None:
     log = tmp_path / "session.log"
     with can.CanutilsLogWriter(log, channel="vcan0") as writer:
@@ -44,11 +39,9 @@ def test_can_player_plays_a_recording(samples: Samples, tmp_path: Path) -> None:
             for identifier, data in sample:
                 frame = can.Message(1.0 + k * 1e-3, identifier, is_extended_id=False, data=data)
                 writer.on_message_received(frame)
-    player = [sys.executable, "-m", "can.player", "-i", "lever", "-c", "bench", str(log)]
-    done = subprocess.run(player, capture_output=True, text=True, check=False, timeout=60)
+    player = [sys.executable, "-m", "can.player", "-v", "-v", "-i", "lever", "-c", "bench", str(log)]
+    done = subprocess.run(player, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    player[3:3] = ["-v", "-v"]
-    done = subprocess.run(player, capture_output=True, text=True, check=False, timeout=60)
     assert len(re.findall(r"ID: {6}11[01] ", done.stdout)) == 100
 
 

@@ -11,8 +11,6 @@ import pytest
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.firmware.config import settings_table
 from lever_cdkf.sil.envelope import measure, motions, pilots, plant
-from lever_cdkf.sil.envelope.condition import Limit
-from lever_cdkf.sil.envelope.conditions import CONDITIONS
 from lever_cdkf.sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_cdkf.sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_cdkf.sil.envelope.motions import Motion, Recording
@@ -115,6 +113,98 @@ def test_pilots_of_sil_answer_the_base_as_their_response_says(pilot: str) -> Non
     assert np.linalg.norm(seen - recording.response[0]) < 0.08 * np.linalg.norm(recording.response[0])
 
 
+# --- motions ---------------------------------------------------------------------------------------------------------
+
+
+def test_what_the_pilot_does_is_as_asked() -> None:
+    """Against runs of the same seeds in which he does nothing, at 29 s, and when all has happened."""
+    seeds, still = range(4), motions.lanes(Motion(duration=40.0), range(4))
+    time = np.arange(40_001) * 1e-3
+
+    def given(**asked: object) -> plant.Lanes:
+        return motions.lanes(Motion(duration=40.0, **asked), seeds)  # type: ignore[arg-type]
+
+    retrimmed = np.degrees(given(retrim=8.0).trim - still.trim)
+    np.testing.assert_allclose(
+        retrimmed, np.interp(time, (30.0, 34.0), (0.0, 8.0))[:, None] + np.zeros((1, 4)), atol=1e-9
+    )
+    factor = np.array((1.0, -1.0, 1.0, -1.0))
+    for asked, angle, seconds in (({"grip": 1.3}, 1.0, 0.05), ({"grip": 1.3, "grip_moves": (3.0, 0.5)}, 3.0, 0.5)):
+        gripped, moment = given(**asked), np.interp(time, (30.0, 30.0 + seconds), (0.0, 1.0))[:, None]
+        for name in ("c_p", "k_p"):
+            changed = getattr(gripped, name) / getattr(still, name)
+            np.testing.assert_allclose(changed, 1.0 + (1.3**-factor - 1.0) * moment, rtol=1e-9)
+        moved = np.degrees(gripped.trim - still.trim)
+        np.testing.assert_allclose(moved, angle * moment + np.zeros((1, 4)), atol=1e-9)
+    ramp = np.interp(time, (20.0, 35.0), (42.0, 18.0))[:, None] + np.zeros((1, 4))
+    np.testing.assert_allclose(given(damping=(42.0, 18.0, 20.0, 35.0)).c_p, ramp)
+    swaying = np.degrees(given(sway=(2.0, 0.3)).trim - still.trim)
+    assert np.ptp(swaying, axis=0) == pytest.approx(4.0, rel=1e-4)
+    np.testing.assert_allclose(swaying[10_000:20_000:100], swaying[:10_000:100], atol=1e-9)  # three periods later
+    wandering = np.degrees(given(wander=1.0).trim - still.trim)
+    assert np.sqrt(np.mean(wandering**2, axis=0)) == pytest.approx(1.0)
+    paused, moving = given(pause=(20.0, 30.0)), (time < 20.0) | (time >= 30.0)
+    for signal, other in ((paused.z_ddot, still.z_ddot), (paused.tau_m, still.tau_m), (paused.kick, still.kick)):
+        np.testing.assert_array_equal(signal, other * moving[:, None])
+    for asked, later in (({}, 1.0), ({"next_pilot": 2.0}, 2.0**-factor)):
+        released, held = given(released=(20.0, 30.0), **asked), np.where(time[:, None] < 20.0, 1.0, later)
+        for name in ("c_p", "k_p"):
+            np.testing.assert_allclose(getattr(released, name), getattr(still, name) * held * moving[:, None])
+        np.testing.assert_array_equal(released.m_p, still.m_p * moving[:, None])
+    drawn = np.array([motions.lanes(Motion(duration=1.0, friction_sigma=0.05), range(200)).friction])
+    assert np.sqrt(np.mean(drawn**2)) == pytest.approx(0.05, rel=0.15)
+    assert (drawn > 0.0).all()
+
+
+def test_what_disturbs_the_lever_is_as_asked() -> None:
+    """rms and, of a torque that is slow, its correlation; of what is in a band, where its power is."""
+    seeds = range(6)
+    slow = motions.lanes(Motion(duration=60.0, slow_torque=0.7), seeds).disturbance
+    assert np.sqrt(np.mean(slow**2)) == pytest.approx(0.7, rel=0.1)
+    assert np.mean(slow[300:] * slow[:-300]) / np.mean(slow**2) == pytest.approx(math.exp(-1.0), abs=0.08)
+    wide = motions.lanes(Motion(duration=20.0, base=0.8, dither=0.2, process_noise=0.07, tremor=0.3, wander=2.0), seeds)
+    for signal, rms, low, high in (
+        (wide.z_ddot, 0.8, 1.0, 10.0),
+        (wide.tau_m, 0.2, 1.0, 10.0),
+        (wide.disturbance, 0.3, 3.0, 5.0),
+        (wide.trim - motions.arms(seeds)[3], math.radians(2.0), 0.05, 0.5),
+    ):
+        assert np.sqrt(np.mean(signal**2, axis=0)) == pytest.approx(rms)
+        power = np.sum(np.abs(np.fft.rfft(signal, axis=0)) ** 2, axis=1)
+        frequency = np.fft.rfftfreq(len(signal), 1e-3)
+        inside = (frequency > 0.95 * low) & (frequency < 1.02 * high)
+        assert power[inside].sum() > 0.999999 * power.sum()
+        assert power[inside & (frequency > 0.5 * (low + high))].sum() > 0.3 * power.sum()
+    assert np.std(wide.kick) == pytest.approx(0.07 * math.sqrt(1e-3), rel=0.02)
+
+
+def test_pilots_are_drawn_about_the_firmwares_first_guess() -> None:
+    m_p, c_p, k_p, trim = motions.arms(range(400))
+    default = {row.name: row.default for row in settings_table()}
+    for values, name, spread in ((m_p, "m_p", 0.25), (c_p, "c_p", 0.3), (k_p, "k_p", 0.3)):
+        w = np.log(values / default[name]) / spread
+        assert abs(np.mean(w)) < 0.15
+        assert np.std(w) == pytest.approx(0.92, abs=0.08)  # of a normal number that stays within 1.8
+        assert np.abs(w).max() == pytest.approx(1.8)
+    assert (np.degrees(trim.min()), np.degrees(trim.max())) == pytest.approx((10.0, 28.0), abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("pilot", "stiffness"),
+    [
+        ("hysteretic", lambda c_p, k_p, s: k_p * (1.0 + 0.6j) + 0.0 * s),
+        ("reflex", lambda c_p, k_p, s: k_p * (1.0 + 0.25 * np.exp(-0.035 * s)) + c_p * s),
+    ],
+)
+def test_linear_pilots_have_the_stiffness_that_they_are_known_for(
+    pilot: str, stiffness: Callable[[FloatArray, FloatArray, ComplexArray], ComplexArray]
+) -> None:
+    frequency = np.array((2.0, 4.0, 8.0))
+    c_p, k_p = np.array(((42.0,), (30.0,))), np.array(((1500.0,), (900.0,)))
+    expected = stiffness(c_p, k_p, 2j * np.pi * frequency)
+    np.testing.assert_allclose(pilots.LINEAR[pilot](c_p, k_p, frequency), expected)
+
+
 # --- sensors ---------------------------------------------------------------------------------------------------------
 
 
@@ -134,6 +224,20 @@ def test_gain_and_delay() -> None:
             (off[name] - clean[name])[10:], (gain * (ramps().theta - late) - ramps().theta)[10:], atol=1e-12
         )
         assert np.std(clean[name] - ramps().theta) == pytest.approx(NOISE[name], rel=0.05)
+
+
+def test_the_sensor_of_the_grip_force_has_gain_bias_and_noise() -> None:
+    force = 10.0 * ramps(40).theta
+    held = replace(ramps(40), grip_force=force)
+    assert "grip_force" not in measured(held, Sensors(), range(40))
+    clean = measured(held, Sensors(grip_gain=1.0), range(40))["grip_force"]
+    assert np.mean(clean - force) == pytest.approx(2.0, abs=0.01)
+    assert np.std(clean - force) == pytest.approx(0.3, rel=0.02)
+    off = measured(held, Sensors(grip_gain=1.5, grip_gain_sigma=0.02), range(40))["grip_force"] - clean
+    gains = off[1:] / force[1:]
+    np.testing.assert_allclose(gains, np.broadcast_to(gains[-1], gains.shape), atol=1e-9)
+    assert np.mean(gains[-1]) == pytest.approx(0.5, abs=0.01)
+    assert np.std(gains[-1]) == pytest.approx(0.02, rel=0.4)
 
 
 @pytest.mark.parametrize(
@@ -251,22 +355,3 @@ def test_feedthrough() -> None:
         stated = Feedthrough(response, np.full(response.shape, gain_sigma), np.full(response.shape, phase_sigma))
         stating = replace(case, track=replace(case.track, feedthrough=stated))
         np.testing.assert_array_equal(FIGURES["θ/z̈ covered"].compute(stating), (covered, 100.0))
-
-
-# --- table -----------------------------------------------------------------------------------------------------------
-
-
-def test_every_condition_asks_for_figures_that_there_are() -> None:
-    for condition in CONDITIONS.values():
-        assert set(condition.figures) <= set(FIGURES), condition.name
-        assert condition.against is None or CONDITIONS[condition.against].motion == condition.motion
-        assert condition.limits or not condition.unless
-
-
-@pytest.mark.parametrize(
-    ("limit", "kept", "broken"), [(Limit("lag", most=1.5), 1.5, 1.6), (Limit("f_n covered", least=90.0), 90.0, 89.0)]
-)
-def test_limits(limit: Limit, kept: float, broken: float) -> None:
-    assert limit.holds(kept)
-    assert not limit.holds(broken)
-    assert not limit.holds(math.nan)

@@ -340,10 +340,24 @@ def test_run_samples_takes_columns_not_tables() -> None:
 
 
 def test_run_samples_takes_outliers_for_what_they_are() -> None:
-    """A spike is the firmware's to judge, not another unit."""
+    """A spike is the firmware's to judge, not another unit: up to one in a hundred."""
     samples = recording(1000)
     samples["theta"][500:505] = 20.0
     assert native.run_samples(None, samples)["theta"].shape == (1000,)
+    samples["theta"][500:513] = 20.0
+    with pytest.raises(LeverError, match="theta is beyond"):
+        native.run_samples(None, samples)
+
+
+@pytest.mark.parametrize(("step_us", "taken"), [(34, True), (33, False), (29_999, True), (30_001, False)])
+def test_run_samples_takes_a_step_of_another_size_but_not_of_another_unit(step_us: int, taken: bool) -> None:
+    """A thirtieth of sample_period to thirty of it."""
+    samples = {"time_us": step_us * np.arange(10), "theta": np.zeros(10)}
+    if taken:
+        assert native.run_samples(None, samples)["theta"].shape == (10,)
+    else:
+        with pytest.raises(LeverError, match="is it in microseconds"):
+            native.run_samples(None, samples)
 
 
 # --- loading ---------------------------------------------------------------------------------------------------------

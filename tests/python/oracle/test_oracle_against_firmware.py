@@ -113,7 +113,7 @@ class Case:
     preload: str = "trim"
     adaptation: str = "fixed"
     block: int = 10  # samples that the parameters learn from at once
-    seconds: float = 5.0
+    seconds: float = 3.0
     form: str = ""  # of the oracle, where it is not named like the estimator
     settings: tuple[tuple[str, float], ...] = ()
     force: bool = False  # with the grip force
@@ -141,9 +141,9 @@ CASES = (
     *(Case(estimator=estimator, block=block) for estimator, block in (("dual", 1), ("joint", 25))),
     *(Case(estimator=e, adaptation=a) for e, a in (("dual", "annealing"), ("joint", "forgetting"))),
     Case(adaptation="robbins_monro", seconds=10.0, block=20, flags=("change",)),
-    Case(estimator="joint", adaptation="robbins_monro", seconds=10.0, settings=CALIBRATED),
-    Case(seconds=10.0, force=True, settings=FORCE),
-    Case(estimator="joint", preload="fixed", seconds=10.0, force=True, settings=FORCE),
+    Case(estimator="joint", adaptation="robbins_monro", seconds=6.0, settings=CALIBRATED),
+    Case(seconds=6.0, force=True, settings=FORCE),
+    Case(estimator="joint", preload="fixed", seconds=6.0, force=True, settings=FORCE),
     Case(model="hand", force=True),
     Case(adaptation="robbins_monro", seconds=10.0, settings=QUIET, flags=("change", "innovation")),
 )

@@ -75,13 +75,13 @@ def test_it_is_the_joint_filter(form: str, share: float) -> None:
 
     What a walk of w leaves unexplained of x, the dual filter drops and the joint one keeps.
     """
-    samples = recorded(1500, PILOT * [1.2, 0.8, 1.1])
+    samples = recorded(700, PILOT * [1.2, 0.8, 1.1])
     estimator = Estimator(EACH_SAMPLE, start_of(samples), "fixed", "fixed", estimator=form)
     estimator.learning.greatest_sigma = np.full(3, np.inf)
     lever = Lever.from_settings(SETTINGS, "fixed")
     z, factor = estimate(estimator), estimator.belief.joint_factor
     noise = np.linalg.cholesky(process_covariance(1e-3))
-    for k in range(1, 1500):
+    for k in range(1, 700):
         u = tuple(0.5 * float(samples[name][k] + samples[name][k - 1]) for name in ("z_ddot", "tau_m"))
 
         def step(z: Array, u: tuple[float, ...] = u) -> Array:
@@ -129,16 +129,6 @@ def test_agrees_with_the_unscented_filter_of_filterpy() -> None:
     np.testing.assert_allclose(sigma, np.sqrt(reference.P.diagonal()), rtol=0.01)
 
 
-def test_finds_another_pilot_within_its_own_uncertainty() -> None:
-    pilot = PILOT * [1.2, 0.7, 0.85]
-    samples = recorded(5000, pilot)
-    estimator = Estimator(SETTINGS, start_of(samples), "fixed")
-    feed(estimator, samples, 1, 5000)
-    found, sigma = estimator.parameters()
-    assert (np.abs(found - pilot) < 3.0 * sigma).all()
-    assert (sigma < 0.12 * pilot).all()
-
-
 def test_coasting_moves_with_the_model_and_grows_uncertain() -> None:
     samples = recorded(1200)
     estimator = Estimator(EACH_SAMPLE, start_of(samples), "fixed")
@@ -182,10 +172,10 @@ def test_annealing_falls_exponentially_to_the_floor() -> None:
 
 
 def test_robbins_monro_stays_between_floor_and_ceiling_and_uses_the_room() -> None:
-    samples = recorded(3000, PILOT * [1.5, 0.5, 1.6])
+    samples = recorded(1500, PILOT * [1.5, 0.5, 1.6])
     estimator = Estimator(SETTINGS | {"walk_ceiling": 3.0}, start_of(samples), "fixed", "robbins_monro")
     seen = []
-    for k in range(1, 3000):
+    for k in range(1, 1500):
         feed(estimator, samples, k, k + 1)
         seen.append(estimator.learning.walk / estimator.learning.floor)
     assert np.min(seen) >= 1.0
@@ -193,21 +183,21 @@ def test_robbins_monro_stays_between_floor_and_ceiling_and_uses_the_room() -> No
 
 
 def test_without_motion_the_walk_is_at_its_floor_and_the_uncertainty_limited() -> None:
-    nothing = np.zeros(4000)
-    still = {"time": np.arange(4000) * 1e-3, "y": np.tile([0.35, 0.0], (4000, 1)), "z_ddot": nothing, "tau_m": nothing}
+    nothing = np.zeros(2000)
+    still = {"time": np.arange(2000) * 1e-3, "y": np.tile([0.35, 0.0], (2000, 1)), "z_ddot": nothing, "tau_m": nothing}
     walk = {f"{name}_walk": 0.5 for name in ("m_p", "c_p", "k_p")}
     estimator = Estimator(SETTINGS | walk, start_of(still), "fixed")
-    feed(estimator, still, 1, 4000)
+    feed(estimator, still, 1, 2000)
     np.testing.assert_array_equal(estimator.learning.walk, estimator.learning.floor)
     assert (cdkf.deviations(estimator.belief.w_factor) <= estimator.learning.greatest_sigma * (1.0 + 1e-9)).all()
 
 
 def test_parameters_stay_in_their_bounds() -> None:
-    samples = recorded(4000, PILOT * [1.0, 1.0, 1.8])
+    samples = recorded(2000, PILOT * [1.0, 1.0, 1.8])
     bounds = np.array([[1.0, 5.0], [10.0, 100.0], [1000.0, 1600.0]])
     estimator = Estimator(SETTINGS, start_of(samples), bounds=bounds)
     seen = []
-    for k in range(1, 4000):
+    for k in range(1, 2000):
         feed(estimator, samples, k, k + 1)
         seen.append(estimator.parameters()[0])
     assert (np.min(seen, axis=0) >= bounds[:, 0] * (1 - 1e-12)).all()
@@ -219,10 +209,10 @@ def test_parameters_stay_in_their_bounds() -> None:
 
 
 def test_noise_that_is_set_too_small_is_found() -> None:
-    samples = recorded(4000)
+    samples = recorded(2500)
     settings = SETTINGS | {"noise_window": 0.5, "theta_noise": SETTINGS["theta_noise"] / 3.0}
     estimator = Estimator(settings, start_of(samples), "fixed")
-    feed(estimator, samples, 1, 4000)
+    feed(estimator, samples, 1, 2500)
     np.testing.assert_allclose(estimator.learning.noise.output_noise, OUTPUT_NOISE.diagonal(), rtol=0.1)
 
 
@@ -242,10 +232,10 @@ def test_white_corrections_are_no_change_and_a_drift_is() -> None:
 
 @pytest.mark.parametrize("frequency", [0.1, 1.0, 4.0])
 def test_detrending_is_a_butterworth_high_pass(frequency: float) -> None:
-    time = np.arange(0.0, 60.0, 1e-3)
+    time = np.arange(0.0, 30.0, 1e-3)
     detrend = Detrend()
     out = np.array([detrend.step(value, 1.0, 1e-3) for value in np.sin(2 * np.pi * frequency * time).tolist()])
-    late = time >= 50.0
+    late = time >= 20.0
     wave = np.exp(-2j * np.pi * frequency * time[late])
     gain = (out[late] * wave).mean() / (np.sin(2 * np.pi * frequency * time[late]) * wave).mean()
     numerator, denominator = butter(6, 2 * np.pi, "highpass", analog=True)

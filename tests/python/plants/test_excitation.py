@@ -67,9 +67,9 @@ def test_noise_is_flat_in_its_band_gaussian_and_nothing_outside() -> None:
 
 
 def test_gauss_markov_noise_has_its_variance_and_its_correlation() -> None:
-    """Mean over 40 seeds of the autocorrelation, unscaled, against exp(-t / T) and the variance 1."""
+    """Mean over 20 seeds of the autocorrelation, unscaled, against exp(-t / T) and the variance 1."""
     kind = excitation.GaussMarkov(rms=1.0, correlation_time=0.3)
-    waves = np.stack([kind.waveform(TIME, np.random.default_rng(seed)) for seed in range(40)])
+    waves = np.stack([kind.waveform(TIME, np.random.default_rng(seed)) for seed in range(20)])
     for lag in (0, 100, 300, 600):
         products = waves[:, lag:] * waves[:, : len(TIME) - lag]
         assert products.mean() == pytest.approx(math.exp(-lag * PERIOD / 0.3), abs=0.05)

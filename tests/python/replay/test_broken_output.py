@@ -9,24 +9,20 @@ import time
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.replay.outputs import FILES
-from processes import LEVER, small_files
-from python.conftest import Session
+from processes import LEVER, full_disk
+from python.conftest import Refused, Session
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of the file that cannot be closed
 @pytest.mark.parametrize("size", [10_000, 500_000, 1_000_000, 2_500_000], ids=lambda size: f"{size} bytes")
-def test_a_full_disk_is_one_line_and_no_file(size: int, session: Session, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert cli.main(["replay", str(session.log), "-o", str(out)]) == 0
-    before = {path.name: path.read_bytes() for path in out.iterdir()}
-    command = [LEVER, "replay", str(session.log), "-o", str(out), "--set", "m_p=3"]
-    done = subprocess.run(command, preexec_fn=small_files(size), capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr.startswith("lever: error: cannot write ")
-    assert done.stderr.count("\n") == 1, done.stderr
-    assert str(out) in done.stderr
-    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+def test_a_full_disk_is_one_line_and_no_file(size: int, session: Session, tmp_path: Path, refused: Refused) -> None:
+    for name in FILES:
+        (tmp_path / name).write_text("of an earlier run")
+    with full_disk(size):
+        line = refused("replay", session.log, "-o", tmp_path)
+    assert line.startswith(f"lever: error: cannot write {tmp_path}")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(FILES, "of an earlier run")
 
 
 def test_ctrl_c_leaves_nothing(session: Session, tmp_path: Path) -> None:
@@ -46,12 +42,9 @@ def test_ctrl_c_leaves_nothing(session: Session, tmp_path: Path) -> None:
     assert list(out.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_made_is_one_line(
-    session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_cannot_be_made_is_one_line(session: Session, tmp_path: Path, refused: Refused) -> None:
     (tmp_path / "file").touch()
-    assert cli.main(["replay", str(session.log), "-o", str(tmp_path / "file/out")]) == 2
-    assert "cannot make the folder" in capsys.readouterr().err
+    assert "cannot make the folder" in refused("replay", session.log, "-o", tmp_path / "file/out")
 
 
 @pytest.mark.parametrize(
@@ -70,15 +63,12 @@ def test_a_log_is_not_written_over_by_what_is_made_of_it(
     session: Session,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    refused: Refused,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("d").mkdir()
     Path("d/bus.log").write_bytes(session.log.read_bytes())
     Path("link.log").symlink_to("d/bus.log")
-    assert cli.main(arguments) == 2
-    shown = capsys.readouterr()
-    assert shown.err.endswith(": it is an input: choose another folder or name\n")
-    assert (shown.out, shown.err.count("\n")) == ("", 1)
+    assert refused(*arguments).endswith(": it is an input: choose another folder or name\n")
     assert os.listdir("d") == ["bus.log"]
     assert Path("d/bus.log").read_bytes() == session.log.read_bytes()

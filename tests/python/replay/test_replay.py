@@ -18,7 +18,7 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.replay import reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
-from python.conftest import Session, simulated
+from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, read
 
 Summary = dict[str, Any]
@@ -57,7 +57,7 @@ def estimates(log: Path) -> list[tuple[str, str]]:
 # --- the same again --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["steady", "sensor_dropout", "linear_physical", "linear_black_box", "fixed_preload"])
+@pytest.mark.parametrize("name", ["sensor_dropout", "linear_black_box", "fixed_preload"])
 def test_the_log_of_a_simulation_is_reproduced_to_the_byte(name: str, tmp_path: Path) -> None:
     session = simulated(name, tmp_path / "sim")
     summary = replayed(tmp_path / "out", session.log, "--settings", settings_of(session, tmp_path))
@@ -91,16 +91,11 @@ def test_two_replays_are_equal_in_every_file(session: Session, replay: tuple[Pat
         first, second = ((folder / name).read_bytes() for folder in (replay[0], tmp_path / "again"))
         assert hashlib.sha256(first).digest() == hashlib.sha256(second).digest(), name
     assert sorted(path.name for path in replay[0].iterdir()) == sorted(FILES)
+    assert (replay[0] / "bus.log").read_bytes() == session.log.read_bytes()
 
 
-def test_replaying_a_replay_changes_nothing(replay: tuple[Path, Summary], tmp_path: Path) -> None:
-    replayed(tmp_path / "again", replay[0] / "bus.log")
-    assert (tmp_path / "again/bus.log").read_bytes() == (replay[0] / "bus.log").read_bytes()
-
-
-@pytest.mark.parametrize("suffix", ["blf", "asc", "mf4", "trc", "csv", "log.gz"])
-def test_any_format_gives_the_same_estimates(suffix: str, session: Session, tmp_path: Path) -> None:
-    path = tmp_path / f"session.{suffix}"
+def test_another_format_gives_the_same_estimates(session: Session, tmp_path: Path) -> None:
+    path = tmp_path / "session.mf4"
     with can.LogReader(session.log) as reader, can.Logger(path) as logger:
         for message in reader:
             logger.on_message_received(message)
@@ -273,12 +268,9 @@ def test_a_sender_that_never_counts_fails_and_is_told_why(
     assert "11998" in row
 
 
-def test_settings_that_the_firmware_refuses_are_one_line(
-    session: Session, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refused: Refused, tmp_path: Path) -> None:
     for bad in (["--set", "m_p=1000"], ["--model", "elastic"], ["--set", "k_q=1"], ["--settings", "absent"]):
-        assert cli.main(["replay", str(session.log), *bad, "-o", str(tmp_path / "out")]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+        assert refused("replay", session.log, *bad, "-o", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -68,6 +68,24 @@ def test_a_recorder_whose_clock_is_set_changes_nothing(jump: int) -> None:
     assert timeline.clocks.restarts == 0
 
 
+@pytest.mark.parametrize(("step", "gaps"), [(1499, 0), (1501, 1)])
+def test_a_gap_is_longer_than_a_period_and_a_half(step: int, gaps: int) -> None:
+    recorded, sender = steady(100)
+    sender[50:] += step - 1000
+    recorded[50:] += step - 1000
+    _, timeline = seconds(recorded, sender)
+    assert (timeline.clocks.gaps, timeline.clocks.longest_gap_s) == (gaps, pytest.approx(gaps * step * 1e-6))
+
+
+@pytest.mark.parametrize(("jump", "jumps"), [(990_000, 0), (1_010_000, 1)])
+def test_clocks_agree_within_a_second(jump: int, jumps: int) -> None:
+    recorded, sender = (1000 * np.arange(200, dtype=np.int64) for _ in range(2))
+    recorded[100:] += jump
+    time, timeline = seconds(recorded, sender)
+    np.testing.assert_array_equal(time, np.arange(200) / 1000)
+    assert timeline.clocks.recorder_jumps == jumps
+
+
 def test_missing_and_late_samples_are_counted() -> None:
     recorded, sender = steady(100)
     keep = np.r_[0:40, 45:100]

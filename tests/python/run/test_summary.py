@@ -143,7 +143,7 @@ def test_faults_and_missing_answers_fail_a_run(recording: loop.Recording) -> Non
     recording.unanswered, recording.misplaced = 0, 2
     made = summary.build(recording, trace)
     assert not made.passed
-    assert made.verdict.startswith("Trouble: 2 estimates came that belong to other samples.")
+    assert made.verdict.startswith("Trouble: 2 estimates belong to other samples.")
     recording.misplaced = 0
     trace["mode"][5000:5100] = 5.0
     made = summary.build(recording, trace)
@@ -169,7 +169,7 @@ def test_faults_are_shares_of_the_judged_time(recording: loop.Recording) -> None
 
 
 def test_whether_the_estimator_has_the_settings_of_the_scenario_is_told(recording: loop.Recording) -> None:
-    unknown = "The estimator has not said which settings it has (IDENTITY): those of the scenario are assumed."
+    unknown = "The estimator has not sent its settings (IDENTITY): those of the scenario are assumed."
     made = summary.build(recording, perfect(recording))
     assert made.firmware == Firmware(None, None, None)
     assert made.verdict.endswith(unknown)

@@ -197,7 +197,7 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
         ),
         (MAYO.replace("trim = '20 deg'", "preload = 'fixed'"), "pilot.preload: 'fixed' is not known; allowed: trim"),
         (LEAST + "model = 'two_dof'\nk_t = '-1 N/m'", "pilot.k_t: falls to -1; it must stay above 0"),
-        (BLACK_BOX + "[limits]\na21 = '5 %'", "limits.a21: has no truth in this run to be judged by"),
+        (BLACK_BOX + "[limits]\na21 = '5 %'", "limits.a21: this run has no true value of it"),
         (LEAST + "[limits]\nm_q = '5 %'", "limits: unknown key 'm_q'; allowed: m_p, c_p, k_p, m, c, k, a21"),
         (LEAST + 'preload = "loose"', "pilot.preload: 'loose' is not known; allowed: trim, fixed"),
         (LEAST + 'preload = "fixed"', "'trim' goes with preload trim"),

@@ -14,7 +14,7 @@ from lever_cdkf.host_tools.signals.mapping import read_mapping
 from lever_cdkf.host_tools.signals.online import Online
 from lever_cdkf.host_tools.signals.reading import Reading
 from lever_cdkf.host_tools.watch.mapped import MappedBusSource
-from lever_cdkf.host_tools.watch.model import Picture
+from lever_cdkf.host_tools.watch.picture import Picture
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY
 from python.signals.test_mapped_replay import frequency, refused, replayed
 

@@ -24,6 +24,7 @@ class Plan:
     model: Any
     """A data.Model; the oracle's say float for what that says are arrays."""
     runs: int = 20
+    period: float = PERIOD
     duration: float = 30.0
     base: float = 0.1 * G  # rms of z_ddot [m/s²]
     torque: float = 0.3  # rms of tau_m [N m]
@@ -38,11 +39,11 @@ class Plan:
     seed: int = 1
 
 
-def band_noise(rng: np.random.Generator, runs: int, count: int, rms: float) -> Array:
+def band_noise(rng: np.random.Generator, runs: int, count: int, rms: float, period: float) -> Array:
     """Noise of 1 to 10 Hz, (runs, count)."""
-    length = max(count, round(5.0 / PERIOD))
+    length = max(count, round(5.0 / period))
     spectrum = np.fft.rfft(rng.standard_normal((runs, length)))
-    frequency = np.fft.rfftfreq(length, PERIOD)
+    frequency = np.fft.rfftfreq(length, period)
     spectrum[:, (frequency < 1.0) | (frequency > 10.0)] = 0.0
     noise = np.fft.irfft(spectrum, length)
     scaled: Array = (noise * (rms / noise.std(axis=1, keepdims=True)))[:, :count]
@@ -52,7 +53,7 @@ def band_noise(rng: np.random.Generator, runs: int, count: int, rms: float) -> A
 def simulate(plan: Plan) -> Batch:
     """The truth moves as Batch.move says, w walks, theta_dot walks besides."""
     rng = np.random.default_rng(plan.seed)
-    count = round(plan.duration / PERIOD)
+    count = round(plan.duration / plan.period)
     shape = (plan.runs, count)
     knowledge = Knowledge(
         np.array(plan.guess),
@@ -62,16 +63,16 @@ def simulate(plan: Plan) -> Batch:
         np.array(plan.output_noise),
         plan.process_noise,
     )
-    u = np.stack([band_noise(rng, *shape, rms) for rms in (plan.base, plan.torque)], axis=2)
+    u = np.stack([band_noise(rng, *shape, rms, plan.period) for rms in (plan.base, plan.torque)], axis=2)
     trim = np.full(shape, plan.trim if plan.model.preload == "trim" else 0.0)
-    w = rng.standard_normal((*shape, 3)) * knowledge.walk_w * np.sqrt(PERIOD)
+    w = rng.standard_normal((*shape, 3)) * knowledge.walk_w * np.sqrt(plan.period)
     w[:, 0] = rng.standard_normal((plan.runs, 3)) * knowledge.sigma_w
     w = w.cumsum(axis=1)
     x = np.empty((*shape, 2))
     x[:, 0] = plan.start
     nothing = Truth(x, None, x)
-    batch = Batch(plan.model, PERIOD, x, u, trim, knowledge, nothing, x, u)
-    factor = np.linalg.cholesky(knowledge.process_covariance(PERIOD) + 1e-30 * np.eye(2))
+    batch = Batch(plan.model, plan.period, x, u, trim, knowledge, nothing, x, u)
+    factor = np.linalg.cholesky(knowledge.process_covariance(plan.period) + 1e-30 * np.eye(2))
     kicks = rng.standard_normal((*shape, 2)) @ factor.T
     for k in range(count - 1):
         x[:, k + 1] = batch.move(k, x[:, k], w[:, k]) + kicks[:, k]

@@ -1,4 +1,4 @@
-"""The filter linearised at the truth and the bound, against Kalman filters, Riccati and Fisher, and Monte Carlo."""
+"""The filter linearised at the truth and the bound, against Kalman filters, Fisher and Monte Carlo."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from lever_cdkf.sil.study import bound, linearised
 from lever_cdkf.sil.study.data import Batch, Knowledge, Truth
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, solve_discrete_are
+from scipy.linalg import block_diag
 
 Array = NDArray[Any]  # of floats
-DT, STEPS, RUNS = 1e-2, 700, 120
+DT, STEPS, RUNS = 1e-2, 700, 30
 OUTPUT = np.eye(2, 5, 3)
 
 
@@ -80,21 +80,19 @@ def linear_batch() -> Batch:
     return Batch(Pushed(), DT, y, u, trim, known, Truth(z[..., 3:], p, dynamics), y, u)
 
 
-@functools.cache
-def kalman(run: int) -> tuple[Array, Array]:
-    """FilterPy's Kalman filter on [w; x], started at the first sample: means (K, 5), covariances (K, 5, 5)."""
+def kalman(run: int) -> Array:
+    """Covariances (K, 5, 5) of FilterPy's Kalman filter on [w; x], started at the first sample."""
     batch, known = linear_batch(), linear_batch().knowledge
     reference = KalmanFilter(dim_x=5, dim_z=2)
     reference.x = np.concatenate((np.zeros(3), batch.y[run, 0]))[:, None]
     reference.P = np.diag((1.0, 1.0, 1.0, *known.output_noise**2))
     reference.Q, reference.R, reference.H = process_covariance(known), np.diag(known.output_noise**2), OUTPUT
-    means, covariances = [reference.x[:, 0].copy()], [reference.P.copy()]
+    covariances = [reference.P.copy()]
     for k in range(1, STEPS):
         reference.predict(F=scaled_matrix(known, float(batch.u[run, k - 1 : k + 1, 0].mean())))
         reference.update(batch.y[run, k])
-        means.append(reference.x[:, 0].copy())
         covariances.append(reference.P.copy())
-    return np.array(means), np.array(covariances)
+    return np.array(covariances)
 
 
 # --- the filter linearised at the truth ------------------------------------------------------------------------------
@@ -105,21 +103,7 @@ def test_of_a_linear_system_it_is_the_covariance_of_the_kalman_filter() -> None:
     found = linearised.covariances(linear_batch(), at)
     assert found.shape == (RUNS, len(at), 5, 5)
     for run in (0, 7):
-        np.testing.assert_allclose(found[run], kalman(run)[1][at], rtol=1e-6, atol=1e-12)
-
-
-def test_it_settles_on_the_riccati_equation() -> None:
-    """Without input its gain is apart from all else, and what is left does not change in time."""
-    known, steps = linear_batch().knowledge, 6000
-    still, trim = np.zeros((1, steps, 2)), np.zeros((1, steps))
-    truth = Truth(still, np.zeros((1, steps, 3)), np.ones((1, steps, 2)))
-    batch = Batch(Pushed(), DT, still, still, trim, known, truth, still, still)
-    left = np.ix_([0, 1, 3, 4], [0, 1, 3, 4])
-    output, noise = OUTPUT[:, [0, 1, 3, 4]], np.diag(known.output_noise**2)
-    before = solve_discrete_are(scaled_matrix(known, 0.0)[left].T, output.T, process_covariance(known)[left], noise)
-    settled = np.linalg.inv(np.linalg.inv(before) + output.T @ np.linalg.inv(noise) @ output)
-    found = linearised.covariances(batch, np.array([steps - 1]))[0, 0]
-    np.testing.assert_allclose(found[left], settled, rtol=1e-6, atol=1e-12)
+        np.testing.assert_allclose(found[run], kalman(run)[at], rtol=1e-6, atol=1e-12)
 
 
 def test_without_any_process_noise_it_is_the_inverse_of_fishers_information() -> None:
@@ -177,13 +161,6 @@ def test_the_bound_is_tichavskys_recursion_of_information() -> None:
     np.testing.assert_allclose(found, np.linalg.inv(information), rtol=1e-4, atol=1e-9)
 
 
-def test_where_all_runs_have_the_same_inputs_a_linear_system_has_one_covariance_and_that_is_the_bound() -> None:
-    batch, at = linear_batch(), np.array([0, 50, 699])
-    alike = dataclasses.replace(batch, u=np.broadcast_to(batch.u[:1], batch.u.shape))
-    expected = linearised.covariances(alike, at)[0]
-    np.testing.assert_allclose(bound.posterior_cramer_rao(alike, at), expected, rtol=1e-6, atol=1e-12)
-
-
 def test_the_bound_is_below_the_linearised_filter_on_average() -> None:
     batch, at = matched(Condition(dither_rms=0.3), 6, 4.0, 3), np.arange(500, 4000, 500)
     least = bound.variances(batch, at, bound.posterior_cramer_rao(batch, at))
@@ -198,25 +175,6 @@ def test_without_process_noise_there_is_no_bound() -> None:
     calm = dataclasses.replace(batch, knowledge=dataclasses.replace(batch.knowledge, process_noise=0.0))
     with pytest.raises(ValueError, match="needs process noise"):
         bound.posterior_cramer_rao(calm, np.array([1]))
-
-
-# --- against Monte Carlo ---------------------------------------------------------------------------------------------
-
-
-def test_squared_errors_of_the_kalman_filter_are_those_of_the_covariance_and_above_the_bound() -> None:
-    """Squared error ÷ variance of 120 runs: 1 on average, within the 99.9 % band of it, for w, for x, at each time."""
-    at = np.array([0, 10, 50, 200, 699])
-    batch = linear_batch()
-    assert batch.truth.p is not None
-    least = np.diagonal(linearised.covariances(batch, at), axis1=-2, axis2=-1)
-    estimates = np.stack([kalman(run)[0][at] for run in range(RUNS)])
-    truth = np.concatenate((batch.truth.p / batch.knowledge.sigma, batch.truth.x), axis=-1)[:, at]
-    squares = np.square(estimates - truth)
-    np.testing.assert_allclose((squares / least).mean(axis=0), 1.0, atol=3.3 * np.sqrt(2.0 / RUNS))
-    of_runs = (squares / least).mean(axis=1)
-    assert (np.abs(of_runs.mean(axis=0) - 1.0) < 3.4 * of_runs.std(axis=0) / np.sqrt(RUNS)).all()
-    bounds = np.diagonal(bound.posterior_cramer_rao(batch, at), axis1=-2, axis2=-1)
-    assert (squares.mean(axis=0) > bounds * (1.0 - 3.3 * np.sqrt(2.0 / RUNS))).all()
 
 
 def test_dynamics_are_as_uncertain_as_a_cloud_of_parameters() -> None:
@@ -237,18 +195,3 @@ def test_dynamics_are_as_uncertain_as_a_cloud_of_parameters() -> None:
             relative = cloud.std(axis=1) / batch.truth.dynamics[run, k]
             np.testing.assert_allclose(np.sqrt(1e-4 * least[run, t, 3:]), relative, rtol=0.01)
             np.testing.assert_allclose(least[run, t, :3], found[run, t, [0, 1, 2], [0, 1, 2]])
-
-
-# --- what it should do -----------------------------------------------------------------------------------------------
-
-
-def test_a_known_torque_makes_the_scale_known() -> None:
-    """Base motion alone leaves the common scale of m_p, c_p, k_p open (firmware/THEORY.md), and frequency known."""
-    at = np.array([9999])
-    shares = {}
-    for dither in (0.0, 0.3):
-        batch = matched(Condition(dither_rms=dither), 4, 10.0, 2)
-        found = linearised.variances(batch, at, linearised.covariances(batch, at))
-        shares[dither] = np.sqrt(found.mean(axis=0))[0]
-    assert (shares[0.3][:3] < 0.5 * shares[0.0][:3]).all()
-    assert shares[0.0][3] < 0.1 * shares[0.0][2]

@@ -14,16 +14,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.native import enum_names
+from lever_cdkf.host_tools import cli, interrupts
+from lever_cdkf.host_tools.firmware.native import enum_names, settings_table
+from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.study.baselines import BASELINES
-from lever_cdkf.sil.study.compare import campaign, comparison, evaluation, table, verdicts
+from lever_cdkf.sil.study.compare import campaign, charts, compare_page, comparison, evaluation, table, verdicts
 from lever_cdkf.sil.study.compare.campaign import Outcome, Results
-from lever_cdkf.sil.study.compare.cases import Plan, References, cases
+from lever_cdkf.sil.study.compare.cases import Matched, Plan, References, Stepped, cases
 from lever_cdkf.sil.study.compare.entrants import entrants
 from lever_cdkf.sil.study.compare.evaluation import Row
 from lever_cdkf.sil.study.data import Batch, Estimates
 from numpy.typing import NDArray
+from python.report.reading import unpack
 
 Lever = Callable[..., int]
 
@@ -65,12 +67,48 @@ def test_every_baseline_takes_part_with_every_model_that_it_handles() -> None:
         assert there >= {name for name, baseline in BASELINES.items() if baseline.handles(known)}, model
 
 
+def test_walks_and_steps_are_as_the_comparison_was_asked_for() -> None:
+    for name, case in cases().items():
+        if isinstance(case, Matched):
+            fixed, dithered, rough = (word in name for word in ("fixed", "dither", "rough"))
+            if case.kind == "wrong noise":
+                dithered, noise = True, 0.05
+            else:
+                noise = 0.1 if rough else 0.01
+            assert (case.preload, case.dither_rms) == ("fixed" if fixed else "trim", 0.3 if dithered else 0.0)
+            assert case.noise == {"theta_dot_process_noise": noise}
+            assert sorted(case.own_settings.values()) == ([] if case.model == "linear_black_box" else [0.25, 0.3, 0.3])
+            assert (case.duration, case.every) == (60.0, 0.1)
+        elif isinstance(case, Stepped):
+            assert (case.step.factor, case.step.at) == (0.7 if "down" in name else 1.3, 25.0)
+            assert case.noise == {"theta_dot_process_noise": 0.1 if "rough" in name else 0.05}
+            assert (case.duration, case.every, case.own_settings) == (45.0, 0.02, {})
+    assert len([case for case in cases().values() if case.kind == "matched"]) == 2 * 2 * (2 + 2 + 1)
+    assert len([case for case in cases().values() if case.kind == "step"]) == 2 * 3
+
+
+def test_a_scenario_is_judged_as_it_judges_itself() -> None:
+    case, time = cases()["sudden_grip"], np.arange(0.0, 60.0, 0.5)
+    wanted = scenario.load("sudden_grip")
+    jump = wanted.changes()[-1]
+    assert (case.own_settings, case.change(Plan())) == (wanted.settings or {}, jump)
+    assert case.change(Plan(duration=0.5 * jump)) is None
+    assert (case.runs(Plan(7)), case.runs(Plan(40))) == (7, 20)
+    converging = [(time >= start) & (time < start + wanted.converged_after) for start in wanted.changes()]
+    np.testing.assert_array_equal(case.judged(time, Plan()), ~np.any(converging, axis=0))
+    assert cases()["steady"].change(Plan()) is None
+
+
 def test_told_the_wrong_noise_in_all_combinations() -> None:
     made = entrants(cases()["wrong_noise_fixed"])
     combinations = {(r, q) for r in ("0.1", "1", "10") for q in ("0.1", "1", "10")}
+    default = {row.name: row.default for row in settings_table()}
     for name in ("dual", "joint"):
         assert {f"{name}_r{r}_q{q}" for r, q in combinations} <= made.keys()
         assert made[f"{name}_r10_q0.1"].reference == name
+        told: Any = made[f"{name}_r10_q0.1"].make(cases()["wrong_noise_fixed"])
+        for setting, factor in (("theta_noise", 10.0), ("theta_dot_noise", 10.0), ("theta_dot_process_noise", 0.1)):
+            assert told.settings[setting] == factor * default[setting]
 
 
 @pytest.mark.parametrize("name", ["lever_fixed_dither_quiet", "lever_trim_base_rough", "wrong_noise_trim", "step_up"])
@@ -89,9 +127,6 @@ def test_moments_move_with_the_duration() -> None:
     assert case.change(Plan(duration=9.0)) == pytest.approx(5.0)
     time = np.arange(0.5, 45.0, 1.0)
     assert time[case.judged(time, Plan())].tolist() == [15.5 + i for i in range(10)]
-    grip = cases()["sudden_grip"]
-    judged = grip.judged(np.arange(0.0, 60.0, 0.5), Plan())
-    assert 0 < judged.sum() < len(judged)
 
 
 # --- what is made of it ----------------------------------------------------------------------------------------------
@@ -246,8 +281,8 @@ def test_winner_and_who_may_be_as_good() -> None:
 @pytest.mark.parametrize(
     ("probability", "said"),
     [
-        (0.001, "Ours is not best: joint has 20 % larger errors (15 to 25 %)."),
-        (0.3, "Ours is not best, but that may be chance: joint has 20 % larger errors (15 to 25 %)."),
+        (0.001, "The firmware is not best: joint has 20 % larger errors (15 to 25 %)."),
+        (0.3, "The firmware is not best, but that may be chance: joint has 20 % larger errors (15 to 25 %)."),
     ],
 )
 def test_says_so_when_ours_is_not_best(probability: float, said: str) -> None:
@@ -258,8 +293,10 @@ def test_says_so_when_ours_is_not_best(probability: float, said: str) -> None:
 def test_who_broke_down_is_not_ranked() -> None:
     said = verdicts.verdict([row("joint", 0.12), row("lms", 0.01, failures=2)], {}, {})
     assert said.startswith("Smallest errors: joint")
-    assert said.endswith("Broke down, and so not ranked: lms in 2 of 20 runs.")
-    assert verdicts.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("Nobody did all runs.")
+    assert said.endswith("Diverged, and so not ranked: lms in 2 of 20 runs.")
+    assert verdicts.verdict([row("lms", 0.1, failures=20)], {}, {}).startswith("No estimator completed all runs.")
+    missing = verdicts.verdict([row("joint", 0.1, runs=19), row("lms", 0.2)], {}, {})
+    assert missing.endswith("No estimator of the firmware completed all runs.")
 
 
 def test_seven_runs_are_too_few() -> None:
@@ -278,29 +315,174 @@ def test_fastest_after_a_step() -> None:
     said = verdicts.verdict(rows, errors, against("joint_ekf", 3.75, 1e-9, "step_up"))
     assert "joint_ekf (baseline) (natural frequency 1 % rms)" in said
     assert said.endswith(f"Fastest after the step: {fastest}.")
-    said = verdicts.verdict(rows, errors, against("joint_ekf", 3.75, 0.2, "step_up"))
-    assert said.endswith(f"{fastest}, which may be chance.")
+    for times in (against("joint_ekf", 3.75, 0.2, "step_up"), {}):
+        assert verdicts.verdict(rows, errors, times).endswith(f"{fastest}, which may be chance.")
+    never = [dataclasses.replace(each, settled_median=math.inf) for each in rows]
+    assert verdicts.verdict(never, errors, {}).endswith("After the step no estimator settles on the natural frequency.")
+    rows[0] = dataclasses.replace(rows[0], settled_median=2.0, settled_worst=math.inf)
+    other = "joint_ekf (baseline) (median 1.50 s, not in every run); the fastest of the firmware, dual_shipped: 2.00 s"
+    assert f"Fastest after the step: {other}" in verdicts.verdict(rows, errors, {})
 
 
-def test_claims_take_the_worst_and_say_where() -> None:
-    rows = [row("joint", 0.1), row("joint_ekf", 0.1)]
-    ratios = (1.0, 1.0, 1.2, 1.0, 1.0)
-    rows[0] = dataclasses.replace(
-        rows[0], linearised=ratios, baseline=(1.0,) * 5, nees=3.2, nees_low=2.5, nees_high=3.5
-    )
-    rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01,) * 5)
-    found = {claim.text: claim for claim in verdicts.claims(rows)}
-    first = found["joint: error ÷ Kalman filter linearised at the truth"]
-    assert (first.measured, first.where, first.kept) == (1.2, f"{CASE}, joint, k_p", False)
-    assert first.kept_in_words == "no"
-    rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01, 0.01, 0.06, 0.01, 0.01))
-    assert verdicts.claims(rows)[0].kept_in_words == "no, but within chance"
-    rows[0] = dataclasses.replace(rows[0], linearised_error=(0.01, 0.01, 0.04, 0.01, 0.01))  # of five: 2.3 sigma
-    assert verdicts.claims(rows)[0].kept_in_words == "no"
-    assert found["joint: NEES ÷ its 95 % limit"].kept
-    assert found["joint: error ÷ best baseline's, preload fixed"].measured == 1.0
-    assert found["firmware: runs with NaN or a refused factor"].kept
-    assert found["dual: step followed in, median [s]"].kept is None
+REQUIRED = {
+    "joint: error ÷ Kalman filter linearised at the truth": 1.1,
+    "dual: error ÷ Kalman filter linearised at the truth, with dither": 1.3,
+    **{
+        f"{name}: error ÷ best baseline's, preload {of}": 1.03 for of in ("fixed", "trim") for name in ("dual", "joint")
+    },
+    "joint: NEES ÷ its 95 % limit": 1.0,
+    "joint: NEES ÷ its lower 95 % limit": -1.0,
+    "dual: stated σ ÷ rms error": -0.5,
+    **{
+        f"{name}: {what}": limit
+        for name in ("dual", "joint")
+        for what, limit in (
+            ("step followed in, median [s]", 1.0),
+            ("step followed in, worst [s]", 2.0),
+            ("the same, 0.1 rad/s/√s, median [s]", 2.0),
+            ("steady frequency, rms [%]", 1.5),
+            ("the same ÷ without change detection", 1.2),
+            ("R, Q wrong by 10: rms ÷ tuned", 1.5),
+        )
+    },
+    "firmware: runs with NaN or a refused factor": 0.0,
+}
+"""What the firmware must show, as it was asked for: at the most, or below zero, at the least."""
+
+
+def fives(first: float) -> tuple[float, ...]:
+    """Five different numbers, the greatest in the middle."""
+    return tuple(first * factor for factor in (0.5, 0.6, 1.0, 0.8, 0.7))
+
+
+def everything(factor: float = 1.0) -> list[Row]:
+    """Rows with a number of its own for each claim, which are `factor` times these."""
+    walk: dict[str, Any] = {"nees": 3.2 * factor, "nees_low": 2.5, "nees_high": 4.0, "ours": True}
+    known: dict[str, Any] = {
+        "settled_median": 0.9 * factor, "settled_worst": 1.9 * factor, "against": fives(1.3 * factor), "ours": True,
+        "rms": fives(0.0125 * factor),
+    }  # fmt: skip
+    rows = [
+        row("joint", 0.1, linearised=fives(1.05 * factor), baseline=fives(1.01 * factor), **walk),
+        row("joint", 0.1, case="lever_trim_base_quiet", baseline=fives(1.02 * factor), linearised=fives(9.0)),
+        row("dual", 0.1, linearised=fives(1.2 * factor), baseline=fives(0.99 * factor), honesty=fives(1.1 * factor)),
+        row("dual", 0.1, case="lever_fixed_base_quiet", linearised=fives(9.0), honesty=fives(1.3 * factor)),
+        row("dual", 0.1, case="lever_trim_base_quiet", baseline=fives(1.0 * factor), linearised=fives(9.0)),
+    ]
+    for index, name in enumerate(("dual", "joint")):
+        for case, own in (("step_up", 1.0), ("step_up_rough", 2.0), ("step_up_black_box", 9.0)):
+            scaled = {
+                key: tuple(own * each for each in value) if isinstance(value, tuple) else value * own
+                for key, value in known.items()
+                if key != "ours"
+            }
+            rows.append(row(f"{name}_shipped", 0.1 + index, case=case, **(scaled | {"ours": True})))
+        rows.append(row(f"{name}_r10_q1", 0.1, case="wrong_noise_fixed", against=fives(1.4 * factor), ours=True))
+    return rows
+
+
+def test_what_has_to_be_shown_is_what_was_asked_for() -> None:
+    found = verdicts.claims([])
+    assert {claim.text: claim.limit if claim.below else -claim.limit for claim in found} == {
+        text: abs(limit) if text.endswith("NaN or a refused factor") else limit for text, limit in REQUIRED.items()
+    }
+    assert {(claim.kept, claim.kept_in_words) for claim in found} == {(None, "not run")}
+
+
+def test_each_claim_is_measured_where_it_is_due() -> None:
+    found = {claim.text: (pytest.approx(claim.measured), claim.where) for claim in verdicts.claims(everything())}
+    walk = "lever_trim_base_quiet"
+    expected = {
+        "joint: error ÷ Kalman filter linearised at the truth": (1.05, f"{CASE}, joint, k_p"),
+        "dual: error ÷ Kalman filter linearised at the truth, with dither": (1.2, f"{CASE}, dual, k_p"),
+        "joint: error ÷ best baseline's, preload fixed": (1.01, f"{CASE}, joint, k_p"),
+        "dual: error ÷ best baseline's, preload fixed": (0.99, f"{CASE}, dual, k_p"),
+        "joint: error ÷ best baseline's, preload trim": (1.02, f"{walk}, joint, k_p"),
+        "dual: error ÷ best baseline's, preload trim": (1.0, f"{walk}, dual, k_p"),
+        "joint: NEES ÷ its 95 % limit": (0.8, f"{CASE}, joint"),
+        "joint: NEES ÷ its lower 95 % limit": (1.28, f"{CASE}, joint"),
+        "dual: stated σ ÷ rms error": (0.55, f"{CASE}, dual, m_p"),
+    }
+    for name in ("dual", "joint"):
+        expected |= {
+            f"{name}: step followed in, median [s]": (0.9, f"step_up, {name}_shipped"),
+            f"{name}: step followed in, worst [s]": (1.9, f"step_up, {name}_shipped"),
+            f"{name}: the same, 0.1 rad/s/√s, median [s]": (1.8, f"step_up_rough, {name}_shipped"),
+            f"{name}: steady frequency, rms [%]": (1.0, f"step_up, {name}_shipped"),
+            f"{name}: the same ÷ without change detection": (1.04, f"step_up, {name}_shipped"),
+            f"{name}: R, Q wrong by 10: rms ÷ tuned": (1.4, f"wrong_noise_fixed, {name}_r10_q1, k_p"),
+        }
+    expected["firmware: runs with NaN or a refused factor"] = (0.0, f"{CASE}, joint")
+    assert expected == found
+
+
+def test_claims_are_kept_or_not() -> None:
+    assert {claim.kept_in_words for claim in verdicts.claims(everything())} == {"yes"}
+    worse = {claim.text: claim.kept for claim in verdicts.claims(everything(2.0))}
+    at_least = {text for text, limit in REQUIRED.items() if limit < 0.0} | {
+        "firmware: runs with NaN or a refused factor"
+    }
+    assert {text for text, kept in worse.items() if kept} == at_least
+    better = {claim.text: claim.kept for claim in verdicts.claims(everything(0.5))}
+    assert {text for text, kept in better.items() if not kept} == {
+        text for text, limit in REQUIRED.items() if limit < 0
+    }
+    failed = verdicts.claims([row("joint", 0.1, failures=1)])[-1]
+    assert (failed.measured, failed.kept) == (1.0, False)
+
+
+@pytest.mark.parametrize(("error", "said"), [(0.01, "no"), (0.04, "no"), (0.06, "no, but within chance")])
+def test_a_claim_that_chance_may_miss_says_so(error: float, said: str) -> None:
+    """Of five values one is 0.1 above the limit: 2.3 standard errors are within chance."""
+    errors = (0.01, 0.01, error, 0.01, 0.01)
+    first = verdicts.claims([row("joint", 0.1, linearised=(1.0, 1.0, 1.2, 1.0, 1.0), linearised_error=errors)])[0]
+    assert (first.measured, first.error, first.kept_in_words) == (1.2, error, said)
+
+
+def test_claims_stand_in_table_and_page() -> None:
+    rows = everything(1.5)
+    claims = verdicts.claims(rows)
+    *_, last = table.tables(rows, claims).items()
+    assert last[0] == "claims about the firmware"
+    first = {"claim": claims[0].text, "limit": "≤ 1.1", "measured": 1.58, "±": None, "kept": "no"}
+    assert last[1][0] == first | {"worst in": claims[0].where}
+    assert [line["limit"] for line in last[1] if "lower" in str(line["claim"])] == ["≥ 1"]
+    page = compare_page.build(Results(Plan(20), {}, {}), rows, {}, claims, {})
+    kept = sum(claim.kept is True for claim in claims)
+    assert f'<p class="verdict bad">{kept} of {len(claims)} claims about the firmware hold.' in page
+    cells = ("<strong>no</strong>", "1.58", "≤ 1.1", claims[0].where)
+    assert "".join(f"<td>{cell}</td>" for cell in cells) in page.replace(' class="num"', "")
+    figures = json.loads(page.split('<script type="application/json" id="figures">')[1].split("</script>")[0])
+    shown = figures["noise-wrong_noise_fixed"]
+    assert [trace["name"] for trace in shown["data"]] == ["m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"]
+    np.testing.assert_allclose([unpack(trace["x"])[0] for trace in shown["data"]], fives(1.4 * 1.5))
+    assert not any("error_x" in trace for trace in shown["data"])
+    assert [shape["x0"] for shape in shown["layout"]["shapes"]] == [1.0, 1.5]
+
+
+def test_a_chart_shows_each_estimator_in_each_case_with_its_standard_error() -> None:
+    own = {"linearised": (2.0, 8.0, math.nan, 4.0, 4.0), "linearised_error": (0.1,) * 5, "bound": (3.0,) * 5}
+    rows = [row("joint", 0.1, nees=3.2, nees_low=2.5, nees_high=3.5, **own), row("rls", 0.2, linearised=fives(1.0))]
+    rows.append(row("joint", 0.1, case="lever_fixed_base_quiet", linearised=fives(2.0)))
+    rows.append(row("joint", 0.1, case="lever_trim_base_quiet", linearised=fives(3.0)))
+    shown = charts.linearised(rows, "lever", "fixed")
+    assert shown is not None
+    first, second = shown.spec()["data"]
+    assert (first["name"], second["name"]) == (CASE, "lever_fixed_base_quiet")
+    np.testing.assert_allclose(unpack(first["x"]), [4.0, np.prod(fives(1.0)) ** 0.2])
+    np.testing.assert_allclose(unpack(first["y"]), [-0.15, 0.85])
+    np.testing.assert_allclose(unpack(second["y"]), [0.15])
+    assert first["error_x"]["array"] == pytest.approx([0.1, 0.0])
+    for chart, value, marks in (
+        (charts.bound, 3.0, [1.0]),
+        (lambda rows, model, _: charts.nees(rows, model), 3.2, [3.0, 2.5, 3.5]),
+    ):
+        shown = chart(rows, "lever", "fixed")
+        assert shown is not None
+        (only,) = shown.spec()["data"]
+        np.testing.assert_allclose(unpack(only["x"]), [value], rtol=1e-6)
+        assert [shape["x0"] for shape in shown.shapes] == marks
+    assert charts.bound(rows, "linear_physical", "fixed") is None
 
 
 def test_csv_has_every_figure_with_all_digits() -> None:
@@ -351,7 +533,9 @@ def test_list(lever: Lever, capsys: pytest.CaptureFixture[str]) -> None:
     assert all(name in out for name in (*cases(), *BASELINES))
 
 
-def test_a_small_campaign(lever: Lever, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_small_campaign(
+    lever: Lever, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Two cases in two processes; the same figures as in one process."""
     chosen = ("--scenarios", "lever_fixed_dither_rough", "step_up", "--estimators", "joint", "dual_shipped", "rls")
     brief = ("--seeds", "2", "--duration", "3")
@@ -369,6 +553,7 @@ def test_a_small_campaign(lever: Lever, tmp_path: Path, capsys: pytest.CaptureFi
     assert {"linearised-lever", "bound-lever", "settling-step_up", "following-step_up"} <= figures.keys()
     assert all(f'id="{key}"' in page for key in figures)
     assert len(json.loads(tables.read_text())) == 2
+    monkeypatch.setattr(interrupts, "worker_pool", None)  # not called for one process
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]

@@ -16,28 +16,22 @@ from lever_cdkf.host_tools.firmware.config import settings_table
 from lever_cdkf.host_tools.firmware.native import Config, Estimator
 from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.figures import catalogue, grip, runs
-from lever_cdkf.sil.study.figures.description import LOOKS, Band, Curve, Figure, Points, Row, Surface, Trace, number
+from lever_cdkf.sil.study.figures.description import LOOKS, Band, Curve, Points, Row, Surface, Trace, number
 from lever_cdkf.sil.study.firmware import EXACT
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
+from python.study.shown import SEED, SHORT, made
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
 Array = NDArray[Any]  # of floats
-SHORT = runs.Extent(duration=4.0, runs=4)
-SEED = 4
 DEFAULTS = {row.name: row.default for row in settings_table()}
 MATCHED = {"change_threshold": 0.0, "noise_window": 0.0, "align_time": 0.0}
 PRIOR = {"m_p_sigma": 0.25, "c_p_sigma": 0.3, "k_p_sigma": 0.3}
 LINEAR = {"m_sigma": 0.25, "c_sigma": 0.3, "k_sigma": 0.3, "lever_preload_angle": 0.0}
 NOISY = Condition("linear_physical", "fixed", dither_rms=2.0, settings={**LINEAR, "theta_dot_process_noise": 0.1})
 every = pytest.mark.parametrize("name", catalogue.FIGURES)
-
-
-@functools.cache
-def made(name: str) -> Figure:
-    return catalogue.FIGURES[name](SEED, SHORT)
 
 
 def rows(name: str, column: int = 0) -> dict[str, Row]:
@@ -110,19 +104,6 @@ def test_a_wild_start_does_not_squeeze_the_rest(name: str) -> None:
     for (low, high), (lower, upper) in zip(late, whole, strict=True):
         assert lower <= low < high <= upper
         assert high - low < 0.8 * (upper - lower)
-
-
-@every
-def test_a_seed_is_a_figure(name: str) -> None:
-    again, other = (catalogue.FIGURES[name](seed, SHORT) for seed in (SEED, SEED + 1))
-    assert again.caption == made(name).caption
-    assert other.caption != made(name).caption
-    for column, same in zip(made(name).columns, again.columns, strict=True):
-        if isinstance(column.content, Surface) or isinstance(same.content, Surface):
-            continue
-        for row, twin in zip(column.content, same.content, strict=True):
-            for entry, copy in zip(row.traces, twin.traces, strict=True):
-                assert all(np.array_equal(*pair) for pair in zip(values(entry), values(copy), strict=True))
 
 
 def test_series_that_share_a_chart_do_not_rely_on_hue() -> None:

@@ -17,11 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.report import screenshot
 from lever_cdkf.sil.study.figures import catalogue, figures_page, png, runs
 from lever_cdkf.sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
 from lever_cdkf.sil.study.figures.typesetting import colours, css, in_html, in_mathtext
 from PIL import Image
 from python.report.reading import figures, read, unpack
+from python.study.shown import ONCE, SEED, SHORT, made
 from quality.tools import ROOT
 
 if sys.version_info >= (3, 11):
@@ -30,15 +32,9 @@ else:
     import tomli as tomllib
 
 Run = Callable[..., tuple[int, str, str]]
-LONG, SHORT = runs.Extent(), runs.Extent(duration=3.0, runs=4)
+LONG = runs.Extent()
 NAMES = list(catalogue.FIGURES)
 every = pytest.mark.parametrize("name", NAMES)
-
-
-@functools.cache
-def made(name: str) -> Figure:
-    """Each figure once, however many tests and commands ask for it."""
-    return catalogue.FIGURES[name](1, SHORT)
 
 
 @functools.cache
@@ -58,6 +54,7 @@ def commands() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(importlib.metadata, "entry_points", lambda group: found)
         patch.setattr(runs, "Extent", lambda: SHORT)
+        patch.setattr(catalogue, "FIGURES", ONCE)
         yield
 
 
@@ -65,7 +62,7 @@ def commands() -> Iterator[None]:
 def folder(commands: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What `lever figures` leaves behind."""
     out = tmp_path_factory.mktemp("figures") / "deep" / "folder"
-    assert cli.main(["figures", "--out", str(out)]) == 0
+    assert cli.main(["figures", "--seed", str(SEED), "--out", str(out)]) == 0
     return out
 
 
@@ -130,8 +127,10 @@ def test_text_is_legible_in_print(name: str) -> None:
 
 
 def test_the_same_seed_gives_the_same_picture(folder: Path) -> None:
-    assert png.render(catalogue.FIGURES["states"](1, SHORT)) == (folder / "states.png").read_bytes()
-    assert png.render(catalogue.FIGURES["states"](2, SHORT)) != (folder / "states.png").read_bytes()
+    anew, other = (ONCE["states"].__wrapped__(seed, SHORT) for seed in (SEED, SEED + 1))
+    assert png.render(anew) == (folder / "states.png").read_bytes()
+    assert png.render(other) != (folder / "states.png").read_bytes()
+    assert other.caption != anew.caption
 
 
 def test_a_picture_does_not_depend_on_how_matplotlib_is_configured() -> None:
@@ -233,6 +232,24 @@ def test_text_is_set_in_type() -> None:
     assert in_html("m_p < 2 & a_21") == "m<sub>p</sub> &lt; 2 &amp; a<sub>21</sub>"
     assert in_mathtext("|θ/z̈| ẋ [N s/m], k_p") == r"|θ/$\ddot{z}$| $\dot{x}$ [N s/m], $k_{p}$"
     assert "<sub>" not in figures_page.build([made("states")]).split("<body>")[0]
+
+
+@pytest.mark.requires("|".join(screenshot.BROWSERS))
+def test_the_page_is_drawn_without_complaint_or_sideways_scrolling(tmp_path: Path) -> None:
+    probe = "<script>window.addEventListener('load', () => setTimeout(() => { document.title = 'width ' + "
+    probe += "document.documentElement.scrollWidth + ' of ' + document.documentElement.clientWidth; }, 3000));</script>"
+    shown = [made(name) for name in NAMES]
+    copy = tmp_path / "probed.html"
+    copy.write_text(figures_page.build(shown).replace("</body>", f"{probe}</body>"), encoding="utf-8")
+    options = ("--dump-dom", "--enable-logging=stderr", "--enable-unsafe-swiftshader", "--window-size=500,900")
+    result = screenshot.browse(copy.as_uri(), *options)
+    said = [line for line in result.stderr.splitlines() if "CONSOLE" in line]
+    assert [line for line in said if not re.search("GL Driver Message|Canvas2D: Multiple readback", line)] == []
+    drawn = re.findall(r'class="chart[^"]*js-plotly-plot[^"]*"', result.stdout)
+    assert len(drawn) == sum(len(figure.columns) for figure in shown)
+    width = re.search(r"width (\d+) of (\d+)", result.stdout)
+    assert width is not None
+    assert int(width[1]) <= int(width[2])
 
 
 # --- the command -----------------------------------------------------------------------------------------------------

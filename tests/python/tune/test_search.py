@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.tune import recording, validation
 from lever_cdkf.host_tools.tune.likelihood import Likelihood
-from lever_cdkf.host_tools.tune.search import Found, Search, groups
+from lever_cdkf.host_tools.tune.search import Search, Tuned, groups
 from python.tune.conftest import NOISE, WALK, Simulate
 
 
-def found_in(likelihood: Likelihood, *kept: str, **settings: float | str) -> dict[str, Found]:
+def found_in(likelihood: Likelihood, *kept: str, **settings: float | str) -> dict[str, Tuned]:
     return {entry.name: entry for entry in Search(likelihood, settings).run(groups(settings, kept))}
 
 
@@ -94,11 +94,16 @@ def test_what_is_off_or_kept_is_not_looked_for() -> None:
     assert wanted == {"noise": ("theta_noise", "theta_dot_noise"), "walk": ("a21_walk", "b21_walk")}
 
 
+@pytest.mark.parametrize(("mean", "clear"), [(2.9, False), (3.1, True), (-2.9, False), (-3.1, True)])
+def test_a_gain_is_clear_beyond_three_standard_errors(mean: float, clear: bool) -> None:
+    assert validation.Gain(mean, 1.0).is_clear is clear
+
+
 @pytest.mark.parametrize(
     ("low", "high", "after", "verdict"),
     [
         (0.5, 2.0, 1.0, "kept: not contradicted"),
-        (None, None, 1.0, "kept: the log does not tell"),
+        (None, None, 1.0, "kept: the log does not determine it"),
         (None, 2.0, 1.0, "kept: not contradicted"),
         (1.5, 4.0, 3.0, "too small"),
         (1.5, None, 3.0, "too small"),
@@ -107,5 +112,5 @@ def test_what_is_off_or_kept_is_not_looked_for() -> None:
     ],
 )
 def test_decision(low: float | None, high: float | None, after: float, verdict: str) -> None:
-    found = Found("theta_noise", before=1.0, best=3.0, low=low, high=high)
+    found = Tuned("theta_noise", before=1.0, best=3.0, low=low, high=high)
     assert (found.after, found.verdict) == (after, verdict)

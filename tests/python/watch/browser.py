@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
 import itertools
 import json
 import shutil
@@ -13,28 +12,26 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lever_cdkf.host_tools.report import picture
+from lever_cdkf.host_tools.report import screenshot
+from python.watch.conftest import PATIENCE
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-PATIENCE = 120.0
-"""[s] that a browser may take to start, or a page to become what is waited for."""
-_OPTIONS = [option for option in picture.OFFLINE if "virtual-time" not in option]
+_OPTIONS = [option for option in screenshot.OFFLINE if "virtual-time" not in option]
 
 
 class Browser:
     """One page. A context manager; what the page complains of is in `complaints`."""
 
-    def __init__(self, width: int = 1280, height: int = 900, *, dark: bool = False, phone: bool = False) -> None:
+    def __init__(self, width: int = 1280, height: int = 900, *, phone: bool = False) -> None:
         self.complaints: list[str] = []
         self._size = {"width": width, "height": height, "deviceScaleFactor": 2 if phone else 1, "mobile": phone}
-        self._scheme = "dark" if dark else "light"
         self._numbers = itertools.count(1)
         self._loop = asyncio.new_event_loop()
         self._socket: WebSocketClientConnection | None = None
 
     def __enter__(self) -> Browser:
         self._profile = tempfile.mkdtemp(prefix="lever-browser-")
-        program = next(found for name in picture.BROWSERS if (found := shutil.which(name)))
+        program = next(found for name in screenshot.BROWSERS if (found := shutil.which(name)))
         options = [*_OPTIONS, "--remote-debugging-port=0", f"--user-data-dir={self._profile}", "about:blank"]
         self._process = subprocess.Popen([program, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
@@ -50,7 +47,7 @@ class Browser:
         finally:
             self._loop.close()
             self._process.terminate()
-            self._process.wait(timeout=10)
+            self._process.wait(PATIENCE)
             shutil.rmtree(self._profile, ignore_errors=True)
 
     async def _detach(self) -> None:
@@ -72,7 +69,6 @@ class Browser:
         self.ask("Runtime.enable")
         self.ask("Log.enable")
         self.ask("Emulation.setDeviceMetricsOverride", **self._size)
-        self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": self._scheme}])
 
     def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
         """A command of the protocol; returns its result."""
@@ -125,9 +121,9 @@ class Browser:
         for kind in ("mousePressed", "mouseReleased"):
             self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
-    def screenshot(self, path: Path, *, full: bool = False) -> None:
-        data = self.ask("Page.captureScreenshot", format="png", captureBeyondViewport=full)["data"]
-        path.write_bytes(base64.b64decode(data))
+    def darken(self) -> None:
+        """As in the evening: the user prefers dark colours from now on."""
+        self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
 
 
 def _wait(condition: Any, what: str) -> Any:

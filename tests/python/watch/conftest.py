@@ -14,10 +14,12 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.can.commander import Commander
 from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.watch.model import Frame
+from lever_cdkf.host_tools.watch.picture import Frame
 from lever_cdkf.host_tools.watch.sources import as_frame
 
 LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
+PATIENCE = 120.0
+"""[s] for what hangs; nothing is expected to be fast."""
 
 
 class Flight:

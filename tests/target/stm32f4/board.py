@@ -16,7 +16,7 @@ from pathlib import Path
 
 from lever_cdkf.host_tools.can import codec
 
-ANSWER_TIME = 20.0
+ANSWER_TIME = 120.0
 """Longest wait for an answer of the board [s], on a machine with much else to do."""
 MACHINE = ("qemu-system-arm", "-M", "netduinoplus2", "-icount", "shift=3,sleep=off", "-nographic", "-monitor", "none")
 
@@ -122,17 +122,9 @@ class Board:
             except TimeoutError:
                 continue
         self._line.settimeout(ANSWER_TIME)
-        while answer := self._rest():
-            pass
-
-    def _rest(self) -> bytes:
-        self._line.settimeout(0.3)
-        try:
-            return self._line.recv(4096)
-        except TimeoutError:
-            return b""
-        finally:
-            self._line.settimeout(ANSWER_TIME)
+        line = self.command("N")
+        while not line.startswith("N"):  # answers to what was sent above
+            line = self._read_line()
 
     def platform_health(self) -> dict[str, float]:
         """What PLATFORM_HEALTH says after some samples of a lever that rests."""

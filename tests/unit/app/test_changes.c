@@ -54,7 +54,7 @@ static void test_a_sudden_grip_is_reported_for_a_second_and_opens_the_parameters
         TEST_ASSERT_TRUE(opened.parameter_sigma[i] > before.parameter_sigma[i]);
     }
     uint32_t reported = 0u;
-    for (uint32_t k = 0u; k < 5000u; k++) {
+    for (uint32_t k = 0u; k < 10000u; k++) {
         reported += has_changed() ? 1u : 0u;
         (void)rig_run(&rig, lever, 1u);
     }

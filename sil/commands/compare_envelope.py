@@ -9,9 +9,9 @@ from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, print_tables, write_json
 
 from ..envelope import conditions
-from ..study.names import known
 from ..study.peers import campaign, tables
 from ..study.peers.filters import PEERS
+from .names import check_names
 
 SEEDS = 8
 _NOT_HERE = ("models", "duration", "seed", "out")
@@ -25,8 +25,8 @@ def run(args: argparse.Namespace) -> int:
     for name in _NOT_HERE:
         if getattr(args, name) is not None:
             raise LeverError(f"--{name} does not go with --envelope")
-    known("condition", args.scenarios or (), conditions.CONDITIONS, "lever compare --envelope --list")
-    known("estimator", args.estimators or (), campaign.ESTIMATORS, "lever compare --envelope --list")
+    check_names("condition", args.scenarios or (), conditions.CONDITIONS, "lever compare --envelope --list")
+    check_names("estimator", args.estimators or (), campaign.ESTIMATORS, "lever compare --envelope --list")
     wanted = args.scenarios or [name for name, one in conditions.CONDITIONS.items() if one.quick or not args.quick]
     seeds = args.seeds if args.seeds is not None else SEEDS
     todo = campaign.tasks(

@@ -1,4 +1,4 @@
-"""What a reader is told of the estimator's model, and of a truth that is of another kind."""
+"""The captions of the report: what its charts show, of which model, and against which truth."""
 
 from ..results import whiteness
 from .charts import transfer
@@ -26,14 +26,14 @@ PARAMETERS = {
 
 def about(run: Run) -> list[str]:
     """Sentences, as HTML, on what is special in this run's model and truth; none for the lever."""
-    told = [ABOUT_MODEL[run.model]] if run.model in ABOUT_MODEL else []
+    sentences = [ABOUT_MODEL[run.model]] if run.model in ABOUT_MODEL else []
     if run.mismatch is not None:
-        told.append(
+        sentences.append(
             f"<strong>The truth of this run is of another kind:</strong> {run.about_truth}. The "
             "parameters of the estimator's model have no true values then; what can be compared are natural frequency "
             "and damping ratio, the answer to the floor, and whether the innovations are white."
         )
-    return told
+    return sentences
 
 
 def parameters_caption(run: Run) -> str:
@@ -41,71 +41,71 @@ def parameters_caption(run: Run) -> str:
     shown = f"{PARAMETERS[run.model]}, with a band of ±2σ"
     if run.mismatch is not None:
         return (
-            f"{shown}. There is no truth to hold them against: the pilot of this run is not of this kind, and these "
-            "are the values with which the model imitates him."
+            f"{shown}. They have no true values: the pilot of this run is not one that the model can represent, and "
+            "these are the values with which it fits the motion best."
         )
     if not run.has_truth:
         return f"{shown}."
-    return f"{shown}: the blue line should follow the dashed one, and the band hold it about 95 % of the time."
+    return f"{shown}: the blue line should follow the dashed one, which the band should contain about 95 % of the time."
 
 
 def dynamics_caption(run: Run) -> str:
     """What the chart of natural frequency and damping ratio shows."""
-    told = [
+    sentences = [
         "What decides about collective bounce: how fast arm and lever swing by themselves, and how quickly that dies "
         "out (a damping ratio of 1 is no swing at all)."
     ]
     if _has_scale(run):
-        told.append("Both are usually known better than the three parameters, whose common scale cancels in them.")
+        sentences.append("Both are usually known better than the three parameters, whose common scale cancels in them.")
     if run.about_true_dynamics:
-        told.append(run.about_true_dynamics)
-    return " ".join(told)
+        sentences.append(run.about_true_dynamics)
+    return " ".join(sentences)
 
 
 def feedthrough_caption(run: Run) -> str:
     """What the Bode diagram with its band shows, and how good it was where the truth is known."""
-    told = [
+    sentences = [
         "The same at one time, as a Bode diagram: magnitude and phase, and below the measured coherence of floor and "
         "lever over the whole run. Where that is low, noise, torque or the pilot's own movement move the lever, and "
         "there is little to learn from the floor. Between 2 and 8 Hz the shaded band is ±2σ, as the estimator sends "
         "it; it contains what the parameters leave open, not what the model cannot do. Drag the slider through the run."
     ]
-    if (found := transfer.accuracy(run)) is not None:
-        told.append(
-            f"After the first third of the run the complex error was {100.0 * found.error:.1f} % rms; ±2σ held the "
-            f"true magnitude {100.0 * found.gain_covered:.0f} % and the true phase {100.0 * found.phase_covered:.0f} % "
-            "of the time."
+    if (accuracy := transfer.accuracy(run)) is not None:
+        sentences.append(
+            f"After the first third of the run the complex error was {100.0 * accuracy.error:.1f} % rms; ±2σ held the "
+            f"true magnitude {100.0 * accuracy.gain_covered:.0f} % and the true phase "
+            f"{100.0 * accuracy.phase_covered:.0f} % of the time."
         )
-    return " ".join(told)
+    return " ".join(sentences)
 
 
 def excitation_caption(run: Run) -> str:
     """What the chart of the excitation shows."""
-    told = ["What shakes the lever. Without motion there is nothing to learn from."]
+    sentences = ["What shakes the lever. Without motion there is nothing to learn from."]
     if _has_scale(run):
-        told.append(
-            "Without motor torque only ratios of the three parameters can be told, and the bands above must be wide."
+        sentences.append(
+            "Without motor torque only ratios of the three parameters can be known, and the bands above must be wide."
         )
-    return " ".join(told)
+    return " ".join(sentences)
 
 
 def _has_scale(run: Run) -> bool:
-    """Whether the parameters have a common scale that base motion alone does not tell."""
+    """Whether the parameters have a common scale that base motion alone does not determine."""
     return run.model in ("lever", "linear_physical")
 
 
 def whiteness_caption(run: Run) -> str:
     """What the chart of the autocorrelation shows."""
-    told = run.whiteness
-    found = ""
-    if told is not None:
-        found = (
+    result = run.whiteness
+    verdict = ""
+    if result is not None:
+        verdict = (
             f" Here the residual passes as white. {whiteness.CANNOT_SEE}"
-            if told.white
+            if result.white
             else " Here the residual is coloured: the arm, or a sensor, is not as assumed."
         )
     return (
         "Is the residual white? Autocorrelation of measured minus estimated rate, averaged over 20 ms. White noise "
         "stays about the band; bars beyond 0.2 mean that something moves the lever in a way that the model does not "
-        f"know.{found}"
+        f"know.{verdict}"
     )

@@ -14,9 +14,9 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.commander import KEEP
 from lever_cdkf.host_tools.firmware.config import Config, model_parameters
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
-from lever_cdkf.host_tools.watch import model, status
-from lever_cdkf.host_tools.watch.model import Frame, Picture
+from lever_cdkf.host_tools.watch import status
 from lever_cdkf.host_tools.watch.paired import Paired
+from lever_cdkf.host_tools.watch.picture import ERROR, FOREIGN, ROWS, STALE_AFTER, STEP, Frame, Picture
 from python.watch.conftest import Flight
 
 
@@ -119,12 +119,12 @@ def test_what_is_old_is_not_shown_as_present(flight: Flight) -> None:
     picture = Picture()
     watch(picture, flight, 1.0)
     assert status.condition(picture)[0] in ("good", "watch")
-    picture.take([], 1.0 + model.STALE_AFTER + 0.5)
+    picture.take([], 1.0 + STALE_AFTER + 0.5)
     assert picture.silence() == pytest.approx(2.5)
     assert all(math.isnan(entry.value) for entry in (*picture.parameters(), *picture.dynamics()))
     assert picture.mode is None
     assert picture.faults() == []
-    assert status.condition(picture) == ("bad", "the estimator has said nothing for 2 s: what is shown is old")
+    assert status.condition(picture) == ("bad", "no frame from the estimator for 2 s: what is shown is old")
     assert math.isnan(picture.history["k_p"][-1])
 
 
@@ -261,7 +261,7 @@ def test_an_estimator_that_does_not_tell_its_contract_is_told(flight: Flight) ->
         picture.take([frame for frame in flight.frames(100) if frame[0] != 0x217], flight.sample * 1e-3)
         told = status.condition(picture)
         assert (told[0] == "bad") is (picture.now > 3.1 + 1e-9)
-    assert told[1].startswith("the estimator does not tell its version (IDENTITY): ")
+    assert told[1].startswith("the estimator does not send its version (IDENTITY): ")
 
 
 def test_a_second_estimator_on_the_bus_is_told(make_flight: Callable[..., Flight]) -> None:
@@ -288,7 +288,7 @@ def test_refused_commands_are_told(flight: Flight) -> None:
 
 def test_other_traffic_is_counted_and_harmless(flight: Flight) -> None:
     picture = Picture()
-    frames: list[Frame] = [(0x123, b"\1\2"), (model.FOREIGN, b""), (model.ERROR, b""), (0x210, b"\1"), (0x210, b"")]
+    frames: list[Frame] = [(0x123, b"\1\2"), (FOREIGN, b""), (ERROR, b""), (0x210, b"\1"), (0x210, b"")]
     picture.take([*flight.frames(400), *frames], 0.0)
     assert (picture.foreign, picture.error_frames) == (2, 1)
     assert picture.traffic["STATE_ESTIMATE"].corrupt == 2
@@ -300,13 +300,13 @@ def test_other_traffic_is_counted_and_harmless(flight: Flight) -> None:
 
 def test_history_has_a_row_a_step_and_is_bounded(flight: Flight) -> None:
     picture, frames = Picture(), flight.frames(50)
-    for k in range(2 * model.ROWS * 3):
-        picture.take(frames if k % 100 == 0 else [], k * model.STEP / 3)
+    for k in range(2 * ROWS * 3):
+        picture.take(frames if k % 100 == 0 else [], k * STEP / 3)
     lengths = {len(column) for column in picture.history.values()}
-    assert lengths == {model.ROWS}
+    assert lengths == {ROWS}
     times = list(picture.history["time"])
     steps = [after - before for before, after in itertools.pairwise(times)]
-    assert steps == pytest.approx([model.STEP] * len(steps))
+    assert steps == pytest.approx([STEP] * len(steps))
 
 
 def test_memory_does_not_grow(flight: Flight) -> None:

@@ -1,6 +1,6 @@
 """The picture of a result for a README: the top of a report (verdict, figures, the pilot's parameters) as a PNG.
 
-    python -m lever_cdkf.host_tools.report.picture build/demo/report.html picture.png
+    python -m lever_cdkf.host_tools.report.screenshot build/demo/report.html picture.png
 
 Needs Chromium (Debian: chromium) on the PATH; nothing else in the project does.
 """
@@ -25,7 +25,7 @@ SIZE = (1120, 1190)  # [pixels]
 
 def browse(url: str, *options: str) -> subprocess.CompletedProcess[str]:
     """Opens `url` in a headless browser that keeps and fetches nothing. Raises LeverError when there is none."""
-    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    browser = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if browser is None:
         raise LeverError(f"none of {', '.join(BROWSERS)} is on the PATH: apt-get install chromium")
     with tempfile.TemporaryDirectory(prefix="lever-browser-", ignore_cleanup_errors=True) as profile:
@@ -51,7 +51,7 @@ def write_picture(report: str | os.PathLike[str], path: str | os.PathLike[str]) 
 
 def main(arguments: list[str]) -> int:
     if len(arguments) != 2:
-        print("usage: python -m lever_cdkf.host_tools.report.picture REPORT.html PICTURE.png", file=sys.stderr)
+        print("usage: python -m lever_cdkf.host_tools.report.screenshot REPORT.html PICTURE.png", file=sys.stderr)
         return 2
     try:
         write_picture(*arguments)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from lever_cdkf.host_tools.errors import LeverError
 
 
-def known(what: str, names: Iterable[str], among: Iterable[str], listed_by: str) -> None:
+def check_names(what: str, names: Iterable[str], among: Iterable[str], listed_by: str) -> None:
     """Raises LeverError for the first of `names` that is not `among` them; `listed_by` is a command that lists them."""
     there: Sequence[str] = list(among)
     for name in names:

@@ -73,7 +73,7 @@ class Picture:
 
     def __init__(self) -> None:
         self.traffic = {entry.name: Traffic(entry.name) for entry in codec.database().messages}
-        self._known = {entry.identifier: entry for entry in self.traffic.values()}
+        self._by_identifier = {entry.identifier: entry for entry in self.traffic.values()}
         self.clear_counts()
         self.now = 0.0
         self.model: str | None = None
@@ -113,7 +113,7 @@ class Picture:
         for identifier, data in frames:
             groups.setdefault(identifier, []).append(data)
         for identifier, group in groups.items():
-            entry = self._known.get(identifier)
+            entry = self._by_identifier.get(identifier)
             if entry is not None:
                 good = entry.take(group, now)
                 if good:
@@ -147,14 +147,14 @@ class Picture:
         return self.values[message][name] if self.is_fresh(message) and message in self.values else NAN
 
     def wrong_contract(self) -> str | None:
-        """Why what is shown may be misread: the estimator speaks another contract, or none that it tells."""
+        """Why what is shown may be misread: the estimator speaks another version of lever.dbc, or an unknown one."""
         contract = self.identity.contract
         if contract is not None:
-            told = f"contract {contract} of lever.dbc, this program {codec.contract()}: what is shown is wrong"
-            return None if contract == codec.contract() else f"the estimator speaks {told}"
+            mismatch = f"contract {contract} of lever.dbc, this program {codec.contract()}: what is shown is wrong"
+            return None if contract == codec.contract() else f"the estimator speaks {mismatch}"
         if self._first_estimate is None or self.now - self._first_estimate <= _PATIENCE:
             return None
-        return "the estimator does not tell its version (IDENTITY): of an old one, what is shown is wrong"
+        return "the estimator does not send its version (IDENTITY): if it is an old one, what is shown is wrong"
 
     def parameters(self) -> list[Estimated]:
         """The parameters of the model; none before it is known."""
@@ -173,12 +173,12 @@ class Picture:
 
     def feedthrough(self) -> list[Feedthrough]:
         """θ/z̈ at each frequency that is sent."""
-        found = []
+        entries = []
         for frequency in FEEDTHROUGH_FREQUENCIES:
             heard, entry = self._feedthrough.get(frequency, (-math.inf, None))
             fresh = self.now - heard <= STALE_AFTER
-            found.append(entry if entry and fresh else Feedthrough(frequency, complex(NAN, NAN), NAN, NAN))
-        return found
+            entries.append(entry if entry and fresh else Feedthrough(frequency, complex(NAN, NAN), NAN, NAN))
+        return entries
 
     def coherence(self) -> Measured | None:
         """Measured, of base acceleration and lever angle over the last seconds; None while there is too little."""
@@ -291,8 +291,8 @@ class _Window:
         self._batches: deque[tuple[float, float, int]] = deque(maxlen=1000)  # time, sum, count
 
     def add(self, now: float, values: np.ndarray) -> None:
-        known = values[np.isfinite(values)]
-        self._batches.append((now, float(np.sum(known)), len(known)))
+        finite = values[np.isfinite(values)]
+        self._batches.append((now, float(np.sum(finite)), len(finite)))
 
     def mean(self, now: float) -> float:
         while self._batches and now - self._batches[0][0] > _MEAN_WINDOW:

@@ -1,0 +1,173 @@
+"""What is asked of the firmware, and in which conditions: as it was required, so that no limit moves unnoticed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from typing import Any
+
+import pytest
+from lever_cdkf.sil.envelope.condition import Condition, Limit
+from lever_cdkf.sil.envelope.conditions import CONDITIONS
+from lever_cdkf.sil.envelope.measure import FIGURES
+from lever_cdkf.sil.envelope.motions import Motion
+from lever_cdkf.sil.envelope.sensors import Sensors
+
+COVERED = ", ".join(f"{name} covered ≥ 90" for name in ("f_n", "zeta", "m_p", "c_p", "k_p"))
+FLAGGED, BACK = "; or flagged ≥ 90", "learnt ≤ 0.1, back ≤ 1"
+FEEDTHROUGH = "θ/z̈ rms ≤ 10, θ/z̈ covered ≥ 85"
+HANDS_OFF = {"released": (25.0, 35.0), "events": ((25.0, 35.0),), "start": 40.0}
+HAND = {"dither": 0.0, "model": "hand"}
+FORCE = {"duration": 120.0, "dither": 0.0, "start": 60.0, "z_ddot_gain_sigma": 2e-3}
+FORCED = FORCE | {"grip_gain_sigma": 5e-3, "against": "grip_none"}
+DRAWN = {"z_ddot_gain_sigma": 0.02, "z_ddot_delay_sigma": 5e-4, "tau_m_gain_sigma": 0.02}
+DRAWN |= {"friction_sigma": 0.05, "runs": 4}
+
+
+def largest(sigmas: float) -> str:
+    return ", ".join(f"{name} largest ≤ {sigmas:g}" for name in ("f_n", "zeta", "m_p"))
+
+
+REQUIRED: dict[str, tuple[dict[str, Any], str]] = {
+    "steady": ({}, "f_n rms ≤ 1, f_n covered ≥ 90, flagged ≤ 2"),
+    "steady_base_only": ({"dither": 0.0}, "f_n rms ≤ 2, f_n covered ≥ 90, flagged ≤ 2"),
+    "sway_2deg_0.3hz": ({"sway": (2.0, 0.3)}, "f_n rms ≤ 2, f_n covered ≥ 90"),
+    "sway_5deg_0.3hz": ({"sway": (5.0, 0.3)}, "f_n rms ≤ 3, f_n covered ≥ 90"),
+    "sway_1deg_0.5hz": ({"sway": (1.0, 0.5)}, "f_n rms ≤ 2, f_n covered ≥ 90"),
+    "wander_1deg": ({"wander": 1.0}, "f_n rms ≤ 1.5, f_n covered ≥ 90"),
+    "wander_1deg_base_only": ({"wander": 1.0, "dither": 0.0}, "f_n rms ≤ 1.5, f_n covered ≥ 90"),
+    "wander_3deg": ({"wander": 3.0}, "f_n rms ≤ 3, f_n covered ≥ 90"),
+    "wander_3deg_base_only": ({"wander": 3.0, "dither": 0.0}, "f_n rms ≤ 3, f_n covered ≥ 90"),
+    "retrim": ({"retrim": 8.0}, "f_n rms ≤ 1.2"),
+    "grip_step": ({"grip": 1.3, "events": ((30.0, 30.0),)}, "settled median ≤ 0.9, settled worst ≤ 2"),
+    "grip_slow": (
+        {"grip": 1.5, "grip_moves": (3.0, 0.5), "events": ((30.0, 30.5),), "start": 30.0},
+        "settled median ≤ 2, f_n covered ≥ 90",
+    ),
+    "slow_torque": ({"slow_torque": 1.0}, "f_n rms ≤ 3, f_n covered ≥ 85" + FLAGGED),
+    "tremor": ({"tremor": 0.2}, "f_n rms ≤ 3, f_n covered ≥ 85" + FLAGGED),
+    "rough_told": ({"process_noise": 0.5}, ""),
+    "rough": ({"process_noise": 0.5, "against": "rough_told"}, "zeta ratio ≤ 1.3, zeta covered ≥ 85"),
+    "damping_ramp": ({"damping": (42.0, 18.0, 20.0, 50.0), "start": 22.0, "end": 50.0}, "c_p covered ≥ 90, lag ≤ 1.5"),
+    "rest_20s": ({"pause": (20.0, 40.0)}, largest(4)),
+    "rest_120s": ({"pause": (20.0, 140.0), "duration": 160.0}, largest(4)),
+    "base_invalid": (
+        {"start": 25.0, "events": ((25.0, 25.2), (28.0, 29.0), (33.0, 36.0), (41.0, 51.0))},
+        f"{largest(3)}, learnt at once ≤ 0.1",
+    ),
+    "lever_lost": ({"duration": 40.0, "dither": 0.0}, largest(3.5)),
+    "sample_lost": ({"duration": 40.0, "dither": 0.0}, largest(3.5)),
+    **{
+        name: ({"start": 30.0, "end": 48.0, "events": ((30.0, 40.0),)}, f"to flag ≤ 0.5, {BACK}")
+        for name in ("base_stuck", "base_zero", "theta_stuck", "theta_dot_stuck")
+    },
+    "base_sign": (
+        {"start": 30.0, "end": 48.0, "events": ((30.0, 40.0),)},
+        f"to flag ≤ 2, {BACK.replace('learnt', 'learnt late')}",
+    ),
+    "spikes": ({"against": "steady"}, "σ ratio ≤ 1.2, f_n rms ≤ 1.5, f_n covered ≥ 90"),
+    "only_theta": ({}, "running ≥ 99, f_n rms ≤ 3, f_n covered ≥ 85"),
+    "only_rate": ({}, "running ≥ 99, f_n rms ≤ 3, f_n covered ≥ 85"),
+    "hands_off": (HANDS_OFF, "to HANDS_OFF ≤ 1, settled ≤ 2"),
+    "hands_off_base_only": (HANDS_OFF | {"dither": 0.0}, "to HANDS_OFF ≤ 1, settled ≤ 2"),
+    **{
+        name: (
+            {"duration": 40.0, "released": gap, "next_pilot": 2.0, "events": (gap,), "start": gap[1]},
+            "settled median ≤ 2, f_n covered ≥ 90",
+        )
+        for name, gap in (("next_pilot_0.3s", (25.0, 25.3)), ("next_pilot_2s", (25.0, 27.0)))
+    },
+    "base_gain_up": ({"z_ddot_gain": 1.05}, COVERED + FLAGGED),
+    "base_gain_down": ({"z_ddot_gain": 0.95}, COVERED + FLAGGED),
+    "base_late_1ms": ({"z_ddot_delay": 1e-3}, COVERED + FLAGGED),
+    "base_late_5ms": ({"z_ddot_delay": 5e-3}, COVERED + FLAGGED),
+    "torque_gain_up": ({"tau_m_gain": 1.1}, COVERED + FLAGGED),
+    "torque_gain_down": ({"tau_m_gain": 0.9}, COVERED + FLAGGED),
+    "angle_gain": ({"angle_gain": 1.02}, COVERED + FLAGGED),
+    "friction_0.1": ({"friction": 0.1}, COVERED + FLAGGED),
+    "friction_0.3": ({"friction": 0.3}, COVERED + FLAGGED),
+    "calibration_told": (
+        {"friction": 0.2, "z_ddot_gain": 1.05, "z_ddot_delay": 3e-3, "tau_m_gain": 0.9},
+        "f_n rms ≤ 2, " + COVERED,
+    ),
+    "calibration_drawn": (DRAWN, COVERED),
+    "calibration_drawn_base_only": (DRAWN | {"dither": 0.0}, COVERED),
+    "grip_none": (FORCE, ""),
+    "grip_force": (FORCED | {"grip_gain": 1.0}, "σ(k_p) ratio ≤ 0.5, k_p covered ≥ 90"),
+    "grip_gain_wrong": (FORCED | {"grip_gain": 1.5}, "k_p ratio ≤ 1"),
+    "two_dof": ({"pilot": "two_dof"}, FEEDTHROUGH + "; or mismatch ≥ 90"),
+    "mayo_ectomorphic": ({"pilot": "mayo_ectomorphic", "dither": 0.0}, FEEDTHROUGH + "; or mismatch ≥ 90"),
+    "mayo_mesomorphic": ({"pilot": "mayo_mesomorphic", "dither": 0.0}, FEEDTHROUGH + "; or mismatch ≥ 90"),
+    "two_dof_seat": ({"pilot": "two_dof"}, FEEDTHROUGH + "; or mismatch ≥ 90"),
+    **{f"{name}_hand": (HAND | {"pilot": name}, FEEDTHROUGH) for name in ("mayo_ectomorphic", "mayo_mesomorphic")},
+    "mayo_random_hand": (HAND | {"pilot": "mayo_random"}, FEEDTHROUGH),
+    "hysteretic": ({"pilot": "hysteretic"}, ""),
+    "reflex": ({"pilot": "reflex"}, ""),
+}
+TOLD = {
+    "rough_told": {"theta_dot_process_noise": 0.5},
+    "calibration_told": {"z_ddot_gain": 1.05, "z_ddot_delay": 3e-3, "tau_m_gain": 0.9, "lever_friction": 0.2},
+    "two_dof_seat": {"seat_frequency": 4.5},
+}
+"""Settings that are not the firmware's own, but for standard deviations."""
+
+
+def different(of: Motion | Sensors | Condition, plain: Motion | Sensors | Condition) -> dict[str, Any]:
+    """What is not as usual, but for what is made of others, or words."""
+    names = {field.name for field in fields(of)} - {
+        "name", "title", "motion", "sensors", "limits", "unless", "settings", "also", "quick", "closed_loop", "faults",
+    }  # fmt: skip
+    return {name: getattr(of, name) for name in names if getattr(of, name) != getattr(plain, name)}
+
+
+def test_all_that_is_required_is_in_the_table() -> None:
+    assert CONDITIONS.keys() == REQUIRED.keys()
+
+
+@pytest.mark.parametrize("name", REQUIRED)
+def test_a_condition_is_as_required(name: str) -> None:
+    condition, (changes, must) = CONDITIONS[name], REQUIRED[name]
+    usual = Motion(duration=60.0, base=1.0, dither=0.3, process_noise=0.05)
+    found = different(condition.motion, usual) | different(condition.sensors, Sensors())
+    assert found | different(condition, Condition("", "", start=20.0)) == changes
+    limits, unless = (
+        ", ".join(f"{limit.figure} {limit}" for limit in of) for of in (condition.limits, condition.unless)
+    )
+    assert limits + (f"; or {unless}" if unless else "") == must
+    assert set(condition.figures) <= set(FIGURES)
+    assert condition.against is None or CONDITIONS[condition.against].motion == condition.motion
+    told = {key: value for key, value in condition.settings.items() if not key.endswith(("_sigma", "grip_force_noise"))}
+    assert told == TOLD.get(name, {})
+    for key, value in different(condition.sensors, Sensors()).items():
+        if key.endswith("_sigma"):
+            assert condition.settings[key.replace("grip_gain", "grip_force_gain")] == value
+
+
+def test_faults_are_as_required() -> None:
+    faults = {name: condition.sensors.faults for name, condition in CONDITIONS.items() if condition.sensors.faults}
+    found = {name: [(f.what, f.kind, f.start, f.end) for f in of] for name, of in faults.items()}
+    always, failing = (0.0, math.inf), (30.0, 40.0)
+    assert found == {
+        "base_invalid": [("z_ddot", "invalid", *interval) for interval in CONDITIONS["base_invalid"].events],
+        "base_stuck": [("z_ddot", "stuck", *failing)],
+        "base_zero": [("z_ddot", "zero", *failing)],
+        "base_sign": [("z_ddot", "sign", *failing)],
+        "theta_stuck": [("theta", "stuck", *failing)],
+        "theta_dot_stuck": [("theta_dot", "stuck", *failing)],
+        "spikes": [("theta", "spikes", *always)],
+        "only_theta": [("theta_dot", "invalid", *always)],
+        "only_rate": [("theta", "invalid", *always)],
+    }
+    loops = {name: condition.closed_loop for name, condition in CONDITIONS.items() if condition.closed_loop}
+    assert {name: (of.dither, of.lost, of.whole) for name, of in loops.items()} == {
+        "lever_lost": (0.3, 0.5, False), "sample_lost": (0.3, 0.5, True)
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("limit", "kept", "broken"), [(Limit("lag", most=1.5), 1.5, 1.6), (Limit("f_n covered", least=90.0), 90.0, 89.0)]
+)
+def test_limits(limit: Limit, kept: float, broken: float) -> None:
+    assert limit.holds(kept)
+    assert not limit.holds(broken)
+    assert not limit.holds(math.nan)

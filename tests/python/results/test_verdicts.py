@@ -1,0 +1,62 @@
+"""What verdicts stand on: the figures of innovations against SciPy, and each threshold from both of its sides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.results import nis, whiteness
+from lever_cdkf.host_tools.results.nis import Innovations, Nis
+from scipy import stats
+
+
+def test_figures_of_innovations_are_those_of_chi_square() -> None:
+    """Samples with one output and with two, in pieces; without an output or an answer they count for nothing."""
+    rng = np.random.default_rng(1)
+    theta, theta_dot = (np.where(rng.random(4000) < share, 0.1, np.nan) for share in (0.6, 0.8))
+    outputs = nis.freedom(theta, theta_dot)
+    assert outputs.tolist() == [
+        int(a) + int(b) for a, b in zip(np.isfinite(theta), np.isfinite(theta_dot), strict=True)
+    ]
+    values = np.where(rng.random(4000) < 0.05, np.nan, rng.chisquare(np.maximum(outputs, 1)))
+    innovations = Innovations()
+    assert innovations.figures() == Nis()
+    for piece in np.array_split(np.arange(4000), 3):
+        innovations.add(values[piece], outputs[piece])
+    used = (outputs > 0) & np.isfinite(values)
+    told, expected = innovations.figures(), outputs[used].mean()
+    assert (told.mean, told.expected) == (pytest.approx(values[used].mean()), pytest.approx(expected))
+    half = stats.norm.ppf(0.975) * math.sqrt(2.0 * expected / used.sum())  # the variance of chi-square is 2 n
+    assert told.mean_band_95 == pytest.approx([expected - half, expected + half])
+    inside = values[used] <= stats.chi2.ppf(0.95, outputs[used])
+    assert told.inside_95_percent == pytest.approx(inside.mean())
+
+
+@pytest.mark.parametrize(
+    ("ratio", "size"), [(0.89, "smaller than"), (0.91, "as large as"), (1.09, "as"), (1.11, "larger than")]
+)
+def test_innovations_are_called_large_or_small_beyond_a_tenth(ratio: float, size: str) -> None:
+    assert nis.verdict(Nis(mean=2.0 * ratio, expected=2.0)).startswith(f"Innovations are {size}")
+    assert nis.verdict(Nis()) == ""
+
+
+@pytest.mark.parametrize(("correlation", "white"), [(0.19, True), (0.21, False), (-0.19, True), (-0.21, False)])
+def test_a_fifth_of_correlation_makes_a_long_residual_coloured(correlation: float, white: bool) -> None:
+    """Moving averages of first order, e_k + b e_{k-1}, have the correlation b / (1 + b²)."""
+    b = (1.0 - math.sqrt(1.0 - 4.0 * correlation**2)) / (2.0 * correlation)
+    noise = np.random.default_rng(2).standard_normal(400_000)
+    told = whiteness.of_averages(noise[1:] + b * noise[:-1], 0.02)
+    assert told is not None
+    assert told.autocorrelation[0] == pytest.approx(correlation, abs=0.005)
+    assert told.white is white
+    text = whiteness.verdict(told)
+    assert f"{told.largest:.2f} after 20 ms" in text
+    assert ("pass the test for whiteness up to a lag of 0.5 s" in text) is white
+    assert ("are coloured" in text) is not white
+    assert whiteness.verdict(None) == ""
+
+
+def test_an_average_needs_half_of_its_values() -> None:
+    values = np.array([1.0, 3.0, np.nan, np.nan, 5.0, np.nan, np.nan, np.nan, 7.0])
+    np.testing.assert_array_equal(whiteness.averages(values, 4), [2.0, np.nan])
