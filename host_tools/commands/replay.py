@@ -117,14 +117,14 @@ def _run_each(args: argparse.Namespace) -> int:
     if args.out is not None:
         warn_of_left_out(FILES)
     with Progress("replay") as progress:
-        made = replay_each(args.logs, lambda log: _options(args, log), args.out, progress.show)
-    print_tables({"logs": rows_of(made)}, args.json)
+        replays = replay_each(args.logs, lambda log: _options(args, log), args.out, progress.show)
+    print_tables({"logs": rows_of(replays)}, args.json)
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join([*write(made, args.out), 'a folder for each log'])}")
-    for each in made:
+        print(f"Written to {args.out}: {', '.join([*write(replays, args.out), 'a folder for each log'])}")
+    for each in replays:
         if each.problem:
             print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)
-    return 1 if any(each.problem for each in made) else 0
+    return 1 if any(each.problem for each in replays) else 0
 
 
 def _options(args: argparse.Namespace, log: str) -> Options:

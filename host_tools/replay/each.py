@@ -53,9 +53,9 @@ class Replayed:
             "duration [s]": self.summary["recording"]["duration_s"],
             "samples": self.summary["samples"],
         }
-        for name, told in self.summary["estimates"].items():
-            unit = "" if told["unit"] == "1" else f" [{told['unit']}]"
-            row[f"{name}{unit}"], row[f"{name} sigma{unit}"] = told["last"], told["last_sigma"]
+        for name, estimate in self.summary["estimates"].items():
+            unit = "" if estimate["unit"] == "1" else f" [{estimate['unit']}]"
+            row[f"{name}{unit}"], row[f"{name} sigma{unit}"] = estimate["last"], estimate["last_sigma"]
         return row | {"mean NIS [1]": self.summary["nis"]["mean"], "problem": self.problem}
 
 
@@ -64,7 +64,7 @@ def replay_each(
 ) -> list[Replayed]:
     """Replays each log; with `out`, its files are in a folder of it that is called as the log is. What is wrong with a
     log is its row's `problem`, and the others go on."""
-    made = []
+    replays = []
     for log, folder in zip(logs, _folders(logs), strict=True):
         each = Replayed(log)
         try:
@@ -72,25 +72,25 @@ def replay_each(
             each.problem = failure(each.summary)
         except LeverError as error:
             each.problem = " ".join(str(error).split())
-        made.append(each)
-    return made
+        replays.append(each)
+    return replays
 
 
-def rows_of(made: Sequence[Replayed]) -> list[Row]:
+def rows_of(replays: Sequence[Replayed]) -> list[Row]:
     """All rows with the same columns, those of the fullest."""
-    rows = [each.row() for each in made]
+    rows = [each.row() for each in replays]
     columns = max(rows, key=len).keys()
     return [{name: row.get(name) for name in columns} for row in rows]
 
 
-def write(made: Sequence[Replayed], out: Path) -> list[str]:
+def write(replays: Sequence[Replayed], out: Path) -> list[str]:
     """Writes the page and the table, as far as their extras are installed; returns their names. Raises LeverError."""
     names = [name for name, extra in ((PAGE, "report"), (TABLE, "files")) if not missing(extra)]
-    with Outputs(out, [each.log for each in made], (PAGE, TABLE)) as outputs:
+    with Outputs(out, [each.log for each in replays], (PAGE, TABLE)) as outputs:
         if PAGE in names:
-            outputs.path(PAGE).write_text(_page(made), encoding="utf-8")
+            outputs.path(PAGE).write_text(_page(replays), encoding="utf-8")
         if TABLE in names:
-            _write_table(rows_of(made), outputs.path(TABLE))
+            _write_table(rows_of(replays), outputs.path(TABLE))
         outputs.finish()
     return names
 
@@ -119,13 +119,13 @@ def _write_table(rows: Sequence[Row], path: Path) -> None:
 # --- the page ---------------------------------------------------------------------------------------------------------
 
 
-def _page(made: Sequence[Replayed]) -> str:
-    title = f"Lever CDKF: {len(made)} logs"
+def _page(replays: Sequence[Replayed]) -> str:
+    title = f"Lever CDKF: {len(replays)} logs"
     page = Page()
-    shown = [each for each in made if each.summary is not None and len(each.rows.get("time_s", ()))]
+    shown = [each for each in replays if each.summary is not None and len(each.rows.get("time_s", ()))]
     caption = "The estimates of all logs over the time since the start of each."
     page.section("estimates", "Estimates", "Estimates", page.figure("overlay", _figure(shown), caption))
-    rows = rows_of(made)
+    rows = rows_of(replays)
     cells = "".join(f"<tr>{''.join(f'<td>{_cell(cell)}</td>' for cell in row.values())}</tr>" for row in rows)
     heads = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
     table = f'<div class="wide"><table><thead><tr>{heads}</tr></thead><tbody>{cells}</tbody></table></div>'

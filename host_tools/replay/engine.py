@@ -243,7 +243,7 @@ class _Replay:
             "clock_wraps": clocks.wraps,
             "clock_restarts": clocks.restarts,
             "recorder_clock_jumps": clocks.recorder_jumps,
-            "mapping": traffic.found.summary() if isinstance(traffic, MappedTraffic) else None,
+            "mapping": traffic.loaded.summary() if isinstance(traffic, MappedTraffic) else None,
         }
 
     def finish(self, outputs: Outputs, summary: dict[str, Any]) -> None:

@@ -17,25 +17,25 @@ from .units import KINDS, normal, split_name
 def columns_of(data: Any) -> Columns:
     """Values and unit of each column of a pandas or polars frame, an xarray Dataset, a structured array, or a mapping
     of arrays; an index or coordinate with a name, or of times, is a column too. Raises LeverError."""
-    found: dict[str, Any]
+    raw: dict[str, Any]
     if hasattr(data, "data_vars"):  # xarray
-        found = {str(name): each for name, each in data.variables.items()}
+        raw = {str(name): each for name, each in data.variables.items()}
     elif isinstance(data, np.ndarray) and data.dtype.names:
-        found = {name: data[name] for name in data.dtype.names}
+        raw = {name: data[name] for name in data.dtype.names}
     elif isinstance(data, Mapping):
-        found = {str(name): each for name, each in data.items()}
+        raw = {str(name): each for name, each in data.items()}
     elif hasattr(data, "columns") and hasattr(data, "__getitem__"):  # pandas, polars
-        found = {str(name): data[name] for name in data.columns}
+        raw = {str(name): data[name] for name in data.columns}
         index = getattr(data, "index", None)
         if index is not None and (index.name is not None or index.dtype.kind in "mMf"):
-            found.setdefault(str(index.name or "time"), index)
+            raw.setdefault(str(index.name or "time"), index)
     else:
         raise LeverError(
             f"samples are a {type(data).__name__}: give a frame of pandas or polars, a Dataset of xarray, or columns "
             "as {'time': …, 'theta': …, 'z_ddot': …}"
         )
     columns: Columns = {}
-    for name, each in found.items():
+    for name, each in raw.items():
         values = each.to_numpy() if hasattr(each, "to_numpy") else np.asarray(each)
         if values.dtype == object and hasattr(each, "tz_convert"):  # pandas' dates with a time zone
             values = each.tz_convert(None).to_numpy()
@@ -52,7 +52,7 @@ def signals_by_input(columns: Columns, units: Mapping[str, str]) -> dict[str, Si
         raise LeverError(f"units of {', '.join(unknown)}: they are of {', '.join(KINDS)}")
     time_name, values = _time(columns, units)
     lengths = {name: len(each) for name, (each, _) in columns.items() if len(each) != len(values)}
-    found = {}
+    signals = {}
     for name, (each, unit) in columns.items():
         key = _key(name)
         if key in KINDS and key != "time" and name != time_name:
@@ -60,8 +60,8 @@ def signals_by_input(columns: Columns, units: Mapping[str, str]) -> dict[str, Si
                 raise LeverError(f"{name} has {lengths[name]} values, {time_name} has {len(values)}")
             if each.dtype.kind not in "biuf":
                 raise LeverError(f"{name} is no column of numbers")
-            found[key] = Signal(name, values, np.asarray(each, np.float64), units.get(key) or unit)
-    return found
+            signals[key] = Signal(name, values, np.asarray(each, np.float64), units.get(key) or unit)
+    return signals
 
 
 def _time(columns: Columns, units: Mapping[str, str]) -> tuple[str, FloatArray]:

@@ -53,11 +53,11 @@ def find(database: Database, name: str, where: str) -> tuple[Message, Field]:
     if dot and message_name not in messages:
         raise LeverError(f"{where}: {name}: no message {message_name}{_near(message_name, messages)}")
     among = [messages[message_name]] if dot else database.messages
-    found = [(message, each) for message in among for each in message.signals if each.name == signal_name]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        choices = ", ".join(f"{message.name}.{signal_name}" for message, _ in found)
+    matches = [(message, each) for message in among for each in message.signals if each.name == signal_name]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        choices = ", ".join(f"{message.name}.{signal_name}" for message, _ in matches)
         raise LeverError(f"{where}: {signal_name} is in several messages: {choices}")
     names = {each.name for message in among for each in message.signals}
     raise LeverError(f"{where}: no signal {name}{_near(signal_name, names)}")
@@ -87,7 +87,7 @@ class Counts:
 
 
 @dataclass
-class Found:
+class Received:
     """Frames of one message on one bus."""
 
     time_us: list[int] = field(default_factory=list)
@@ -102,7 +102,7 @@ class BusSignals:
         """By message."""
         self._messages = {(each.frame_id, each.is_extended_frame): each for each in wanted}
         self._protected = protected
-        self._frames: dict[tuple[str, str], Found] = defaultdict(Found)  # by message and bus
+        self._frames: dict[tuple[str, str], Received] = defaultdict(Received)  # by message and bus
         self._done: dict[tuple[str, str], list[tuple[int, dict[str, Any]]]] = {}
         self._fd: set[str] = set()
         if unknown := sorted(set(protected) - {each.name for each in database.messages}):
@@ -120,10 +120,10 @@ class BusSignals:
             chosen = frames[same & ~of_fd]
             for bus in np.unique(chosen["bus"]):
                 kept = chosen[chosen["bus"] == bus]
-                found = self._frames[message.name, names[bus]]
-                found.time_us += kept["time_us"].tolist()
+                received = self._frames[message.name, names[bus]]
+                received.time_us += kept["time_us"].tolist()
                 raw = np.ascontiguousarray(kept["data"]).tobytes()
-                found.data += [raw[8 * k : 8 * k + length] for k, length in enumerate(kept["length"].tolist())]
+                received.data += [raw[8 * k : 8 * k + length] for k, length in enumerate(kept["length"].tolist())]
 
     def signals(
         self, message: Message, names: Iterable[str], channel: str | None, log: str
@@ -165,14 +165,14 @@ class BusSignals:
             self._done[message.name, bus] = self._decode(message, self._frames[message.name, bus])
         return self._done[message.name, bus]
 
-    def _decode(self, message: Message, found: Found) -> list[tuple[int, dict[str, Any]]]:
+    def _decode(self, message: Message, received: Received) -> list[tuple[int, dict[str, Any]]]:
         counts = self.counts.setdefault(message.name, Counts())
         protection = self._protected.get(message.name)
         check = None if protection is None or protection.profile is None else _CHECKS[protection.profile]
         kept: list[tuple[int, dict[str, Any]]] = []
         last: int | None = None
-        counts.frames += len(found.data)
-        for time_us, data in zip(found.time_us, found.data, strict=True):
+        counts.frames += len(received.data)
+        for time_us, data in zip(received.time_us, received.data, strict=True):
             if check is not None and protection is not None and not check(bytearray(data), protection.data_id):
                 counts.corrupt += 1
                 continue

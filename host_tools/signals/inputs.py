@@ -69,9 +69,9 @@ def understood(key: str, source: Source, signal: Signal) -> Input:
     if gravity == "included":
         values = values - GRAVITY
     check_plausible(key, name, values)
-    made = replace(signal, time=signal.time - source.delay, values=values, unit=KINDS[key][1])
+    converted = replace(signal, time=signal.time - source.delay, values=values, unit=KINDS[key][1])
     decided = replace(source, unit=unit, sign=sign, gravity=gravity if key == "z_ddot" else "none")
-    return Input(made, decided, tuple(notes))
+    return Input(converted, decided, tuple(notes))
 
 
 def _scale(key: str, source: Source, signal: Signal, notes: list[str]) -> tuple[str, float]:
@@ -100,16 +100,16 @@ def _scale(key: str, source: Source, signal: Signal, notes: list[str]) -> tuple[
 
 def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[Samples, list[str]]:
     """The samples of all inputs, and notes for the user. Raises LeverError."""
-    made = sample({key: each.signal for key, each in inputs.items()}, clock)
+    samples = sample({key: each.signal for key, each in inputs.items()}, clock)
     notes = [note for each in inputs.values() for note in each.notes]
-    for key, how in made.how.items():
+    for key, how in samples.how.items():
         period = inputs[key].signal.period
-        rates = f"{key} comes at {1.0 / period:.4g} Hz, {made.clock} and samples at {1.0 / made.period:.4g} Hz"
+        rates = f"{key} comes at {1.0 / period:.4g} Hz, {samples.clock} and samples at {1.0 / samples.period:.4g} Hz"
         if how == "slower":
             notes.append(f"{rates}: it is missing in between (--clock {key} samples at its rate)")
-        elif period * _FASTER < made.period:
+        elif period * _FASTER < samples.period:
             notes.append(f"{rates}: its values in between are not used (--clock {key} uses them)")
-    return made, notes + _disagreement(inputs, made)
+    return samples, notes + _disagreement(inputs, samples)
 
 
 def _disagreement(inputs: Mapping[str, Input], samples: Samples) -> list[str]:

@@ -226,11 +226,11 @@ def _protection(name: str, table: Any) -> Protection:
     given = dict(table)
     if isinstance(given.get("data_id"), list):
         given["data_id"] = tuple(given["data_id"])
-    made = Protection(**given)
-    if made.profile is None and made.counter is None:
+    protection = Protection(**given)
+    if protection.profile is None and protection.counter is None:
         raise LeverError(f"{where}: it has neither a profile nor a counter")
-    if made.profile not in (None, 1, 2, 5):
-        raise LeverError(f"{where}: profile = {made.profile}; it may be 1, 2 or 5")
-    if (made.profile == 2) != (isinstance(made.data_id, tuple) and len(made.data_id) == 16):
+    if protection.profile not in (None, 1, 2, 5):
+        raise LeverError(f"{where}: profile = {protection.profile}; it may be 1, 2 or 5")
+    if (protection.profile == 2) != (isinstance(protection.data_id, tuple) and len(protection.data_id) == 16):
         raise LeverError(f"{where}: data_id is a list of sixteen bytes for profile 2, and a number for the others")
-    return made
+    return protection

@@ -72,10 +72,11 @@ def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
         "padding:0 1rem}figure{margin:1rem 0}svg{width:100%;height:auto;border:1px solid #8886}"
         "path{fill:none;stroke:#2a6fdb;stroke-width:1.2;vector-effect:non-scaling-stroke}"
     )
+    seconds = max((float(np.ptp(each.time)) for _, each in signals if len(each.time)), default=0.0)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width"><style>{style}</style>'
-        f"<h1>{html.escape(title)}</h1>{''.join(figures)}</html>\n"
+        f"<h1>{html.escape(title)}</h1><p>{seconds:.4g} s</p>{''.join(figures)}</html>\n"
     )
 
 

@@ -18,7 +18,7 @@ from ..errors import LeverError
 from .mapping import Mapping, Source
 from .recorded import Signal
 from .slope import STEP, slope_likeness, together
-from .units import GRAVITY, INPUTS, fitting, known
+from .units import GRAVITY, INPUTS, fitting, is_unit
 
 _UNIT_FITS, _NO_UNIT, _UNIT_DOES_NOT = 4.0, 2.0, -8.0
 _IS_SLOPE = 4.0
@@ -132,7 +132,7 @@ def _candidate(key: str, signal: Signal) -> Candidate:
         why.append(f"in {signal.unit}")
     elif not signal.unit:
         score += _NO_UNIT
-    elif known(signal.unit) or signal.unit == "%":
+    elif is_unit(signal.unit) or signal.unit == "%":
         score += _UNIT_DOES_NOT
     if key == "z_ddot" and (level := _gravity(signal.values)):
         score += _HAS_GRAVITY
@@ -193,11 +193,11 @@ def _with_movement(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _gained(candidates: list[Candidate], gains: dict[tuple[str, str], tuple[float, str]]) -> list[Candidate]:
-    made = []
+    gained = []
     for each in candidates:
         gain, words = gains.get((each.key, each.signal.name), (0.0, ""))
-        made.append(replace(each, score=each.score + gain, why=(*each.why, words) if words else each.why))
-    return made
+        gained.append(replace(each, score=each.score + gain, why=(*each.why, words) if words else each.why))
+    return gained
 
 
 def _coherence(base: Signal, lever: Signal) -> float:

@@ -36,7 +36,7 @@ class Reading:
 
 
 @dataclass
-class Found:
+class Loaded:
     """The samples, and where they come from."""
 
     samples: Samples
@@ -69,7 +69,7 @@ class Found:
         }
 
 
-def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> Found:
+def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> Loaded:
     """Samples of recorded logs, one after another in time, or of one file of columns. Raises LeverError."""
     paths = [str(path) for path in logs]
     if any(is_table(path) for path in paths):
@@ -85,16 +85,16 @@ def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None
     return _of_bus(paths, reading, reading.mapping, reading.database, progress)
 
 
-def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, progress: Progress | None) -> Found:
+def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, progress: Progress | None) -> Loaded:
     database = load_database(file)
-    found = {key: find(database, source.signal, file) for key, source in mapping.sources.items()}
-    messages = {message.name: message for message, _ in found.values()}
+    fields = {key: find(database, source.signal, file) for key, source in mapping.sources.items()}
+    messages = {message.name: message for message, _ in fields.values()}
     reader = BusSignals(database, messages.values(), mapping.protected)
     recording = Recording(paths)
     frames = _collect(reader, recording, reading.start, reading.length, progress)
     inputs, buses = {}, set[str]()
     for key, source in mapping.sources.items():
-        message, signal = found[key]
+        message, signal = fields[key]
         channel = source.channel or reading.channel
         decoded, bus = reader.signals(message, [signal.name], channel, ", ".join(paths))
         buses.add(bus)
@@ -103,13 +103,13 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
     samples, notes = samples_of(inputs, reading.clock)
     unprotected = sum(counts.frames for name, counts in reader.counts.items() if name not in mapping.protected)
     used = sum(counts.frames for counts in reader.counts.values())
-    return Found(
+    return Loaded(
         *(samples, inputs, notes, [str(path) for path in recording.paths], sorted(buses), frames, used),
         *(reader.counts, unprotected, recording.damaged, recording.ends_early),
     )
 
 
-def _of_table(path: str, reading: Reading) -> Found:
+def _of_table(path: str, reading: Reading) -> Loaded:
     mapping = reading.mapping
     columns = read_table(path, None if mapping is None else mapping.time)
     mapping = mapping or own_mapping(columns, path)
@@ -120,7 +120,7 @@ def _of_table(path: str, reading: Reading) -> Found:
         inputs[key] = understood(key, source, signal)
     samples, notes = samples_of(inputs, reading.clock)
     rows = max(len(each.time) for each in columns)
-    return Found(samples, inputs, notes, [path], [], rows, 0)
+    return Loaded(samples, inputs, notes, [path], [], rows, 0)
 
 
 def all_signals(
@@ -136,16 +136,16 @@ def all_signals(
     loaded = load_database(database)
     reader, recording = BusSignals(loaded, loaded.messages, {}), Recording([log])
     _collect(reader, recording, start, length, None)
-    found = [
+    signals = [
         signal
         for message in loaded.messages
         for bus in reader.buses(message)[:1]
         if channel is None or channel in reader.buses(message)
         for signal in reader.signals(message, [each.name for each in message.signals], channel or bus, log)[0].values()
     ]
-    if not found:
+    if not signals:
         raise LeverError(f"{log}: none of its frames is of a message of {database}: is it the database of this bus?")
-    return found
+    return signals
 
 
 def _collect(reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None) -> int:

@@ -53,8 +53,8 @@ class Samples:
 
 def sample(signals: Mapping[str, Signal], clock: str | None = None) -> Samples:
     """Samples of signals in the firmware's units, by input. Raises LeverError."""
-    made = {key: ordered(signal) for key, signal in signals.items()}
-    clean = {key: signal for key, (signal, _) in made.items()}
+    cleaned = {key: ordered(signal) for key, signal in signals.items()}
+    clean = {key: signal for key, (signal, _) in cleaned.items()}
     clock = clock or _clock(clean)
     if clock not in clean:
         raise LeverError(f"--clock {clock}: it is not mapped; {', '.join(clean)} are")
@@ -67,7 +67,7 @@ def sample(signals: Mapping[str, Signal], clock: str | None = None) -> Samples:
             raise LeverError(f"{key} = {signal.name}: no value of it is at the time of {clock} = {clean[clock].name}")
     time_us = np.rint((time - min(float(time[0]), 0.0)) * 1e6).astype(np.int64)
     period = float(f"{period:.4g}")
-    return Samples(time, time_us, columns, period, clock, how, sum(count for _, count in made.values()))
+    return Samples(time, time_us, columns, period, clock, how, sum(count for _, count in cleaned.values()))
 
 
 def check_period(period: float, key: str, name: str) -> None:

@@ -68,21 +68,21 @@ class Result(Mapping[str, Estimated]):
     def _by_name(self) -> dict[str, Estimated]:
         raw, usable = self._raw, ~np.isin(self.mode, ("init", "align", "fault"))
 
-        def made(name: str, unit: str, values: Any, sigma: Any) -> Estimated:
+        def at_samples(name: str, unit: str, values: Any, sigma: Any) -> Estimated:
             usable_values, usable_sigma = (
                 np.where(usable, each.astype(np.float64), np.nan) for each in (values, sigma)
             )
             return Estimated(name, unit, usable_values, usable_sigma)
 
         model = self.config.choices["model"]
-        found = {}
+        estimated = {}
         for k, each in enumerate(parameters(model)):
-            found[each.key] = made(each.key, each.unit, raw["parameter"][:, k], raw["parameter_sigma"][:, k])
+            estimated[each.key] = at_samples(each.key, each.unit, raw["parameter"][:, k], raw["parameter_sigma"][:, k])
         for each in DYNAMICS:
-            found[each.key] = made(each.key, each.unit, raw[each.key], raw[f"{each.key}_sigma"])
+            estimated[each.key] = at_samples(each.key, each.unit, raw[each.key], raw[f"{each.key}_sigma"])
         for name, unit in (("theta", "rad"), ("theta_dot", "rad/s")):
-            found[name] = made(name, unit, raw[name], raw[f"{name}_sigma"])
-        return found
+            estimated[name] = at_samples(name, unit, raw[name], raw[f"{name}_sigma"])
+        return estimated
 
     def __getitem__(self, name: str) -> Estimated:
         if name not in self._estimated:
@@ -147,9 +147,9 @@ class Result(Mapping[str, Estimated]):
             axis.fill_between(time, values - 2.0 * sigma, values + 2.0 * sigma, alpha=0.25, linewidth=0)
             axis.plot(time, values)
             axis.set_ylabel(each.name if each.unit == "1" else f"{each.name}\n[{each.unit}]")
-            known = values[np.isfinite(values)]
-            if len(known):
-                low, high = np.percentile(known, [1.0, 99.0])
+            finite = values[np.isfinite(values)]
+            if len(finite):
+                low, high = np.percentile(finite, [1.0, 99.0])
                 room = max(0.5 * float(high - low), 4.0 * each.last_sigma, 1e-9)
                 axis.set_ylim(float(low) - room, float(high) + room)
         axes[-1].set_xlabel("time [s]")

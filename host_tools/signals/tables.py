@@ -72,14 +72,14 @@ def find_time(columns: Columns, where: str, wanted: str | None = None) -> str:
     """The name of the column that is the time. Raises LeverError."""
     names = list(columns)
     if wanted:
-        found = [name for name in names if wanted in (name, split_name(name)[0])]
+        matches = [name for name in names if wanted in (name, split_name(name)[0])]
     else:
         dates = [name for name in names if columns[name][0].dtype.kind in "mM"]
-        found = [*filter(_TIME.match, names), *dates]
-    if not found:
+        matches = [*filter(_TIME.match, names), *dates]
+    if not matches:
         what = f"no column {wanted}" if wanted else "no column of time that is known by its name"
         raise LeverError(f"{where}: {what}: say which by --map time=COLUMN; it has {_some(names)}")
-    return found[0]
+    return matches[0]
 
 
 def seconds(values: Array, unit: str, where: str) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import LeverError
-from .units import known, normal, split_name
+from .units import is_unit, normal, split_name
 
 _DELIMITERS = ",;\t| "
 _LOOKED_AT = 200
@@ -123,7 +123,7 @@ def _header(lines: list[str], delimiter: str, first: int, path: str) -> tuple[li
     if not above:
         raise LeverError(f"{path}: its columns have no names: put a line with a name for each above the numbers")
     labels, units = above[-1], [""] * width
-    if len(above) > 1 and sum(known(normal(each.strip("[]()"))) for each in above[-1]) >= width / 2:
+    if len(above) > 1 and sum(is_unit(normal(each.strip("[]()"))) for each in above[-1]) >= width / 2:
         labels, units = above[-2], [each.strip("[]() ") for each in above[-1]]
     split = [split_name(label) for label in labels]
     return [name for name, _ in split], [unit or own for unit, (_, own) in zip(units, split, strict=True)]

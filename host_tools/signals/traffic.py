@@ -11,7 +11,7 @@ import numpy as np
 from ..can import codec
 from ..can.bulk import FRAME, Frames
 from ..firmware.config import Config, setting
-from .reading import Found, Progress, Reading, read
+from .reading import Loaded, Progress, Reading, read
 from .resample import Samples
 
 _SAMPLES_AT_ONCE = 1 << 15
@@ -33,8 +33,8 @@ def frames_of(samples: Samples) -> Frames:
         frames["data"][:, place] = codec.encode_columns(name, counters, values)
     frames["length"] = 8
     frames["time_us"] = samples.time_us[:, np.newaxis]
-    made: Frames = frames.reshape(-1)
-    return made
+    in_order: Frames = frames.reshape(-1)
+    return in_order
 
 
 _CONTENTS = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
@@ -56,25 +56,25 @@ class MappedTraffic:
 
     def __init__(self, logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> None:
         """Reads all of it. Raises LeverError."""
-        self.found: Found = read(logs, reading, progress)
-        self.recording = Origin(self.found.paths, self.found.damaged, self.found.ends_early)
-        self.channel: str | None = "_".join(self.found.buses)[:24] or BUS
-        self.frames = self.found.frames
-        self.others = {"other_identifiers": max(self.found.frames - self.found.used, 0) if self.found.buses else 0}
+        self.loaded: Loaded = read(logs, reading, progress)
+        self.recording = Origin(self.loaded.paths, self.loaded.damaged, self.loaded.ends_early)
+        self.channel: str | None = "_".join(self.loaded.buses)[:24] or BUS
+        self.frames = self.loaded.frames
+        self.others = {"other_identifiers": max(self.loaded.frames - self.loaded.used, 0) if self.loaded.buses else 0}
         self.corrupt_answers = 0
         self.other_samples: set[str] = set()
-        time_us = self.found.samples.time_us
+        time_us = self.loaded.samples.time_us
         self.first_us, self.last_us = int(time_us[0]), int(time_us[-1])
 
     def at_its_rate(self, config: Config) -> Config:
         """`config` with the sample period of the log, unless it sets one that is not the default. Raises LeverError."""
         settings = config.settings
         if settings["sample_period"] == setting("sample_period").default:
-            settings["sample_period"] = self.found.samples.period
+            settings["sample_period"] = self.loaded.samples.period
         return Config(**config.choices, settings=settings)
 
     def chunks(self) -> Iterator[Frames]:
         """The frames."""
-        frames = frames_of(self.found.samples)
+        frames = frames_of(self.loaded.samples)
         for first in range(0, len(frames), _SAMPLES_AT_ONCE):
             yield frames[first : first + _SAMPLES_AT_ONCE]

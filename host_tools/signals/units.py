@@ -71,7 +71,7 @@ def factor(key: str, unit: str) -> float | None:
     return _FACTORS[KINDS[key][0]].get(normal(unit))
 
 
-def known(unit: str) -> bool:
+def is_unit(unit: str) -> bool:
     """Whether it is a unit of any kind."""
     return any(normal(unit) in factors for factors in _FACTORS.values())
 
@@ -84,13 +84,13 @@ def fitting(unit: str) -> set[str]:
 def split_name(label: str) -> tuple[str, str]:
     """Name and unit of a column's label: "Angle [deg]", "Angle (deg)", "angle_deg"; "" without."""
     label = label.strip()
-    if found := re.fullmatch(r"(.*\S)\s*[\[({](.*)[\])}]", label):
-        return found[1].strip(), found[2].strip()
+    if bracketed := re.fullmatch(r"(.*\S)\s*[\[({](.*)[\])}]", label):
+        return bracketed[1].strip(), bracketed[2].strip()
     parts = re.split(r"_+|\s+|/(?=\D*$)", label)
     for first in range(1, len(parts)):
         for joint in ("/", " "):
             unit = joint.join(parts[first:])
-            if known(unit) and (len(unit) > 1 or unit in "gsN"):
+            if is_unit(unit) and (len(unit) > 1 or unit in "gsN"):
                 return label, unit
     return label, ""
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
+from collections import deque
 from pathlib import Path
 
 import can
 import pytest
+from can.interfaces import BACKENDS
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.signals.mapping import read_mapping
@@ -15,6 +18,7 @@ from lever_cdkf.host_tools.signals.online import Online
 from lever_cdkf.host_tools.signals.reading import Reading
 from lever_cdkf.host_tools.watch.mapped import MappedBusSource
 from lever_cdkf.host_tools.watch.picture import Picture
+from python.can.test_record import Line
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY
 from python.signals.test_mapped_replay import frequency, refused, replayed
 
@@ -68,6 +72,28 @@ def test_a_view_of_a_bus(folder: Path, frames: list[can.Message]) -> None:
         finally:
             source.stop()
     assert source.error is None
+
+
+def test_a_recording_says_what_has_come_of_the_mapped_signals(
+    folder: Path, frames: list[can.Message], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(BACKENDS, "kvaser", ("python.can.test_record", Line.__name__))
+    recording = ["record", "--interface", "kvaser", "--channel", "x", "--json", str(tmp_path / "rows.json")]
+    mapped = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]
+    Line.frames = deque(frames[:16000])
+    assert cli.main([*recording, "-o", str(tmp_path / "flight.log"), *mapped]) == 0
+    rows = json.loads((tmp_path / "rows.json").read_text())
+    assert [(row["input"], row["rate_hz"], row["missing"]) for row in rows["signals"]] == [
+        ("theta", 500.0, 0),
+        ("theta_dot", 500.0, 0),
+        ("z_ddot", 500.0, 0),
+    ]
+    assert {row["message"]: row["frames"] for row in rows["mapped messages"]} == {
+        "InceptorPosition": 5000,
+        "AhrsAccel": 5000,
+    }
+    Line.frames = deque(frames[2:3])  # of another message: the log is complete all the same
+    assert cli.main([*recording, "-o", str(tmp_path / "other.log"), *mapped]) == 0
 
 
 def test_what_a_bus_needs(capsys: pytest.CaptureFixture[str], folder: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from e2e.p01 import e2e_p01_protect
 from e2e.p05 import e2e_p05_protect
 from lever_cdkf.host_tools.signals.mapping import read_mapping
-from lever_cdkf.host_tools.signals.reading import Found, Reading, read
+from lever_cdkf.host_tools.signals.reading import Loaded, Reading, read
 from python.conftest import Session
 
 DATABASE = """VERSION ""
@@ -21,7 +21,7 @@ BO_ 291 Protected: 8 A
 """
 
 
-def made(folder: Path, profile: int, wrong: tuple[int, ...] = (), lost: tuple[int, ...] = ()) -> Found:
+def made(folder: Path, profile: int, wrong: tuple[int, ...] = (), lost: tuple[int, ...] = ()) -> Loaded:
     """200 protected frames, of which some have a flipped bit and some never came."""
     lines = []
     for k in range(200):
