@@ -94,19 +94,38 @@ class Received:
     data: list[bytes] = field(default_factory=list)
 
 
+@dataclass
+class Decoded:
+    """One signal of the frames that are right."""
+
+    time: list[float] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+
+
 class BusSignals:
     """The signals that are asked for, out of logs."""
 
-    def __init__(self, database: Database, wanted: Iterable[Message], protected: dict[str, Protection]) -> None:
+    def __init__(
+        self, database: Database, wanted: Iterable[tuple[Message, Field]], protected: dict[str, Protection]
+    ) -> None:
+        """Raises LeverError for a protection that does not fit the database."""
         self.counts: dict[str, Counts] = {}
         """By message."""
-        self._messages = {(each.frame_id, each.is_extended_frame): each for each in wanted}
+        self.fd: set[str] = set()
+        """Messages that came as CAN FD, whose data bulk.FRAME does not hold: add_fd() takes them."""
+        self._messages: dict[tuple[int, bool], Message] = {}
+        self._fields: dict[str, dict[str, Field]] = defaultdict(dict)  # by message
+        for message, signal in wanted:
+            self._messages[message.frame_id, message.is_extended_frame] = message
+            self._fields[message.name][signal.name] = signal
         self._protected = protected
         self._frames: dict[tuple[str, str], Received] = defaultdict(Received)  # by message and bus
-        self._done: dict[tuple[str, str], list[tuple[int, dict[str, Any]]]] = {}
-        self._fd: set[str] = set()
-        if unknown := sorted(set(protected) - {each.name for each in database.messages}):
-            raise LeverError(f"the mapping protects {', '.join(unknown)}, which is no message of the database")
+        self._decoded: dict[tuple[str, str], dict[str, Decoded]] = {}
+        for name, protection in protected.items():
+            if protection.counter is not None:
+                find(database, f"{name}.{protection.counter}", f"[protected.{name}]")
+            elif name not in {each.name for each in database.messages}:
+                raise LeverError(f"the mapping protects {name}, which is no message of the database")
 
     def add(self, frames: Frames, recording: Recording) -> None:
         """Keeps what is needed of further frames."""
@@ -116,7 +135,7 @@ class BusSignals:
             same &= frames["flags"] & (REMOTE | ERROR) == 0
             of_fd = frames["flags"] & FD != 0
             if (same & of_fd).any():
-                self._fd.add(message.name)
+                self.fd.add(message.name)
             chosen = frames[same & ~of_fd]
             for bus in np.unique(chosen["bus"]):
                 kept = chosen[chosen["bus"] == bus]
@@ -125,21 +144,31 @@ class BusSignals:
                 raw = np.ascontiguousarray(kept["data"]).tobytes()
                 received.data += [raw[8 * k : 8 * k + length] for k, length in enumerate(kept["length"].tolist())]
 
-    def signals(
-        self, message: Message, names: Iterable[str], channel: str | None, log: str
-    ) -> tuple[dict[str, Signal], str]:
-        """Signals of a message, and on which bus: if not given, the only one that has it. Raises LogError."""
+    def add_fd(self, path: str, first_us: int, last_us: int) -> None:
+        """Keeps what is needed of the frames of CAN FD in a log, from one time to another. Raises LeverError."""
+        import can
+
+        try:
+            with can.LogReader(path) as log:
+                for frame in log:
+                    message = self._messages.get((frame.arbitration_id, frame.is_extended_id))
+                    time_us = round(1e6 * frame.timestamp)
+                    if message is not None and frame.is_fd and first_us <= time_us < last_us:
+                        bus = "can" if frame.channel is None else "_".join(str(frame.channel).split()) or "can"
+                        received = self._frames[message.name, bus]
+                        received.time_us.append(time_us)
+                        received.data.append(bytes(frame.data))
+        except Exception as error:  # each format has its own
+            raise LeverError(f"{path}: its frames of CAN FD cannot be read: {error}") from None
+
+    def signal(self, message: Message, name: str, channel: str | None, log: str) -> tuple[Signal, str]:
+        """A signal of a message, and on which bus: if not given, the only one that has it. Raises LogError."""
         bus = self._bus(message, channel, log)
-        decoded = self._decoded(message, bus)
-        time = np.array([time_us for time_us, _ in decoded], np.float64) * 1e-6
-        signals = {}
-        for name in names:
-            each = message.get_signal_by_name(name)
-            values = np.array([number(each, values.get(name)) for _, values in decoded], np.float64)
-            there = np.array([name in values for _, values in decoded], np.bool_)  # of a multiplexed one, not always
-            words = each.comment or ""
-            signals[name] = Signal(f"{message.name}.{name}", time[there], values[there], each.unit or "", words)
-        return signals, bus
+        if (message.name, bus) not in self._decoded:
+            self._decoded[message.name, bus] = self._decode(message, self._frames[message.name, bus])
+        decoded, each = self._decoded[message.name, bus][name], self._fields[message.name][name]
+        time, values = np.array(decoded.time, np.float64), np.array(decoded.values, np.float64)
+        return Signal(f"{message.name}.{name}", time, values, each.unit or "", each.comment or ""), bus
 
     def buses(self, message: Message) -> list[str]:
         """Which buses have it."""
@@ -155,25 +184,17 @@ class BusSignals:
         if len(buses) > 1 or (buses and channel is not None):
             missed = "" if channel is None else f"not on {channel}, but "
             raise LogError(f"{log}: {what} is {missed}on {' and '.join(buses)}: choose with --channel or channel=")
-        if message.name in self._fd:
-            raise LogError(f"{log}: {what} comes as CAN FD, which is not read here: export it as CSV or MF4 signals")
         raise LogError(f"{log}: no frame of {what} in it")
 
-    def _decoded(self, message: Message, bus: str) -> list[tuple[int, dict[str, Any]]]:
-        """Time and fields of each frame that is right."""
-        if (message.name, bus) not in self._done:
-            self._done[message.name, bus] = self._decode(message, self._frames[message.name, bus])
-        return self._done[message.name, bus]
-
-    def _decode(self, message: Message, received: Received) -> list[tuple[int, dict[str, Any]]]:
+    def _decode(self, message: Message, received: Received) -> dict[str, Decoded]:
+        """The signals of each frame that is right; a multiplexed one is not in all of them."""
         counts = self.counts.setdefault(message.name, Counts())
-        protection = self._protected.get(message.name)
-        check = None if protection is None or protection.profile is None else _CHECKS[protection.profile]
-        kept: list[tuple[int, dict[str, Any]]] = []
-        last: int | None = None
         counts.frames += len(received.data)
+        protection = self._protected.get(message.name)
+        decoded = {name: Decoded() for name in self._fields[message.name]}
+        counter = _Counter(message, protection, counts)
         for time_us, data in zip(received.time_us, received.data, strict=True):
-            if check is not None and protection is not None and not check(bytearray(data), protection.data_id):
+            if not _is_right(protection, data):
                 counts.corrupt += 1
                 continue
             try:
@@ -181,22 +202,41 @@ class BusSignals:
             except Exception:  # cantools raises what its decoder happens to
                 counts.undecoded += 1
                 continue
-            if protection is not None and protection.counter is not None:
-                now = int(values[protection.counter])
-                step = 1 if last is None else (now - last) % _turn(message, protection)
-                last = now
-                counts.lost += max(step - 1, 0)
-                counts.repeated += step == 0
-                if step == 0:
-                    continue
-            kept.append((time_us, values))
-        return kept
+            if counter.is_new(values):
+                for name, each in self._fields[message.name].items():
+                    if name in values:
+                        decoded[name].time.append(1e-6 * time_us)
+                        decoded[name].values.append(number(each, values[name]))
+        return decoded
 
 
-def _turn(message: Message, protection: Protection) -> int:
-    """After how many frames the counter is where it was: profile 1 leaves out its last value."""
-    assert protection.counter is not None
-    return (1 << message.get_signal_by_name(protection.counter).length) - (1 if protection.profile == 1 else 0)
+def _is_right(protection: Protection | None, data: bytes) -> bool:
+    """By the CRC of its profile, where one is known."""
+    if protection is None or protection.profile is None:
+        return True
+    return len(data) >= 3 and _CHECKS[protection.profile](bytearray(data), protection.data_id)
+
+
+class _Counter:
+    """Follows the counter of a message, where the mapping names one."""
+
+    def __init__(self, message: Message, protection: Protection | None, counts: Counts) -> None:
+        self._name = None if protection is None else protection.counter
+        self._counts = counts
+        self._last: int | None = None
+        if self._name is not None and protection is not None:
+            values = 1 << message.get_signal_by_name(self._name).length
+            self._turn = values - 1 if protection.profile == 1 else values  # profile 1 leaves out the last
+
+    def is_new(self, values: Any) -> bool:
+        """False for a frame that is repeated; counts it, or what was lost before it."""
+        if self._name is None or self._name not in values:
+            return True
+        step = 1 if self._last is None else (int(values[self._name]) - self._last) % self._turn
+        self._last = int(values[self._name])
+        self._counts.lost += max(step - 1, 0)
+        self._counts.repeated += step == 0
+        return step != 0
 
 
 def number(signal: Field, value: Any) -> float:

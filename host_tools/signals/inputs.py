@@ -109,6 +109,11 @@ def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[S
             notes.append(f"{rates}: it is missing in between (--clock {key} samples at its rate)")
         elif period * _FASTER < samples.period:
             notes.append(f"{rates}: its values in between are not used (--clock {key} uses them)")
+    if samples.disordered:
+        notes.append(
+            f"{samples.disordered:,} values are left out, since they come no later than the one before them: the "
+            "recorder's time stamps are coarse, or go back"
+        )
     return samples, notes + _disagreement(inputs, samples)
 
 

@@ -16,6 +16,7 @@ from .own import own_mapping
 from .recorded import Signal
 from .resample import Samples
 from .tables import is_table, read_table
+from .units import split_name
 
 Progress = Callable[[int, int], None]
 
@@ -88,18 +89,17 @@ def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None
 def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, progress: Progress | None) -> Loaded:
     database = load_database(file)
     fields = {key: find(database, source.signal, file) for key, source in mapping.sources.items()}
-    messages = {message.name: message for message, _ in fields.values()}
-    reader = BusSignals(database, messages.values(), mapping.protected)
+    reader = BusSignals(database, fields.values(), mapping.protected)
     recording = Recording(paths)
     frames = _collect(reader, recording, reading.start, reading.length, progress)
     inputs, buses = {}, set[str]()
     for key, source in mapping.sources.items():
         message, signal = fields[key]
         channel = source.channel or reading.channel
-        decoded, bus = reader.signals(message, [signal.name], channel, ", ".join(paths))
+        decoded, bus = reader.signal(message, signal.name, channel, ", ".join(paths))
         buses.add(bus)
         named = Source(**{**asdict(source), "signal": f"{message.name}.{signal.name}", "channel": bus})
-        inputs[key] = understood(key, named, decoded[signal.name])
+        inputs[key] = understood(key, named, decoded)
     samples, notes = samples_of(inputs, reading.clock)
     unprotected = sum(counts.frames for name, counts in reader.counts.items() if name not in mapping.protected)
     used = sum(counts.frames for counts in reader.counts.values())
@@ -134,14 +134,15 @@ def all_signals(
     if database is None:
         raise LeverError(f"{log}: a log of a bus needs the database of its messages: add --dbc FILE")
     loaded = load_database(database)
-    reader, recording = BusSignals(loaded, loaded.messages, {}), Recording([log])
+    wanted = [(message, each) for message in loaded.messages for each in message.signals]
+    reader, recording = BusSignals(loaded, wanted, {}), Recording([log])
     _collect(reader, recording, start, length, None)
     signals = [
-        signal
+        reader.signal(message, each.name, channel or bus, log)[0]
         for message in loaded.messages
         for bus in reader.buses(message)[:1]
         if channel is None or channel in reader.buses(message)
-        for signal in reader.signals(message, [each.name for each in message.signals], channel or bus, log)[0].values()
+        for each in message.signals
     ]
     if not signals:
         raise LeverError(f"{log}: none of its frames is of a message of {database}: is it the database of this bus?")
@@ -160,9 +161,14 @@ def _collect(reader: BusSignals, recording: Recording, start: float, length: flo
             progress(recording.done, recording.size)
         if since[-1] > start + length + _SLACK:
             break
+    if reader.fd:
+        first = first_us + round(1e6 * start)
+        for path in recording.paths:
+            reader.add_fd(path, first, first + round(1e6 * min(length, _EVER)))
     return frames
 
 
+_EVER = 1e9  # [s]
 _SLACK = 10.0  # [s] that recorded time may go back
 
 
@@ -170,7 +176,7 @@ def column(columns: Sequence[Signal], name: str, where: str) -> Signal:
     """A column by its name, or by the part after the last dot. Raises LeverError."""
     for matches in (
         [each for each in columns if each.name == name],
-        [each for each in columns if each.name.lower() == name.lower()],
+        [each for each in columns if each.name.lower() in (name.lower(), split_name(name)[0].lower())],
         [each for each in columns if each.name.rpartition(".")[2] == name.rpartition(".")[2]],
     ):
         if len(matches) == 1:

@@ -31,7 +31,8 @@ class Signal:
         steps = steps[steps > 0.0]
         if not len(steps):
             return float("inf")
-        usual = steps[steps < 1.5 * np.median(steps)]  # without gaps: their mean, which jitter does not move
+        middle = np.median(steps)
+        usual = steps[(steps > 0.5 * middle) & (steps < 1.5 * middle)]  # without gaps; jitter does not move their mean
         return float(np.mean(usual))
 
     def between(self, start: float, end: float) -> Signal:

@@ -152,6 +152,24 @@ def test_losses_are_counted_by_the_counter_that_the_mapping_names(
     assert "4 lost, 1 repeated" in summary["verdict"]
 
 
+@pytest.mark.parametrize("suffix", ["blf", "asc", "log"])
+def test_can_fd(suffix: str, folder: Path, frames: list[can.Message], flight: Flight, tmp_path: Path) -> None:
+    """The same frames as CAN FD, with 64 bytes of which the database describes eight."""
+    fd = [
+        can.Message(
+            *(frame.timestamp, frame.arbitration_id, frame.is_extended_id),
+            channel=0,
+            is_fd=True,
+            data=bytes(frame.data).ljust(64, b"\0"),
+        )
+        for frame in frames[: len(frames) // 3]
+    ]
+    log = write_log(tmp_path / f"fd.{suffix}", fd)
+    summary = replayed(tmp_path / "out", log, "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    assert summary["samples"] == len(flight.time) // 3
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.03)
+
+
 def test_an_acceleration_that_points_down_is_turned(flight: Flight, tmp_path: Path) -> None:
     columns = np.column_stack((flight.time, flight.theta, -flight.z_ddot - 9.81))
     np.savetxt(tmp_path / "down.csv", columns, "%.7f", ",", header="time_s,theta_rad,nz_m_s2", comments="")

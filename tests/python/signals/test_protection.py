@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from e2e.p01 import e2e_p01_protect
 from e2e.p05 import e2e_p05_protect
+from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.signals.mapping import read_mapping
 from lever_cdkf.host_tools.signals.reading import Loaded, Reading, read
 from python.conftest import Session
@@ -77,6 +78,13 @@ def test_profile_2_is_that_of_lever_dbc(session: Session, root: Path, tmp_path: 
     assert read([tmp_path / "wrong.log"], reading).counts["LEVER_SAMPLE"].corrupt == 3
 
 
+def test_a_counter_that_is_not_there(session: Session, root: Path, tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text("[protected.LEVER_SAMPLE]\ncounter = 'count'\n")
+    mapping = read_mapping([str(tmp_path / "m.toml"), "theta=LEVER_SAMPLE.theta", "z_ddot=BASE_SAMPLE.z_ddot"])
+    with pytest.raises(LeverError, match=r"no signal LEVER_SAMPLE\.count; near to it: counter"):
+        read([session.log], Reading(mapping, str(root / "firmware/can/lever.dbc")))
+
+
 @pytest.mark.parametrize(
     ("table", "said"),
     [
@@ -88,5 +96,5 @@ def test_profile_2_is_that_of_lever_dbc(session: Session, root: Path, tmp_path: 
 )
 def test_what_is_wrong_with_a_protection(table: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(f"[protected.X]\n{table}\n")
-    with pytest.raises(Exception, match=said):
+    with pytest.raises(LeverError, match=said):
         read_mapping([str(tmp_path / "m.toml"), "theta=a", "z_ddot=b"])
