@@ -12,6 +12,8 @@ from pathlib import Path
 from lever_cdkf.host_tools import cli
 
 LEVER = str(Path(sys.executable).with_name("lever"))
+PATIENCE = 120.0
+"""[s] for what hangs; nothing is expected to be fast."""
 
 
 def lever(*arguments: str | Path) -> str:

@@ -109,7 +109,6 @@ class _Replay:
         self._waiting: list[Rows] = []
         self._model_number = -1
         self._model_changes = 0
-        self._started_us = 0
         self._recorded_contract: int | None = None
         self._other_contract = False
 
@@ -181,7 +180,6 @@ class _Replay:
         there = bool(np.any(rows["known"] >> min(RECORDED.values())))
         with_recorded = there and self._recorded_contract == codec.contract()
         self._other_contract = there and not with_recorded
-        self._started_us = int(rows["time_us"][0])
         self.figures = Figures(self._options.config, self.model)
         self.kept = Kept(self._options.config.settings["sample_period"])
         self._sinks = [self.figures]
@@ -193,7 +191,8 @@ class _Replay:
             self._csv = TraceCsv(self._outputs.path("trace.csv"))
             self._sinks.append(self._csv)
             if not missing("mf4"):
-                self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, self._started_us, with_recorded)
+                start_us = int(rows["time_us"][0])
+                self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, start_us, with_recorded)
         return Columns(self._timeline, self.model, with_recorded)
 
     # --- what comes of it ---------------------------------------------------------------------------------------------

@@ -146,21 +146,22 @@ Frame = tuple[int, bytes]
 Samples = Callable[[int, int], list[tuple[Frame, Frame]]]
 
 
+def swing(first: int, count: int) -> list[tuple[Frame, Frame]]:
+    """The LEVER_SAMPLE and BASE_SAMPLE of a swinging lever, at 1 kHz from sample `first`."""
+    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+    frames = []
+    for k in range(first, first + count):
+        phase = 2.0 * math.pi * 3.0 * k * 1e-3
+        theta, theta_dot = 0.35 + 0.02 * math.sin(phase), 0.02 * 6.0 * math.pi * math.cos(phase)
+        motion = lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase))
+        frames.append(((0x110, motion), (0x111, base(k, 0.8 * math.sin(phase + 1.0), 1000 * k))))
+    return frames
+
+
 @pytest.fixture
 def samples() -> Samples:
-    """samples(first, count): the LEVER_SAMPLE and BASE_SAMPLE of a swinging lever, at 1 kHz from sample `first`."""
-    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-
-    def make(first: int, count: int) -> list[tuple[Frame, Frame]]:
-        frames = []
-        for k in range(first, first + count):
-            phase = 2.0 * math.pi * 3.0 * k * 1e-3
-            theta, theta_dot = 0.35 + 0.02 * math.sin(phase), 0.02 * 6.0 * math.pi * math.cos(phase)
-            motion = lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase))
-            frames.append(((0x110, motion), (0x111, base(k, 0.8 * math.sin(phase + 1.0), 1000 * k))))
-        return frames
-
-    return make
+    """samples(first, count): swing()."""
+    return swing
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ import pytest
 from can.interfaces import BACKENDS
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can.recorder import Recorder
-from processes import full_disk
+from processes import PATIENCE, full_disk
 from python.conftest import Refused, Session
 
 
@@ -124,12 +124,12 @@ def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
     )
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        end = time.monotonic() + 120.0
+        end = time.monotonic() + PATIENCE
         while not (tmp_path / "a.log.partial").exists():
             assert time.monotonic() < end
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=120.0)
+        output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     assert "a.log: 0 frames, 0 lost" in output
     assert os.listdir(tmp_path) == ["a.log"]

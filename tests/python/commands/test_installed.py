@@ -14,6 +14,7 @@ import can
 import pytest
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware.native import Config
+from processes import PATIENCE
 
 pytestmark = pytest.mark.usefixtures("installed")
 
@@ -56,7 +57,7 @@ def test_can_logger_opens_and_waits(tmp_path: Path) -> None:
         time.sleep(0.5)
         after = sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]))
         process.send_signal(signal.SIGINT)
-        assert process.wait(30) == 0
+        assert process.wait(PATIENCE) == 0
     assert after - used <= 10  # hundredths of a second: it waits, and does not go round
 
 

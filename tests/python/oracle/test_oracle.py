@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter
 from lever_cdkf.host_tools.firmware.native import settings_table
 from lever_cdkf.host_tools.models.linear import Hand
 from lever_cdkf.sil.oracle import Lever, cdkf
@@ -50,59 +48,7 @@ def test_a_square_has_its_exact_mean_and_variance() -> None:
     assert cdkf.deviations(np.hstack((first, second)))[0] ** 2 == pytest.approx(4 * 1.3**2 * 0.7**2 + 2 * 0.7**4)
 
 
-def test_transform_of_the_parameters_agrees_with_monte_carlo() -> None:
-    rng = np.random.default_rng(5)
-    lever = Lever.from_settings(SETTINGS, "trim")
-    mean, factor = np.array([0.1, -0.2, 0.1]), 0.1 * random_factor(rng, 3)
-    points, cloud = cdkf.draw(mean, factor), mean[:, None] + factor @ rng.standard_normal((3, 200_000))
-    transformed, first, second = cdkf.differences(lever.dynamics(PILOT[:, None] * np.exp(points), 0.35))
-    dynamics = lever.dynamics(PILOT[:, None] * np.exp(cloud), 0.35)
-    np.testing.assert_allclose(transformed, dynamics.mean(axis=1), rtol=2e-3)
-    np.testing.assert_allclose(cdkf.deviations(np.hstack((first, second))), dynamics.std(axis=1), rtol=2e-2)
-
-
 # --- the filter, for any model ---------------------------------------------------------------------------------------
-
-
-def linear_system(rng: np.random.Generator) -> tuple[Array, Array, Array, Array]:
-    """Transition, output, and the factors of both noises, of a stable system with three states and two outputs."""
-    transition = 0.9 * np.linalg.qr(rng.standard_normal((3, 3)))[0]
-    return transition, rng.standard_normal((2, 3)), random_factor(rng, 3, 0.1), random_factor(rng, 2, 0.3)
-
-
-@pytest.mark.parametrize("pattern", ["all", "one missing", "runs missing"])
-def test_on_a_linear_system_it_is_the_kalman_filter(pattern: str) -> None:
-    rng = np.random.default_rng(11)
-    transition, output, process, noise = linear_system(rng)
-    reference = KalmanFilter(dim_x=3, dim_z=2)
-    reference.F, reference.Q = transition, process @ process.T
-    reference.P = 4.0 * np.eye(3)
-    mean, factor, truth = np.zeros(3), 2.0 * np.eye(3), rng.standard_normal(3)
-    for index in range(300):
-        truth = transition @ truth + process @ rng.standard_normal(3)
-        y = output @ truth + noise @ rng.standard_normal(2)
-        valid = BOTH.copy()
-        if pattern == "one missing":
-            valid[index % 2] = False
-        elif pattern == "runs missing":
-            valid[:] = index % 20 > 5
-        reference.predict()
-        mean, factor = cdkf.predict(mean, factor, lambda x: transition @ x, process)
-        if valid.any():
-            rows = output[valid]
-            reference.update(y[valid, None], R=(noise @ noise.T)[np.ix_(valid, valid)], H=rows)
-            expected = cdkf.measure(mean, factor, functools.partial(np.matmul, rows), _part(noise, valid))
-            innovation = y[valid] - expected.mean
-            nis = cdkf.normalised_square(expected.factor, innovation)
-            assert nis == pytest.approx((reference.y.T @ reference.SI @ reference.y).item())
-            mean, factor = cdkf.update(mean, factor, expected, cdkf.gain(factor, expected), innovation)
-        np.testing.assert_allclose(mean, reference.x.ravel(), atol=1e-9)
-        np.testing.assert_allclose(factor @ factor.T, reference.P, atol=1e-9)
-
-
-def _part(noise: Array, valid: NDArray[np.bool_]) -> Array:
-    """Factor of the noise of the valid outputs alone."""
-    return cdkf.tria(noise[valid])
 
 
 def dense_differences(mean: Array, covariance: Array, function: Callable[[Array], Array]) -> tuple[Array, Array, Array]:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from lever_cdkf.host_tools.firmware.native import settings_table
 from lever_cdkf.host_tools.models.detrend import Detrend
 from lever_cdkf.sil.oracle import Estimator, Lever, Start, cdkf
@@ -99,34 +98,6 @@ def test_it_is_the_joint_filter(form: str, share: float) -> None:
         assert (np.abs(estimate(estimator) - z) < share * cdkf.deviations(factor)).all()
         assert estimator.nis == pytest.approx(cdkf.normalised_square(expected.factor, innovation), rel=share, abs=share)
     assert (np.abs(estimator.belief.joint_factor - factor) < share * cdkf.deviations(factor)[:, None]).all()
-
-
-def test_agrees_with_the_unscented_filter_of_filterpy() -> None:
-    """The same sigma points, weighted by Julier and Uhlmann: close, as both are right to second order."""
-    settings = EACH_SAMPLE | {f"{name}_sigma": 0.15 for name in ("m_p", "c_p", "k_p")}
-    samples = recorded(2500, PILOT * [1.1, 0.9, 1.1])
-    estimator = Estimator(settings, start_of(samples), "fixed", adaptation="fixed")
-    middle = [(0.0, 0.0)]
-
-    def step(z: Array, dt: float) -> Array:
-        p = (PILOT * np.exp(z[:3]))[:, None]
-        return np.concatenate((z[:3], estimator.model.step(z[3:, None], p, middle[0], estimator.trim, dt)[:, 0]))
-
-    points = MerweScaledSigmaPoints(5, alpha=1.0, beta=0.0, kappa=-2.0)
-    reference = UnscentedKalmanFilter(5, 2, 1e-3, lambda z: z[3:], step, points)
-    reference.x = estimate(estimator)
-    reference.P = estimator.belief.joint_factor @ estimator.belief.joint_factor.T
-    reference.Q = process_covariance(1e-3)
-    reference.R = OUTPUT_NOISE @ OUTPUT_NOISE.T
-    for k in range(1, 2500):
-        base, torque = (0.5 * float(samples[name][k] + samples[name][k - 1]) for name in ("z_ddot", "tau_m"))
-        middle[0] = (base, torque)
-        reference.predict()
-        reference.update(samples["y"][k])
-        feed(estimator, samples, k, k + 1)
-    sigma = cdkf.deviations(estimator.belief.joint_factor)
-    assert (np.abs(estimate(estimator) - reference.x) < 0.01 * sigma).all()
-    np.testing.assert_allclose(sigma, np.sqrt(reference.P.diagonal()), rtol=0.01)
 
 
 def test_coasting_moves_with_the_model_and_grows_uncertain() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from lever_cdkf.host_tools.replay.outputs import FILES
-from processes import LEVER, full_disk
+from processes import LEVER, PATIENCE, full_disk
 from python.conftest import Refused, Session
 
 
@@ -32,13 +32,13 @@ def test_ctrl_c_leaves_nothing(session: Session, tmp_path: Path) -> None:
     with subprocess.Popen(command, stderr=subprocess.PIPE) as process, pipe.open("wb") as file:
         file.write(session.log.read_bytes())
         file.flush()
-        end = time.monotonic() + 30.0
+        end = time.monotonic() + PATIENCE
         while not list(out.glob(".lever.*/bus.log")):
             assert time.monotonic() < end
             time.sleep(0.02)
         assert not any((out / name).exists() for name in FILES)
         process.send_signal(signal.SIGINT)
-        assert process.wait(30.0) == 130
+        assert process.wait(PATIENCE) == 130
     assert list(out.iterdir()) == []
 
 

@@ -228,6 +228,23 @@ def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result)
     assert "complex error was" in "".join(page.text)
 
 
+def test_spectra_are_those_of_scipy_and_the_natural_frequency_is_marked(page: Reader, result: Result) -> None:
+    signal = pytest.importorskip("scipy.signal")
+    for name, column in (("base acceleration z̈", "z_ddot_true_m_s2"), ("motor torque τ<sub>m</sub>", "tau_m_true_N_m")):
+        (trace,) = traces(page, "figure-spectra", name)
+        x, y = unpack(trace["x"]), unpack(trace["y"])
+        frequency, power = signal.welch(result.trace[column], 1e3, "hann", 4000)
+        np.testing.assert_allclose(y, np.sqrt(np.interp(x, frequency, power)), rtol=1e-3)
+        assert (x[0], x[-1]) == pytest.approx((0.25, 50.0), abs=0.26)
+    layout, truth = figures(page)["figure-spectra"]["layout"], result.trace["natural_frequency_true_Hz"]
+    (box,), (words,) = layout["shapes"], layout["annotations"]
+    assert (box["x0"], box["x1"]) == pytest.approx((truth.min(), truth.max()))
+    assert 10.0 ** words["x"] == pytest.approx(np.sqrt(truth.min() * truth.max()))
+    for row in ("yaxis", "yaxis2"):
+        low, high = layout[row]["range"]
+        assert 0.0 < high - low < 4.3
+
+
 def test_overview_of_the_motion_keeps_the_extremes(page: Reader, result: Result) -> None:
     trace = traces(page, "figure-motion", "truth")[0]
     theta = np.degrees(result.trace["theta_true_rad"])

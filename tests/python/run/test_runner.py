@@ -327,11 +327,11 @@ def test_real_time_is_real_and_changes_nothing(lever_bus: MakeBus) -> None:
     assert np.array_equal(paced.frames.data, fast.frames.data)
 
 
-def test_progress_is_told_from_start_to_end(short: Scenario) -> None:
+def test_progress_is_told_from_start_to_end_each_half_second() -> None:
     told: list[tuple[int, int]] = []
-    loop.run(short, PuppetBus(always), progress=lambda done, total: told.append((done, total)))
-    assert told[0] == (0, 500)
-    assert told[-1] == (500, 500)
+    wanted = scenario.load("steady", ["duration=1.2 s"])
+    loop.run(wanted, PuppetBus(always), progress=lambda done, total: told.append((done, total)))
+    assert told == [(done, 1200) for done in (0, 500, 1000, 1200)]
 
 
 def test_files_are_complete_or_not_there(short: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,6 @@ class Plan:
     model: Any
     """A data.Model; the oracle's say float for what that says are arrays."""
     runs: int = 20
-    period: float = PERIOD
     duration: float = 30.0
     base: float = 0.1 * G  # rms of z_ddot [m/s²]
     torque: float = 0.3  # rms of tau_m [N m]
@@ -37,6 +36,7 @@ class Plan:
     trim: float = 0.35
     start: tuple[float, float] = (0.0, 0.0)
     seed: int = 1
+    period: float = PERIOD
 
 
 def band_noise(rng: np.random.Generator, runs: int, count: int, rms: float, period: float) -> Array:

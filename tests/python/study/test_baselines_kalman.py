@@ -11,9 +11,9 @@ from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigma
 from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.sil.study.baselines.algorithm1 import Algorithm1, ParameterFilter, differences
 from lever_cdkf.sil.study.baselines.dual_ekf import DualEkf
-from lever_cdkf.sil.study.baselines.joint_ekf import JointEkf, joint_ekf
+from lever_cdkf.sil.study.baselines.joint_ekf import JointEkf
 from lever_cdkf.sil.study.baselines.joint_ukf import JointUkf, UnscentedTransform
-from lever_cdkf.sil.study.baselines.recursion import factor
+from lever_cdkf.sil.study.baselines.recursion import factor, follow
 from lever_cdkf.sil.study.data import Batch
 from python.study.baseline_runs import PERIOD, Plan, lever, simulate
 
@@ -85,26 +85,6 @@ def plain_filter(batch: Batch, run: int, size: int) -> Any:
     kf.F[-2:, -2:] = [[1.0, PERIOD], [-PERIOD * STIFFNESS, 1.0 - PERIOD * SETTLE]]
     kf.B = np.eye(size)[:, -1:] * PERIOD
     return kf
-
-
-def test_joint_ekf_is_the_kalman_filter_of_a_linear_system() -> None:
-    batch = driven()
-    ekf = JointEkf(batch)
-    filters = [plain_filter(batch, run, 5) for run in range(batch.runs)]
-    for k in range(1, batch.samples):
-        ekf.step(k)
-        for run, kf in enumerate(filters):
-            phi = inputs(batch, run, k - 1)
-            kf.F[4, :3] = PERIOD * batch.knowledge.sigma * phi
-            kf.predict(u=phi[np.newaxis] @ batch.knowledge.guess)
-            kf.update(batch.y[run, k])
-            np.testing.assert_allclose(np.concatenate((ekf.w[run], ekf.x[run])), kf.x, atol=1e-8)
-            np.testing.assert_allclose(ekf.innovation_covariance[run], kf.S, rtol=1e-8)
-    np.testing.assert_allclose(ekf.covariance, [kf.P for kf in filters], atol=1e-9)
-    nis = joint_ekf(batch, np.array([batch.samples - 1])).nis
-    assert nis is not None
-    np.testing.assert_allclose(nis[:, 0], [kf.mahalanobis**2 for kf in filters], rtol=1e-6)
-    assert (np.abs(ekf.w) > 0.1).any()
 
 
 def test_dual_ekf_with_known_parameters_is_a_kalman_filter_and_its_derivative_that_of_one() -> None:
@@ -284,11 +264,11 @@ def test_joint_ukf_is_the_unscented_filter_of_filterpy(alpha: float) -> None:
 
 
 @pytest.mark.parametrize("joint", [JointEkf, JointUkf])
-def test_a_missing_output_is_skipped(joint: type[JointEkf]) -> None:
+def test_of_a_linear_system_it_is_the_kalman_filter_which_skips_a_missing_output(joint: type[JointEkf]) -> None:
     """Without theta_dot from a sample on: FilterPy's filter with theta as its only output."""
-    batch = driven(runs=1, duration=0.3)
+    batch, last = driven(runs=1, duration=0.3), 99
     missing = np.zeros(batch.y.shape, dtype=bool)
-    missing[:, 100:, 1] = True
+    missing[:, last + 1 :, 1] = True
     y = np.where(missing, 1e3, batch.y)
     ours, kf = joint(replace(batch, y=y, missing=missing)), plain_filter(batch, 0, 5)
     for k in range(1, batch.samples):
@@ -296,8 +276,14 @@ def test_a_missing_output_is_skipped(joint: type[JointEkf]) -> None:
         phi = inputs(batch, 0, k - 1)
         kf.F[4, :3] = PERIOD * batch.knowledge.sigma * phi
         kf.predict(u=phi[np.newaxis] @ batch.knowledge.guess)
-        if k < 100:
+        if k <= last:
             kf.update(batch.y[0, k])
+            np.testing.assert_allclose(ours.innovation_covariance[0], kf.S, rtol=1e-6)
         else:
             kf.update(batch.y[0, k, :1], R=kf.R[:1, :1], H=kf.H[:1])
+        if k == last:
+            nis = follow(joint(batch), np.array([last])).nis
+            assert nis is not None
+            assert nis[0, 0] == pytest.approx(kf.mahalanobis**2, rel=1e-4)
     np.testing.assert_allclose(np.concatenate((ours.w[0], ours.x[0])), kf.x, atol=1e-7)
+    np.testing.assert_allclose(ours.covariance[0], kf.P, atol=1e-8)

@@ -29,7 +29,10 @@ def wrong(simulate: Simulate) -> Recording:
 @pytest.mark.parametrize("start", [{}, {name: 2.0 * value for name, value in NOISE.items()} | {"z_ddot_delay": 5e-3}])
 def test_it_is_found_wherever_the_search_starts(wrong: Recording, start: dict[str, float]) -> None:
     """Noise that is set wrong, by a factor of two both ways, must not look like a gain."""
-    found = calibrate(Likelihood(wrong, held_out=0.0), start).entries
+    steps: list[tuple[int, int, str]] = []
+    found = calibrate(Likelihood(wrong, held_out=0.0), start, progress=lambda *step: steps.append(step)).entries
+    assert [step[0] for step in steps] == sorted(step[0] for step in steps)
+    assert all(0 < done < total for done, total, _ in steps)
     assert [entry.name for entry in found] == list(NAMES)
     for entry, true, within in zip(found, TRUTH, WITHIN, strict=True):
         assert abs(entry.best - true) < min(within, 3.0 * entry.sigma), entry

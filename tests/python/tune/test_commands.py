@@ -94,9 +94,8 @@ def test_the_page_holds_the_same(tuned: Path) -> None:
             end is None or end == pytest.approx(x, rel=1e-4) for end, x in zip(ends, unpack(bar["x"]), strict=True)
         )
         assert {*unpack(bar["y"]), *unpack(before["y"]), *unpack(after["y"])} == {lane}
-    held = {row["noise"]: row for row in json.loads((tuned / "tune.json").read_text())["before and after"][::-1]}[
-        "as set"
-    ]
+    rows = json.loads((tuned / "tune.json").read_text())["before and after"]
+    (held,) = (row for row in rows if (row["part"], row["noise"]) == ("held out", "as set"))
     sizes = {name: [t for t in drawn["sizes"]["data"] if t["name"] == name] for name in ("before", "after")}
     for name, (theta, theta_dot) in sizes.items():
         assert unpack(theta["x"])[:3] == pytest.approx([0.5, 1.5, 2.5])

@@ -84,9 +84,17 @@ def test_settings_that_only_fit_the_part_tuned_on_are_no_gain(steady_log: Path) 
 
 def test_at_rest_only_noise_is_looked_for(simulate: Simulate) -> None:
     at_rest = simulate(25.0, rest=True, theta_dot_process_noise=0.0)
-    search = Search(Likelihood(recording.read([at_rest])), {})
+    steps: list[tuple[int, int, str]] = []
+    recorded = recording.read([at_rest], progress=lambda *step: steps.append(step))
+    assert steps[-1] == (at_rest.stat().st_size, at_rest.stat().st_size, "reading the log")
+    steps.clear()
+    search = Search(Likelihood(recorded), {}, lambda *step: steps.append(step))
     assert not search.can_learn
     assert [entry.name for entry in search.run(groups({}, list(NOISE)[1:]))] == ["theta_noise"]
+    done = [step[0] for step in steps]
+    assert done == sorted(done)
+    assert all(0 < so_far < total for so_far, total, _ in steps)
+    assert list(dict.fromkeys(step[2] for step in steps)) == ["looking for noise", "how sure that is"]
 
 
 def test_what_is_off_or_kept_is_not_looked_for() -> None:

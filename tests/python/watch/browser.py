@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from lever_cdkf.host_tools.report import screenshot
-from python.watch.conftest import PATIENCE
+from processes import PATIENCE
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 _OPTIONS = [option for option in screenshot.OFFLINE if "virtual-time" not in option]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -16,10 +15,9 @@ from lever_cdkf.host_tools.can.commander import Commander
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.watch.picture import Frame
 from lever_cdkf.host_tools.watch.sources import as_frame
+from python.conftest import swing
 
 LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
-PATIENCE = 120.0
-"""[s] for what hangs; nothing is expected to be fast."""
 
 
 class Flight:
@@ -29,15 +27,12 @@ class Flight:
         self.bus = LeverBus("flight", config=config, receive_own_messages=True)
         self.sample = 0
         self._commander = Commander()
-        self._lever, self._base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
 
     def messages(self, count: int) -> list[can.Message]:
         """All that passes on the bus during `count` more samples."""
-        for k in range(self.sample, self.sample + count):
-            phase = 2.0 * math.pi * 3.0 * k * 1e-3
-            theta, theta_dot = 0.35 + 0.02 * math.sin(phase), 0.02 * 6.0 * math.pi * math.cos(phase)
-            self.send(0x110, self._lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase)))
-            self.send(0x111, self._base(k, 0.8 * math.sin(phase + 1.0), 1000 * k))
+        for sample in swing(self.sample, count):
+            for frame in sample:
+                self.send(*frame)
         self.sample += count
         return list(iter(lambda: self.bus.recv(0.0), None))
 

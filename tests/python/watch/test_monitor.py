@@ -16,8 +16,9 @@ from lever_cdkf.host_tools.watch import panels
 from lever_cdkf.host_tools.watch.picture import Frame
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.terminal import SPANS, TALL, Monitor
+from processes import PATIENCE
 from python.conftest import Refused
-from python.watch.conftest import LEVER, PATIENCE, Flight
+from python.watch.conftest import LEVER, Flight
 from rich.segment import Segment
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 from lever_cdkf.host_tools.report import screenshot
+from processes import PATIENCE
 from python.watch.browser import Browser
-from python.watch.conftest import PATIENCE
 
 pytestmark = pytest.mark.requires("|".join(screenshot.BROWSERS))
 

@@ -21,8 +21,9 @@ from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.watch.server import Server
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.state import State, command_of
+from processes import PATIENCE
 from python.conftest import Refused
-from python.watch.conftest import PATIENCE, Flight
+from python.watch.conftest import Flight
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.websocket import websocket_connect
 

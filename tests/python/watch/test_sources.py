@@ -18,7 +18,8 @@ from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
 from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
 from lever_cdkf.sil.run.live_source import SimulationSource
 from lever_cdkf.sil.scenarios.scenario import load
-from python.watch.conftest import PATIENCE, Flight
+from processes import PATIENCE
+from python.watch.conftest import Flight
 
 
 def wait_for(source: Source, count: int) -> list[Frame]:
@@ -203,28 +204,6 @@ def test_a_clock_that_jumps_is_not_waited_for(tmp_path: Path) -> None:
     path.write_text("".join(f"({when:.6f}) can0 123#00 R\n" for when in times))
     pauses = [pause for pause, _ in LogSource(str(path))._frames()]
     assert pauses == pytest.approx([0.0, 0.1, 0.0, 0.1, sources.LONGEST_PAUSE, 0.1], abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "text"),
-    [
-        ("missing.log", None, "cannot read .*missing.log: No such file or directory"),
-        ("a.unknown", b"x", "a.unknown: .unknown is not a known format of CAN logs"),
-        ("empty.log", b"", "empty.log: holds no CAN frame"),
-        (
-            "garbage.log",
-            bytes(range(256)) * 9,
-            "garbage.log: holds no CAN frame; [0-9]+ lines of it are something else",
-        ),
-        ("garbage.blf", b"LOGG" + bytes(300), "garbage.blf: "),
-    ],
-)
-def test_a_log_that_is_none(name: str, content: bytes | None, text: str, tmp_path: Path) -> None:
-    if content is not None:
-        (tmp_path / name).write_bytes(content)
-    with pytest.raises(LeverError, match=text) as raised:
-        LogSource(str(tmp_path / name))
-    assert "\n" not in str(raised.value)
 
 
 def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path: Path) -> None:
