@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options
 from ..errors import LeverError
 from ..extras import require
-from .signal_options import MAP_HELP, add_signal_options, chosen_reading
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
 
 if TYPE_CHECKING:
     from ..firmware.config import Config
@@ -147,6 +147,8 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
 
         if settings is not None:
             raise LeverError("--settings goes with a bus or a log; a scenario has its own settings")
+        if args.map or args.dbc:
+            raise LeverError("--dbc and --map go with a bus or a log; a scenario speaks lever.dbc")
         return simulated(args.scenario)
 
     from ..firmware.settings_file import make_config, read_assignments
@@ -159,13 +161,16 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
         return MappedLogSource(args.log, reading, config), config
     if args.map or args.dbc:
         from ..signals.mapping import read_mapping
-        from ..signals.reading import Reading
+        from ..signals.online import Online
         from ..watch.mapped import MappedBusSource
 
-        reading = Reading(read_mapping(args.map) if args.map else None, args.dbc, clock=args.clock)
-        return MappedBusSource(args.interface, args.channel, reading, config, chosen_options(args)), config
+        if not (args.map and args.dbc):
+            raise LeverError("a bus needs both --dbc FILE and --map KEY=MESSAGE.SIGNAL")
+        online = Online(read_mapping(args.map), args.dbc, args.clock)
+        check_others_can_be_heard(args.interface)
+        return MappedBusSource(args.interface, args.channel, online, config, chosen_options(args)), config
     if args.log is not None:
-        return LogSource(args.log, args.channel), config
+        return LogSource(args.log, args.channel, part=check_part(args)), config
     check_others_can_be_heard(args.interface)
     return BusSource(args.interface, args.channel, chosen_options(args)), config
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..can.bulk import Buses, Feeder, Frames
-from ..errors import LeverError
 from ..firmware.config import Config, setting
 from ..firmware.estimator import FRAME_SAMPLE, Estimator
 from ..signals.online import Online
@@ -50,14 +49,12 @@ class MappedBusSource(BusSource):
         self,
         interface: str,
         channel: str | None,
-        reading: Reading,
+        online: Online,
         config: Config,
         options: Mapping[str, Any] | None = None,
     ) -> None:
         """Opens the bus. Raises LeverError."""
-        if reading.mapping is None or reading.database is None:
-            raise LeverError("a bus needs both --dbc FILE and --map KEY=MESSAGE.SIGNAL")
-        self._online = Online(reading.mapping, reading.database, reading.clock)
+        self._online = online
         self._config = config
         self._estimator: Estimator | None = None
         super().__init__(interface, channel, options)

@@ -15,7 +15,6 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.signals.mapping import read_mapping
 from lever_cdkf.host_tools.signals.online import Online
-from lever_cdkf.host_tools.signals.reading import Reading
 from lever_cdkf.host_tools.watch.mapped import MappedBusSource
 from lever_cdkf.host_tools.watch.picture import Picture
 from python.can.test_record import Line
@@ -56,9 +55,9 @@ def test_a_bus_gives_what_a_replay_of_its_log_gives(folder: Path, frames: list[c
 
 
 def test_a_view_of_a_bus(folder: Path, frames: list[can.Message]) -> None:
-    reading = Reading(read_mapping(MAPPED), str(folder / "foreign.dbc"))
+    online = Online(read_mapping(MAPPED), str(folder / "foreign.dbc"))
     with can.Bus(interface="virtual", channel="foreign", preserve_timestamps=True) as other_end:
-        source = MappedBusSource("virtual", "foreign", reading, Config())
+        source = MappedBusSource("virtual", "foreign", online, Config())
         picture = Picture()
         source.start()
         try:
