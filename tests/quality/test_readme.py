@@ -4,8 +4,7 @@ Each fenced block of language `sh`, `python` or `c` of a README is a file that i
 another page (FLASH.md, SIL.md …) are one script, so that a step finds what the steps before have left in out/. They
 run in a scratch folder that looks like the source tree, with the virtual environment active and a recording
 `session.log` at hand. Not run are lines that begin with ctest or cmake (they are what runs this; but a page may build
-in out/) and sudo (not a test's to use); what pytest is to run is only found; and sil/README.md, which
-tests/python/commands runs.
+in out/) and sudo (not a test's to use). What pytest is to run is only found.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ from quality import tools
 
 FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
 READMES = [tools.ROOT / "README.md", *(file for folder in FOLDERS for file in (tools.ROOT / folder).rglob("README.md"))]
-RUN_ELSEWHERE = tools.ROOT / "sil/README.md"
 TIME_LIMIT = "1800"
 """For what hangs [s]; nothing is expected to be fast."""
 
@@ -47,7 +45,6 @@ def blocks(language: str) -> list[object]:
     return [
         case(f"{readme.relative_to(tools.ROOT)}:{line}", content)
         for readme in READMES
-        if readme != RUN_ELSEWHERE
         for line, content in readmes.blocks(readme, language).items()
     ]
 
