@@ -141,8 +141,8 @@ class _Replay:
         """Which contract the recorded estimator speaks, by its first IDENTITY that says so."""
         if self._recorded_contract is None:
             data = frames["data"][frames["id"] == codec.message("IDENTITY").frame_id]
-            said = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
-            self._recorded_contract = next((int(number) for number in said[np.isfinite(said)]), None)
+            contracts = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
+            self._recorded_contract = next((int(number) for number in contracts[np.isfinite(contracts)]), None)
 
     def _log(self, fed: Frames, outputs: Outputs) -> None:
         if self._bus_log is None:
