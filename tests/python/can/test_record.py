@@ -226,7 +226,12 @@ def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path, m
     with SocketcanBus() as bus:
         recorder = Recorder(bus, tmp_path / "a.log", "can0")
         states = []
-        monkeypatch.setattr(Recorder, "_count", lambda self, frame: (count(self, frame), states.append(self.bus_state)))
+
+        def note(self: Recorder, frame: can.Message) -> None:
+            count(self, frame)
+            states.append(self.bus_state)
+
+        monkeypatch.setattr(Recorder, "_count", note)
         recorder.run(lambda: not bus.frames, lambda _: None)
     assert states == ["active", "warning", "passive", "bus off", "active", "active"]
     assert recorder.error_frames == 6

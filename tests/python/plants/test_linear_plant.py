@@ -27,7 +27,7 @@ def test_motion_dynamics_and_transfer_function_are_those_of_the_state_space(kind
     _, expected, _ = signal.lsim(system, np.column_stack((base, np.full(count, 0.4))), np.arange(count) * PERIOD)
     assert np.abs(path - expected).max() < 1e-4 * np.abs(expected).max()
     np.testing.assert_array_equal(list(truth.parameters.values()), columns(count, *parameters))
-    pole = np.linalg.eigvals(a)[0]
+    pole = np.linalg.eigvals(np.array(a, np.float64))[0]
     np.testing.assert_allclose(truth.dynamics.natural_frequency, abs(pole) / (2 * math.pi))
     np.testing.assert_allclose(truth.dynamics.damping_ratio, -pole.real / abs(pole))
     frequency = np.array([0.5, 3.0, 9.0])
