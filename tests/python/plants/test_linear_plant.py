@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from lever_cdkf.sil.plants.linear_plant import BlackBox, LinearTruth, Physical
 from python.plants.motion import PERIOD, TRIM, body, columns, moved
 from scipy import signal
 
-SYSTEMS = {  # matrix of the motion, and by z_ddot and tau_m, from the parameters of each
+SYSTEMS: dict[
+    type[LinearTruth], tuple[tuple[float, float, float], Any, Any]
+] = {  # matrix of the motion, and by z_ddot and tau_m, from the parameters of each
     Physical: ((3.2, 60.0, 2100.0), [[0, 1], [-2100.0 / 3.2, -60.0 / 3.2]], [[0, 0], [1, 1 / 3.2]]),
     BlackBox: ((-500.0, -14.0, -2.2), [[0, 1], [-500.0, -14.0]], [[0, 0], [-2.2, 0]]),
 }
