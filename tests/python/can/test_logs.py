@@ -157,7 +157,9 @@ def test_several_logs_are_taken_in_the_order_of_time(session: Session, tmp_path:
 def test_standard_input_is_a_log(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     with session.log.open() as log:
         monkeypatch.setattr(sys, "stdin", log)
-        assert np.array_equal(frames_of(Path("-")), frames_of(session.log))
+        recording = Recording(["-"])
+        assert np.array_equal(np.concatenate(list(recording.chunks())), frames_of(session.log))
+    assert recording.done == recording.size == 0  # which nobody knows
 
 
 # --- what is no log --------------------------------------------------------------------------------------------------

@@ -222,6 +222,8 @@ def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result)
     signal = pytest.importorskip("scipy.signal")
     (trace,) = traces(page, "figure-slices", "measured coherence")
     frequency, coherence = unpack(trace["x"]), unpack(trace["y"])
+    assert (frequency[0], frequency[-1]) == pytest.approx((0.5, 12.0), abs=0.51)
+    assert frequency[0] == pytest.approx(0.5)
     inside = [np.where(np.isfinite(c), c, np.nanmean(c)) for c in (result.trace[name] for name in COHERENT)]
     expected_frequency, expected = signal.coherence(*inside, 1000.0, nperseg=2000)
     np.testing.assert_allclose(coherence, np.interp(frequency, expected_frequency, expected), atol=0.02)
