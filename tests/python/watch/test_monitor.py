@@ -193,7 +193,7 @@ def test_bad_input_is_one_line(arguments: list[str], text: str, refused: Refused
 
 @pytest.mark.requires("tmux")
 def test_in_a_real_terminal(tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    server = ["tmux", "-L", f"lever-{tmp_path.name}", "-f", "/dev/null"]
+    server = ["tmux", "-S", str(tmp_path / "socket"), "-f", "/dev/null"]
 
     def tmux(*arguments: str) -> str:
         return subprocess.run([*server, *arguments], capture_output=True, text=True, check=True).stdout
