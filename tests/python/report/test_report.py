@@ -105,6 +105,7 @@ def test_cards_and_headline_say_what_the_summary_says(page: Reader, result: Resu
         expected = asdict(result.summary.parameters[key])
         assert f"{expected['rms_percent']:.1f} % {name}" in text
         assert f"{100 * expected['coverage_2sigma']:.0f} % {name}" in text
+    assert "in % of the truth, from 4 s after the start and each sudden change on." in text
     verdict = result.summary.verdict
     assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
 

@@ -115,6 +115,11 @@ def test_keys(flight: Flight) -> None:
             await pilot.press("f")
             await pilot.pause()
             assert "phase [deg]" in "\n".join(screen(app))
+            source.feed(flight.frames(100), flight.sample * 1e-3)
+            end = time.monotonic() + PATIENCE
+            while source._waiting and time.monotonic() < end:  # it goes on by itself
+                await pilot.pause(0.02)
+            assert not source._waiting
             await pilot.press("q")
         assert app.return_code == 0
         assert not source._thread.is_alive()
