@@ -117,7 +117,7 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1792 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1728 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];

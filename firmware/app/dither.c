@@ -9,12 +9,10 @@
 /* Butterworth low-pass of second order behind the high-pass of trim.h, by semi-implicit Euler. */
 static float filter(dither_t *dither, float in)
 {
-    const float period = dither->period;
-    const float deviation = high_pass_step(&dither->high_pass, in, &dither->low, period);
-    const float force =
-        (dither->high.square * (deviation - dither->low_pass)) - (dither->high.damping * dither->low_pass_rate);
-    dither->low_pass_rate += period * force;
-    dither->low_pass += period * dither->low_pass_rate;
+    const float deviation = high_pass_step(&dither->high_pass, in, dither->low, HIGH_PASS_BUTTERWORTH);
+    const float force = (deviation - dither->low_pass) - (HIGH_PASS_BUTTERWORTH * dither->low_pass_rate);
+    dither->low_pass_rate += dither->high * force;
+    dither->low_pass += dither->high * dither->low_pass_rate;
     return dither->low_pass;
 }
 
@@ -32,10 +30,10 @@ static float uniform(uint32_t *state)
 /* Both filters above have the denominator z^2 - (2 - a - d) z + (1 - d), with a = (w T)^2 and d = sqrt(2) w T of their
  * corner. Its squared magnitude at z = exp(jv) is a^2 + a d x + (1 - d) x^2 in x = 4 sin^2(v/2), and with s = j
  * tan(v/2) that is |p[2] s^2 + p[1] s + p[0]|^2 / (1 - s^2)^2. */
-static void denominator_of(float p[3], const high_pass_corner_t *corner, float period)
+static void denominator_of(float p[3], float corner)
 {
-    const float a = corner->square * period * period;
-    const float d = corner->damping * period;
+    const float a = corner * corner;
+    const float d = HIGH_PASS_BUTTERWORTH * corner;
     p[0] = a;
     p[2] = sqrtf((a * (a + (4.0f * d))) + (16.0f * (1.0f - d)));
     p[1] = sqrtf(2.0f * a * (a + (2.0f * d) + p[2]));
@@ -48,8 +46,8 @@ static float band_variance(const dither_t *dither)
 {
     float p[3];
     float q[3];
-    denominator_of(p, &dither->low, dither->period);
-    denominator_of(q, &dither->high, dither->period);
+    denominator_of(p, dither->low);
+    denominator_of(q, dither->high);
     const float b = q[0];
     const float d1 = (p[1] * q[0]) + (p[0] * q[1]);
     const float d3 = (p[2] * q[1]) + (p[1] * q[2]);
@@ -63,9 +61,8 @@ static float band_variance(const dither_t *dither)
 void dither_init(dither_t *dither, float low, float high, float period, float rms_most, float fade)
 {
     const float highest = HIGHEST / period;
-    dither->low = high_pass_corner((low < highest) ? low : highest, HIGH_PASS_BUTTERWORTH);
-    dither->high = high_pass_corner((high < highest) ? high : highest, HIGH_PASS_BUTTERWORTH);
-    dither->period = period;
+    dither->low = (HIGH_PASS_TURN * period) * ((low < highest) ? low : highest);
+    dither->high = (HIGH_PASS_TURN * period) * ((high < highest) ? high : highest);
     dither->scale = sqrtf(3.0f / band_variance(dither)); /* uniform() has a variance of 1/3 */
     dither->rms_most = rms_most;
     dither->fade = fade / period;

@@ -13,14 +13,13 @@
 #include <stdint.h>
 
 typedef struct dither {
-    high_pass_corner_t low; /* corners of the band */
-    high_pass_corner_t high;
-    float period;   /* of a step [s] */
+    float low; /* corners of the band [rad / step] */
+    float high;
     float scale;    /* makes the filtered noise 1 rms */
     float rms_most; /* [N m] */
     float fade;     /* steps of a fade */
     high_pass_t high_pass;
-    float low_pass; /* output of the low-pass, and its rate [1/s] */
+    float low_pass; /* output of the low-pass, and its rate in corners */
     float low_pass_rate;
     float target;   /* commanded rms [N m] */
     float level;    /* rms now [N m] */

@@ -102,34 +102,35 @@ static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 }
 
 /* Notes in the faults what is missing, `elapsed` seconds after the last sample. */
-static checked_t check(estimator_t *estimator, const lever_sample_t *sample, float own_torque, float elapsed)
+static void check(
+    estimator_t *estimator, const lever_sample_t *sample, float own_torque, float elapsed, checked_t *checked)
 {
-    checked_t checked = {.y = {sample->theta, sample->theta_dot}};
     monitor_t *monitor = &estimator->learning.monitor;
     const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
     const bool torque = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);
-    checked.valid[0] = theta && monitor_is_alive(monitor, MONITOR_THETA, sample->theta);
-    checked.valid[1] = theta_dot && monitor_is_alive(monitor, MONITOR_THETA_DOT, sample->theta_dot);
-    checked.base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
-    checked.gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
-    checked.grip_force = sample->grip_force;
-    checked.tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
-    checked.z_ddot = checked.base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
-    estimator->last_z_ddot = checked.z_ddot;
-    estimator->last_tau_m = checked.tau_m;
+    checked->y[0] = sample->theta;
+    checked->y[1] = sample->theta_dot;
+    checked->valid[0] = theta && monitor_is_alive(monitor, MONITOR_THETA, sample->theta);
+    checked->valid[1] = theta_dot && monitor_is_alive(monitor, MONITOR_THETA_DOT, sample->theta_dot);
+    checked->base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
+    checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
+    checked->grip_force = sample->grip_force;
+    checked->tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
+    checked->z_ddot = checked->base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
+    estimator->last_z_ddot = checked->z_ddot;
+    estimator->last_tau_m = checked->tau_m;
     estimator->time_us = sample->time_us;
     estimator->samples++;
 
     estimator->faults = 0u;
-    note(estimator, !checked.valid[0], LEVER_FAULT_THETA);
-    note(estimator, !checked.valid[1], LEVER_FAULT_THETA_DOT);
+    note(estimator, !checked->valid[0], LEVER_FAULT_THETA);
+    note(estimator, !checked->valid[1], LEVER_FAULT_THETA_DOT);
     note(estimator, !torque, LEVER_FAULT_TORQUE);
-    note(estimator, !checked.base || monitor->base_wrong, LEVER_FAULT_BASE);
+    note(estimator, !checked->base || monitor->base_wrong, LEVER_FAULT_BASE);
     note(estimator, estimator->communication_fault, LEVER_FAULT_COMMUNICATION);
     estimator->communication_fault = false;
-    return checked;
 }
 
 /* --- measurement update ------------------------------------------------------------------------------------------ */
@@ -305,7 +306,8 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
         estimator->faults = LEVER_FAULT_CLOCK; /* the sample is ignored */
     } else {
         const float elapsed = (started && !new_clock) ? ((float)elapsed_us * 1.0e-6f) : 0.0f;
-        checked_t checked = check(estimator, sample, own_torque, elapsed); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+        checked_t checked;
+        check(estimator, sample, own_torque, elapsed, &checked);
         estimator->late_series_us = 0u;
         if (started && !new_clock) {
             step(estimator, &checked, &last, elapsed);

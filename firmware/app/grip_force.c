@@ -69,7 +69,8 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
     receive(grip, setup, trim, force, period);
     const bool known = (force != NULL) && grip->right && !grip->wrong;
     if (grip->seen) {
-        const float now = trim_input(trim, TRIM_GRIP_FORCE, grip->raw, period);
+        float now = grip->raw;
+        trim_inputs(trim, &now, TRIM_GRIP_FORCE, 1u, period);
         grip->impulse += (period * setup->constants.length) * now;
         grip->square += share_of(period, MEMORY) * ((now * now) - grip->square);
         grip->settling -= (grip->settling > 0.0f) ? period : 0.0f;

@@ -40,9 +40,12 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     const setup_t *setup = &estimator->setup;
     const lever_settings_t *s = setup->settings;
     const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
-    const float stop = trim_input(trim, TRIM_FRICTION, friction(trim->origin[1] + cdkf->x[1]), period);
-    const float next_z_ddot = trim_input(trim, TRIM_Z_DDOT, z_ddot, period);
-    const float next_tau_m = trim_input(trim, TRIM_TAU_M, tau_m, period) - (s->lever_friction * stop);
+    const bool steps = (cdkf->acting > (uint32_t)CDKF_STEP);
+    float input[] = {friction(trim->origin[1] + cdkf->x[1]), z_ddot, tau_m, 1.0f}; /* as in enum trim_signal */
+    trim_inputs(trim, input, TRIM_FRICTION, steps ? 4u : 3u, period);
+    const float stop = input[0];
+    const float next_z_ddot = input[1];
+    const float next_tau_m = input[2] - (s->lever_friction * stop);
     float error[CDKF_CONSIDERED];
     cdkf_grip_t grip;
     trim_set_origin(trim);
@@ -64,8 +67,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     }
     considered_errors(estimator, next_z_ddot, stop, error);
     error[CDKF_STEP] = 0.0f;
-    if (cdkf->acting > (uint32_t)CDKF_STEP) {
-        error[CDKF_STEP] = trim_input(trim, TRIM_STEP, 1.0f, period);
+    if (steps) {
+        error[CDKF_STEP] = input[3];
         cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
     }
     const bool gripped =

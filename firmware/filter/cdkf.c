@@ -49,16 +49,42 @@ static void predict_mean_and_parameter_columns(cdkf_t *cdkf, const model_respons
 }
 
 /* S_xx: its own columns; process noise, and second differences along the parameters in the direction [T/2; 1] of its
- * first column; what theta has beside it. */
+ * first column; what theta has beside it. As factor_tria_two() with these as columns, without their roots. */
 static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period)
 {
+    float *s = cdkf->s_xx;
     const step_noise_t noise = step_noise(cdkf, response, period);
-    const float rate = sqrtf(noise.variance + noise.second);
-    float theta[4] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, noise.angle};
-    float theta_dot[4] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, 0.0f};
+    const float half = 0.5f * period;
+    const float rate = noise.variance + noise.second;
+    float theta[2] = {s[0], 0.0f};
+    float theta_dot[2] = {s[2], s[3]};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);
-    factor_tria_two(theta, theta_dot, 4u, cdkf->s_xx);
+    const float square = (theta[0] * theta[0]) + (theta[1] * theta[1]) + (half * half * rate) + noise.angle;
+    const float product = (theta[0] * theta_dot[0]) + (theta[1] * theta_dot[1]) + (half * rate);
+    const float own = (theta[0] * theta_dot[1]) - (theta[1] * theta_dot[0]); /* minors: of both columns, */
+    const float first = theta[0] - (half * theta_dot[0]);                    /* of each with the walk */
+    const float second = theta[1] - (half * theta_dot[1]);
+    const float minors = (own * own) + (rate * ((first * first) + (second * second))) +
+                         (noise.angle * ((theta_dot[0] * theta_dot[0]) + (theta_dot[1] * theta_dot[1]) + rate));
+    const float norm = sqrtf(square);
+    const float inverse = (norm > 0.0f) ? (1.0f / norm) : 0.0f;
+    s[0] = norm;
+    s[2] = product * inverse;
+    s[3] = sqrtf(minors) * inverse;
+}
+
+/* The first cdkf->acting of the considered errors act. */
+static void predict_considered(cdkf_t *cdkf, const float input[CDKF_CONSIDERED], const model_response_t *response,
+    float period, const float error[CDKF_CONSIDERED])
+{
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+        float *x = cdkf->considered[c].x;
+        const float change = input[c] * error[c];
+        response_move(response, period, &x[0], &x[1]);
+        x[0] += 0.5f * (period * change);
+        x[1] += change;
+    }
 }
 
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
@@ -66,6 +92,7 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
 {
     model_points_t points;
     model_response_t response;
+    float input[CDKF_CONSIDERED];
     grip_seen_t seen;
     bool taken = false;
     points.coefficients = cdkf->points;
@@ -85,7 +112,8 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
     } else {
         predict_state_columns(cdkf, &response, step->period);
     }
-    considered_predict(cdkf->considered, cdkf->acting, &response, step->period, error);
+    considered_inputs(&response, step->period, input);
+    predict_considered(cdkf, input, &response, step->period, error);
     response_move(&response, step->period, &cdkf->response[0], &cdkf->response[1]);
     if (taken) {
         grip_take(cdkf, grip, &seen);
@@ -99,7 +127,7 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
  * is only ever multiplied by factors in (0, 1], so it cannot fail. */
 static inline gain_t condition_on(float *s, uint32_t i, float noise)
 {
-    gain_t gain = {{0.0f, 0.0f}, 0.0f};
+    gain_t gain = {{0.0f, 0.0f}, 0.0f, 1.0f};
     float root = noise; /* of the variance of the output, in the columns so far */
     for (uint32_t left = i + 1u; left > 0u; left--) {
         const uint32_t j = left - 1u;
@@ -118,6 +146,7 @@ static inline gain_t condition_on(float *s, uint32_t i, float noise)
     }
     gain.k[0] *= gain.inverse * gain.inverse;
     gain.k[1] *= gain.inverse * gain.inverse;
+    gain.kept = (noise * gain.inverse) * (noise * gain.inverse);
     return gain;
 }
 
@@ -126,20 +155,19 @@ static inline gain_t condition_on(float *s, uint32_t i, float noise)
 static inline gain_t take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, float row[MODEL_PARAMETERS],
     innovation_t *innovation, float step[MODEL_STATES])
 {
-    gain_t gain = {{0.0f, 0.0f}, 0.0f};
+    gain_t gain = {{0.0f, 0.0f}, 0.0f, 1.0f};
     if (valid) {
         gain = condition_on(cdkf->s_xx, i, cdkf->output_noise[i]);
-        float *theta = &cdkf->s[L * L];
-        float *theta_dot = &cdkf->s[(L + 1u) * L];
-        const float *seen = (i == 0u) ? theta : theta_dot;
-        for (uint32_t j = 0u; j < L; j++) {
-            row[j] = gain_correct(&gain, seen[j], &theta[j], &theta_dot[j]);
+        const uint32_t j = N - 1u - i; /* the other state */
+        float *own = &cdkf->s[(L + i) * L];
+        float *other = &cdkf->s[(L + j) * L];
+        for (uint32_t k = 0u; k < L; k++) {
+            row[k] = gain_correct_own(&gain, gain.k[j], &own[k], &other[k]);
         }
         const float nu = y - cdkf->x[i];
-        const float share = cdkf->output_noise[i] * gain.inverse;
         innovation->value = gain.inverse * nu;
-        innovation->noise_variance = share * share;
-        innovation->response = gain_correct(&gain, cdkf->response[i], &cdkf->response[0], &cdkf->response[1]);
+        innovation->noise_variance = gain.kept;
+        innovation->response = gain_correct_own(&gain, gain.k[j], &cdkf->response[i], &cdkf->response[j]);
         for (uint32_t k = 0u; k < N; k++) {
             cdkf->x[k] += gain.k[k] * nu;
             step[k] += gain.k[k] * nu;
@@ -149,6 +177,24 @@ static inline gain_t take_output(cdkf_t *cdkf, uint32_t i, float y, bool valid, 
         (void)memset(innovation, 0, sizeof *innovation);
     }
     return gain;
+}
+
+/* After the update of the filter: gain, what each output saw of S_ww, innovation. */
+static void correct_considered(cdkf_t *cdkf, const gain_t gain[CDKF_OUTPUTS], float row[CDKF_OUTPUTS][MODEL_PARAMETERS],
+    const innovation_t innovation[CDKF_OUTPUTS], bool learn)
+{
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+        considered_t *of = &cdkf->considered[c];
+        const float first = gain_correct_own(&gain[0], gain[0].k[1], &of->x[0], &of->x[1]);
+        const float second = gain_correct_own(&gain[1], gain[1].k[0], &of->x[1], &of->x[0]);
+        if (learn) {
+            for (uint32_t i = 0u; i < L; i++) {
+                of->cross[i] += (row[0][i] * first) + (row[1][i] * second);
+            }
+            of->vector += (innovation[0].value * first) + (innovation[1].value * second);
+            of->information += (first * first) + (second * second);
+        }
+    }
 }
 
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
@@ -165,7 +211,7 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
         information_add(&cdkf->pending, row[0], innovation[0].value);
         information_add(&cdkf->pending, row[1], innovation[1].value);
     }
-    considered_correct(cdkf->considered, cdkf->acting, gain, row, innovation, learn);
+    correct_considered(cdkf, gain, row, innovation, learn);
     /* w makes both uncertain together: I + R R^T = L D L^T, and the second innovation is then given the first */
     const float covariance = factor_dot_three(row[0], row[1]);
     innovation[0].inverse_variance = 1.0f / (1.0f + factor_dot_three(row[0], row[0]));

@@ -182,10 +182,12 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
  * uncertainty stays with the state. */
 void cdkf_open(cdkf_t *cdkf);
 
+enum { CDKF_TRIANGLE = (MODEL_PARAMETERS * (MODEL_PARAMETERS + 1)) / 2 };
+
 /* The belief of the parameters alone, kept to return to. */
 typedef struct snapshot {
     float w[MODEL_PARAMETERS];
-    float s_ww[MODEL_PARAMETERS * MODEL_PARAMETERS];
+    float s_ww[CDKF_TRIANGLE]; /* row by row to the diagonal */
     float trust;
 } snapshot_t;
 

@@ -136,7 +136,13 @@ void cdkf_open(cdkf_t *cdkf)
 void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
 {
     (void)memcpy(snapshot->w, cdkf->w, sizeof snapshot->w);
-    (void)memcpy(snapshot->s_ww, cdkf->s, sizeof snapshot->s_ww);
+    uint32_t k = 0u;
+    for (uint32_t i = 0u; i < L; i++) {
+        for (uint32_t j = 0u; j <= i; j++) {
+            snapshot->s_ww[k] = cdkf->s[(i * L) + j];
+            k++;
+        }
+    }
     snapshot->trust = cdkf->trust;
 }
 
@@ -146,7 +152,13 @@ void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
     considered_lift(cdkf, of_w);
     open_parameters(cdkf);
     (void)memcpy(cdkf->w, snapshot->w, sizeof snapshot->w);
-    (void)memcpy(cdkf->s, snapshot->s_ww, sizeof snapshot->s_ww);
+    uint32_t k = 0u;
+    for (uint32_t i = 0u; i < L; i++) {
+        for (uint32_t j = 0u; j <= i; j++) {
+            cdkf->s[(i * L) + j] = snapshot->s_ww[k];
+            k++;
+        }
+    }
     cdkf->trust = snapshot->trust;
     if (snapshot->trust >= 1.0f) { /* what the considered errors made of w then was nearly the same */
         considered_lower(cdkf, of_w);

@@ -7,7 +7,6 @@
 #define N ((uint32_t)MODEL_STATES)
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define CONSIDERED ((uint32_t)CDKF_CONSIDERED)
-#define CALIBRATION ((uint32_t)CDKF_CALIBRATION)
 
 void considered_start_state(considered_t considered[CDKF_CONSIDERED])
 {
@@ -20,47 +19,6 @@ void considered_start_w(considered_t considered[CDKF_CONSIDERED])
 {
     for (uint32_t c = 0u; c < CONSIDERED; c++) {
         (void)memset(considered[c].w, 0, sizeof considered[c].w);
-    }
-}
-
-static inline void predict_one(considered_t *considered, const model_response_t *response, float period, float change)
-{
-    float *x = considered->x;
-    response_move(response, period, &x[0], &x[1]);
-    x[0] += 0.5f * (period * change);
-    x[1] += change;
-}
-
-void considered_predict(considered_t considered[CDKF_CONSIDERED], uint32_t count, const model_response_t *response,
-    float period, const float error[CDKF_CONSIDERED])
-{
-    for (uint32_t c = 0u; c < CALIBRATION; c++) {
-        predict_one(&considered[c], response, period, considered_input(response, period, c) * error[c]);
-    }
-    if (count > CALIBRATION) {
-        predict_one(&considered[CDKF_STEP], response, period, period * error[CDKF_STEP]);
-    }
-}
-
-static inline void correct_one(considered_t *of, const gain_t gain[CDKF_OUTPUTS],
-    float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
-{
-    const float first = gain_correct(&gain[0], of->x[0], &of->x[0], &of->x[1]);
-    const float second = gain_correct(&gain[1], of->x[1], &of->x[0], &of->x[1]);
-    if (learn) {
-        for (uint32_t i = 0u; i < L; i++) {
-            of->cross[i] += (row[0][i] * first) + (row[1][i] * second);
-        }
-        of->vector += (innovation[0].value * first) + (innovation[1].value * second);
-        of->information += (first * first) + (second * second);
-    }
-}
-
-void considered_correct(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t gain[CDKF_OUTPUTS],
-    float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn)
-{
-    for (uint32_t c = 0u; c < count; c++) {
-        correct_one(&considered[c], gain, row, innovation, learn);
     }
 }
 

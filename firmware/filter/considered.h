@@ -6,10 +6,11 @@
 
 #include "filter/cdkf.h"
 
-/* Gain of one output on the state for given w, and the innovation's standard deviation; all 0 when it is not valid. */
+/* Gain of one output on the state for given w, and the innovation's standard deviation; 0 when it is not valid. */
 typedef struct gain {
     float k[MODEL_STATES];
     float inverse; /* 1 / S_y */
+    float kept;    /* R / S_y^2, what is left of a deviation of the output itself; 1 when it is not valid */
 } gain_t;
 
 /* Takes from a deviation of the state what the correction by an output takes, I - K H; returns what the output saw of
@@ -18,6 +19,15 @@ static inline float gain_correct(const gain_t *gain, float seen, float *theta, f
 {
     *theta -= gain->k[0] * seen;
     *theta_dot -= gain->k[1] * seen;
+    return gain->inverse * seen;
+}
+
+/* The same by an output that is `own` of the states `own` and `other`, whose gain is `k`. */
+static inline float gain_correct_own(const gain_t *gain, float k, float *own, float *other)
+{
+    const float seen = *own;
+    *own = gain->kept * seen;
+    *other -= k * seen;
     return gain->inverse * seen;
 }
 
@@ -30,33 +40,21 @@ static inline void response_move(const model_response_t *response, float period,
     *theta_dot += change;
 }
 
-/* The change of theta_dot over a step by a unit of what error c acts through. */
-static inline float considered_input(const model_response_t *response, float period, uint32_t c)
+/* What each considered error acts through: change of theta_dot over a step by a unit of it. */
+static inline void considered_inputs(const model_response_t *response, float period, float input[CDKF_CONSIDERED])
 {
-    float input = response->torque;
-    if (c <= (uint32_t)CDKF_BASE_DELAY) {
-        input = response->base;
-    } else if (c == (uint32_t)CDKF_STEP) {
-        input = period;
-    } else {
-        /* a torque */
-    }
-    return input;
+    input[CDKF_BASE_GAIN] = response->base;
+    input[CDKF_BASE_DELAY] = response->base;
+    input[CDKF_TORQUE_GAIN] = response->torque;
+    input[CDKF_FRICTION] = response->torque;
+    input[CDKF_STEP] = period;
 }
 
 /* The state, or the parameters, start anew: no error of theirs is made by the considered ones. */
 void considered_start_state(considered_t considered[CDKF_CONSIDERED]);
 void considered_start_w(considered_t considered[CDKF_CONSIDERED]);
 
-/* Time update: the first `count` errors act, through the inputs or as an acceleration. */
-void considered_predict(considered_t considered[CDKF_CONSIDERED], uint32_t count, const model_response_t *response,
-    float period, const float error[CDKF_CONSIDERED]);
-
-/* Measurement update, after that of the filter: gain, what each output saw of S_ww, innovation. */
-void considered_correct(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t gain[CDKF_OUTPUTS],
-    float row[CDKF_OUTPUTS][MODEL_PARAMETERS], const innovation_t innovation[CDKF_OUTPUTS], bool learn);
-
-/* By one more output that sees `seen` of each, not yet divided by S_y; `row` and `nu` are. */
+/* Measurement update by an output that sees `seen` of each, not yet divided by S_y; `row` and `nu` are. */
 void considered_correct_by(considered_t considered[CDKF_CONSIDERED], uint32_t count, const gain_t *gain,
     const float seen[CDKF_CONSIDERED], const float row[MODEL_PARAMETERS], float nu, bool learn);
 

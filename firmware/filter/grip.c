@@ -11,16 +11,17 @@ void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float 
     const float *theta = &cdkf->s[L * L];
     const float *theta_dot = &cdkf->s[(L + 1u) * L];
     const float *own = cdkf->s_xx;
+    float input[CDKF_CONSIDERED];
     float mean = response->mean;
     for (uint32_t j = 0u; j < L; j++) {
         mean += SIGMA_MEAN * response->second_difference[j];
         seen->row[j] =
             (SIGMA_FIRST * response->difference[j]) + (grip->own[0] * theta[j]) + (grip->own[1] * theta_dot[j]);
     }
+    considered_inputs(response, period, input);
     for (uint32_t c = 0u; c < cdkf->acting; c++) {
         const float *x = cdkf->considered[c].x;
-        seen->considered[c] = (slope[0] * x[0]) + (slope[1] * x[1]) +
-                              ((considered_input(response, period, c) * error[c]) - grip->error[c]);
+        seen->considered[c] = (slope[0] * x[0]) + (slope[1] * x[1]) + ((input[c] * error[c]) - grip->error[c]);
     }
     seen->column[0] = (slope[0] * own[0]) + (slope[1] * own[2]);
     seen->column[1] = slope[1] * own[3];
@@ -54,7 +55,8 @@ bool grip_predict_state_columns(cdkf_t *cdkf, const model_response_t *response, 
     const float rate = sqrtf(noise.variance);
     const float second = sqrtf(noise.second);
     const float column[COLUMNS] = {seen->column[0], seen->column[1], seen->walk * rate, second, 0.0f};
-    float theta[COLUMNS + 1u] = {cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, noise.angle, 0.0f};
+    float theta[COLUMNS + 1u] = {
+        cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, sqrtf(noise.angle), 0.0f};
     float theta_dot[COLUMNS + 1u] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, second, 0.0f, 0.0f};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);

@@ -13,7 +13,7 @@
  * (van Loan 1978); theta may walk itself. */
 typedef struct step_noise {
     float variance; /* of theta_dot [rad^2/s^2]; theta has T/2 of it in common */
-    float angle;    /* standard deviation of theta beside that [rad] */
+    float angle;    /* of theta beside that [rad^2] */
     float second;   /* sum of the squares of the second differences along the parameters [rad^2/s^2] */
 } step_noise_t;
 
@@ -23,7 +23,7 @@ static inline step_noise_t step_noise(const cdkf_t *cdkf, const model_response_t
     const float variance = walk * walk * period;
     const float own = cdkf->process_noise[0] * cdkf->process_noise[0] * period;
     const float *second = response->second_difference;
-    const step_noise_t noise = {variance, sqrtf((variance * (period * period * 0.0833333333f)) + own),
+    const step_noise_t noise = {variance, (variance * (period * period * 0.0833333333f)) + own,
         (SIGMA_SECOND * SIGMA_SECOND) * factor_dot_three(second, second)};
     return noise;
 }

@@ -3,24 +3,11 @@
 #include <math.h>
 #include <string.h>
 
-#define TURN 6.28318531f
+#define SECTIONS ((uint32_t)TRIM_SECTIONS)
 #define STEPS_MOST 24.0f /* of that line */
 
-high_pass_corner_t high_pass_corner(float frequency, float damping)
-{
-    const float w = TURN * frequency;
-    const high_pass_corner_t corner = {w * w, damping * w};
-    return corner;
-}
-
-/* level/signal = (d w s + w^2) / (s^2 + d w s + w^2), by semi-implicit Euler. */
-float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period)
-{
-    const float deviation = value - filter->level;
-    filter->slope += period * (corner->square * deviation);
-    filter->level += period * (filter->slope + (corner->damping * deviation));
-    return deviation;
-}
+/* The sections in units of the corner: 2 cos(pi / 12), 2 cos(3 pi / 12), 2 cos(5 pi / 12). */
+static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f};
 
 static float level_of(const level_t *level)
 {
@@ -34,11 +21,8 @@ float trim_angle(const trim_t *trim)
 
 void trim_start(trim_t *trim, float angle, float corner, bool deviations)
 {
-    static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f}; /* 2 cos(pi / 12), ... */
     (void)memset(trim, 0, sizeof *trim);
-    for (uint32_t i = 0u; i < (uint32_t)TRIM_SECTIONS; i++) {
-        trim->corner[i] = high_pass_corner(corner, damping[i]);
-    }
+    trim->corner = HIGH_PASS_TURN * corner;
     trim->settling_time = 0.9f / corner;
     trim->deviations = deviations;
     trim->output[0].section[0].level = angle;
@@ -65,10 +49,9 @@ void trim_begin(trim_t *trim, const float x[MODEL_STATES])
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         begin(&trim->output[i], trim->origin[i] + trim->ahead[i] + x[i]);
     }
-    for (uint32_t i = 0u; i < (uint32_t)TRIM_STEP; i++) {
-        begin(&trim->input[i], level_of(&trim->input[i]));
+    for (uint32_t i = 0u; i < (uint32_t)TRIM_INPUTS; i++) {
+        begin(&trim->input[i], (i == (uint32_t)TRIM_STEP) ? 0.0f : level_of(&trim->input[i]));
     }
-    begin(&trim->input[TRIM_STEP], 0.0f);
     trim->begin_rate = trim->output[1].section[0].level;
     (void)memset(trim->ahead, 0, sizeof trim->ahead);
     trim_set_origin(trim);
@@ -79,18 +62,24 @@ void trim_unsettle(trim_t *trim)
     trim->unsettled = trim->deviations ? trim->settling_time : 0.0f;
 }
 
-static float pass(const trim_t *trim, level_t *level, float value, float period)
+/* The deviation of a value, `turn` = corner times period after the last one. */
+static inline float pass(level_t *level, float value, float turn)
 {
     float deviation = value;
-    for (uint32_t i = 0u; i < (uint32_t)TRIM_SECTIONS; i++) {
-        deviation = high_pass_step(&level->section[i], deviation, &trim->corner[i], period);
+    for (uint32_t i = 0u; i < SECTIONS; i++) {
+        deviation = high_pass_step(&level->section[i], deviation, turn, damping[i]);
     }
-    return trim->deviations ? deviation : value;
+    return deviation;
 }
 
-float trim_input(trim_t *trim, enum trim_signal input, float value, float period)
+void trim_inputs(trim_t *trim, float value[], enum trim_signal first, uint32_t count, float period)
 {
-    return pass(trim, &trim->input[input], value, period);
+    const float turn = trim->corner * period;
+    if (trim->deviations) {
+        for (uint32_t i = 0u; i < count; i++) {
+            value[i] = pass(&trim->input[(uint32_t)first + i], value[i], turn);
+        }
+    }
 }
 
 void trim_start_input(trim_t *trim, enum trim_signal input, float value)
@@ -110,10 +99,11 @@ static float pass_line(trim_t *trim, uint32_t i, float value, float period)
     const float whole = (elapsed < (STEPS_MOST * period)) ? ((elapsed / period) + 0.5f) : STEPS_MOST;
     const uint32_t steps = (uint32_t)whole;
     const float part = 1.0f / (float)steps;
+    const float turn = trim->corner * (part * elapsed);
     float deviation = 0.0f;
     for (uint32_t k = 1u; k <= steps; k++) {
         const float between = trim->last[i] + ((part * (float)k) * (value - trim->last[i]));
-        deviation = pass(trim, &trim->output[i], between, part * elapsed);
+        deviation = pass(&trim->output[i], between, turn);
     }
     return deviation;
 }
@@ -125,35 +115,46 @@ static void follow(trim_t *trim, uint32_t i, float x, float period)
     const bool waiting = trim_is_waiting(trim, i);
     float deviation = (fabsf(x) <= MODEL_THETA_MOST) ? x : 0.0f;
     float rate = 0.0f;
-    for (uint32_t left = (uint32_t)TRIM_SECTIONS; left > 0u; left--) {
+    for (uint32_t left = SECTIONS; left > 0u; left--) {
         high_pass_t *section = &trim->output[i].section[left - 1u];
         section->slope = waiting ? 0.0f : section->slope;
-        rate += section->slope + (trim->corner[left - 1u].damping * deviation);
+        rate += section->slope + (damping[left - 1u] * deviation);
         deviation += section->level;
     }
     if (trim->deviations && !waiting) {
-        trim->ahead[i] += period * rate;
+        trim->ahead[i] += (trim->corner * period) * rate;
     }
     trim->missing[i] += period;
+}
+
+/* An output that is missing, or was. Returns the deviation of a valid one. */
+static float irregular(trim_t *trim, uint32_t i, float x, float value, bool valid, float period, bool *back)
+{
+    float deviation = value;
+    if (!valid) {
+        follow(trim, i, x, period);
+    } else {
+        const bool waiting = trim_is_waiting(trim, i);
+        deviation = waiting ? pass(&trim->output[i], value, trim->corner * period) : pass_line(trim, i, value, period);
+        *back = *back || waiting;
+        trim->ahead[i] = 0.0f;
+        trim->missing[i] = 0.0f;
+    }
+    return deviation;
 }
 
 bool trim_outputs(
     trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period)
 {
+    const float turn = trim->corner * period;
     bool back = false;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
         const float value = y[i];
-        const bool waiting = trim_is_waiting(trim, i);
-        if (!valid[i]) {
-            follow(trim, i, x[i], period);
-        } else {
-            const bool line = (trim->missing[i] > 0.0f) && !waiting;
-            back = back || waiting;
-            y[i] = line ? pass_line(trim, i, value, period) : pass(trim, &trim->output[i], value, period);
-            trim->last[i] = value;
-            trim->ahead[i] = 0.0f;
-            trim->missing[i] = 0.0f;
-        }
+        const bool regular = valid[i] && (trim->missing[i] <= 0.0f);
+        const float deviation =
+            regular ? pass(&trim->output[i], value, turn) : irregular(trim, i, x[i], value, valid[i], period, &back);
+        y[i] = (valid[i] && trim->deviations) ? deviation : value;
+        trim->last[i] = valid[i] ? value : trim->last[i];
     }
     return back;
 }

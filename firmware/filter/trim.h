@@ -20,36 +20,35 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Of a corner w [rad/s] and a damping d (twice the damping ratio): w^2 and d w. */
-typedef struct high_pass_corner {
-    float square;
-    float damping;
-} high_pass_corner_t;
-
-/* A section of second order. */
+/* A section of second order, in time of 1 / corner. */
 typedef struct high_pass {
     float level; /* [unit of the signal] */
-    float slope; /* [unit / s] */
+    float slope; /* [unit corner] */
 } high_pass_t;
 
-#define HIGH_PASS_BUTTERWORTH 1.41421356f /* damping of one section alone */
+#define HIGH_PASS_TURN 6.28318531f        /* [rad] */
+#define HIGH_PASS_BUTTERWORTH 1.41421356f /* damping, twice the damping ratio, of one section alone */
 
-/* Of a corner frequency [Hz] and a damping. */
-high_pass_corner_t high_pass_corner(float frequency, float damping);
-
-/* One value after `period` seconds. Returns its deviation from the level before it. */
-float high_pass_step(high_pass_t *filter, float value, const high_pass_corner_t *corner, float period);
+/* One value; `turn`: the corner [rad/s] times the time since the last one. Returns its deviation from the level before
+ * it. level / signal = (damping s + 1) / (s^2 + damping s + 1), by semi-implicit Euler. */
+static inline float high_pass_step(high_pass_t *filter, float value, float turn, float damping)
+{
+    const float deviation = value - filter->level;
+    filter->slope += turn * deviation;
+    filter->level += turn * (filter->slope + (damping * deviation));
+    return deviation;
+}
 
 #define TRIM_OUTAGE 0.0205f /* a signal missing for longer is out [s]; not a whole number of periods */
 
 enum { TRIM_SECTIONS = 3 };
 
 enum trim_signal {
+    TRIM_FRICTION, /* of a newton metre */
     TRIM_Z_DDOT,
     TRIM_TAU_M,
-    TRIM_FRICTION,   /* of a newton metre */
-    TRIM_GRIP_FORCE, /* [N] */
     TRIM_STEP,       /* of 1, when levels are begun anew */
+    TRIM_GRIP_FORCE, /* [N] */
     TRIM_INPUTS
 };
 
@@ -67,9 +66,9 @@ typedef struct trim {
     float last[MODEL_STATES];     /* value of that sample */
     float ahead[MODEL_STATES];    /* by which the level of a missing output has moved since */
     float unsettled;              /* time until the levels have settled: nothing can be learnt before [s] */
-    high_pass_corner_t corner[TRIM_SECTIONS];
-    float settling_time; /* [s] */
-    bool deviations;     /* preload trim */
+    float corner;                 /* [rad/s] */
+    float settling_time;          /* [s] */
+    bool deviations;              /* preload trim */
 } trim_t;
 
 /* Starts at a trim angle, at rest; corner [Hz]. */
@@ -82,8 +81,8 @@ void trim_begin(trim_t *trim, const float x[MODEL_STATES]);
 /* The trim angle [rad]. */
 float trim_angle(const trim_t *trim);
 
-/* An input after `period` seconds: its deviation in preload trim. */
-float trim_input(trim_t *trim, enum trim_signal input, float value, float period);
+/* `count` inputs from `first` on after `period` seconds: replaced by their deviations in preload trim. */
+void trim_inputs(trim_t *trim, float value[], enum trim_signal first, uint32_t count, float period);
 
 /* An input starts at a level that is `value`. */
 void trim_start_input(trim_t *trim, enum trim_signal input, float value);

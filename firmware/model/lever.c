@@ -44,26 +44,25 @@ typedef struct shared {
     float period;
     float half;         /* of the period */
     float acceleration; /* of the base, and gravity unless preload trim has it cancel [m/s^2] */
-    float rest_sine;    /* of the angle at which the arm's spring rests */
     float damping;      /* the lever's own */
 } shared_t;
 
-/* A point's change of theta_dot is force / inertia. */
+/* A point's change of theta_dot is T force / inertia. */
 typedef struct fraction {
     float arm;     /* force of the arm along cos theta, gravity and base included */
     float damping; /* D */
-    float force;   /* times the period */
+    float force;
     float inertia; /* M + T/2 D */
 } fraction_t;
 
-/* At a point: angle by sine and cosine, torque of lever spring and motor there. */
+/* At a point: sine of the angle, less that at which the arm's spring rests, and cosine; torque of lever spring and motor. */
 static inline fraction_t fraction_at(
     const shared_t *shared, const float *c, float sine, float cosine, float torque, float theta_dot)
 {
     fraction_t at;
-    at.arm = (c[FORCING] * shared->acceleration) + (c[STIFFNESS] * (sine - shared->rest_sine));
+    at.arm = (c[FORCING] * shared->acceleration) + (c[STIFFNESS] * sine);
     at.damping = (c[DAMPING] * (cosine * cosine)) + shared->damping;
-    at.force = shared->period * ((torque - (cosine * at.arm)) - (at.damping * theta_dot));
+    at.force = (torque - (cosine * at.arm)) - (at.damping * theta_dot);
     at.inertia = c[INERTIA] + (shared->half * at.damping);
     return at;
 }
@@ -72,17 +71,17 @@ static inline fraction_t fraction_at(
 static inline void respond_at_mean(const shared_t *shared, const float *c, const fraction_t *at, sine_cosine_t angle,
     float stiffness, float theta_dot, model_response_t *response)
 {
-    const float inverse = 1.0f / at->inertia;
-    const float change = at->force * inverse;
+    const float gain = shared->period / at->inertia;
+    const float change = at->force * gain;
     const float damping_slope = -2.0f * (c[DAMPING] * (angle.cosine * angle.sine));
     const float arm_slope = (angle.sine * at->arm) - (c[STIFFNESS] * (angle.cosine * angle.cosine));
-    const float force_slope = shared->period * ((arm_slope - stiffness) - (damping_slope * theta_dot));
-    const float slope = (force_slope - ((shared->half * damping_slope) * change)) * inverse;
+    const float force_slope = (arm_slope - stiffness) - (damping_slope * (theta_dot + (0.5f * change)));
+    const float slope = force_slope * gain;
     response->mean = change;
     response->slope[0] = slope;
-    response->slope[1] = (shared->half * slope) - ((shared->period * at->damping) * inverse);
-    response->torque = shared->period * inverse;
-    response->base = -(angle.cosine * c[FORCING]) * response->torque;
+    response->slope[1] = (shared->half * slope) - (at->damping * gain);
+    response->torque = gain;
+    response->base = -(angle.cosine * c[FORCING]) * gain;
 }
 
 /* Sine and cosine of an angle that is mostly near the trim, of which they are known. */
@@ -106,30 +105,27 @@ static void respond(const model_constants_t *constants, const model_step_t *step
     const shared_t shared = {.period = step->period,
         .half = 0.5f * step->period,
         .acceleration = constants->trim ? step->z_ddot : (step->z_ddot + MODEL_GRAVITY),
-        .rest_sine = constants->trim ? step->trim_sine : constants->arm_preload_sine,
         .damping = constants->damping};
     const float rest = constants->trim ? step->trim : constants->lever_preload_angle;
     const float theta_dot = points->x[1];
     const float middle = step->origin + (points->x[0] + (shared.half * theta_dot));
     const sine_cosine_t angle = sine_cosine_beside(step, middle);
+    const float sine = angle.sine - (constants->trim ? step->trim_sine : constants->arm_preload_sine);
     const float torque = step->tau_m - (constants->stiffness * (middle - rest));
     const float *c = points->coefficients[0].c;
-    const fraction_t mean = fraction_at(&shared, c, angle.sine, angle.cosine, torque, theta_dot);
+    const fraction_t mean = fraction_at(&shared, c, sine, angle.cosine, torque, theta_dot);
     respond_at_mean(&shared, c, &mean, angle, constants->stiffness, theta_dot, response);
     for (uint32_t j = 0u; j < (uint32_t)MODEL_PARAMETERS; j++) {
         const float rate = points->offset[j][1];
         const float ahead = points->offset[j][0] + (shared.half * rate);
-        const sine_cosine_t by = sine_cosine_small(ahead);
-        const float sine = angle.sine * by.cosine; /* addition theorem: what + and - share, and what they do not */
-        const float cosine = angle.cosine * by.cosine;
-        const float more_sine = angle.cosine * by.sine;
-        const float less_cosine = angle.sine * by.sine;
+        const float more_sine = angle.cosine * ahead; /* offsets are so small that their sines are they themselves */
+        const float less_cosine = angle.sine * ahead;
         const float less_torque = constants->stiffness * ahead;
         const fraction_t plus = fraction_at(&shared, points->coefficients[1u + (2u * j)].c, sine + more_sine,
-            cosine - less_cosine, torque - less_torque, theta_dot + rate);
+            angle.cosine - less_cosine, torque - less_torque, theta_dot + rate);
         const fraction_t minus = fraction_at(&shared, points->coefficients[2u + (2u * j)].c, sine - more_sine,
-            cosine + less_cosine, torque + less_torque, theta_dot - rate);
-        model_response_pair(response, j, plus.force, plus.inertia, minus.force, minus.inertia);
+            angle.cosine + less_cosine, torque + less_torque, theta_dot - rate);
+        model_response_pair(response, j, shared.period, plus.force, plus.inertia, minus.force, minus.inertia);
     }
 }
 

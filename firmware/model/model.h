@@ -111,13 +111,13 @@ typedef struct model {
         const model_constants_t *constants, const model_step_t *step, const model_coefficients_t *coefficients);
 } model_t;
 
-/* Both differences of a pair whose changes are the fractions force / inertia: one division. */
-static inline void model_response_pair(model_response_t *response, uint32_t pair, float plus_force, float plus_inertia,
-    float minus_force, float minus_inertia)
+/* Both differences of a pair whose changes are the fractions period force / inertia: one division. */
+static inline void model_response_pair(model_response_t *response, uint32_t pair, float period, float plus_force,
+    float plus_inertia, float minus_force, float minus_inertia)
 {
-    const float inverse = 1.0f / (plus_inertia * minus_inertia);
-    const float plus = (plus_force * minus_inertia) * inverse;
-    const float minus = (minus_force * plus_inertia) * inverse;
+    const float gain = period / (plus_inertia * minus_inertia);
+    const float plus = (plus_force * minus_inertia) * gain;
+    const float minus = (minus_force * plus_inertia) * gain;
     response->difference[pair] = plus - minus;
     response->second_difference[pair] = (plus - response->mean) + (minus - response->mean);
 }

@@ -156,7 +156,7 @@ def test_a_row_of_known_errors() -> None:
     assert row.linearised == pytest.approx([2.0] * 5, rel=0.03)
     assert row.bound == pytest.approx([2.5] * 5, rel=0.03)
     assert row.linearised_error == pytest.approx([2.0 / math.sqrt(2 * 200 * 46)] * 5, rel=0.3)
-    assert row.honesty == pytest.approx([1.0] * 5, rel=0.03)
+    assert row.sigma_ratio == pytest.approx([1.0] * 5, rel=0.03)
     assert row.nees == pytest.approx(3.0, rel=0.03)
     assert (row.nees_low, row.nees_high) == pytest.approx((2.67, 3.35), abs=0.01)  # chi-square, 600 degrees, ÷ 200
     assert row.nees_inside > 0.8
@@ -365,8 +365,10 @@ def everything(factor: float = 1.0) -> list[Row]:
     rows = [
         row("joint", 0.1, linearised=fives(1.05 * factor), baseline=fives(1.01 * factor), **walk),
         row("joint", 0.1, case="lever_trim_base_quiet", baseline=fives(1.02 * factor), linearised=fives(9.0)),
-        row("dual", 0.1, linearised=fives(1.2 * factor), baseline=fives(0.99 * factor), honesty=fives(1.1 * factor)),
-        row("dual", 0.1, case="lever_fixed_base_quiet", linearised=fives(9.0), honesty=fives(1.3 * factor)),
+        row(
+            "dual", 0.1, linearised=fives(1.2 * factor), baseline=fives(0.99 * factor), sigma_ratio=fives(1.1 * factor)
+        ),
+        row("dual", 0.1, case="lever_fixed_base_quiet", linearised=fives(9.0), sigma_ratio=fives(1.3 * factor)),
         row("dual", 0.1, case="lever_trim_base_quiet", baseline=fives(1.0 * factor), linearised=fives(9.0)),
     ]
     for index, name in enumerate(("dual", "joint")):
