@@ -34,6 +34,7 @@ a first session:
   lever sim --list                        all scenarios; `lever sim NAME` runs one
   lever live --scenario demo              watch it in a browser while it runs; `lever monitor` does so in the terminal
   lever replay session.log                the same estimator on a recorded log; `lever record` makes one
+  lever map flight.blf --dbc some.dbc     which signals of a log with other messages are the estimator's inputs
   lever settings                          every tunable number of the estimator with unit, default and range
   lever dbc                               the CAN messages
 

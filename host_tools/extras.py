@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from .errors import LeverError
 
 PACKAGES = {
+    "files": ("asammdf", "h5py", "pyarrow", "scipy"),
     "flash": ("pyocd",),
     "live": ("textual", "tornado"),
     "mf4": ("asammdf",),
@@ -25,7 +26,7 @@ _FILES = {"report.html": "report", "signals.mf4": "mf4"}
 
 def missing(extra: str) -> str:
     """Which packages of an extra are not installed, and how to get them; empty if all are."""
-    if extra == "mf4":
+    if "asammdf" in PACKAGES[extra]:
         reveal_mf4()
     absent = [package for package in PACKAGES[extra] if not _is_installed(package)]
     return f"this needs {' and '.join(absent)}: {pip_install(f'lever-cdkf[{extra}]')}" if absent else ""

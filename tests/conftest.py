@@ -69,3 +69,22 @@ def root() -> Path:
 def build_dir() -> Path:
     """The CMake build tree: lever_can, firmware/liblever_cdkf.so, venv/ … are in it."""
     return Path(os.environ.get("LEVER_BUILD_DIR", ROOT / "build"))
+
+
+def _image(build_dir: Path, transport: str) -> Path:
+    path = build_dir / f"stm32f4/lever_stm32f4_{transport}.elf"
+    if not path.is_file():
+        pytest.skip(f"no {path}: apt install gcc-arm-none-eabi libnewlib-arm-none-eabi, and build the target stm32f4")
+    return path
+
+
+@pytest.fixture(scope="session")
+def can_image(build_dir: Path) -> Path:
+    """The image for the STM32F405 whose frames travel over bxCAN; .bin, .hex and .map are beside it."""
+    return _image(build_dir, "can")
+
+
+@pytest.fixture(scope="session")
+def slcan_image(build_dir: Path) -> Path:
+    """The image whose frames travel as SLCAN over USART1; .bin, .hex and .map are beside it."""
+    return _image(build_dir, "slcan")

@@ -11,15 +11,19 @@ if TYPE_CHECKING:
     from typing import Any
 
     from .host_tools.firmware.native import Config, Estimator, run_samples
+    from .host_tools.signals.estimate import estimate
+    from .host_tools.signals.result import Result
     from .sil.run.runner import simulate
     from .sil.scenarios.scenario import load as load_scenario
 
-__all__ = ["Config", "Estimator", "load_scenario", "run_samples", "simulate"]
+__all__ = ["Config", "Estimator", "Result", "estimate", "load_scenario", "run_samples", "simulate"]
 
 _NATIVE = "lever_cdkf.host_tools.firmware.native"
 _HOMES = {
     "Config": (_NATIVE, "Config"),
     "Estimator": (_NATIVE, "Estimator"),
+    "estimate": ("lever_cdkf.host_tools.signals.estimate", "estimate"),
+    "Result": ("lever_cdkf.host_tools.signals.result", "Result"),
     "run_samples": (_NATIVE, "run_samples"),
     "simulate": ("lever_cdkf.sil.run.runner", "simulate"),
     "load_scenario": ("lever_cdkf.sil.scenarios.scenario", "load"),

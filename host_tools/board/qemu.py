@@ -49,17 +49,17 @@ def running(image: Path, *, count_instructions: bool = False) -> Iterator[str]:
     options = ["-display", "none", "-monitor", "none", "-serial", "chardev:usart1", "-echr", _NO_ESCAPE]
     if count_instructions:
         options += _INSTRUCTIONS_COUNT
-    with socket.create_server(("127.0.0.1", 0)) as listener, tempfile.TemporaryFile("w+", errors="replace") as said:
+    with socket.create_server(("127.0.0.1", 0)) as listener, tempfile.TemporaryFile("w+", errors="replace") as output:
         address = listener.getsockname()
         options += ["-chardev", _SERIAL.format(listener.fileno())]
         command = [PROGRAM, "-machine", MACHINE, "-kernel", str(image), *options]
         with one_processor():
             process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=said, stderr=said, pass_fds=[listener.fileno()]
+                command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, pass_fds=[listener.fileno()]
             )
         try:
             listener.close()
-            _wait_for_answer(process, said, address, image)
+            _wait_for_answer(process, output, address, image)
             yield f"socket://{address[0]}:{address[1]}"
         finally:
             _stop(process)
@@ -99,13 +99,13 @@ def check(image: Path) -> None:
         )
 
 
-def _wait_for_answer(process: subprocess.Popen[bytes], said: IO[str], address: tuple[str, int], image: Path) -> None:
+def _wait_for_answer(process: subprocess.Popen[bytes], output: IO[str], address: tuple[str, int], image: Path) -> None:
     """Returns when the SLCAN peer has told its version, and the line is quiet."""
     end = time.monotonic() + _START_S
     while not _answers(address):
         if process.poll() is not None:
-            said.seek(0)
-            raise QemuError(f"{PROGRAM} has ended: {said.read().strip() or 'it does not say why'}")
+            output.seek(0)
+            raise QemuError(f"{PROGRAM} has ended: {output.read().strip() or 'it does not say why'}")
         if time.monotonic() > end:
             raise QemuError(
                 f"{image} has not answered within {_START_S:g} s on USART1: is it the image for SLCAN, "

@@ -13,15 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options, open_bus
 from ..errors import LeverError
-from ..tables import Row, add_json_option
+from ..tables import Row, Tables, add_json_option
+from .signal_options import add_signal_options
 
 if TYPE_CHECKING:
     from ..can.recorder import Recorder
+    from ..signals.reading import Reading
 
 _DESCRIPTION = """\
 Records everything on a CAN bus, through any interface of python-can, into a log in the format of candump -L, for
 `lever replay`, `lever tune`, canplayer and the like. Lost frames are detected by the E2E counters of the messages of
-lever.dbc, damaged ones by their CRC. Ctrl-C ends the recording.
+lever.dbc, damaged ones by their CRC. Ctrl-C ends the recording. With --dbc and --map, the recorded signals that are
+mapped are shown at the end, with their rates and what is missing.
 
 Until it has ended the log is called FILE.partial. A file that keeps that name is incomplete: the disk was full, or the
 bus failed.
@@ -31,6 +34,7 @@ examples:
   lever record --interface socketcan --channel can0
   lever record --interface socketcan --channel can0 -o flight.log --duration 3600
   lever record --interface slcan --channel /dev/ttyACM0 --bitrate 1000000 -o bench.log
+  lever record --interface socketcan --channel can0 --dbc aircraft.dbc --map aircraft.toml -o flight.log
 
 Exit status: 0 when FILE is complete (losses on the bus are reported, but are no error), 2 when the recording failed.
 """
@@ -43,6 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     add_bus_options(parser)
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="the log (default: lever_DATE_TIME.log)")
     parser.add_argument("--duration", metavar="SECONDS", type=_seconds, help="end after so long (default: at Ctrl-C)")
+    add_signal_options(parser, part=False)
     add_json_option(parser)
 
 
@@ -54,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if args.interface is None:
         raise LeverError("record what? give a bus such as --interface socketcan --channel can0")
     check_others_can_be_heard(args.interface)
+    reading = _reading(args)
     with open_bus(args.interface, args.channel, chosen_options(args)) as bus, _stopping() as stopped:
         recorder = Recorder(bus, out, args.channel or args.interface)
         print(f"recording {bus.channel_info} into {out}; Ctrl-C ends", file=sys.stderr)
@@ -66,9 +72,41 @@ def run(args: argparse.Namespace) -> int:
             recorder.run(ended, line.show)
         finally:
             line.end()
-    print_tables({"recorded": _rows(recorder)}, args.json)
+    print_tables({"recorded": _rows(recorder), **_mapped(out, reading)}, args.json)
     print(f"{out}: {_summary(recorder)}")
     return 0
+
+
+def _reading(args: argparse.Namespace) -> Reading | None:
+    """How the log will be read by others, checked before it is recorded. Raises LeverError."""
+    if not (args.map or args.dbc or args.clock):
+        return None
+    if not (args.map and args.dbc):
+        raise LeverError("mapped signals need both --dbc FILE and --map KEY=MESSAGE.SIGNAL")
+    from ..signals.bus_signals import find, load_database
+    from ..signals.mapping import read_mapping
+    from ..signals.reading import Reading
+
+    mapping, database = read_mapping(args.map), load_database(args.dbc)
+    for source in mapping.sources.values():
+        find(database, source.signal, args.dbc)
+    return Reading(mapping, args.dbc, clock=args.clock)
+
+
+def _mapped(log: Path, reading: Reading | None) -> Tables:
+    """What has come of the mapped signals. A log without them is complete, too."""
+    if reading is None:
+        return {}
+    from ..signals.reading import read
+
+    try:
+        samples = read([log], reading)
+    except LeverError as error:
+        print(f"lever: record: warning: {error}", file=sys.stderr)
+        return {}
+    summary = samples.summary()
+    messages = [{"message": name, **counts} for name, counts in summary["messages"].items()]
+    return {"signals": [{"input": key, **row} for key, row in summary["inputs"].items()], "mapped messages": messages}
 
 
 def _seconds(text: str) -> float:

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 from ..extras import warn_of_left_out
 from ..files import check_not_input
 from ..tables import Row, Tables, add_json_option
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
 
 if TYPE_CHECKING:
+    from ..firmware.settings_file import Assignments
     from ..replay.engine import Options
 
-_DESCRIPTION = """\
+_DESCRIPTION = f"""\
 Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints its estimates; with --out also
 writes into DIR
 
@@ -25,13 +27,14 @@ writes into DIR
   report.html   all of it as one page for a browser
 
 LOG is a log of candump -L (.log, or - for standard input), or .blf, .asc, .mf4, .trc, .csv or .db, compressed (.gz) or
-not. Several logs are taken one after another in the order of their first frames. Whatever else is in a log, other
-messages, other buses, damaged lines, is counted and left out. If it holds estimates too, of the firmware that ran when
-it was recorded, and of this version of lever.dbc (IDENTITY says so), they are compared with the new ones, signal by
-signal.
+not, or a file of columns (see below). Several logs are taken one after another in the order of their first frames, or
+with --each as recordings of their own. Whatever else is in a log, other messages, other buses, damaged lines, is
+counted and left out. If it holds estimates too, of the firmware that ran when it was recorded, and of this version of
+lever.dbc (IDENTITY says so), they are compared with the new ones, signal by signal.
 
+{MAP_HELP}
 The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
-choice (model, preload, estimator, adaptation) that is made here.
+choice (model, preload, estimator, adaptation) that is made here. sample_period is that of mapped signals.
 """
 _EPILOG = """\
 examples:
@@ -40,6 +43,9 @@ examples:
   lever replay session.log --model linear_physical --set theta_noise=0.002 -o out/other
   lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
   candump -L can0 | lever replay - -o out/live
+  lever replay monday/*.blf --each --dbc aircraft.dbc --map aircraft.toml -o out/monday --json monday.json
+  lever replay flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o out/flight
+  lever replay flight.csv --map theta=angle z_ddot=acc,unit=g -o out/flight
 
 Exit status: 0 when the log was replayed; 1 when the estimator was in fault or published no estimate, with one line on
 standard error.
@@ -51,6 +57,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "replay", help="estimate again from recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log; several are one recording in pieces")
+    parser.add_argument(
+        "--each", action="store_true", help="every LOG is a recording of its own: one table, one page, a row for each"
+    )
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     parser.add_argument(
         "--channel", metavar="NAME", help="the bus with the samples (default: the only one that has any)"
@@ -65,6 +74,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         default=[],
         help="set one value; may be repeated, the last counts",
     )
+    add_signal_options(parser)
     add_json_option(parser)
 
 
@@ -75,8 +85,10 @@ def run(args: argparse.Namespace) -> int:
     from ..replay.summary import failure
     from ..tables import print_tables
 
-    options = _options(args)
     check_not_input(args.json, args.logs)
+    if args.each:
+        return _run_each(args)
+    options = _options(args, args.logs[0])
     if args.out is not None:
         warn_of_left_out(FILES)
     with Progress("replay") as progress:
@@ -90,19 +102,52 @@ def run(args: argparse.Namespace) -> int:
     return 0 if summary["passed"] else 1
 
 
-def _options(args: argparse.Namespace) -> Options:
+def _run_each(args: argparse.Namespace) -> int:
+    from ..firmware.settings_file import make_config
+    from ..progress import Progress
+    from ..replay.each import replay_each, rows_of, write
+    from ..replay.outputs import FILES
+    from ..signals.mapping import read_mapping
+    from ..tables import print_tables
+
+    make_config(_assignments(args))  # what is wrong with the command line is wrong for all
+    if args.map:
+        read_mapping(args.map)
+    check_part(args)
+    if args.out is not None:
+        warn_of_left_out(FILES)
+    with Progress("replay") as progress:
+        replays = replay_each(args.logs, lambda log: _options(args, log), args.out, progress.show)
+    print_tables({"logs": rows_of(replays)}, args.json)
+    if args.out is not None:
+        print(f"Written to {args.out}: {', '.join([*write(replays, args.out), 'a folder for each log'])}")
+    for each in replays:
+        if each.problem:
+            print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)
+    return 1 if any(each.problem for each in replays) else 0
+
+
+def _options(args: argparse.Namespace, log: str) -> Options:
     from ..firmware.config import CHOICES
-    from ..firmware.settings_file import make_config, parse_assignment, read_assignments
+    from ..firmware.settings_file import make_config
     from ..replay.engine import Options
+
+    assignments = _assignments(args)
+    chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
+    reading = chosen_reading(args, log)
+    return Options(make_config(assignments), chosen_here, args.channel, reading, *check_part(args))
+
+
+def _assignments(args: argparse.Namespace) -> Assignments:
+    from ..firmware.config import CHOICES
+    from ..firmware.settings_file import parse_assignment, read_assignments
 
     assignments = read_assignments(args.settings) if args.settings is not None else {}
     assignments |= dict(parse_assignment(text) for text in args.set)
     for what in CHOICES:
         if (chosen := getattr(args, what)) is not None:
             assignments |= dict([parse_assignment(f"{what}={chosen}")])
-    config = make_config(assignments)
-    chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
-    return Options(config, chosen_here, args.channel)
+    return assignments
 
 
 def _tables(summary: dict[str, Any]) -> Tables:
@@ -133,6 +178,8 @@ def _tables(summary: dict[str, Any]) -> Tables:
             }
             for name, entry in summary["comparison"]["signals"].items()
         ]
+    if mapping := summary["recording"]["mapping"]:
+        tables["signals"] = [{"input": key, **row} for key, row in mapping["inputs"].items()]
     return tables | {"recording": [_recording_row(summary)]}
 
 

@@ -13,6 +13,7 @@ from ..errors import LeverError
 from ..extras import require
 from ..files import check_not_input
 from ..tables import Row, Tables, add_json_option
+from .signal_options import MAP_HELP, add_signal_options, chosen_reading
 
 if TYPE_CHECKING:
     from ..firmware.settings_file import Assignments
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from ..tune.search import Tuned
     from ..tune.validation import Fit
 
-_DESCRIPTION = """\
+_DESCRIPTION = f"""\
 Finds settings of the estimator from a recorded log: measurement noise (theta_noise, theta_dot_noise), process noise
 (theta_dot_process_noise), the walk of the parameters and how it adapts. They are those under which the log is most
 likely: the firmware's own filter runs through it some hundred times, and the density of its innovations is maximised.
@@ -40,7 +41,8 @@ What is printed: the settings with units (sigma: standard deviation), and for bo
   lnL     log-likelihood per sample of angle [rad] and rate [rad/s], given all before [nat]; more is better
   NIS     normalised innovation squared per output [1]: 1 where the stated uncertainty is right, above: too certain
   corr.   largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
-"""
+
+{MAP_HELP}"""
 _EPILOG = """\
 examples:
   lever sim steady --out out/steady                        a log, out/steady/bus.log
@@ -49,6 +51,7 @@ examples:
                                                            -D LEVER_SETTINGS_FILE=my.settings for building firmware
   lever tune flight.log --settings old.settings --start 60 --length 120 --page tune.html
   lever tune flight.log --set model=linear_physical --keep theta_noise
+  lever tune flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o my.settings
 
 Exit status: 0, or 1 when the new settings do clearly worse on the part held out; then no settings are written.
 """
@@ -80,6 +83,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         default=0.3,
         help="share of it, at its end, that is not tuned on (default: %(default)g; 0: all is tuned on)",
     )
+    add_signal_options(parser, part=False)
     add_json_option(parser)
 
 
@@ -97,7 +101,8 @@ def run(args: argparse.Namespace) -> int:
 
     before = _settings(args)
     with Progress("tune") as progress:
-        recording = read(args.log, args.channel, args.start, args.length, progress.show)
+        reading = chosen_reading(args, args.log[0])
+        recording = read(args.log, args.channel, args.start, args.length, progress.show, reading)
         before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
         calibration = calibrate(likelihood, before, args.keep, progress.show)

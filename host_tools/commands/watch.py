@@ -9,19 +9,24 @@ from typing import TYPE_CHECKING, Any
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options
 from ..errors import LeverError
 from ..extras import require
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
 
 if TYPE_CHECKING:
     from ..firmware.config import Config
     from ..watch.sources import Source
 
-_MONITOR = """\
+_MONITOR = f"""\
 Shows the estimator on a CAN bus in the terminal, ten times a second: its parameters with standard deviation and trend,
 natural frequency and damping ratio, mode and faults in words, and of each message the rate and what was lost or corrupt
 by its E2E counter and CRC. It listens and sends nothing, and receives in a thread of its own, so that the bus never
 waits for the terminal. Works over ssh and from 80 by 24 characters on.
 
 Instead of a bus, LOG is played at the pace it was recorded at, or the pilot of --scenario is simulated in real time.
-"""
+
+A bus or log without an estimator, with other messages: the firmware in this process estimates from mapped signals. On a
+bus these are looked at for two seconds first.
+
+{MAP_HELP}"""
 _MONITOR_EPILOG = """\
 keys: q quits, space holds the picture, t changes the time span of the trends, f shows or hides the feedthrough (shown
 from 32 lines on), c clears the counts
@@ -31,6 +36,7 @@ examples:
   lever monitor --interface slcan --channel /dev/ttyACM0
   lever monitor --scenario demo
   lever monitor session.log
+  lever monitor flight.blf --dbc aircraft.dbc --map aircraft.toml
   lever monitor session.log --once                   the picture at the end of the log, as text
   lever monitor --interface socketcan --channel can0 --once --duration 5
 """
@@ -42,12 +48,16 @@ and to choose its model. The page comes from this computer alone, and works on a
 Only this computer can open it unless --host says otherwise. There is no password: whoever can reach the port can send
 COMMAND frames (E2E protects against faults, not people), so give --read-only with --host, or use a tunnel:
   ssh -L 8642:localhost:8642 THE_OTHER_COMPUTER
+
+A bus or log with other messages is mapped by --dbc and --map (see `lever monitor --help`); the firmware in this process
+estimates from it.
 """
 _LIVE_EPILOG = """\
 examples:
   lever live --scenario demo                         then open http://127.0.0.1:8642/
   lever live --interface socketcan --channel can0 --read-only
   lever live session.log --port 0                    any free port
+  lever live --interface socketcan --channel can0 --dbc aircraft.dbc --map aircraft.toml
 
 Ctrl-C ends it.
 """
@@ -88,6 +98,7 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scenario", metavar="NAME", help="simulate a scenario of `lever sim --list` or a .toml file")
     add_bus_options(parser)
+    add_signal_options(parser)
 
 
 def run_monitor(args: argparse.Namespace) -> int:
@@ -136,14 +147,30 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
 
         if settings is not None:
             raise LeverError("--settings goes with a bus or a log; a scenario has its own settings")
+        if args.map or args.dbc:
+            raise LeverError("--dbc and --map go with a bus or a log; a scenario speaks lever.dbc")
         return simulated(args.scenario)
 
     from ..firmware.settings_file import make_config, read_assignments
     from ..watch.sources import BusSource, LogSource
 
     config = Config() if settings is None else make_config(read_assignments(settings))
+    if args.log is not None and (reading := chosen_reading(args, args.log)) is not None:
+        from ..watch.mapped import MappedLogSource
+
+        return MappedLogSource(args.log, reading, config), config
+    if args.map or args.dbc:
+        from ..signals.mapping import read_mapping
+        from ..signals.online import Online
+        from ..watch.mapped import MappedBusSource
+
+        if not (args.map and args.dbc):
+            raise LeverError("a bus needs both --dbc FILE and --map KEY=MESSAGE.SIGNAL")
+        online = Online(read_mapping(args.map), args.dbc, args.clock)
+        check_others_can_be_heard(args.interface)
+        return MappedBusSource(args.interface, args.channel, online, config, chosen_options(args)), config
     if args.log is not None:
-        return LogSource(args.log, args.channel), config
+        return LogSource(args.log, args.channel, part=check_part(args)), config
     check_others_can_be_heard(args.interface)
     return BusSource(args.interface, args.channel, chosen_options(args)), config
 

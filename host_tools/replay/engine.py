@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from ..arrays import FloatArray
 from ..can import codec
 from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.logs import Recording
@@ -22,6 +23,8 @@ from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
 from ..results.summary import SCHEMA, ReplaySummary, of
 from ..results.trace import Trace
+from ..signals.reading import Reading
+from ..signals.traffic import MappedTraffic
 from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
@@ -52,16 +55,31 @@ class Options:
     """Choices of `config` (model, estimator …) that no COMMAND in the log may change."""
     channel: str | None = None
     """The bus with the samples; by default the only one that has any."""
+    reading: Reading | None = None
+    """How samples are made of logs that do not speak lever.dbc; their sample period becomes `config`'s."""
+    start: float = 0.0
+    """[s] of recorded time; COMMAND frames before it count."""
+    length: float = float("inf")
 
 
 def replay(
-    logs: Iterable[str | Path], options: Options, out_dir: Path | None = None, progress: Progress | None = None
+    logs: Iterable[str | Path],
+    options: Options,
+    out_dir: Path | None = None,
+    progress: Progress | None = None,
+    keep: Callable[[Mapping[str, FloatArray]], None] | None = None,
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
     trace.csv, signals.mf4, report.html and summary.json there, all or none; signals.mf4 with the extra `mf4`,
-    report.html with `report`. Raises LeverError, also rather than write over a log."""
+    report.html with `report`, and hands the trace, reduced, to `keep`. Raises LeverError, also rather than write over a
+    log."""
     logs = list(logs)
-    traffic = Traffic(Recording(logs), options.channel)
+    traffic: Traffic | MappedTraffic
+    if options.reading is None:
+        traffic = Traffic(Recording(logs), options.channel)
+    else:
+        traffic = MappedTraffic(logs, options.reading, progress)
+        options = replace(options, config=traffic.at_its_rate(options.config))
     with ExitStack() as stack:
         outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs, FILES))
         replayed = _Replay(traffic, options, outputs)
@@ -69,13 +87,15 @@ def replay(
         summary = replayed.summary()
         if outputs is not None:
             replayed.finish(outputs, summary)
+            if keep is not None:
+                keep(replayed.kept.stretches.rows())
         return summary
 
 
 class _Replay:
     """The parts, joined."""
 
-    def __init__(self, traffic: Traffic, options: Options, outputs: Outputs | None) -> None:
+    def __init__(self, traffic: Traffic | MappedTraffic, options: Options, outputs: Outputs | None) -> None:
         self._traffic, self._options, self._outputs = traffic, options, outputs
         self._feeder = Feeder(Estimator(options.config))
         self._commands = Commands(options.config.choices, options.chosen)
@@ -95,7 +115,8 @@ class _Replay:
     def run(self, progress: Progress | None) -> None:
         """All of the recording."""
         recording = self._traffic.recording
-        for frames in self._traffic.chunks():
+        for chunk in self._traffic.chunks():
+            frames = self._part(chunk)
             self._repeats.add(frames)
             self._identify(frames)
             for fed, rows in self._feeder.feed(self._commands.applied(frames)):
@@ -106,12 +127,22 @@ class _Replay:
                 progress(recording.done, recording.size)
         self._take(self._feeder.flush(), last=True)
 
+    def _part(self, frames: Frames) -> Frames:
+        """Those between start and end; of a mapped log it is taken already."""
+        start, length = self._options.start, self._options.length
+        if self._options.reading is not None or (start == 0.0 and length == float("inf")):
+            return frames
+        since = (frames["time_us"] - self._traffic.first_us) * 1e-6
+        wanted = (since >= start) | (frames["id"] == codec.message("COMMAND").frame_id)
+        part: Frames = frames[wanted & (since < start + length)]
+        return part
+
     def _identify(self, frames: Frames) -> None:
         """Which contract the recorded estimator speaks, by its first IDENTITY that says so."""
         if self._recorded_contract is None:
             data = frames["data"][frames["id"] == codec.message("IDENTITY").frame_id]
-            said = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
-            self._recorded_contract = next((int(number) for number in said[np.isfinite(said)]), None)
+            contracts = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
+            self._recorded_contract = next((int(number) for number in contracts[np.isfinite(contracts)]), None)
 
     def _log(self, fed: Frames, outputs: Outputs) -> None:
         if self._bus_log is None:
@@ -211,6 +242,7 @@ class _Replay:
             "clock_wraps": clocks.wraps,
             "clock_restarts": clocks.restarts,
             "recorder_clock_jumps": clocks.recorder_jumps,
+            "mapping": traffic.loaded.summary() if isinstance(traffic, MappedTraffic) else None,
         }
 
     def finish(self, outputs: Outputs, summary: dict[str, Any]) -> None:

@@ -112,6 +112,9 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
     troubles, recording = [], summary["recording"]
     if failure(summary):
         troubles.append(f"Trouble: {failure(summary)}.")
+    if mapping := recording.get("mapping"):
+        troubles += [f"{note}." for note in mapping["notes"]]
+        troubles += _protection(mapping)
     if recording["refused"]:
         why = why_refused(summary["corrupt"], summary["late"])
         troubles.append(f"{recording['refused']:,} frames were refused: {why}.")
@@ -130,6 +133,20 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
     if step and not 0.7 < step / period < 1.4:
         troubles.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
     return troubles + _recorded_estimates(recording)
+
+
+def _protection(mapping: dict[str, Any]) -> list[str]:
+    """What E2E protection has found, or that there was none."""
+    sentences = []
+    for name, counts in mapping["messages"].items():
+        wrong = [f"{counts[what]:,} {what}" for what in ("corrupt", "lost", "repeated", "undecoded") if counts[what]]
+        if wrong:
+            sentences.append(f"Of {counts['frames']:,} frames of {name}: {', '.join(wrong)}.")
+    if mapping["unprotected_frames"]:
+        sentences.append(
+            f"{mapping['unprotected_frames']:,} frames are unprotected: the mapping names no E2E profile for them."
+        )
+    return sentences
 
 
 def _recorded_estimates(recording: dict[str, Any]) -> list[str]:

@@ -57,7 +57,7 @@ class Calibrated:
     sigma: float
     """Its standard deviation, that of tau_m_gain included."""
     white: bool
-    """Whether the innovations are, with the most likely values: if not, torque that nobody knows may look like them."""
+    """Whether the innovations are, with the most likely values: if not, unknown torque may look like them."""
 
     @property
     def is_taken(self) -> bool:

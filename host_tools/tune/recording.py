@@ -14,6 +14,8 @@ from ..can.traffic import Traffic, why_refused
 from ..errors import LeverError
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
+from ..signals.reading import Reading
+from ..signals.traffic import MappedTraffic
 
 _SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
 
@@ -59,9 +61,13 @@ def read(
     start: float = 0.0,
     length: float = float("inf"),
     progress: Callable[[int, int, str], None] | None = None,
+    reading: Reading | None = None,
 ) -> Recording:
     """The samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`, both [s] of
-    recorded time. Raises LeverError."""
+    recorded time; with `reading`, of a log that does not speak lever.dbc. Raises LeverError."""
+    if reading is not None:
+        mapped = MappedTraffic(list(map(str, paths)), reading)
+        return _recording(np.concatenate(list(mapped.chunks())), str(mapped.channel), ", ".join(mapped.recording.paths))
     traffic = Traffic(logs.Recording(paths), channel)
     log = traffic.recording
     identifiers = np.array([codec.message(name).frame_id for name in _SAMPLES])

@@ -15,7 +15,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..can import codec
 from ..can.buses import open_bus
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import can
 
     from ..arrays import ComplexArray, FloatArray
+    from ..can.bulk import Buses, Frames
     from ..firmware.config import Config
 
 MOST_WAITING = 65536
@@ -176,17 +177,34 @@ class BusSource(Source):
         self._put((identifier, data))
 
 
+class PlayedLog(Protocol):
+    """What a LogSource plays: a can.logs.Recording, or frames that are made from a log of other signals."""
+
+    buses: Buses
+    damaged: int
+    ends_early: list[str]
+
+    def chunks(self) -> Iterator[Frames]: ...
+
+
 class LogSource(Source):
     """A recorded log; `channel` chooses among several in it. What is wrong in it is told in `error` at its end."""
 
-    def __init__(self, path: str, channel: str | None = None) -> None:
-        """Opens the log. Raises LeverError."""
+    def __init__(
+        self,
+        path: str,
+        channel: str | None = None,
+        log: PlayedLog | None = None,
+        part: tuple[float, float] = (0.0, float("inf")),
+    ) -> None:
+        """Opens the log, unless `log` is it; of it `part` is played: start and length [s]. Raises LeverError."""
         from ..can.logs import Recording
 
         super().__init__()
         self.title = path
         self._channel = channel
-        self._log = Recording([path])
+        self._log: PlayedLog = Recording([path]) if log is None else log
+        self._part = part
 
     def run(self) -> None:
         due = time.monotonic()
@@ -213,11 +231,15 @@ class LogSource(Source):
         from ..can.bulk import ERROR as ERROR_FRAME
 
         last: int | None = None
+        start_us: int | None = None
         for chunk in self._log.chunks():
-            frames = chunk
+            start_us = int(chunk["time_us"][0]) if start_us is None else start_us
+            since = (chunk["time_us"] - start_us) * 1e-6
+            frames = chunk[((since >= self._part[0]) | (self._part[0] == 0.0)) & (since < sum(self._part))]
             if self._channel is not None:
                 names = self._log.buses.names()
-                frames = chunk[chunk["bus"] == (names.index(self._channel) if self._channel in names else len(names))]
+                wanted = names.index(self._channel) if self._channel in names else len(names)
+                frames = frames[frames["bus"] == wanted]
             columns = (frames[name].tolist() for name in ("time_us", "id", "flags", "length"))
             data = frames["data"].tobytes()
             for k, (time_us, identifier, flags, length) in enumerate(zip(*columns, strict=True)):
@@ -228,9 +250,10 @@ class LogSource(Source):
                     frame = (ERROR if flags & ERROR_FRAME else FOREIGN, b"")
                 yield min(pause, LONGEST_PAUSE), frame
         if last is None:
-            raise LeverError(f"{self.title}: no CAN frame of channel {self._channel} in it")
+            what = "in the part from --start on" if self._channel is None else f"of channel {self._channel} in it"
+            raise LeverError(f"{self.title}: no CAN frame {what}")
         if self._log.damaged:
-            self.error = f"{self.title}: {self._log.damaged} lines of it are no frame"
+            self.error = f"{self.title}: {self._log.damaged} lines of it are not frames"
         if self._log.ends_early:
             self.error = self._log.ends_early[-1]
 

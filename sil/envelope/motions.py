@@ -60,7 +60,7 @@ class Motion:
     pause: tuple[float, float] | None = None
     """Nothing moves between these times [s]."""
     released: tuple[float, float] | None = None
-    """Nobody holds the lever between these times [s]."""
+    """The hands are off the lever between these times [s]."""
     next_pilot: float = 1.0
     """Who holds it then: c_p and k_p are so many times as large, or as small in every second run."""
     friction: float = 0.0
@@ -158,7 +158,7 @@ def _moved(motion: Motion, seeds: Sequence[int], trim: FloatArray) -> FloatArray
 
 
 def _disturbance(motion: Motion, seeds: Sequence[int]) -> FloatArray:
-    """Torque that nobody measures [N m]."""
+    """Unmeasured torque [N m]."""
     count = len(motion.time)
     torque = np.zeros((1, len(seeds)))
     if motion.slow_torque:

@@ -57,7 +57,7 @@ class Lanes:
     trim: FloatArray
     """Angle at which the lever rests while the pilot holds still [rad]."""
     disturbance: FloatArray
-    """Torque that nobody measures [N m]."""
+    """Unmeasured torque [N m]."""
     kick: FloatArray
     """What process noise adds to theta_dot from sample to sample [rad/s]."""
     friction: FloatArray

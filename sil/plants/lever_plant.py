@@ -66,8 +66,8 @@ class Lever:
 
 @dataclass(frozen=True)
 class Truth:
-    """The pilot at every sample: arrays of equal length [kg, N s/m, N/m, rad]; 0, 0, 0 while nobody holds the lever.
-    Fixed preload does not use the trim."""
+    """The pilot at every sample: arrays of equal length [kg, N s/m, N/m, rad]; 0, 0, 0 while the hands are
+    off the lever. Fixed preload does not use the trim."""
 
     m_p: FloatArray
     c_p: FloatArray

@@ -41,14 +41,14 @@ class Conditions:
     period: float
     """Between two samples [s]."""
     process_noise: float
-    """Random walk of theta_dot: torque that nobody knows [rad/s/sqrt(s)]."""
+    """Random walk of theta_dot: unmodelled torque [rad/s/sqrt(s)]."""
     motor_lag: float
     """Time constant with which the torque follows its command [s]."""
     rng: np.random.Generator
     substeps: int | None = None
     """In a period; None: as few as LONGEST_SUBSTEP allows."""
     disturbance: FloatArray | float = 0.0
-    """Torque in the lever that nobody measures, at the samples [N m]; linear between them."""
+    """Unmeasured torque in the lever, at the samples [N m]; linear between them."""
 
     @property
     def count(self) -> int:
@@ -132,7 +132,7 @@ class Truth(ABC):
     @property
     @abstractmethod
     def parameters(self) -> Mapping[str, FloatArray]:
-        """The model's parameters by name, SI units; NaN while nobody holds the lever."""
+        """The model's parameters by name, SI units; NaN while the hands are off the lever."""
 
     @property
     @abstractmethod
@@ -143,7 +143,7 @@ class Truth(ABC):
     @abstractmethod
     def dynamics(self) -> Dynamics:
         """Natural frequency and damping ratio; of the mode that an observer of theta sees, where there are several. NaN
-        while nobody holds the lever."""
+        while the hands are off the lever."""
 
     @abstractmethod
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:

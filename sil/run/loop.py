@@ -70,7 +70,7 @@ class Inputs:
     torque: FloatArray
     """Commanded by the scenario itself [N m]."""
     disturbance: FloatArray
-    """Torque in the lever that nobody measures [N m]."""
+    """Unmeasured torque in the lever [N m]."""
     missing: dict[str, NDArray[np.bool_]]
     """For each of sensors.VALUES and sensors.FRAMES."""
 

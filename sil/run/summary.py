@@ -195,8 +195,13 @@ def missed_limits(
     least = limits.get("coverage")
     for name, share in coverage.items():
         if least is not None and share is not None and share < least:
-            missed.append(f"coverage of {name} {100.0 * share:.0f} % (limit {100.0 * least:g} %)")
+            missed.append(f"coverage of {name} {_whole_percent(share)} % (limit {100.0 * least:g} %)")
     return missed
+
+
+def _whole_percent(share: float) -> int:
+    """Not rounded up, so that what is below a limit does not look as if it kept it."""
+    return math.floor(100.0 * share + 1e-9)
 
 
 def _verdict(summary: SimulationSummary) -> str:
@@ -262,7 +267,7 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
     if not covered:
         return ""
     worst = min(covered, key=lambda name: covered[name])
-    percent = f"{math.floor(100.0 * covered[worst] + 1e-9)} % of the time"  # "at least" is not rounded up
+    percent = f"{_whole_percent(covered[worst])} % of the time"
     if covered[worst] >= LEAST_COVERAGE:
         return f"In this run ±2σ covers every truth for at least {percent}."
     return f"In this run the stated σ of {_spelled(worst)} is too small: ±2σ covers the truth for {percent}."

@@ -76,7 +76,7 @@ def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 20
 # --- consistency -----------------------------------------------------------------------------------------------------
 
 
-def honesty(deviations: Array, variances: Array) -> Array:
+def sigma_ratio(deviations: Array, variances: Array) -> Array:
     """(n,) what an estimator claims ÷ what it does: root of the mean of its variances (B, T, n) ÷ rms of its errors."""
     return 1.0 / ratio(deviations, variances)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -79,6 +80,13 @@ def health(mode: str = "run", *faults: str, restarts: int = 0, excitation: float
     """A HEALTH for a PuppetBus."""
     flags = {f"fault_{name}": int(name in faults) for name in enum_names("lever_fault").values()}
     return "HEALTH", {"mode": mode, "restarts": restarts, "excitation": excitation, **flags}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _ctrl_c() -> None:
+    """Ends a process also where the tests are started in the background of a shell, which ignores it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 Run = Callable[..., tuple[int, str, str]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -14,35 +13,32 @@ PROJECT = Path(__file__).with_name("package")
 TOOLCHAIN = tools.FIRMWARE / "port/stm32f4/toolchain.cmake"
 
 
-def install(folder: Path, *settings: str | Path) -> Path:
-    """Configures, builds and installs the core of this tree; the prefix."""
-    build, prefix = folder / "build", folder / "prefix"
-    options = ["-DLEVER_TESTS=OFF", "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_INSTALL_LIBDIR=lib", *settings]
-    tools.assert_silent(["cmake", "-S", tools.ROOT, "-B", build, *options])
-    tools.assert_silent(["cmake", "--build", build, "--parallel", "2", "--target", "lever_cdkf"])
-    tools.assert_silent(["cmake", "--install", build, "--prefix", prefix])
+def install(build: Path, prefix: Path) -> Path:
+    """Installs the core out of a finished build."""
+    tools.assert_silent(["cmake", "--install", build, "--component", "core", "--prefix", prefix])
     return prefix
 
 
 def build(folder: Path, *settings: str | Path) -> Path:
-    """The program of the other project."""
-    tools.assert_silent(["cmake", "-S", PROJECT, "-B", folder, "-DCMAKE_BUILD_TYPE=Release", *settings])
-    tools.assert_silent(["cmake", "--build", folder, "--parallel", "2"])
+    """The program of the other project; without optimisation, as the bits are the same."""
+    tools.assert_silent(["cmake", "-S", PROJECT, "-B", folder, "-DCMAKE_BUILD_TYPE=Debug", *settings])
+    tools.assert_silent(["cmake", "--build", folder])
     return folder / "package"
 
 
 @pytest.fixture(scope="module")
-def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return install(tmp_path_factory.mktemp("installed"))
+def prefix(build_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return install(build_dir, tmp_path_factory.mktemp("installed"))
 
 
 def test_what_is_installed(prefix: Path) -> None:
     """The library, its manual, the contract, and what find_package reads; nothing of Python's or of the inside."""
     files = {str(file.relative_to(prefix)) for file in prefix.rglob("*") if file.is_file()}
-    package = "lib/cmake/lever_cdkf/lever_cdkfConfig"
+    library = next(prefix.rglob("liblever_cdkf.a")).relative_to(prefix)
+    package = f"{library.parent}/cmake/lever_cdkf/lever_cdkfConfig"
     described = {f"{package}.cmake", f"{package}-release.cmake", f"{package}Version.cmake"}
     headers = {"include/lever_cdkf.h", "include/lever_settings.def"}
-    assert files == {"lib/liblever_cdkf.a", "share/lever_cdkf/lever.dbc", *headers, *described}
+    assert files == {str(library), "share/lever_cdkf/lever.dbc", *headers, *described}
     for name in ("lever_cdkf.h", "lever_settings.def"):
         assert (prefix / "include" / name).read_bytes() == (tools.FIRMWARE / name).read_bytes()
 
@@ -62,20 +58,10 @@ def test_another_project_computes_the_same(installed: bool, prefix: Path, tmp_pa
     assert abs(float(estimate["theta"][0]) - float(theta[-1])) < 0.01
 
 
-def test_another_version_is_refused(prefix: Path, tmp_path: Path) -> None:
-    """Until version 1, every minor version may differ."""
-    (tmp_path / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.25)\nproject(other LANGUAGES C)\nfind_package(lever_cdkf 0.0 REQUIRED)\n"
-    )
-    result = tools.run(["cmake", "-S", tmp_path, "-B", tmp_path / "build", f"-Dlever_cdkf_ROOT={prefix}"])
-    assert result.returncode != 0
-    assert re.search(r'compatible with requested\s+version "0.0"', result.stdout)
-
-
 @pytest.mark.requires("arm-none-eabi-gcc")
-def test_the_package_of_a_microcontroller(tmp_path: Path) -> None:
+def test_the_package_of_a_microcontroller(can_image: Path, tmp_path: Path) -> None:
     """Cross-compiled, installed, found by a cross-compiled project: all of it is code of a Cortex-M4F with its FPU."""
-    prefix = install(tmp_path, f"-DCMAKE_TOOLCHAIN_FILE={TOOLCHAIN}")
+    prefix = install(can_image.parent, tmp_path / "prefix")
     flags = "-DCMAKE_EXE_LINKER_FLAGS=--specs=nosys.specs"
     cross = (f"-DCMAKE_TOOLCHAIN_FILE={TOOLCHAIN}", f"-DCMAKE_FIND_ROOT_PATH={prefix}", flags)
     program = build(tmp_path / "project", f"-Dlever_cdkf_ROOT={prefix}", *cross)

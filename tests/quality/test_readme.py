@@ -4,7 +4,8 @@ Each fenced block of language `sh`, `python` or `c` of a README is a file that i
 another page (FLASH.md, SIL.md …) are one script, so that a step finds what the steps before have left in out/. They
 run in a scratch folder that looks like the source tree, with the virtual environment active and a recording
 `session.log` at hand. Not run are lines that begin with ctest or cmake (they are what runs this; but a page may build
-in out/) and sudo (not a test's to use).
+in out/) and sudo (not a test's to use); what pytest is to run is only found; and sil/README.md, which
+tests/python/commands runs.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from quality import tools
 
 FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
 READMES = [tools.ROOT / "README.md", *(file for folder in FOLDERS for file in (tools.ROOT / folder).rglob("README.md"))]
+RUN_ELSEWHERE = tools.ROOT / "sil/README.md"
 TIME_LIMIT = "1800"
 """For what hangs [s]; nothing is expected to be fast."""
 
@@ -45,6 +47,7 @@ def blocks(language: str) -> list[object]:
     return [
         case(f"{readme.relative_to(tools.ROOT)}:{line}", content)
         for readme in READMES
+        if readme != RUN_ELSEWHERE
         for line, content in readmes.blocks(readme, language).items()
     ]
 
@@ -78,6 +81,7 @@ def scratch(tmp_path: Path, build_dir: Path, recording: Path, monkeypatch: pytes
     (tmp_path / "build").symlink_to(build_dir)
     shutil.copy(recording, tmp_path / "session.log")
     monkeypatch.setenv("PATH", f"{build_dir}/venv/bin:{os.environ['PATH']}")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--collect-only")
     return tmp_path
 
 
@@ -127,7 +131,9 @@ def test_links_lead_to_files_and_headings(page: Path) -> None:
 
 
 @pytest.mark.parametrize("script", blocks("sh"))
-def test_commands(script: str, scratch: Path) -> None:
+def test_commands(script: str, scratch: Path, request: pytest.FixtureRequest) -> None:
+    if "build/stm32f4" in script or "lever flash" in script:
+        request.getfixturevalue("slcan_image")
     run_here(script, scratch)
 
 

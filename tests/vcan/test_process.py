@@ -12,6 +12,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import can
 import pytest
 from lever_cdkf.host_tools.can import codec
 from vcan import rig
@@ -157,23 +158,31 @@ def test_no_frame_is_dropped_when_the_interface_has_no_room(start: rig.Starter, 
     host.bus.shutdown()
 
 
-@pytest.mark.requires("cansend")
 def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, interface: str) -> None:
-    foreign = ["7FF#1122334455667788", "00000110#0102030405060708", "110#R", "111#R8", "000#"]
+    foreign = [
+        can.Message(arbitration_id=0x7FF, is_extended_id=False, data=bytes(range(8))),
+        can.Message(arbitration_id=0x110, is_extended_id=True, data=bytes(range(8))),
+        can.Message(arbitration_id=0x110, is_extended_id=False, is_remote_frame=True),
+        can.Message(arbitration_id=0x111, is_extended_id=False, is_remote_frame=True, dlc=8),
+        can.Message(arbitration_id=0x000, is_extended_id=False),
+    ]
     broken = [
-        "110#",
-        "110#11",
-        "111#11223344556677",
-        "110#0000000000000000",
-        "111#FFFFFFFFFFFFFFFF",
-        "120#0011223344556677",
+        can.Message(arbitration_id=identifier, is_extended_id=False, data=data)
+        for identifier, data in [
+            (0x110, b""),
+            (0x110, b"\x11"),
+            (0x111, bytes(7)),
+            (0x110, bytes(8)),
+            (0x111, 8 * b"\xff"),
+            (0x120, bytes(range(8))),
+        ]
     ]
     process = start()
     host = rig.Host.on(interface)
     answers = []
     for frame in (*foreign, *broken):
         answers += host.run(20)
-        subprocess.run(["cansend", interface, frame], check=True)
+        host.bus.send(frame)
     answers += host.run(20)
     samples = 20 * (len(foreign) + len(broken) + 1)
     tell_of_them = (HEALTH, LINK_HEALTH)

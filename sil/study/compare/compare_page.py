@@ -141,7 +141,7 @@ def _assembled(page: Page, results: Results, claims: Sequence[Claim]) -> str:
     kept, decided = (sum(claim.kept is value for claim in claims) for value in (True, False))
     decided += kept
     mood = "good" if kept == decided else "bad"
-    said = (
+    verdict = (
         f"{kept} of {decided} claims about the firmware hold."
         if decided
         else "A preview: the claims about the firmware take 20 whole runs of each case."
@@ -153,7 +153,7 @@ def _assembled(page: Page, results: Results, claims: Sequence[Claim]) -> str:
         f'<header><h1>{_TITLE}</h1><p class="subtitle">{plan.seeds} runs{length} of each case, seed {plan.seed}. '
         "Differences are called significant by paired bootstrap over runs, at 5 % for all comparisons of this page "
         "together (Holm).</p></header>"
-        f'<p class="verdict {mood}">{said}</p><nav>{links}</nav>{"".join(page.sections)}'
+        f'<p class="verdict {mood}">{verdict}</p><nav>{links}</nav>{"".join(page.sections)}'
         "<footer>Made by <code>lever compare</code>. Nothing on this page is loaded from elsewhere.</footer>"
     )
     return document(_TITLE, body, {key: figure.spec() for key, figure in page.figures.items()})

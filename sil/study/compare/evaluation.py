@@ -11,7 +11,7 @@ from lever_cdkf.host_tools.arrays import Array, BoolArray
 
 from ..data import OUTPUTS, PARAMETERS
 from ..matched import KINDS
-from ..scores import Consistency, consistency, honesty, median_and_worst, ratio, ratio_spread, rms, settling_times
+from ..scores import Consistency, consistency, median_and_worst, ratio, ratio_spread, rms, settling_times, sigma_ratio
 from .campaign import Outcome, Results
 from .cases import Case, References, cases
 from .comparison import Differences, corrected, of_errors, of_times
@@ -54,7 +54,7 @@ class Row:
     """Of ours: rms error ÷ that of the best baseline, quantity by quantity."""
     baseline_error: Five = UNKNOWN
     """Its standard error."""
-    honesty: Five = UNKNOWN
+    sigma_ratio: Five = UNKNOWN
     """Stated standard deviation ÷ rms error."""
     nees: float = math.nan
     nees_low: float = math.nan
@@ -143,7 +143,7 @@ def _with_errors(row: Row, outcome: Outcome, intact: BoolArray, judged: BoolArra
     )
     if outcome.stated is None:
         return row
-    return replace(row, honesty=_five(honesty(errors, outcome.stated[intact][:, judged])))
+    return replace(row, sigma_ratio=_five(sigma_ratio(errors, outcome.stated[intact][:, judged])))
 
 
 def _with_references(row: Row, errors: Array, references: References, intact: BoolArray, judged: BoolArray) -> Row:

@@ -159,7 +159,7 @@ def claims(rows: Sequence[Row]) -> list[Claim]:
             add(f"{name}: error ÷ best baseline's, preload {preload}", NEAR, values)
     add("joint: NEES ÷ its 95 % limit", 1.0, _of(joint, lambda row: row.nees / row.nees_high))
     add("joint: NEES ÷ its lower 95 % limit", 1.0, _of(joint, lambda row: row.nees / row.nees_low), False)
-    add("dual: stated σ ÷ rms error", 0.5, _each(dual, lambda row: row.honesty), False)
+    add("dual: stated σ ÷ rms error", 0.5, _each(dual, lambda row: row.sigma_ratio), False)
     _add_steps(add, rows)
     wrong = [row for row in rows if cases()[row.case].kind == "wrong noise"]
     for name in OURS:

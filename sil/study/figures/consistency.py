@@ -21,7 +21,7 @@ _ESTIMATORS = {"dual": "estimate", "joint": "joint"}  # and their looks
 def nees(seed: int, extent: Extent) -> Figure:
     """Mean NEES of many runs over time, dual and joint, without and with dither, in its 95 % band."""
     drawn: dict[str, tuple[Trace, ...]] = {}
-    said: list[str] = []
+    sentences: list[str] = []
     for case, dither in _CASES.items():
         condition = Condition("lever", "fixed", dither_rms=dither, settings=PRIOR)
         batch = matched(condition, extent.runs, extent.duration, seed)
@@ -33,13 +33,14 @@ def nees(seed: int, extent: Extent) -> Figure:
             assert estimates.covariance is not None
             squares = normalised_squares(errors(batch, estimates)[..., :PARAMETERS], estimates.covariance)
             traces.append(Curve(at * batch.period, squares.mean(axis=0), name, look))
-            said.append(f"{case}, {name}: {_numbers(consistency(squares, PARAMETERS))}")
+            sentences.append(f"{case}, {name}: {_numbers(consistency(squares, PARAMETERS))}")
         drawn[f"NEES, {case} [1]"] = tuple(traces)
     caption = (
         "Squares of the errors of m_p, c_p and k_p in units of the covariance that the firmware states, mean of "
         f"{extent.runs} matched runs at each time. If the covariance is right the mean is {PARAMETERS}, and in the "
         "shaded band 95 % of the time; above it the filter is over-confident, below it too cautious. Mean over the "
-        f"run, the interval in which it would lie by chance, and the share of times in the band: {'; '.join(said)}."
+        "run, the interval in which it would lie by chance, and the share of times in the band: "
+        f"{'; '.join(sentences)}."
     )
     top = _HEADROOM * max(
         float(trace.y.max()) for traces in drawn.values() for trace in traces if isinstance(trace, Curve)

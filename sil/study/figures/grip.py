@@ -113,7 +113,7 @@ def _rows(time: Array, truth: Array, case: _Case) -> tuple[Row, ...]:
 
 
 def _caption(cases: dict[str, _Case], truth: Array, elapsed: Array) -> str:
-    said = " ".join(_case_caption(title, case, truth, elapsed) for title, case in cases.items())
+    sentences = " ".join(_case_caption(title, case, truth, elapsed) for title, case in cases.items())
     watched = next(iter(cases.values())).noticed
     soon = int(watched[:, (elapsed >= 0.0) & (elapsed < _WATCHED)].any(axis=1).sum())
     before = np.diff(watched[:, elapsed < 0.0].astype(np.int64), axis=1, prepend=0)
@@ -123,7 +123,7 @@ def _caption(cases: dict[str, _Case], truth: Array, elapsed: Array) -> str:
         f"{percent(_FACTORS[_STIFFNESS] - 1.0)}. Above, one run of the dual filter (preload trim, dither of "
         f"{number(DITHER)} N m rms) with the ±2σ that it states; below, the error of stiffness in all runs. With "
         "detection, the filter opens its uncertainty when its corrections drift to one side; without, it knows of no "
-        f"changes but the random walk. {said} The change is noticed within {number(_WATCHED)} s in {soon} "
+        f"changes but the random walk. {sentences} The change is noticed within {number(_WATCHED)} s in {soon} "
         f"of {len(truth)} runs; false alarms before it: {false} in {number(-elapsed[0] * len(truth), 3)} s."
     )
 

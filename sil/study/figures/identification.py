@@ -79,7 +79,7 @@ def _traces(case: _Case, index: int) -> tuple[Trace, ...]:
 
 def _caption(cases: dict[str, _Case], settled: float) -> str:
     without, with_dither = cases.values()
-    said = [
+    sigmas = [
         f"{label.split()[0]} {number(100.0 * _claimed(without)[index])} → {percent(_claimed(with_dither)[index])} "
         f"({number(100.0 * without.linearised[-1, index])} → {percent(with_dither.linearised[-1, index])})"
         for index, label in enumerate(_LABELS)
@@ -90,7 +90,7 @@ def _caption(cases: dict[str, _Case], settled: float) -> str:
         "(thin lines: the ±2σ that they state). The shaded band is ±2σ, about the truth, of a Kalman filter linearised "
         "there. First the base alone shakes the lever, then the motor adds a known torque of "
         f"{number(DITHER)} N m rms: same pilot, same axes. σ of the dual filter at the end, without → with that "
-        f"torque, and in brackets that of the filter linearised at the truth: {', '.join(said)}. Dual and joint are "
+        f"torque, and in brackets that of the filter linearised at the truth: {', '.join(sigmas)}. Dual and joint are "
         f"nowhere more than {number(apart)} σ apart. The axes are scaled to what follows the first {number(settled)} s."
     )
 

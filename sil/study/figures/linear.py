@@ -78,7 +78,7 @@ def states(seed: int, extent: Extent) -> Figure:
     estimated = estimates(matched_config(_NOISY, "dual"), batch)
     time, window = _excerpt(batch)
     rows: list[Row] = []
-    said: list[str] = []
+    sentences: list[str] = []
     for index, (column, symbol, unit) in enumerate((("theta", "x", "mm"), ("theta_dot", "ẋ", "mm/s"))):
         truth, measured = _MILLI * batch.truth.x[0, :, index], _MILLI * batch.raw_y[0, :, index]
         estimate, sigma = _MILLI * estimated[column], _MILLI * estimated[f"{column}_sigma"]
@@ -86,12 +86,12 @@ def states(seed: int, extent: Extent) -> Figure:
         settled = late(np.arange(batch.samples, dtype=np.float64))
         off, noise = rms((estimate - truth)[settled]), rms((measured - truth)[settled])
         inside = held(truth[settled], estimate[settled], sigma[settled])
-        said.append(f"{symbol} {number(off)} {unit} rms against {number(noise)} {unit}, {percent(inside, 3)} held")
+        sentences.append(f"{symbol} {number(off)} {unit} rms against {number(noise)} {unit}, {percent(inside, 3)} held")
     caption = (
         "Position and rate of the linear physical model with process noise as the firmware reconstructs them (dual "
         "filter, which learns the parameters meanwhile), and below each its error with the band of ±2σ that it states "
         "itself. In the second half of the run, error of the estimate against that of a measurement, and share of the "
-        f"errors within the band (95 % if σ is right): {'; '.join(said)}. Shown are the last {number(_EXCERPT)} s."
+        f"errors within the band (95 % if σ is right): {'; '.join(sentences)}. Shown are the last {number(_EXCERPT)} s."
     )
     columns = (Column("", tuple(rows)),)
     return Figure("states", "State reconstruction", caption, columns, _excerpt_range(batch), row_height=0.9)
@@ -129,7 +129,7 @@ def parameters(seed: int, extent: Extent) -> Figure:
         "(a_21, a_22, b_21; base only), from the firmware's dual filter. The truth is a random walk; the estimate "
         "starts at a first guess that is wrong by chance, and its band of ±2σ narrows to what excitation and drift "
         "allow. Rms error in the second half of the run, and in brackets the share of the run in which the band holds "
-        f"the truth: {', '.join(said for _, said in parts)}. The axes are scaled to what follows the first "
+        f"the truth: {', '.join(sentence for _, sentence in parts)}. The axes are scaled to what follows the first "
         f"{number(WILD * extent.duration)} s."
     )
     title, end = "Linear parameter reconstruction", extent.duration

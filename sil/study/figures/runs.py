@@ -68,5 +68,5 @@ def rms(values: Array) -> float:
 
 
 def held(truth: Array, estimate: Array, sigma: Array) -> float:
-    """Share of values of the truth within estimate ± 2 sigma; about 0.95 if sigma is honest."""
+    """Share of values of the truth within estimate ± 2 sigma; about 0.95 if sigma is right."""
     return float(np.mean(np.abs(truth - estimate) <= 2.0 * sigma))

@@ -81,8 +81,8 @@ def do(task: Task) -> tuple[Task, list[Result]]:
     ready = list(logs([conditions.CONDITIONS[name] for name in task.conditions], task.seeds))
     results = []
     for name in task.estimators:
-        said = [log.firmware for log in ready] if name == FIRMWARE else tracks(ready, PEERS[name])
-        results += [_result(log, name, track) for log, track in zip(ready, said, strict=True) if track is not None]
+        estimated = [log.firmware for log in ready] if name == FIRMWARE else tracks(ready, PEERS[name])
+        results += [_result(log, name, track) for log, track in zip(ready, estimated, strict=True) if track is not None]
     return task, results
 
 

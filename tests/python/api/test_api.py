@@ -9,7 +9,7 @@ import lever_cdkf
 import numpy as np
 import pytest
 
-PUBLIC = ["Config", "Estimator", "load_scenario", "run_samples", "simulate"]
+PUBLIC = ["Config", "Estimator", "Result", "estimate", "load_scenario", "run_samples", "simulate"]
 
 
 def test_the_public_names_are_these() -> None:

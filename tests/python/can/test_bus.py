@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import itertools
 import logging
 import sys
 import threading
@@ -56,19 +55,6 @@ def test_form_of_an_answer(make_bus: MakeBus, samples: Samples, exchange: Exchan
     assert (answer.channel, answer.dlc, answer.is_rx) == ("bench", 8, True)
     assert not any((answer.is_extended_id, answer.is_remote_frame, answer.is_error_frame, answer.is_fd))
     assert codec.decode(answer.arbitration_id, answer.data)[0] == "STATE_ESTIMATE"
-
-
-def test_dither_command_gives_motor_commands(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
-    bus = make_bus("x", settings={"align_time": 0.05, "dither_fade": 0.1})
-    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
-    command = codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **keep})
-    bus.send(can.Message(arbitration_id=0x120, is_extended_id=False, data=command))
-    torques = []
-    for sample in samples(0, 500):
-        answers = exchange(bus, sample)
-        torques += [codec.decode(a.arbitration_id, a.data)[1]["torque"] for a in answers if a.arbitration_id == 0x215]
-    assert len(torques) >= 400
-    assert 0.05 < max(torques) <= 1.5
 
 
 def test_nothing_without_a_good_base_sample(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
@@ -378,19 +364,6 @@ def test_notifier_and_redirection(make_bus: MakeBus, samples: Samples, message: 
         notifier.stop()
         bus.shutdown()
     assert lever.estimator.health().samples == 30
-
-
-def test_periodic_sending(make_bus: MakeBus) -> None:
-    bus, base = make_bus("x"), codec.encoder("BASE_SAMPLE")
-    counter = itertools.count()
-
-    def next_sample(message: can.Message) -> None:
-        k = next(counter)
-        message.data[:] = base(k, 0.0, 1000 * k)
-
-    frame = can.Message(arbitration_id=0x111, is_extended_id=False, data=bytes(8))
-    bus.send_periodic(frame, 0.001, modifier_callback=next_sample)
-    assert all(bus.recv(PATIENCE) is not None for _ in range(10))
 
 
 def test_thread_safe_wrapper(samples: Samples, installed: str) -> None:

@@ -14,7 +14,6 @@ from e2e.p02 import e2e_p02_check
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import CodecError
 from lever_cdkf.host_tools.files import native_file
-from lever_cdkf.host_tools.firmware import native
 
 FRAMING = {"crc", "counter"}
 DATABASE = cantools.database.load_file(native_file("lever.dbc"))
@@ -225,56 +224,6 @@ def test_fast_encoders_against_cantools() -> None:
         assert codec.check(0x111, frame)
     with pytest.raises(ValueError, match="zip"):
         lever(0, 1.0)
-
-
-def test_the_firmware_takes_what_is_encoded() -> None:
-    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    estimator = native.Estimator()
-    for k in range(40):
-        assert estimator.on_frame(0x110, lever(k, 0.3, 0.0, None)) == native.lib.LEVER_FRAME_TAKEN
-        assert estimator.on_frame(0x111, base(k, 0.0, 1000 * k)) == native.FRAME_SAMPLE
-        estimator.step()
-    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
-    command = codec.encode("COMMAND", 0, {"request": "freeze", "dither_rms": 0.0, **keep})
-    assert estimator.on_frame(0x120, command) == native.lib.LEVER_FRAME_TAKEN
-    assert estimator.health().corrupt == 0
-    for identifier, frame in ((0x110, lever(0, 0.3, 0.0, None)), (0x111, base(0, 0.0, 0)), (0x120, command)):
-        for bit in range(64):
-            flipped = (int.from_bytes(frame, "big") ^ 1 << bit).to_bytes(8, "big")
-            assert native.Estimator().on_frame(identifier, flipped) == native.lib.LEVER_FRAME_REFUSED
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_decoding_what_the_firmware_says(model: int) -> None:
-    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    estimator = native.Estimator(native.Config(model=native.enum_names("lever_model")[model]))
-    seen = set()
-    for k in range(500):
-        theta = 0.35 + 0.02 * math.sin(0.02 * k)
-        estimator.on_frame(0x110, lever(k, theta, 0.4 * math.cos(0.02 * k), 0.0))
-        estimator.on_frame(0x111, base(k, 0.5 * math.sin(0.02 * k), 1000 * k))
-        estimator.step()
-        said = {}
-        while (frame := estimator.next_frame()) is not None:
-            name, said[name] = codec.decode(*frame)
-            seen.add(name)
-        estimate, health = estimator.estimate(), estimator.health()
-        state = said["STATE_ESTIMATE"]
-        assert state["theta"] == pytest.approx(estimate.theta, abs=1.01e-4)
-        assert state["theta_dot"] == pytest.approx(estimate.theta_dot, abs=1.001e-3)
-        assert state["time_low"] == estimate.time_us & 0xFFFF
-        for index, name in enumerate(MODELS[model]) if "PILOT_PARAMETERS" in said else ():
-            step = 0.501 * float(MESSAGES["PILOT_PARAMETERS"].get_signal_by_name(name).scale)
-            assert said["PILOT_PARAMETERS"][name] == pytest.approx(estimate.parameter[index], abs=step)
-        for index, name in enumerate(MODELS[model]) if "PILOT_SIGMA" in said else ():
-            sigma = MESSAGES["PILOT_SIGMA"].get_signal_by_name(f"{name}_sigma")
-            fits = estimate.parameter_sigma[index] <= (sigma.maximum or 0.0)
-            expected = estimate.parameter_sigma[index] if fits else math.nan
-            told = said["PILOT_SIGMA"][f"{name}_sigma"]
-            assert told == pytest.approx(expected, abs=0.501 * float(sigma.scale), nan_ok=True)
-        if "HEALTH" in said:
-            assert native.enum_names("lever_mode")[int(said["HEALTH"]["mode"])] == health.mode
-    assert {"STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "HEALTH"} <= seen
 
 
 def test_decoding_refuses() -> None:

@@ -130,7 +130,10 @@ def test_writing_and_reading_give_the_same_frames(session: Session, tmp_path: Pa
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_every_format_gives_the_same_frames(suffix: str, session: Session, tmp_path: Path) -> None:
+def test_every_format_gives_the_same_frames(
+    suffix: str, session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(logs, "_MESSAGES", 700)
     expected = frames_of(session.log)[:2000]
     path = tmp_path / f"session.{suffix}"
     convert(session.log, path)
@@ -175,7 +178,7 @@ def test_other_failures_are_one_line_each(tmp_path: Path, refused: Refused) -> N
     assert "No such file" in refused("replay", tmp_path / "absent.log")
     assert "it is a folder" in refused("replay", tmp_path)
     (tmp_path / "a.xyz").touch()
-    assert ".xyz is no format" in refused("replay", tmp_path / "a.xyz")
+    assert ".xyz is not a known format" in refused("replay", tmp_path / "a.xyz")
     foreign = tmp_path / "foreign.log"
     foreign.write_text("(1.0) can0 123#00\n(1.1) can1 124#00\n")
     told = refused("replay", foreign)

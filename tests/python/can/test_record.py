@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
@@ -22,10 +24,11 @@ from python.conftest import Refused, Session
 
 
 class Line(can.BusABC):
-    """A bus on which `frames` come, and then Ctrl-C."""
+    """A bus on which `frames` come, and then `end`."""
 
     channel_info = "a bus in a test"
     frames: ClassVar[deque[can.Message]] = deque()
+    end: ClassVar[Callable[[], None]]
 
     def __init__(self, channel: str) -> None:
         super().__init__(channel)
@@ -33,7 +36,7 @@ class Line(can.BusABC):
     def recv(self, timeout: float | None = None) -> can.Message | None:
         if self.frames:
             return self.frames.popleft()
-        signal.raise_signal(signal.SIGINT)
+        type(self).end()
         return None
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -46,8 +49,16 @@ def _line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(BACKENDS, "kvaser", (__name__, Line.__name__))
 
 
-def record(path: Path, frames: list[can.Message]) -> int:
-    Line.frames = deque(frames)
+def ctrl_c() -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def failure() -> None:
+    raise can.CanOperationError("Network is down")
+
+
+def record(path: Path, frames: list[can.Message], end: Callable[[], None] = ctrl_c) -> int:
+    Line.frames, Line.end = deque(frames), staticmethod(end)
     return cli.main(["record", "--interface", "kvaser", "--channel", "x", "-o", str(path)])
 
 
@@ -113,6 +124,40 @@ def test_a_full_disk_leaves_a_partial_log_and_one_line(
     assert (tmp_path / "a.log.partial").stat().st_size == 50_000
 
 
+def test_a_bus_that_fails_leaves_a_partial_log_and_one_line(
+    session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert record(tmp_path / "a.log", messages(session, 100), failure) == 2
+    line = "lever: error: the bus failed: Network is down; what was recorded until then, up to 100 frames, is in "
+    assert capsys.readouterr().err.splitlines()[-1] == f"{line}{tmp_path}/a.log.partial"
+    assert len((tmp_path / "a.log.partial").read_text().splitlines()) == 100
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_it_shows_how_it_goes(
+    terminal: bool,
+    session: Session,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    monkeypatch.setattr("lever_cdkf.host_tools.can.recorder._TELL", 0.0)
+    monkeypatch.setattr("lever_cdkf.host_tools.commands.record._Line._BETWEEN_LINES", 0.0)
+    assert record(tmp_path / "a.log", messages(session, 100)) == 0
+    shown = capsys.readouterr().err.partition("Ctrl-C ends\n")[2]
+    line = r"\d+ s, \d+ frames/s, 100 frames, 0 lost, 0 corrupt, 0 error frames, controller active"
+    assert re.fullmatch(rf"(\r\x1b\[K{line})+\r\x1b\[K" if terminal else rf"(lever: record: {line}\n)+", shown)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [((), "record what? give a bus such as "), (("--interface", "kvaser", "--duration", "0"), "--duration")],
+)
+def test_bad_input_is_one_line(arguments: tuple[str, ...], text: str, tmp_path: Path, refused: Refused) -> None:
+    assert text in refused("record", "-o", tmp_path / "a.log", *arguments)
+
+
 def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
     """In a process, on python-can's virtual bus."""
     program = (
@@ -156,8 +201,10 @@ def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, refused: Refused) -
     assert os.listdir(tmp_path) == []
 
 
-def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path) -> None:
+def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """<linux/can/error.h>: byte 1 of class 4 has the controller's conditions; 0x40 is bus off, 0x100 restarted."""
+
+    count = Recorder._count
 
     class SocketcanBus(can.BusABC):
         channel_info = "a bus in a test"
@@ -178,7 +225,15 @@ def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path) -
 
     with SocketcanBus() as bus:
         recorder = Recorder(bus, tmp_path / "a.log", "can0")
+        states = []
+
+        def note(self: Recorder, frame: can.Message) -> None:
+            count(self, frame)
+            states.append(self.bus_state)
+
+        monkeypatch.setattr(Recorder, "_count", note)
         recorder.run(lambda: not bus.frames, lambda _: None)
+    assert states == ["active", "warning", "passive", "bus off", "active", "active"]
     assert recorder.error_frames == 6
     assert recorder.overflows == 1
     assert recorder.left_active == 1

@@ -81,6 +81,8 @@ def packages(extras: dict[str, list[str]], extra: str) -> list[str]:
 @pytest.mark.parametrize(
     ("extra", "arguments"),
     [
+        ("files", "replay flight.parquet"),
+        ("files", "replay flight.mat"),
         ("live", "live --scenario demo"),
         ("live", "monitor --scenario demo"),
         ("mf4", "replay session.mf4"),
@@ -127,6 +129,7 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
         f"sim unknown_torque {short}",
         f"sim steady {short}",
         "replay sim/bus.log -o replay",
+        "replay sim/trace.csv --map theta=theta_measured_rad z_ddot=z_ddot_measured_m_s2",
         "monitor sim/bus.log --once",
         "record --interface lever --channel x -o record.log",
     )

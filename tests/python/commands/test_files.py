@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
+import sys
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import files
+from lever_cdkf.host_tools import files, progress
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.tables import Tables, print_tables
 
@@ -58,6 +60,30 @@ def test_links_and_devices_stay(tmp_path: Path) -> None:
     assert (tmp_path / "a.txt").read_text() == "text"
     files.write_text("/dev/null", "text")
     assert not Path("/dev/null").is_file()
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress(terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """A bar on a terminal, lines elsewhere, and neither while it takes but a moment."""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    monkeypatch.setattr(progress, "PATIENCE", 3600.0)
+    with progress.Progress("act") as quick:
+        quick.show(1, 4)
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "_BETWEEN_LINES", 0.0)
+    with progress.Progress("act") as slow:
+        slow.show(1, 4, "a part")
+        slow.show(3, 4)
+        if terminal:
+            (task,) = slow._bar.tasks
+            assert (task.completed, task.total, task.description) == (3, 4, "act")
+            assert slow._bar.live.is_started
+    if terminal:
+        assert not slow._bar.live.is_started
+    else:
+        shown = capsys.readouterr().err
+        assert re.fullmatch(r"lever: act: 1 of 4 after \d s \(a part\)\nlever: act: 3 of 4 after \d s\n", shown)
 
 
 def test_printed_table(capsys: pytest.CaptureFixture[str]) -> None:

@@ -61,14 +61,6 @@ def test_can_logger_opens_and_waits(tmp_path: Path) -> None:
     assert after - used <= 10  # hundredths of a second: it waits, and does not go round
 
 
-def test_the_command_lever() -> None:
-    done = subprocess.run([BIN / "lever", "--version"], capture_output=True, text=True, check=False)
-    assert re.fullmatch(r"lever \d+\.\d+\.\d+\n", done.stdout), done.stderr
-    done = subprocess.run([BIN / "lever", "settings", "--set", "x"], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "lever: error: 'x' has no '=': write name = value\n"
-
-
 def test_the_tree_is_what_is_tested(root: Path) -> None:
     """An edit of a Python file counts without a build step, here and in every process that a test starts."""
     code = "from lever_cdkf import host_tools, sil; print(sil.__file__, host_tools.__file__)"

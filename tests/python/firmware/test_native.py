@@ -259,20 +259,6 @@ def test_run_samples_is_the_loop(model: str, estimator: str) -> None:
     assert columns["theta"].dtype == np.float32
 
 
-def test_the_correlation_of_the_parameters_explains_the_sigma_of_the_frequency() -> None:
-    """The linear physical model's frequency is sqrt(k/m) / 2 pi: its sigma by the law of error propagation."""
-    columns = native.run_samples(Config(model="linear_physical"), recording(4000))
-    m, _, k = columns["parameter"][-1].astype(float)
-    sigma_m, _, sigma_k = columns["parameter_sigma"][-1].astype(float)
-    _, m_with_k, _ = columns["parameter_correlation"][-1].astype(float)
-    assert np.abs(columns["parameter_correlation"]).max() <= 1.0
-    relative = 0.5 * np.sqrt((sigma_m / m) ** 2 + (sigma_k / k) ** 2 - 2.0 * m_with_k * sigma_m * sigma_k / (m * k))
-    frequency = np.sqrt(k / m) / (2.0 * np.pi)
-    assert columns["natural_frequency"][-1] == pytest.approx(frequency, rel=1e-5)
-    assert columns["natural_frequency_sigma"][-1] == pytest.approx(relative * frequency, rel=0.05)
-    assert m_with_k > 0.5  # without a torque only their ratio is known
-
-
 def test_run_samples_wraps_time() -> None:
     samples = recording(300)
     expected = native.run_samples(None, samples)

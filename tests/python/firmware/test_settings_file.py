@@ -47,20 +47,6 @@ def test_form() -> None:
     assert max(len(line.encode()) for line in lines) <= 510
 
 
-def test_lever_can_reads_it(tmp_path: Path, build_dir: Path) -> None:
-    executables = sorted(build_dir.rglob("lever_can"))
-    if not executables:
-        pytest.skip(f"no lever_can in {build_dir}: cmake --build {build_dir}")
-    path = tmp_path / "my.settings"
-    path.write_text(format_config(odd_config()), encoding="utf-8")
-    command = [str(executables[0]), "--settings", str(path), "--can", "no_such_can"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 1, done.stderr  # 2 would be a file that it cannot read
-    path.write_text("theta_noise = 7\n", encoding="utf-8")
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-
-
 def test_comments_order_and_spaces(tmp_path: Path) -> None:
     path = tmp_path / "my.settings"
     path.write_text("# all\n\n  m_p=3 # [kg]\n\tpreload =  fixed\r\nm_p = 4.5e0\n", encoding="utf-8")

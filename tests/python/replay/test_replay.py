@@ -18,6 +18,7 @@ from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.replay import reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
+from lever_cdkf.host_tools.replay.summary import verdict
 from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, read
 
@@ -154,16 +155,6 @@ def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
     assert time == sorted(time)
 
 
-def test_the_rotated_pieces_of_a_log_are_one(session: Session, tmp_path: Path) -> None:
-    pieces = [tmp_path / f"{name}.log" for name in "ca"]
-    lines = session.lines
-    for piece, part in zip(pieces, (lines[:9000], lines[9000:]), strict=True):
-        piece.write_text("".join(f"{line}\n" for line in part))
-    summary = replayed(tmp_path / "out", *reversed(pieces))
-    assert summary["recording"]["logs"] == ["c.log", "a.log"]
-    assert (tmp_path / "out/bus.log").read_bytes() == session.log.read_bytes()
-
-
 # --- other settings --------------------------------------------------------------------------------------------------
 
 
@@ -274,6 +265,28 @@ def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refus
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("part", "key", "value", "words"),
+    [
+        ("modes_s", "fault", 2.5, "Trouble: the estimator was in fault for 2.5 s."),
+        ("recording", "ends_early", ["a.log: cut"], "The log is incomplete: a.log: cut."),
+        ("recording", "damaged_lines", 3, "3 of its lines are not frames."),
+        ("recording", "clock_restarts", 2, "The sender's clock started over 2 times."),
+        ("recording", "model_changes", 1, "changes the model on the way"),
+        ("recording", "typical_step_s", 1.41e-3, "Samples come every 1.41 ms, but sample_period is 1 ms: set it."),
+        ("recording", "typical_step_s", 0.69e-3, "Samples come every 0.69 ms"),
+    ],
+)
+def test_the_verdict_begins_with_what_is_wrong(
+    part: str, key: str, value: object, words: str, replay: tuple[Path, Summary]
+) -> None:
+    summary = replay[1]
+    assert words not in verdict(summary)
+    assert words in verdict(summary | {part: summary[part] | {key: value}})
+    for step in (0.71e-3, 1.39e-3, 0.0):
+        assert "Samples come" not in verdict(summary | {"recording": summary["recording"] | {"typical_step_s": step}})
+
+
 # --- the files -------------------------------------------------------------------------------------------------------
 
 
@@ -330,5 +343,6 @@ def test_the_page_has_all_but_truth(replay: tuple[Path, Summary]) -> None:
     curves = {trace["name"] for figure in figures(page).values() for trace in figure["data"]}
     assert {"recorded", "replayed", "measured", "estimate"} <= curves
     assert "truth" not in curves
+    assert "Estimates at the end" in "".join(page.text)
     cells = {row[0]: row[1:] for table in page.tables for row in table}
     assert cells["theta"][1:3] == ["5\u2009700", "5\u2009700"]

@@ -68,13 +68,13 @@ def test_a_recorder_whose_clock_is_set_changes_nothing(jump: int) -> None:
     assert timeline.clocks.restarts == 0
 
 
-@pytest.mark.parametrize(("step", "gaps"), [(1499, 0), (1501, 1)])
+@pytest.mark.parametrize(("step", "gaps"), [(1500, 0), (1501, 1)])
 def test_a_gap_is_longer_than_a_period_and_a_half(step: int, gaps: int) -> None:
     recorded, sender = steady(100)
     sender[50:] += step - 1000
     recorded[50:] += step - 1000
     _, timeline = seconds(recorded, sender)
-    assert (timeline.clocks.gaps, timeline.clocks.longest_gap_s) == (gaps, pytest.approx(gaps * step * 1e-6))
+    assert [timeline.clocks.gaps, timeline.clocks.longest_gap_s] == pytest.approx([gaps, gaps * step * 1e-6])
 
 
 @pytest.mark.parametrize(("jump", "jumps"), [(990_000, 0), (1_010_000, 1)])

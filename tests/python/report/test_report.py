@@ -305,19 +305,6 @@ def test_every_fault_has_a_word() -> None:
 # --- less than everything --------------------------------------------------------------------------------------------
 
 
-def test_a_replay_without_truth_leaves_out_what_it_cannot_know(result: Result, tmp_path: Path) -> None:
-    trace = {name: column for name, column in result.trace.items() if "_true" not in name}
-    write_report(trace, None, tmp_path / "replay.html")
-    page = read(tmp_path / "replay.html")
-    assert page.ids("section") == [name for name in SECTIONS if name != "numbers"]
-    assert "figure-map-truth" not in figures(page)
-    names = {trace["name"] for figure in figures(page).values() for trace in figure["data"]}
-    assert "truth" not in names
-    assert "estimate" in names
-    assert "Estimates at the end" in "".join(page.text)
-    assert "figure-whiteness" in figures(page)
-
-
 @pytest.mark.parametrize("missing", ["estimate", "sigma", "measured", "true", "theta", "nis", "mode", "excitation"])
 def test_any_missing_column_costs_only_its_figure(missing: str, result: Result, tmp_path: Path) -> None:
     trace = {name: column for name, column in result.trace.items() if missing not in name}

@@ -95,6 +95,34 @@ def test_coverage_of_a_gaussian_error_is_that_of_two_sigma(recording: loop.Recor
     assert coverage == pytest.approx(stats.norm.cdf(2) - stats.norm.cdf(-2), abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("outside", "said"),
+    [
+        (600, "In this run ±2σ covers every truth for at least 90 % of the time."),
+        (601, "In this run the stated σ of m_p is too small: ±2σ covers the truth for 89 % of the time."),
+    ],
+)
+def test_sigma_is_too_small_where_it_covers_less_than_90_percent(
+    recording: loop.Recording, outside: int, said: str
+) -> None:
+    """6,000 samples are judged: those from 2 s after the start and after the jump at 4 s on."""
+    trace = perfect(recording)
+    trace["m_p_estimate_kg"][-outside:] *= 1.0201  # of 2.0 % of sigma
+    trace["m_p_estimate_kg"][6000:-outside] *= 1.0199
+    summed = summary.build(recording, trace)
+    assert summed.parameters["m_p"].coverage_2sigma == pytest.approx(1.0 - outside / 6000)
+    assert said in summed.verdict
+    assert summed.missed == ([] if outside == 600 else ["coverage of m_p 89 % (limit 90 %)"])
+
+
+@pytest.mark.parametrize(("factor", "kept"), [(1.0499, True), (1.0501, False)])
+def test_a_limit_is_missed_by_more_than_it_says(recording: loop.Recording, factor: float, kept: bool) -> None:
+    trace = perfect(recording)
+    trace["m_p_estimate_kg"] *= factor
+    trace["m_p_sigma_kg"] *= 10.0
+    assert summary.build(recording, trace).passed is kept
+
+
 def test_times_run_from_each_change_until_inside_for_good() -> None:
     relative = 0.5 * np.exp(-TIME / 0.5)
     relative[TIME >= 4.0] = -0.3 * np.exp(-(TIME[TIME >= 4.0] - 4.0) / 1.0)

@@ -99,7 +99,7 @@ def test_charts_hold_all_that_is_drawn_once_the_start_is_over(name: str) -> None
 
 @pytest.mark.parametrize("name", ["parameters", "identification"])
 def test_a_wild_start_does_not_squeeze_the_rest(name: str) -> None:
-    assert 0.0 < made(name).scaled_from < 0.1 * SHORT.duration
+    assert made(name).scaled_from == pytest.approx(0.05 * SHORT.duration)
     whole, late = (dataclasses.replace(made(name), scaled_from=at).limits() for at in (0.0, 0.5 * SHORT.duration))
     for (low, high), (lower, upper) in zip(late, whole, strict=True):
         assert lower <= low < high <= upper

@@ -69,7 +69,7 @@ def test_rms_and_ratio_of_numbers_made_by_hand() -> None:
     variances = np.array([[[2.0, 4.0], [4.0, 4.0]], [[1.0, 4.0], [5.5, 4.0]]])  # means 3.125, 4
     np.testing.assert_allclose(scores.rms(deviations), [np.sqrt(12.5), 1.0])
     np.testing.assert_allclose(scores.ratio(deviations, variances), [2.0, 0.5])
-    np.testing.assert_allclose(scores.honesty(deviations, variances), [0.5, 2.0])
+    np.testing.assert_allclose(scores.sigma_ratio(deviations, variances), [0.5, 2.0])
 
 
 def test_two_estimators_are_told_apart_more_finely_than_one_from_the_bound() -> None:
@@ -103,7 +103,7 @@ def test_spread_of_the_ratio_is_that_of_many_experiments() -> None:
     assert np.mean(opinions) == pytest.approx(np.std(ratios), rel=0.15)
 
 
-# --- honesty ---------------------------------------------------------------------------------------------------------
+# --- consistency -----------------------------------------------------------------------------------------------------
 
 
 def test_normalised_squares_of_honest_errors_are_chi_square() -> None:
@@ -147,8 +147,8 @@ def test_a_filter_that_lies_about_its_sigma_is_found_out(claim: float) -> None:
     assert not found.consistent
     assert found.inside < 0.8
     assert found.mean == pytest.approx(3.0 / claim**2, rel=0.1)
-    honesty = scores.honesty(normal, np.diagonal(covariance, axis1=-2, axis2=-1))
-    np.testing.assert_allclose(honesty, claim, rtol=0.1)
+    sigma_ratio = scores.sigma_ratio(normal, np.diagonal(covariance, axis1=-2, axis2=-1))
+    np.testing.assert_allclose(sigma_ratio, claim, rtol=0.1)
 
 
 # --- convergence -----------------------------------------------------------------------------------------------------

@@ -104,7 +104,9 @@ def test_what_is_off_or_kept_is_not_looked_for() -> None:
 
 @pytest.mark.parametrize(("mean", "clear"), [(2.9, False), (3.1, True), (-2.9, False), (-3.1, True)])
 def test_a_gain_is_clear_beyond_three_standard_errors(mean: float, clear: bool) -> None:
-    assert validation.Gain(mean, 1.0).is_clear is clear
+    gain = validation.Gain(mean, 1.0)
+    assert gain.is_clear is clear
+    assert validation._outcome(gain) == ("no clear difference" if not clear else "better" if mean > 0.0 else "worse")
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.watch import panels
 from lever_cdkf.host_tools.watch.picture import Frame
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.terminal import SPANS, TALL, Monitor
@@ -146,14 +145,6 @@ def test_before_the_first_estimate_and_after_the_last(flight: Flight) -> None:
             assert "● Network is down" in "\n".join(screen(app))
 
     asyncio.run(drive())
-
-
-def test_sparkline() -> None:
-    assert panels.sparkline([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], 0.0, 8) == "▁▂▃▄▅▆▇█"
-    assert panels.sparkline([1.0, float("nan"), 2.0], 0.0, 3) == "▁ █"
-    assert set(panels.sparkline([1.0, 1.01, 0.99, 1.0], 1.0, 4)) <= set("▄▅")  # within sigma: flat
-    assert len(panels.sparkline(list(range(1000)), 0.0, 20)) == 20
-    assert panels.sparkline([], 0.0, 5) == panels.sparkline([float("nan")], 0.0, 5) == ""
 
 
 # --- as a command ----------------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.library import ffi, lib
 from lever_cdkf.host_tools.watch.server import Server
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.state import State, command_of
@@ -240,6 +241,19 @@ def test_before_the_first_estimate_nothing_is_made_up(flight: Flight) -> None:
     assert update["mode"] is None
     assert set(update["row"][1:7]) == {None}
     assert (update["level"], update["condition"]) == ("watch", "no frame has come yet")
+
+
+def test_the_machine_is_shown_when_it_tells(flight: Flight) -> None:
+    state = State(FlightSource(flight), Config())
+    (message,) = state.advance()[-1:]
+    assert json.loads(message)["update"]["machine"] is None
+    for overruns in (250, 262):
+        report = {"transmit_errors": 96, "receive_errors": 3, "bus_offs": 1, "overruns": overruns}
+        lib.lever_platform(flight.bus.estimator.pointer, ffi.new("lever_platform_t *", report))
+        for _ in range(3):
+            (message,) = state.advance()[-1:]
+    shown = {"transmit_errors": 96, "receive_errors": 3, "bus_offs": 0, "overruns": 12, "dropped": 0}
+    assert json.loads(message)["update"]["machine"] == shown
 
 
 def test_the_past_that_is_kept_is_bounded(flight: Flight) -> None:
@@ -484,7 +498,7 @@ def test_a_source_that_fails_is_told_at_the_end(tmp_path: Any, capsys: pytest.Ca
     path = tmp_path / "garbage.log"
     path.write_text("(1.000000) can0 123#00\nnothing of the kind\n")
     assert cli.main(["live", str(path), "--port", "0", "--duration", "0.5"]) == 2
-    assert "garbage.log: 1 lines of it are no frame" in capsys.readouterr().err
+    assert "garbage.log: 1 lines of it are not frames" in capsys.readouterr().err
 
 
 def test_times_keep_their_resolution() -> None:

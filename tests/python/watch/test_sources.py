@@ -206,6 +206,17 @@ def test_a_clock_that_jumps_is_not_waited_for(tmp_path: Path) -> None:
     assert pauses == pytest.approx([0.0, 0.1, 0.0, 0.1, sources.LONGEST_PAUSE, 0.1], abs=1e-6)
 
 
+def test_a_part_of_a_log(log: Path) -> None:
+    whole = list(LogSource(str(log))._frames())
+    span = sum(pause for pause, _ in whole)
+    frames = [frame for _, frame in LogSource(str(log), part=(0.25 * span, 0.5 * span))._frames()]
+    first = next(k for k in range(len(whole)) if sum(pause for pause, _ in whole[: k + 1]) >= 0.25 * span)
+    assert frames == [frame for _, frame in whole[first : first + len(frames)]]
+    assert 0.4 * len(whole) < len(frames) < 0.6 * len(whole)
+    with pytest.raises(LeverError, match="no CAN frame in the part from --start on"):
+        list(LogSource(str(log), part=(100.0, math.inf))._frames())
+
+
 def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path: Path) -> None:
     (tmp_path / "truncated.log").write_text("(1.000000) can0 123#00 R\n(1.1")
     source, picture = LogSource(str(tmp_path / "truncated.log")), Picture()

@@ -68,10 +68,12 @@ def test_its_budget_is_the_accepted_one() -> None:
 
 
 @pytest.mark.requires("arm-none-eabi-gcc")
-def test_the_callbacks_are_as_large_as_it_says(build_dir: Path) -> None:
+def test_the_callbacks_are_as_large_as_it_says(can_image: Path, slcan_image: Path) -> None:
     """To 5 %."""
-    images = build_dir / "stm32f4"
-    sizes = {name: port_sizes.of_port(name, guide.port_image(images, name)) for name in port_sizes.TRANSPORTS}
+    sizes = {
+        name: port_sizes.of_port(name, image)
+        for name, image in zip(port_sizes.TRANSPORTS, (can_image, slcan_image), strict=True)
+    }
     said, measured = guide.section("port"), guide.port(sizes)
     numbers = re.compile(r"\d[\d,]*")
     assert numbers.sub("", said) == numbers.sub("", measured), f"{golden.ACCEPT} writes it"
@@ -81,12 +83,12 @@ def test_the_callbacks_are_as_large_as_it_says(build_dir: Path) -> None:
 
 
 @pytest.mark.requires("arm-none-eabi-gcc")
-def test_the_loop_takes_the_stack_that_it_says(build_dir: Path) -> None:
+def test_the_loop_takes_the_stack_that_it_says(can_image: Path) -> None:
     text = guide.GUIDE.read_text(encoding="utf-8")
     said = re.search(r"(\d+) bytes for the loop \((\d+) for `self_test\(\)`", text)
     assert said is not None
     for function, bytes_ in zip(("loop_turn", "self_test"), said.groups(), strict=True):
-        pushed, _ = stack.pushed_by(guide.port_image(build_dir / "stm32f4", "can"), function)
+        pushed, _ = stack.pushed_by(can_image, function)
         assert 0.8 * int(bytes_) < pushed <= int(bytes_), function
 
 

@@ -92,6 +92,12 @@ class _Code:
         return self._costs[block, after]
 
 
+@cache
+def _code(elf: Path) -> _Code:
+    """Of an image that does not change while this runs."""
+    return _Code(elf)
+
+
 def _steps(path: NDArray[np.uint64]) -> Counter[tuple[int, int]]:
     """How often which block was followed by which."""
     return Counter(pairwise(path.tolist()))
@@ -103,7 +109,7 @@ class Trace:
     def __init__(self, code: _Code, paths: list[NDArray[np.uint64]]) -> None:
         """Of the blocks that were executed in each sample; the last one is not measured."""
         self._code, self._paths = code, paths
-        costs = np.array([self._cost(path) for path in paths])
+        costs = self._costs()
         self.instructions: NDArray[np.int64] = costs[:, 0]
         """Of each sample."""
         self.operations: NDArray[np.int64] = costs[:, 1]
@@ -111,10 +117,17 @@ class Trace:
         self.cycles: NDArray[np.int64] = costs[:, 2]
         """Of each sample, by the model of cycles.py."""
 
-    def _cost(self, path: NDArray[np.uint64]) -> NDArray[np.int64]:
-        steps = _steps(path)
-        costs = np.array([self._code.cost(*step) for step in steps])
-        total: NDArray[np.int64] = costs.T @ np.array(list(steps.values()))
+    def _costs(self) -> NDArray[np.int64]:
+        """A row of _Code.cost() for each sample, whose last block is not measured."""
+        blocks, kinds = np.unique(np.concatenate(self._paths), return_inverse=True)
+        ends = np.cumsum([len(path) for path in self._paths])
+        steps = kinds * len(blocks) + np.roll(kinds, -1)
+        steps[ends - 1] = len(blocks) ** 2  # none
+        table = np.zeros((len(blocks) ** 2 + 1, 3), np.int64)
+        for step in np.flatnonzero(np.bincount(steps)[: len(blocks) ** 2]).tolist():
+            block, after = divmod(step, len(blocks))
+            table[step] = self._code.cost(int(blocks[block]), int(blocks[after]))
+        total: NDArray[np.int64] = np.add.reduceat(table[steps], np.concatenate(([0], ends[:-1])))
         return total
 
     def executed(self, samples: Iterable[int]) -> tuple[Counter[int], Counter[int]]:
@@ -133,7 +146,7 @@ def trace(elf: Path, recording: Recording, model: str, estimator: str, form: str
     """Runs the image over samples 0 to `last` and follows those from `first` on, or what is measured before (LOOP,
     INIT). Raises LeverError."""
     words = ["budget", "-", form, *arguments(recording, model, estimator), "paint=0"]
-    return Trace(_Code(elf), _Machine(elf, recording.blob(form), words).run(first, last))
+    return Trace(_code(elf), _Machine(elf, recording.blob(form), words).run(first, last))
 
 
 @cache

@@ -1,0 +1,74 @@
+"""The options that say how samples are made of logs and files that do not speak lever.dbc."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from ..errors import LeverError
+
+if TYPE_CHECKING:
+    from ..signals.reading import Reading
+
+MAP_HELP = """\
+Signals of other messages: --dbc FILE describes them, and --map says which is what.
+  --map theta=LEVER.Angle z_ddot=IMU.AccZ tau_m=MOTOR.Torque
+The inputs are theta, theta_dot, z_ddot, tau_m and grip_force; z_ddot and one of theta and theta_dot are needed. In a
+file of columns (.csv, .parquet, .mat, .npz, .mf4 with signals) a column is mapped, without --dbc; time=COLUMN names the
+time where it is not called so. The unit is that of the database or the header; where there is none, it is guessed, and
+the guess is told. Gravity is recognised and subtracted. To say these by hand, append ,unit=deg ,factor=0.01
+,offset=-0.3 ,sign=-1 ,gravity=included (or none) ,delay=0.004 [s] ,channel=can1.
+In place of KEY=SIGNAL, a .toml file holds the same, and how messages are protected (E2E); `lever map` proposes one.
+"""
+
+
+def add_signal_options(parser: argparse.ArgumentParser, *, part: bool = True) -> None:
+    """--dbc, --map, --clock, and with `part` --start and --length."""
+    options = parser.add_argument_group("signals of other logs and files")
+    options.add_argument("--dbc", metavar="FILE", help="database of the messages (DBC, ARXML, KCD, SYM)")
+    options.add_argument(
+        "--map",
+        metavar="KEY=SIGNAL",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="input of the firmware = MESSAGE.SIGNAL, or a column; or a .toml file with the mapping",
+    )
+    options.add_argument(
+        "--clock",
+        metavar="KEY",
+        help="the input whose values make the samples (default: the slowest of z_ddot and tau_m)",
+    )
+    if part:
+        add_part_options(parser)
+
+
+def add_part_options(parser: argparse.ArgumentParser) -> None:
+    """--start and --length."""
+    parser.add_argument("--start", metavar="S", type=float, default=0.0, help="first second used (default: 0)")
+    parser.add_argument("--length", metavar="S", type=float, default=None, help="seconds used (default: all)")
+
+
+def check_part(args: argparse.Namespace) -> tuple[float, float]:
+    """Start and length. Raises LeverError."""
+    length = float("inf") if args.length is None else args.length
+    if not args.start >= 0.0 or not length > 0.0:
+        raise LeverError(f"--start {args.start:g} --length {length:g}: seconds, and length must be more than 0")
+    return args.start, length
+
+
+def chosen_reading(args: argparse.Namespace, log: str) -> Reading | None:
+    """How `log` is to be read; None for a log of lever.dbc. Raises LeverError."""
+    start, length = check_part(args)
+    if not (args.map or args.dbc):
+        from ..signals.tables import is_table
+
+        if log == "-" or not is_table(log):
+            if args.clock is not None:
+                raise LeverError("--clock goes with --map")
+            return None
+    from ..signals.mapping import read_mapping
+    from ..signals.reading import Reading
+
+    mapping = read_mapping(args.map) if args.map else None
+    return Reading(mapping, args.dbc, args.channel, args.clock, start, length)

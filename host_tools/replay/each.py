@@ -1,0 +1,158 @@
+"""Many logs, each a recording of its own: a row for each, their estimates on one page, and the rows as Parquet."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..errors import LeverError
+from ..extras import missing, require
+from ..files import Outputs
+from ..firmware.quantities import Quantity, quantities
+from ..report.document import document
+from ..report.figure import Figure, axis, line
+from ..report.page import Page
+from ..tables import Row
+from .engine import Options, Progress, replay
+from .summary import failure
+
+PAGE = "overlay.html"
+TABLE = "logs.parquet"
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c564b")
+_ROW_HEIGHT = 190  # [pixels]
+
+
+@dataclass
+class Replayed:
+    """One of the logs."""
+
+    log: str
+    summary: dict[str, Any] | None = None
+    """None where it could not be replayed."""
+    problem: str = ""
+    """Why not, or why it is not to be believed."""
+    rows: Mapping[str, FloatArray] = field(default_factory=dict)
+    """Of its trace, reduced."""
+
+    def keep(self, rows: Mapping[str, FloatArray]) -> None:
+        """What replay() hands over of the trace."""
+        self.rows = rows
+
+    def row(self) -> Row:
+        """What the table says of it."""
+        if self.summary is None:
+            return {"log": Path(self.log).name, "problem": self.problem}
+        row: dict[str, Any] = {
+            "log": Path(self.log).name,
+            "duration [s]": self.summary["recording"]["duration_s"],
+            "samples": self.summary["samples"],
+        }
+        for name, estimate in self.summary["estimates"].items():
+            unit = "" if estimate["unit"] == "1" else f" [{estimate['unit']}]"
+            row[f"{name}{unit}"], row[f"{name} sigma{unit}"] = estimate["last"], estimate["last_sigma"]
+        return row | {"mean NIS [1]": self.summary["nis"]["mean"], "problem": self.problem}
+
+
+def replay_each(
+    logs: Sequence[str], options_of: Callable[[str], Options], out: Path | None, progress: Progress | None = None
+) -> list[Replayed]:
+    """Replays each log; with `out`, its files are in a folder of it that is called as the log is. What is wrong with a
+    log is its row's `problem`, and the others go on."""
+    replays = []
+    for log, folder in zip(logs, _folders(logs), strict=True):
+        each = Replayed(log)
+        try:
+            each.summary = replay([log], options_of(log), None if out is None else out / folder, progress, each.keep)
+            each.problem = failure(each.summary)
+        except LeverError as error:
+            each.problem = " ".join(str(error).split())
+        replays.append(each)
+    return replays
+
+
+def rows_of(replays: Sequence[Replayed]) -> list[Row]:
+    """All rows with the same columns, those of the fullest."""
+    rows = [each.row() for each in replays]
+    columns = max(rows, key=len).keys()
+    return [{name: row.get(name) for name in columns} for row in rows]
+
+
+def write(replays: Sequence[Replayed], out: Path) -> list[str]:
+    """Writes the page and the table, as far as their extras are installed; returns their names. Raises LeverError."""
+    names = [name for name, extra in ((PAGE, "report"), (TABLE, "files")) if not missing(extra)]
+    with Outputs(out, [each.log for each in replays], (PAGE, TABLE)) as outputs:
+        if PAGE in names:
+            outputs.path(PAGE).write_text(_page(replays), encoding="utf-8")
+        if TABLE in names:
+            _write_table(rows_of(replays), outputs.path(TABLE))
+        outputs.finish()
+    return names
+
+
+def _folders(logs: Sequence[str]) -> list[str]:
+    """A name for each: that of the log without its ending, and a number where another has it."""
+    names: list[str] = []
+    for log in logs:
+        stem = Path(log.removesuffix(".gz")).stem
+        number = 2
+        name = stem
+        while name in names:
+            name, number = f"{stem}_{number}", number + 1
+        names.append(name)
+    return names
+
+
+def _write_table(rows: Sequence[Row], path: Path) -> None:
+    require("files")
+    import pyarrow
+    from pyarrow import parquet
+
+    parquet.write_table(pyarrow.Table.from_pylist([dict(row) for row in rows]), path)
+
+
+# --- the page ---------------------------------------------------------------------------------------------------------
+
+
+def _page(replays: Sequence[Replayed]) -> str:
+    title = f"Lever CDKF: {len(replays)} logs"
+    page = Page()
+    shown = [each for each in replays if each.summary is not None and len(each.rows.get("time_s", ()))]
+    caption = "The estimates of all logs over the time since the start of each."
+    page.section("estimates", "Estimates", "Estimates", page.figure("overlay", _figure(shown), caption))
+    rows = rows_of(replays)
+    cells = "".join(f"<tr>{''.join(f'<td>{_cell(cell)}</td>' for cell in row.values())}</tr>" for row in rows)
+    heads = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
+    table = f'<div class="wide"><table><thead><tr>{heads}</tr></thead><tbody>{cells}</tbody></table></div>'
+    page.section("numbers", "At the end", "At the end of each", table)
+    body = f"<header><h1>{html.escape(title)}</h1></header>{''.join(page.sections)}"
+    return document(title, body, {key: figure.spec() for key, figure in page.figures.items()}, ".wide{overflow-x:auto}")
+
+
+def _cell(cell: Any) -> str:
+    if cell is None:
+        return ""
+    return f"{cell:.4g}" if isinstance(cell, float) else html.escape(str(cell))
+
+
+def _figure(shown: Sequence[Replayed]) -> Figure | None:
+    """A row a quantity, a curve a log."""
+    if not shown:
+        return None
+    wanted: list[Quantity] = list(quantities(shown[0].summary["estimator"]["model"]))  # type: ignore[index]
+    wanted = [each for each in wanted if any(each.column("estimate") in log.rows for log in shown)]
+    wanted.sort(key=lambda each: each.key not in ("natural_frequency", "damping_ratio"))
+    rows = [axis(each.key if each.unit == "1" else f"{each.key} [{each.shown_unit}]") for each in wanted]
+    figure = Figure(rows, axis("time [s]"), 60 + _ROW_HEIGHT * len(rows))
+    for number, log in enumerate(shown):
+        colour = _COLOURS[number % len(_COLOURS)]
+        for row, quantity in enumerate(wanted):
+            if (values := log.rows.get(quantity.column("estimate"))) is not None:
+                time = np.asarray(log.rows["time_s"])
+                figure.add(line(time, values, Path(log.log).name, "estimate", row, line_color=colour))
+    return figure

@@ -1,0 +1,90 @@
+"""estimate(): the firmware's estimator on whatever holds samples in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import LeverError
+from ..firmware.config import Config, setting
+from ..firmware.estimator import run_samples
+from .arrays import columns_of, signals_by_input
+from .inputs import samples_of, understood
+from .mapping import Source
+from .recorded import Signal
+from .result import Result
+from .slope import slope_ratio
+from .units import KINDS, guess
+
+
+def estimate(
+    samples: Any,
+    config: Config | None = None,
+    units: Mapping[str, str] | None = None,
+    *,
+    names: Mapping[str, str] | None = None,
+) -> Result:
+    """The pilot's parameters, with their standard deviations, from recorded samples.
+
+    samples: a frame of pandas or polars, a Dataset of xarray, or a mapping of arrays, with the columns time [s], theta
+    [rad], theta_dot [rad/s], z_ddot [m/s²], tau_m [N m], grip_force [N]; z_ddot and one of theta and theta_dot are
+    needed. NaN and null are missing. Time may be an index or coordinate, and dates.
+
+    units: where they are others, {"theta": "deg", "z_ddot": "g", "time": "ms"}. A unit in a column's name (theta_deg,
+    "theta [deg]") or in xarray's attribute `units` counts too. What is plainly in another unit than is said, or than SI
+    where none is said, is a LeverError that names it. Gravity in z_ddot is recognised and subtracted.
+
+    names: columns that are called otherwise, {"theta": "LvrAngle"}.
+
+    config: the estimator's; its sample_period becomes that of the samples, unless it has one that is not the default.
+    """
+    columns = columns_of(samples)
+    for key, name in (names or {}).items():
+        if key not in KINDS or name not in columns:
+            raise LeverError(f"names: {key} = {name}: keys are {', '.join(KINDS)}, and columns {', '.join(columns)}")
+        columns[key] = columns.pop(name)
+    signals = signals_by_input(columns, units or {})
+    signals = {key: signal for key, signal in signals.items() if np.isfinite(signal.values).any()}
+    if "z_ddot" not in signals or not signals.keys() & {"theta", "theta_dot"}:
+        raise LeverError(
+            f"samples have values of {', '.join(signals) or 'no input'}: z_ddot and one of theta and theta_dot are "
+            f"needed; names={{'theta': 'column'}} says which they are, of {', '.join(columns)}"
+        )
+    _check_units(signals)
+    sources = {key: Source(signal.name, signal.unit or KINDS[key][1]) for key, signal in signals.items()}
+    taken, notes = samples_of({key: understood(key, sources[key], signal) for key, signal in signals.items()})
+    config = config or Config()
+    settings = config.settings
+    if settings["sample_period"] == setting("sample_period").default:
+        settings["sample_period"] = taken.period
+    config = Config(**config.choices, settings=settings)
+    return Result(config, taken.time_us, run_samples(config, taken.arrays()), tuple(notes))
+
+
+def _check_units(signals: Mapping[str, Signal]) -> None:
+    """Raises LeverError for values without a unit that do not look like SI."""
+    unsaid = {key: signal for key, signal in signals.items() if not signal.unit}
+    for key in ("theta", "theta_dot", "z_ddot"):
+        if key in unsaid and np.isfinite(unsaid[key].values).any():
+            _check_unit(key, unsaid[key])
+    if {"theta", "theta_dot"} <= unsaid.keys():
+        ratio = slope_ratio(signals["theta"], signals["theta_dot"])
+        for low, high, key in ((40.0, 80.0, "theta_dot"), (0.0125, 0.025, "theta")):
+            if low < abs(ratio) < high:
+                unit = {"theta": "deg", "theta_dot": "deg/s"}[key]
+                raise LeverError(
+                    f"theta_dot is {abs(ratio):.3g} times the slope of theta: {key} looks like degrees: "
+                    f"units={{'{key}': '{unit}'}} says so"
+                )
+
+
+def _check_unit(key: str, signal: Signal) -> None:
+    try:
+        unit, why = guess(key, signal.values)
+    except LeverError:  # an acceleration without gravity may well be in SI
+        return
+    if unit not in (KINDS[key][1], "m/s^2"):
+        word = {"deg": "degrees", "deg/s": "degrees a second", "g": "g"}[unit]
+        raise LeverError(f"{signal.name}: {why}: it looks like {word}: units={{'{key}': '{unit}'}} says so")

@@ -1,0 +1,130 @@
+"""Recorded signals as inputs of the firmware: in its units, without gravity, on its clock; and what was guessed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import LeverError
+from .mapping import Source
+from .recorded import Signal
+from .resample import Samples, sample
+from .slope import slope_ratio
+from .units import GRAVITY, KINDS, check_plausible, factor, gravity_in, guess
+
+_FASTER = 1.5
+"""Periods of a signal in one of the samples from which on it is told that some of it is not used."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """One input as it was understood."""
+
+    signal: Signal
+    """In the firmware's unit."""
+    source: Source
+    """With everything that was left open decided."""
+    notes: tuple[str, ...]
+    """What was guessed, for the user to see."""
+
+    def row(self, samples: Samples, key: str) -> dict[str, Any]:
+        """What summary.json says of it."""
+        values = samples.columns[key]
+        return {
+            "signal": self.signal.name,
+            "unit": self.source.unit,
+            "factor": self.source.factor,
+            "offset": self.source.offset,
+            "sign": self.source.sign,
+            "gravity": self.source.gravity,
+            "channel": self.source.channel,
+            "delay_s": self.source.delay,
+            "rate_hz": float(f"{1.0 / self.signal.period:.4g}"),
+            "sampled": samples.how[key],
+            "missing": int(np.isnan(values).sum()),
+        }
+
+
+def understood(key: str, source: Source, signal: Signal) -> Input:
+    """A signal as the input `key`. Raises LeverError."""
+    name = source.signal
+    if not np.isfinite(signal.values).any():
+        raise LeverError(f"{key} = {name}: the log has no valid value of it")
+    notes: list[str] = []
+    unit, scale = _scale(key, source, signal, notes)
+    values = signal.values * scale + source.offset
+    sign, gravity = source.sign or 1, source.gravity
+    if key == "z_ddot" and gravity == "auto":
+        direction = gravity_in(values)
+        gravity = "included" if direction else "none"
+        if source.sign is None and direction < 0:
+            sign = -1
+            notes.append(f"z_ddot = {name}: it rests at {-GRAVITY:.3g} m/s², so it points down and is turned (sign=-1)")
+        if direction:
+            notes.append(f"z_ddot = {name}: gravity is in it, and is subtracted (gravity=included)")
+    values = sign * values
+    if gravity == "included":
+        values = values - GRAVITY
+    check_plausible(key, name, values)
+    converted = replace(signal, time=signal.time - source.delay, values=values, unit=KINDS[key][1])
+    decided = replace(source, unit=unit, sign=sign, gravity=gravity if key == "z_ddot" else "none")
+    return Input(converted, decided, tuple(notes))
+
+
+def _scale(key: str, source: Source, signal: Signal, notes: list[str]) -> tuple[str, float]:
+    """The unit of the recorded values, and their factor to the firmware's. Raises LeverError."""
+    if source.factor is not None:
+        return "", source.factor
+    unit = source.unit or signal.unit
+    if unit:
+        scale = factor(key, unit)
+        if scale is None:
+            what, si = KINDS[key]
+            raise LeverError(
+                f"{key} = {source.signal}: it is in {unit}, which is no unit of {what} known here: "
+                f"map another signal, or say unit= or factor= (to {si})"
+            )
+        return unit, scale
+    try:
+        unit, why = guess(key, signal.values)
+    except LeverError as error:
+        raise LeverError(f"{key} = {source.signal}: {error}") from None
+    scale = factor(key, unit)
+    assert scale is not None
+    notes.append(f"{key} = {source.signal}: no unit is said; taken as {unit}, since {why}")
+    return unit, scale
+
+
+def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[Samples, list[str]]:
+    """The samples of all inputs, and notes for the user. Raises LeverError."""
+    samples = sample({key: each.signal for key, each in inputs.items()}, clock)
+    notes = [note for each in inputs.values() for note in each.notes]
+    for key, how in samples.how.items():
+        period = inputs[key].signal.period
+        rates = f"{key} comes at {1.0 / period:.4g} Hz, {samples.clock} and samples at {1.0 / samples.period:.4g} Hz"
+        if how == "slower":
+            notes.append(f"{rates}: it is missing in between (--clock {key} samples at its rate)")
+        elif period * _FASTER < samples.period:
+            notes.append(f"{rates}: its values in between are not used (--clock {key} uses them)")
+    if samples.disordered:
+        notes.append(
+            f"{samples.disordered:,} values are left out, since they come no later than the one before them: the "
+            "recorder's time stamps are coarse, or go back"
+        )
+    return samples, notes + _disagreement(inputs, samples)
+
+
+def _disagreement(inputs: Mapping[str, Input], samples: Samples) -> list[str]:
+    """Whether the angular rate is the slope of the angle; where it is not, one of their units or signs is wrong."""
+    if not {"theta", "theta_dot"} <= inputs.keys():
+        return []
+    ratio = slope_ratio(inputs["theta"].signal, inputs["theta_dot"].signal)
+    names = f"theta_dot = {inputs['theta_dot'].signal.name} and theta = {inputs['theta'].signal.name}"
+    if ratio < 0.0:
+        return [f"{names}: the rate is minus the slope of the angle: one of them needs sign=-1"]
+    if ratio and not 0.5 < ratio < 2.0:
+        return [f"{names}: the rate is {ratio:.3g} times the slope of the angle: is one of them in another unit?"]
+    return []

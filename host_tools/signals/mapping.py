@@ -1,0 +1,236 @@
+"""Which signal of a log or file is which input of the firmware, and what turns the one into the other.
+
+    theta=LEVER_POSITION.Angle                              what the database or the header says, gravity by its looks
+    z_ddot=IMU.AccZ,unit=g,sign=-1,gravity=included         said by hand
+    theta=Angle,factor=0.0017,offset=-0.2,channel=can1,delay=0.004
+
+or the same as TOML, a table for each input, and one for each message with E2E protection:
+
+    [theta]
+    message = "LEVER_POSITION"
+    signal = "Angle"
+
+    [protected.LEVER_POSITION]
+    profile = 1
+    data_id = 0x1A2
+    counter = "AngleCounter"
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from ..errors import LeverError
+from .units import INPUTS, KINDS, factor
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+GRAVITY_CHOICES = ("auto", "included", "none")
+PROTECTED = "protected"
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where one input comes from."""
+
+    signal: str
+    """MESSAGE.SIGNAL of a database, SIGNAL where only one message has it, or a column of a file."""
+    unit: str = ""
+    """Of the recorded values; empty: what the database or header says, else by plausibility."""
+    factor: float | None = None
+    """Instead of a unit: value times this, plus offset, is in the firmware's unit."""
+    offset: float = 0.0
+    """Added to the values in the firmware's unit."""
+    sign: int | None = None
+    """1 or -1; None: 1, but -1 for an acceleration whose gravity points down."""
+    gravity: str = "auto"
+    """Whether an acceleration holds gravity: included, none, or auto, by its median."""
+    channel: str | None = None
+    """The bus; by default the only one that has the message."""
+    delay: float = 0.0
+    """By how much it is behind [s]: so much is taken from its time."""
+
+
+@dataclass(frozen=True)
+class Protection:
+    """How a message is protected against losses and damage (AUTOSAR E2E)."""
+
+    profile: int | None = None
+    """1, 2 or 5; None: the counter alone."""
+    data_id: int | tuple[int, ...] = 0
+    """The identifier; of profile 2 the list of sixteen."""
+    counter: str | None = None
+    """The signal that counts frames; losses are counted by it, repeated frames dropped."""
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """All inputs that there are, and how to read what they come from."""
+
+    sources: dict[str, Source]
+    protected: dict[str, Protection] = field(default_factory=dict)
+    time: str | None = None
+    """The column with the time, of a file without a bus; by default found by its name."""
+
+    def __post_init__(self) -> None:
+        if "theta" not in self.sources and "theta_dot" not in self.sources:
+            raise LeverError("the mapping has neither theta nor theta_dot: give --map theta=MESSAGE.SIGNAL")
+        if "z_ddot" not in self.sources:
+            raise LeverError(
+                "the mapping has no z_ddot, the acceleration of the base: give --map z_ddot=MESSAGE.SIGNAL"
+            )
+
+
+def read_mapping(entries: Iterable[str]) -> Mapping:
+    """A mapping of KEY=SIGNAL[,OPTION=VALUE…] and of .toml files, later ones over earlier ones. Raises LeverError."""
+    sources: dict[str, Source] = {}
+    protected: dict[str, Protection] = {}
+    time: str | None = None
+    for entry in entries:
+        if "=" not in entry or (entry.lower().endswith(".toml") and Path(entry).is_file()):
+            content = _toml(entry)
+            protected |= {name: _protection(name, each) for name, each in content.pop(PROTECTED, {}).items()}
+            time = _time(content.pop("time", None)) or time
+            sources |= {_key(key): _source(key, table) for key, table in content.items()}
+            continue
+        key, _, text = entry.partition("=")
+        if key.strip() == "time":
+            time = text.strip()
+        else:
+            sources[_key(key)] = _source(key, _assignments(key, text))
+    return Mapping(sources, protected, time)
+
+
+def as_toml(mapping: Mapping) -> str:
+    """The text of a mapping file."""
+    lines: list[str] = [] if mapping.time is None else ["[time]", f"signal = {_quoted(mapping.time)}", ""]
+    for key, source in mapping.sources.items():
+        lines += [f"[{key}]", f"signal = {_quoted(source.signal)}"]
+        for each in fields(Source)[1:]:
+            value = getattr(source, each.name)
+            if value != each.default:
+                lines.append(f"{each.name} = {_quoted(value) if isinstance(value, str) else value}")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+# --- from text -------------------------------------------------------------------------------------------------------
+
+
+def _toml(path: str) -> dict[str, Any]:
+    if not path.lower().endswith(".toml"):
+        raise LeverError(f"--map {path}: it is neither KEY=MESSAGE.SIGNAL nor a .toml file")
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise LeverError(f"cannot read {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise LeverError(f"{path}: not a mapping in TOML: {error}") from None
+
+
+def _time(table: Any) -> str | None:
+    return str(table["signal"]) if isinstance(table, dict) and "signal" in table else table
+
+
+def _key(key: str) -> str:
+    key = key.strip()
+    if key not in INPUTS:
+        near = difflib.get_close_matches(key, INPUTS, n=1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise LeverError(f"--map {key}: {hint}the inputs are {', '.join(INPUTS)}, and time for a file's column of time")
+    return key
+
+
+def _assignments(key: str, text: str) -> dict[str, Any]:
+    """SIGNAL,unit=deg,sign=-1 as a table; a comma that no option follows belongs to the name."""
+    names = [each.name for each in fields(Source)]
+    parts = text.split(",")
+    options: dict[str, Any] = {}
+    while len(parts) > 1 and parts[-1].partition("=")[0].strip() in names:
+        name, _, value = parts.pop().partition("=")
+        options[name.strip()] = value.strip()
+    signal = ",".join(parts).strip()
+    if not signal:
+        raise LeverError(f"--map {key}=: the signal is missing: give MESSAGE.SIGNAL, or the column of a file")
+    return {"signal": signal, **options}
+
+
+def _source(key: str, table: Any) -> Source:
+    where = f"mapping of {key.strip()}"
+    if not isinstance(table, dict) or "signal" not in table:
+        raise LeverError(f'{where}: it needs a signal, as in [{key.strip()}] signal = "Angle"')
+    table = dict(table)
+    if message := table.pop("message", None):
+        table["signal"] = f"{message}.{table['signal']}"
+    names = [each.name for each in fields(Source)]
+    if unknown := sorted(set(table) - set(names)):
+        raise LeverError(f"{where}: unknown {', '.join(unknown)}; it may have message, {', '.join(names)}")
+    for name in ("factor", "offset", "delay"):
+        if name in table:
+            table[name] = _number(where, name, table[name])
+    if "sign" in table:
+        if str(table["sign"]).strip() not in ("1", "+1", "-1"):
+            raise LeverError(f"{where}: sign = {table['sign']}; it may be 1 or -1")
+        table["sign"] = int(table["sign"])
+    table |= {name: str(table[name]) for name in ("signal", "unit", "gravity", "channel") if name in table}
+    source = Source(**table)
+    _check(where, key.strip(), source)
+    return source
+
+
+def _check(where: str, key: str, source: Source) -> None:
+    if source.gravity not in GRAVITY_CHOICES:
+        raise LeverError(f"{where}: gravity = {source.gravity}; it may be {', '.join(GRAVITY_CHOICES)}")
+    if source.gravity != "auto" and key != "z_ddot":
+        raise LeverError(f"{where}: gravity is of z_ddot alone")
+    if source.unit and source.factor is not None:
+        raise LeverError(f"{where}: a unit and a factor: give one of them")
+    if source.unit and factor(key, source.unit) is None:
+        what, si = KINDS[key]
+        raise LeverError(f"{where}: {source.unit} is no unit of {what} known here: give factor=, to {si}")
+    if abs(source.delay) > 1.0:
+        raise LeverError(f"{where}: delay = {source.delay:g} s is more than a second: it is in seconds")
+
+
+def _number(where: str, name: str, value: Any) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number) or isinstance(value, bool):
+        raise LeverError(f"{where}: {name} = {value}; it must be a number")
+    return number
+
+
+def _protection(name: str, table: Any) -> Protection:
+    where = f"mapping of [{PROTECTED}.{name}]"
+    if not isinstance(table, dict) or (unknown := sorted(set(table) - {each.name for each in fields(Protection)})):
+        raise LeverError(
+            f"{where}: it may have profile, data_id and counter"
+            + (f", not {', '.join(unknown)}" if isinstance(table, dict) else "")
+        )
+    given = dict(table)
+    if isinstance(given.get("data_id"), list):
+        given["data_id"] = tuple(given["data_id"])
+    protection = Protection(**given)
+    if protection.profile is None and protection.counter is None:
+        raise LeverError(f"{where}: it has neither a profile nor a counter")
+    if protection.profile not in (None, 1, 2, 5):
+        raise LeverError(f"{where}: profile = {protection.profile}; it may be 1, 2 or 5")
+    if (protection.profile == 2) != (isinstance(protection.data_id, tuple) and len(protection.data_id) == 16):
+        raise LeverError(f"{where}: data_id is a list of sixteen bytes for profile 2, and a number for the others")
+    return protection

@@ -1,0 +1,124 @@
+"""Signals as small plots: lines of characters for a terminal, SVG in a page, or PNG."""
+
+from __future__ import annotations
+
+import html
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..errors import LeverError
+from ..extras import require
+from ..files import write_text
+from .recorded import Signal
+
+_BLOCKS = "▁▂▃▄▅▆▇█"
+_POINTS = 600
+_WIDTH, _HEIGHT = 640, 90
+
+
+def sparkline(signal: Signal, width: int) -> str:
+    """The means of `width` equal parts of its time, from least to greatest as eight heights; blank where none is."""
+    values = _parts(signal, width)[1]
+    present = values[np.isfinite(values)]
+    if not len(present):
+        return " " * width
+    low, span = float(present.min()), float(np.ptp(present)) or 1.0
+    return "".join(_BLOCKS[min(int(8.0 * (each - low) / span), 7)] if math.isfinite(each) else " " for each in values)
+
+
+def write(path: Path, signals: Sequence[tuple[str, Signal]], title: str) -> None:
+    """A page (.html) or picture (.png) with each signal under its heading. Raises LeverError."""
+    suffix = path.suffix.lower()
+    if suffix == ".html":
+        write_text(path, _page(signals, title))
+    elif suffix == ".png":
+        _picture(path, signals, title)
+    else:
+        raise LeverError(f"cannot write {path}: plots are .html or .png")
+
+
+def _parts(signal: Signal, count: int) -> tuple[FloatArray, FloatArray]:
+    """Times and means of equal parts."""
+    if not len(signal.time):
+        return np.zeros(0), np.zeros(0)
+    valid = np.isfinite(signal.values)
+    time, values = signal.time[valid], signal.values[valid]
+    first, last = float(signal.time[0]), float(signal.time[-1])
+    place = np.minimum(((time - first) / max(last - first, 1e-9) * count).astype(np.int64), count - 1)
+    counts = np.bincount(place, minlength=count)
+    means = np.bincount(place, values, count) / np.where(counts, counts, np.nan)
+    return (np.arange(count) + 0.5) * (last - first) / count, means
+
+
+def _extremes(signal: Signal) -> str:
+    present = signal.values[np.isfinite(signal.values)]
+    if not len(present):
+        return "no value"
+    return f"{present.min():.4g} to {present.max():.4g} {signal.unit}".rstrip()
+
+
+def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
+    figures = []
+    for heading, signal in signals:
+        caption = f"<b>{html.escape(heading)}</b> {html.escape(signal.name)}: {html.escape(_extremes(signal))}"
+        figures.append(f"<figure><figcaption>{caption}</figcaption>{_svg(signal)}</figure>")
+    style = (
+        ":root{color-scheme:light dark}body{font:15px/1.4 system-ui,sans-serif;max-width:60rem;margin:1rem auto;"
+        "padding:0 1rem}figure{margin:1rem 0}svg{width:100%;height:auto;border:1px solid #8886}"
+        "path{fill:none;stroke:#2a6fdb;stroke-width:1.2;vector-effect:non-scaling-stroke}"
+    )
+    seconds = max((float(np.ptp(each.time)) for _, each in signals if len(each.time)), default=0.0)
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
+        f'<meta name="viewport" content="width=device-width"><style>{style}</style>'
+        f"<h1>{html.escape(title)}</h1><p>{seconds:.4g} s</p>{''.join(figures)}</html>\n"
+    )
+
+
+def _svg(signal: Signal) -> str:
+    time, values = _parts(signal, _POINTS)
+    present = values[np.isfinite(values)]
+    low, span = (float(present.min()), float(np.ptp(present)) or 1.0) if len(present) else (0.0, 1.0)
+    last = float(time[-1]) if len(time) else 1.0
+    path, pen = [], "M"
+    for at, value in zip(time.tolist(), values.tolist(), strict=True):
+        if math.isfinite(value):
+            height = _HEIGHT * (0.95 - 0.9 * (value - low) / span)
+            path.append(f"{pen}{_WIDTH * at / last:.1f} {height:.1f}")
+        pen = "L" if math.isfinite(value) else "M"
+    return f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img"><path d="{"".join(path)}"/></svg>'
+
+
+def _picture(path: Path, signals: Sequence[tuple[str, Signal]], title: str) -> None:
+    require("study")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 1.2 + 1.4 * len(signals)), layout="constrained")
+    figure.suptitle(title)
+    axes = figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (heading, signal) in zip(axes, signals, strict=True):
+        time, values = _parts(signal, 4 * _POINTS)
+        axis.plot(time, values, linewidth=0.7)
+        axis.set_ylabel(signal.unit or "no unit")
+        axis.set_title(f"{heading}: {signal.name}", fontsize="small", loc="left")
+    axes[-1].set_xlabel("time [s]")
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=150)
+    write_bytes(path, picture.getvalue())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """A file that is there whole or not at all. Raises LeverError."""
+    partial = path.with_name(f".{path.name}.tmp")
+    try:
+        partial.write_bytes(content)
+        partial.replace(path)
+    except OSError as error:
+        raise LeverError(f"cannot write {path}: {error.strerror}") from None
+    finally:
+        partial.unlink(missing_ok=True)

@@ -1,0 +1,189 @@
+"""What estimate() has found: named, with units and standard deviations, to be looked at, plotted and kept."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray, IntArray
+from ..extras import require
+from ..files import writing
+from ..firmware.config import Config
+from ..firmware.estimator import fault_names
+from ..firmware.library import enum_names
+from ..firmware.quantities import DYNAMICS, parameters
+
+Text = NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """One quantity at every sample."""
+
+    name: str
+    unit: str
+    """ "1" without one."""
+    values: FloatArray
+    sigma: FloatArray
+    """Standard deviation."""
+
+    @property
+    def last(self) -> float:
+        """At the last sample."""
+        return float(self.values[-1])
+
+    @property
+    def last_sigma(self) -> float:
+        return float(self.sigma[-1])
+
+    def __str__(self) -> str:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.name} = {self.last:.4g} ± {self.last_sigma:.2g}{unit}"
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return np.array(self.values, dtype=dtype)
+
+
+class Result(Mapping[str, Estimated]):
+    """The estimates by name: result["natural_frequency"].last, .sigma, .unit. They are NaN until the estimator runs."""
+
+    def __init__(
+        self, config: Config, time_us: IntArray, raw: Mapping[str, NDArray[Any]], notes: tuple[str, ...]
+    ) -> None:
+        self.config = config
+        self.time = (time_us - time_us[0]) * 1e-6
+        """Of each sample since the first [s]."""
+        self.notes = notes
+        """What was understood of the samples that they do not say, such as gravity."""
+        self._raw = raw
+        self._estimated = self._by_name()
+
+    def _by_name(self) -> dict[str, Estimated]:
+        raw, usable = self._raw, ~np.isin(self.mode, ("init", "align", "fault"))
+
+        def at_samples(name: str, unit: str, values: Any, sigma: Any) -> Estimated:
+            usable_values, usable_sigma = (
+                np.where(usable, each.astype(np.float64), np.nan) for each in (values, sigma)
+            )
+            return Estimated(name, unit, usable_values, usable_sigma)
+
+        model = self.config.choices["model"]
+        estimated = {}
+        for k, each in enumerate(parameters(model)):
+            estimated[each.key] = at_samples(each.key, each.unit, raw["parameter"][:, k], raw["parameter_sigma"][:, k])
+        for each in DYNAMICS:
+            estimated[each.key] = at_samples(each.key, each.unit, raw[each.key], raw[f"{each.key}_sigma"])
+        for name, unit in (("theta", "rad"), ("theta_dot", "rad/s")):
+            estimated[name] = at_samples(name, unit, raw[name], raw[f"{name}_sigma"])
+        return estimated
+
+    def __getitem__(self, name: str) -> Estimated:
+        if name not in self._estimated:
+            raise KeyError(f"{name}; there are {', '.join(self._estimated)}")
+        return self._estimated[name]
+
+    def __iter__(self) -> Any:
+        return iter(self._estimated)
+
+    def __len__(self) -> int:
+        return len(self._estimated)
+
+    @cached_property
+    def mode(self) -> Text:
+        """The estimator's at each sample: init, align, run, coast, frozen, fault."""
+        return _as_text(self._raw["mode"], lambda number: enum_names("lever_mode")[number])
+
+    @cached_property
+    def flags(self) -> Text:
+        """The faults at each sample, as words: "excitation, torque", or nothing."""
+        return _as_text(self._raw["faults"], lambda bits: ", ".join(fault_names(bits)))
+
+    def columns(self) -> dict[str, tuple[NDArray[Any], str]]:
+        """Values and unit by name, as to_parquet() writes them."""
+        table: dict[str, tuple[NDArray[Any], str]] = {"time": (self.time, "s")}
+        for each in self._estimated.values():
+            table[each.name], table[f"{each.name}_sigma"] = (each.values, each.unit), (each.sigma, each.unit)
+        return table | {"nis": (self._raw["nis"], "1"), "mode": (self.mode, ""), "flags": (self.flags, "")}
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Writes columns() with the units as metadata of the fields. Raises LeverError."""
+        require("files")
+        import pyarrow
+        from pyarrow import parquet
+
+        fields, arrays = [], []
+        for name, (values, unit) in self.columns().items():
+            array = pyarrow.array(values.tolist() if values.dtype.kind == "U" else values)
+            arrays.append(array)
+            fields.append(pyarrow.field(name, array.type, metadata={"unit": unit} if unit else None))
+        path = Path(path)
+        partial = path.with_name(f".{path.name}.tmp")
+        try:
+            with writing(path):
+                parquet.write_table(pyarrow.table(arrays, schema=pyarrow.schema(fields)), partial)
+                partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+    def plot(self) -> Any:
+        """The parameters, natural frequency and damping ratio over time with their bands of ±2 sigma, as a Figure of
+        matplotlib. Raises LeverError."""
+        require("study")
+        from matplotlib.figure import Figure
+
+        shown = [each for name, each in self._estimated.items() if name not in ("theta", "theta_dot")]
+        figure = Figure(figsize=(8.0, 1.6 * len(shown)), layout="constrained")
+        axes = figure.subplots(len(shown), 1, sharex=True)
+        thin = max(1, len(self.time) // 5000)
+        for axis, each in zip(axes, shown, strict=True):
+            time, values, sigma = self.time[::thin], each.values[::thin], each.sigma[::thin]
+            axis.fill_between(time, values - 2.0 * sigma, values + 2.0 * sigma, alpha=0.25, linewidth=0)
+            axis.plot(time, values)
+            axis.set_ylabel(each.name if each.unit == "1" else f"{each.name}\n[{each.unit}]")
+            finite = values[np.isfinite(values)]
+            if len(finite):
+                low, high = np.percentile(finite, [1.0, 99.0])
+                room = max(0.5 * float(high - low), 4.0 * each.last_sigma, 1e-9)
+                axis.set_ylim(float(low) - room, float(high) + room)
+        axes[-1].set_xlabel("time [s]")
+        return figure
+
+    def __repr__(self) -> str:
+        lines = [str(each) for name, each in self._estimated.items() if name not in ("theta", "theta_dot")]
+        return f"{self._heading()}\n" + "\n".join(f"  {line}" for line in lines)
+
+    def _heading(self) -> str:
+        choices = self.config.choices
+        flags = f", flags: {self.flags[-1]}" if self.flags[-1] else ""
+        return (
+            f"{choices['model']}, {choices['estimator']}: {len(self.time)} samples in {self.time[-1]:.4g} s, "
+            f"{self.mode[-1]} at the end{flags}"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{html.escape(each.name)}</td><td>{each.last:.4g}</td><td>± {each.last_sigma:.2g}</td>"
+            f"<td>{html.escape('' if each.unit == '1' else each.unit)}</td></tr>"
+            for name, each in self._estimated.items()
+            if name not in ("theta", "theta_dot")
+        )
+        notes = "".join(f"<li>{html.escape(note)}</li>" for note in self.notes)
+        return (
+            f"<p>{html.escape(self._heading())}</p><table><thead><tr><th>quantity</th><th>at the end</th>"
+            f"<th>σ</th><th>unit</th></tr></thead><tbody>{rows}</tbody></table>{f'<ul>{notes}</ul>' if notes else ''}"
+        )
+
+
+def _as_text(numbers: NDArray[Any], word: Any) -> Text:
+    """The word of each number; few of them differ."""
+    different, place = np.unique(numbers, return_inverse=True)
+    words = np.array([word(int(number)) for number in different], dtype=np.str_)
+    text: Text = words[place.reshape(-1)]
+    return text

@@ -1,0 +1,58 @@
+"""Whether one signal is the slope of another, and how signals are compared at all: as means over the same 20 ms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray
+from .recorded import Signal
+
+STEP = 0.02
+"""[s] of a mean."""
+_LONGEST = 60.0  # [s] that are compared
+_ALIKE = 0.8  # correlation from which on a ratio says something
+
+
+def together(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
+    """Their means over the same stretches of STEP, of at most a minute."""
+    if not len(one.time) or not len(other.time):
+        return np.zeros(0), np.zeros(0)
+    first = max(one.time[0], other.time[0])
+    edges = np.arange(first, min(one.time[-1], other.time[-1], first + _LONGEST), STEP)
+    return _means(one, edges), _means(other, edges)
+
+
+def slope_likeness(angle: Signal, rate: Signal) -> float:
+    """Correlation of the slope of an angle with a rate; 0 where there is too little of both."""
+    slope, value = _slope_and_rate(angle, rate)
+    return float(np.corrcoef(slope, value)[0, 1]) if len(slope) else 0.0
+
+
+def slope_ratio(angle: Signal, rate: Signal) -> float:
+    """A rate as a multiple of the slope of the angle, negative where their signs differ; 0 where they are not alike."""
+    slope, value = _slope_and_rate(angle, rate)
+    likeness = slope_likeness(angle, rate)
+    return float(np.sign(likeness) * np.std(value) / np.std(slope)) if abs(likeness) > _ALIKE else 0.0
+
+
+def _slope_and_rate(angle: Signal, rate: Signal) -> tuple[FloatArray, FloatArray]:
+    """Both at the same times, as far as both are known; empty where that is too little."""
+    angles, rates = together(angle, rate)
+    slope, value = (angles[2:] - angles[:-2]) / (2.0 * STEP), rates[1:-1]
+    both = np.isfinite(slope) & np.isfinite(value)
+    slope, value = slope[both], value[both]
+    enough = len(slope) >= 40 and np.std(slope) > 0.0 and np.std(value) > 0.0
+    return (slope, value) if enough else (np.zeros(0), np.zeros(0))
+
+
+def _means(signal: Signal, edges: FloatArray) -> FloatArray:
+    """Means between the edges [s]; NaN where there is no value."""
+    if len(edges) < 2:
+        return np.zeros(0)
+    valid = np.isfinite(signal.values)
+    bins = np.digitize(signal.time[valid], edges) - 1
+    inside = (bins >= 0) & (bins < len(edges) - 1)
+    sums = np.bincount(bins[inside], signal.values[valid][inside], len(edges) - 1)
+    counts = np.bincount(bins[inside], minlength=len(edges) - 1)
+    means: FloatArray = sums / np.where(counts > 0, counts, np.nan)
+    return means

@@ -1,0 +1,85 @@
+"""Sources that do not speak lever.dbc: the firmware in this process estimates from their mapped signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ..can.bulk import Buses, Feeder, Frames
+from ..firmware.config import Config, setting
+from ..firmware.estimator import FRAME_SAMPLE, Estimator
+from ..signals.online import Online
+from ..signals.reading import Reading
+from ..signals.traffic import MappedTraffic
+from .sources import BusSource, LogSource
+
+
+class MappedLog:
+    """A PlayedLog: a mapped log with the estimator's answers."""
+
+    def __init__(self, path: str, reading: Reading, config: Config) -> None:
+        """Reads all of it. Raises LeverError."""
+        self.buses = Buses()
+        self._traffic = MappedTraffic([path], reading)
+        self._estimator = Estimator(self._traffic.at_its_rate(config))
+        self.damaged, self.ends_early = self._traffic.recording.damaged, self._traffic.recording.ends_early
+
+    def chunks(self) -> Iterator[Frames]:
+        feeder = Feeder(self._estimator)
+        for frames in self._traffic.chunks():
+            for fed, _ in feeder.feed(frames):
+                plain = fed.copy()
+                plain["flags"] = 0
+                yield plain
+
+
+class MappedLogSource(LogSource):
+    """A recorded log, or a file of columns."""
+
+    def __init__(self, path: str, reading: Reading, config: Config) -> None:
+        super().__init__(path, None, MappedLog(path, reading, config))
+
+
+class MappedBusSource(BusSource):
+    """A bus on which there is no estimator. Nothing is sent."""
+
+    takes_commands = False
+
+    def __init__(
+        self,
+        interface: str,
+        channel: str | None,
+        online: Online,
+        config: Config,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Opens the bus. Raises LeverError."""
+        self._online = online
+        self._config = config
+        self._estimator: Estimator | None = None
+        super().__init__(interface, channel, options)
+
+    def run(self) -> None:
+        """Raises LeverError when the signals are not what the mapping says."""
+        while not self._stopping.is_set():
+            message = self._bus.recv(0.2)
+            if message is None or message.is_error_frame or message.is_remote_frame:
+                continue
+            identifier, extended = message.arbitration_id, message.is_extended_id
+            for frame in self._online.take(identifier, extended, bytes(message.data), message.timestamp):
+                self._feed(*frame)
+
+    def _feed(self, identifier: int, data: bytes) -> None:
+        if self._estimator is None:
+            self._estimator = Estimator(self._at_its_rate())
+        self._put((identifier, data))
+        if self._estimator.on_frame(identifier, data) == FRAME_SAMPLE:
+            self._estimator.step()
+        while (answer := self._estimator.next_frame()) is not None:
+            self._put(answer)
+
+    def _at_its_rate(self) -> Config:
+        settings = self._config.settings
+        if settings["sample_period"] == setting("sample_period").default and self._online.period is not None:
+            settings["sample_period"] = self._online.period
+        return Config(**self._config.choices, settings=settings)

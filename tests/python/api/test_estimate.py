@@ -1,0 +1,175 @@
+"""lever_cdkf.estimate() on frames and arrays of every library: the same result, units noticed, everything named."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+import xarray as xr
+from lever_cdkf import Config, Result, estimate, run_samples
+from lever_cdkf.host_tools.errors import LeverError
+from pyarrow import parquet
+from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight, fly
+
+Columns = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    return fly(40.0)
+
+
+@pytest.fixture(scope="module")
+def columns(flight: Flight) -> Columns:
+    return {"time": flight.time, "theta": flight.theta, "theta_dot": flight.theta_dot, "z_ddot": flight.z_ddot}
+
+
+@pytest.fixture(scope="module")
+def result(columns: Columns) -> Result:
+    return estimate(columns)
+
+
+def with_units(columns: Columns) -> xr.Dataset:
+    degrees = ("time", np.degrees(columns["theta"]), {"units": "degrees"})
+    values = {"theta": degrees, "theta_dot": ("time", columns["theta_dot"]), "z_ddot": ("time", columns["z_ddot"])}
+    return xr.Dataset(values, coords={"time": columns["time"]})
+
+
+FRAMES: dict[str, Callable[[Columns], Any]] = {
+    "lists": lambda columns: {name: list(values) for name, values in columns.items()},
+    "pandas": pd.DataFrame,
+    "pandas with time as index": lambda columns: pd.DataFrame(columns).set_index("time"),
+    "pandas with dates": lambda columns: (
+        pd.DataFrame(columns)
+        .set_index(pd.Timestamp("2024-05-01T10:00:00Z") + pd.to_timedelta(columns["time"], unit="s"))
+        .drop(columns="time")
+    ),
+    "polars": pl.DataFrame,
+    "xarray": with_units,
+    "microseconds": lambda columns: {
+        **{name: values for name, values in columns.items() if name != "time"},
+        "time_us": np.rint(columns["time"] * 1e6).astype(np.int64),
+    },
+    "structured": lambda columns: pd.DataFrame(columns).to_records(index=False),
+    "names with units": lambda columns: {
+        "time": columns["time"],
+        "theta_deg": np.degrees(columns["theta"]),
+        "theta_dot [deg/s]": np.degrees(columns["theta_dot"]),
+        "z_ddot (g)": columns["z_ddot"] / GRAVITY,
+    },
+}
+
+
+@pytest.mark.parametrize("kind", FRAMES)
+def test_whatever_holds_the_samples(kind: str, columns: Columns, result: Result) -> None:
+    other = estimate(FRAMES[kind](columns))
+    assert other["natural_frequency"].last == pytest.approx(result["natural_frequency"].last, rel=1e-4)
+    assert len(other.time) == len(columns["time"])
+
+
+def test_it_is_right_and_equal_to_the_samples_fed_directly(columns: Columns, result: Result) -> None:
+    assert result["natural_frequency"].last == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+    time_us = np.rint(columns["time"] * 1e6).astype(np.int64)
+    raw = {"time_us": time_us, **{name: columns[name] for name in ("theta", "theta_dot", "z_ddot")}}
+    direct = run_samples(Config(settings={"sample_period": 2e-3}), raw)
+    assert result["natural_frequency"].last == direct["natural_frequency"][-1]
+    assert result["m_p"].last == direct["parameter"][-1, 0]
+    assert result["c_p"].last_sigma == direct["parameter_sigma"][-1, 1]
+    assert result.config.settings["sample_period"] == 2e-3
+
+
+def test_units_that_are_said(columns: Columns, result: Result) -> None:
+    said = {
+        "t": 1e3 * columns["time"],
+        "theta": np.degrees(columns["theta"]),
+        "theta_dot": np.degrees(columns["theta_dot"]),
+        "z_ddot": 1.0 + columns["z_ddot"] / GRAVITY,
+    }
+    units = {"time": "ms", "theta": "deg", "theta_dot": "deg/s", "z_ddot": "g"}
+    other = estimate(said, units=units)
+    assert other["natural_frequency"].last == pytest.approx(result["natural_frequency"].last, rel=1e-4)
+    assert ["gravity" in note for note in other.notes] == [True]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"theta": np.degrees}, r"looks like degrees: units=\{'theta': 'deg'\}"),
+        ({"theta_dot": np.degrees}, r"theta_dot looks like degrees: units=\{'theta_dot': 'deg/s'\}"),
+        ({"z_ddot": lambda values: 1.0 + values / GRAVITY}, r"gravity in g: it looks like g: units=\{'z_ddot': 'g'\}"),
+        ({"time": lambda values: 1e3 * values}, r"looks like ms: units=\{'time': 'ms'\}"),
+        ({"time": lambda values: 20.0 * values}, "the firmware takes samples from 50 to 10000 Hz"),
+        ({"theta": lambda values: values[:-1]}, r"theta has 19999 values, time has 20000"),
+        ({"theta": lambda values: values * np.nan, "theta_dot": lambda values: values * np.nan}, "one of theta and"),
+    ],
+)
+def test_what_is_noticed(change: dict[str, Callable[[Any], Any]], said: str, columns: Columns) -> None:
+    changed = {name: change.get(name, lambda each: each)(values) for name, values in columns.items()}
+    with pytest.raises(LeverError, match=said):
+        estimate(changed)
+
+
+@pytest.mark.parametrize(
+    ("samples", "options", "said"),
+    [
+        (3, {}, "samples are a int: give a frame"),
+        ({"theta": [1.0]}, {}, "no column of time"),
+        ({"time": [0.0, 1e-3], "theta": [0.1, 0.1]}, {}, "z_ddot and one of theta and theta_dot are needed"),
+        ({"time": [0.0, 1e-3], "theta": [0.1, 0.1]}, {"units": {"angle": "deg"}}, "units of angle"),
+        ({"time": [0.0, 1e-3], "a": [0.1, 0.1]}, {"names": {"theta": "b"}}, "names: theta = b"),
+    ],
+)
+def test_what_is_refused(samples: Any, options: Any, said: str) -> None:
+    with pytest.raises(LeverError, match=said):
+        estimate(samples, **options)
+
+
+def test_other_names_and_settings(columns: Columns) -> None:
+    renamed = {"Zeit": columns["time"], "winkel": columns["theta"], "nz": columns["z_ddot"]}
+    names = {"theta": "winkel", "z_ddot": "nz"}
+    made = estimate(renamed, Config(model="linear_physical"), names=names)
+    assert list(made)[:3] == ["m", "c", "k"]
+
+
+def test_missing_values_are_missing(columns: Columns) -> None:
+    holes = {**columns, "tau_m": np.full(len(columns["time"]), math.nan), "theta": columns["theta"].copy()}
+    holes["theta"][::7] = math.nan
+    made = estimate(holes)
+    assert "theta" in made.flags[7]
+    assert "tau" not in " ".join(made.notes)
+    assert made["natural_frequency"].last == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+def test_everything_has_its_name(result: Result, tmp_path: Path) -> None:
+    assert list(result) == ["m_p", "c_p", "k_p", "natural_frequency", "damping_ratio", "theta", "theta_dot"]
+    assert [result[name].unit for name in list(result)[:4]] == ["kg", "N s/m", "N/m", "Hz"]
+    assert result.mode[-1] == "run"
+    assert "torque" in result.flags[-1]
+    assert np.isnan(result["k_p"].values[0])
+    for shown in (repr(result), result._repr_html_()):
+        assert "natural_frequency" in shown
+        assert f"{result['natural_frequency'].last:.4g}" in shown
+        assert "20000 samples in 40 s" in shown
+    result.to_parquet(tmp_path / "estimates.parquet")
+    table = parquet.read_table(tmp_path / "estimates.parquet")
+    assert table.schema.field("k_p_sigma").metadata == {b"unit": b"N/m"}
+    assert table["flags"][-1].as_py() == result.flags[-1]
+    np.testing.assert_array_equal(table["damping_ratio"].to_numpy(), result["damping_ratio"].values)
+    with pytest.raises(LeverError, match="cannot write"):
+        result.to_parquet(tmp_path / "nowhere/estimates.parquet")
+    with pytest.raises(KeyError, match="there are m_p"):
+        _ = result["mass"]
+
+
+def test_the_plot_shows_the_last_estimates(result: Result) -> None:
+    figure = result.plot()
+    labels = [axis.get_ylabel() for axis in figure.axes]
+    assert labels == ["m_p\n[kg]", "c_p\n[N s/m]", "k_p\n[N/m]", "natural_frequency\n[Hz]", "damping_ratio"]
+    low, high = figure.axes[3].get_ylim()
+    assert low < NATURAL_FREQUENCY < high

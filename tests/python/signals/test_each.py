@@ -1,0 +1,41 @@
+"""Many logs in one call: a row for each, all on one page, and what is wrong with one does not stop the others."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools import cli
+from pyarrow import parquet
+from python.report.reading import figures, read
+from python.signals.flight import MAPPED, NATURAL_FREQUENCY
+
+
+def test_a_row_for_each(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "empty.blf").write_bytes(b"")
+    logs = [str(folder / "flight.blf"), str(tmp_path / "empty.blf"), str(folder / "flight.log")]
+    arguments = ["--each", "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED, "--length", "30"]
+    written = ["-o", str(tmp_path / "out"), "--json", str(tmp_path / "rows.json")]
+    assert cli.main(["replay", *logs, *arguments, *written]) == 1
+    assert f"lever: replay: {logs[1]}: " in capsys.readouterr().err
+    rows = json.loads((tmp_path / "rows.json").read_text())["logs"]
+    assert [row["log"] for row in rows] == ["flight.blf", "empty.blf", "flight.log"]
+    assert [bool(row["problem"]) for row in rows] == [False, True, False]
+    assert rows[0]["natural_frequency [Hz]"] == rows[2]["natural_frequency [Hz]"]
+    assert rows[0]["natural_frequency [Hz]"] == pytest.approx(NATURAL_FREQUENCY, rel=0.03)
+    assert sorted(os.listdir(tmp_path / "out")) == ["flight", "flight_2", "logs.parquet", "overlay.html"]
+    table = parquet.read_table(tmp_path / "out/logs.parquet").to_pylist()
+    assert table == rows
+    drawn = figures(read(tmp_path / "out/overlay.html"))["overlay"]["data"]
+    assert {trace["name"] for trace in drawn} == {"flight.blf", "flight.log"}
+    assert len(drawn) == 2 * 5
+
+
+def test_tables_are_recordings_of_their_own(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = str(folder / "columns.csv")
+    mapped = ["--map", "theta=Lever angle", "z_ddot=Vertical acc."]
+    assert cli.main(["replay", table, table, *mapped]) == 2
+    assert "add --each" in capsys.readouterr().err
+    assert cli.main(["replay", table, table, "--each", *mapped]) == 0

@@ -1,0 +1,230 @@
+"""A log with foreign identifiers, names and units, 500 Hz and other traffic: mapped in one command, in any format."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import can
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.firmware.native import Config, run_samples
+from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
+
+COLUMNS = ("theta=Lever angle", "theta_dot=Lever rate", "z_ddot=Vertical acc.")
+
+
+def replayed(out: Path, log: Path, *arguments: str | Path) -> dict[str, Any]:
+    """`lever replay log … -o out`, which must do; returns its summary."""
+    assert cli.main(["replay", str(log), *map(str, arguments), "-o", str(out)]) == 0
+    summary: dict[str, Any] = json.loads((out / "summary.json").read_text())
+    return summary
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
+    """What a command says that must fail, in one line."""
+    capsys.readouterr()
+    assert cli.main([*map(str, arguments)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("lever: error: ")
+    assert said.count("\n") == 1
+    return said
+
+
+def frequency(summary: dict[str, Any]) -> float:
+    return float(summary["estimates"]["natural_frequency"]["last"])
+
+
+def fed_directly(flight: Flight, period: float = 2e-3) -> float:
+    """The last frequency that the firmware finds in the same values, without any log."""
+    samples = {"theta": flight.theta, "theta_dot": flight.theta_dot, "z_ddot": flight.z_ddot}
+    time_us = np.rint(flight.time * 1e6).astype(np.int64)
+    made = run_samples(Config(settings={"sample_period": period}), {"time_us": time_us, **samples})
+    return float(made["natural_frequency"][-1])
+
+
+@pytest.mark.parametrize("suffix", ["blf", "asc", "mf4", "csv", "trc", "log"])
+def test_every_log_of_the_bus(suffix: str, folder: Path, flight: Flight, tmp_path: Path) -> None:
+    summary = replayed(tmp_path, folder / f"flight.{suffix}", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+    assert frequency(summary) == pytest.approx(fed_directly(as_decoded(flight)), rel=1e-3)
+    assert summary["samples"] == len(flight.time)
+    mapping = summary["recording"]["mapping"]
+    assert mapping["sample_period_s"] == summary["estimator"]["settings"]["sample_period"] == 2e-3
+    assert mapping["inputs"]["z_ddot"]["gravity"] == "included"
+    assert mapping["unprotected_frames"] == 2 * len(flight.time)
+    assert summary["recording"]["frames_left_out"] == {"other_identifiers": round(1.2 * len(flight.time))}
+
+
+def test_columns_of_a_csv(folder: Path, flight: Flight, tmp_path: Path) -> None:
+    summary = replayed(tmp_path, folder / "columns.csv", "--map", *COLUMNS)
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+    assert frequency(summary) == pytest.approx(fed_directly(flight), rel=1e-3)
+
+
+def test_the_same_as_a_log_of_lever_dbc_to_the_bit(folder: Path, tmp_path: Path) -> None:
+    """What the mapping feeds is in bus.log; replayed as it is, it gives the same trace."""
+    replayed(tmp_path / "mapped", folder / "flight.log", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    again = [line for line in (tmp_path / "mapped/bus.log").read_text().splitlines() if line.endswith("T")]
+    (tmp_path / "own.log").write_text("\n".join(again) + "\n")
+    replayed(tmp_path / "own", tmp_path / "own.log", "--set", "sample_period=0.002")
+    assert (tmp_path / "own/trace.csv").read_bytes() == (tmp_path / "mapped/trace.csv").read_bytes()
+
+
+def test_angle_and_acceleration_are_enough(folder: Path, tmp_path: Path) -> None:
+    summary = replayed(tmp_path, folder / "columns.csv", "--map", *COLUMNS[::2])
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+@pytest.mark.parametrize("step", [2, 5, 10])
+def test_at_other_rates(step: int, flight: Flight, tmp_path: Path) -> None:
+    slow = flight.every(step)
+    columns = np.column_stack((slow.time, slow.theta, slow.theta_dot, slow.z_ddot))
+    np.savetxt(tmp_path / "slow.csv", columns, "%.7f", ",", header="t,theta,theta_dot,z_ddot", comments="")
+    summary = replayed(tmp_path / "out", tmp_path / "slow.csv")
+    assert summary["estimator"]["settings"]["sample_period"] == pytest.approx(step * 2e-3)
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+def test_too_slow_is_refused(flight: Flight, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    slow = flight.every(20)
+    columns = np.column_stack((slow.time, slow.theta, slow.z_ddot))
+    np.savetxt(tmp_path / "slow.csv", columns, "%.7f", ",", header="t,theta,z_ddot", comments="")
+    said = refused(capsys, "replay", tmp_path / "slow.csv", "-o", tmp_path / "out")
+    assert "every 40 ms (25 Hz); the firmware takes samples from 50 to 10000 Hz" in said
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_a_part(folder: Path, tmp_path: Path) -> None:
+    arguments = ("--dbc", folder / "foreign.dbc", "--map", *MAPPED, "--start", "20", "--length", "25")
+    summary = replayed(tmp_path / "mapped", folder / "flight.blf", *arguments)
+    assert summary["samples"] == pytest.approx(12500, abs=1)
+    replayed(tmp_path / "all", folder / "flight.log", *arguments[:6])
+    own = replayed(tmp_path / "own", tmp_path / "all/bus.log", "--set", "sample_period=0.002", *arguments[6:])
+    assert own["samples"] == summary["samples"]
+
+
+# --- how they are mapped ---------------------------------------------------------------------------------------------
+
+
+def test_a_mapping_file_with_everything_said(folder: Path, flight: Flight, tmp_path: Path) -> None:
+    (tmp_path / "foreign.toml").write_text(
+        """
+[theta]
+message = "InceptorPosition"
+signal = "LvrAngle"
+factor = 0.017453292519943295
+[theta_dot]
+signal = "LvrRate"
+unit = "°/s"
+[z_ddot]
+signal = "AhrsAccel.AccVert"
+gravity = "included"
+sign = 1
+delay = 0.0
+[protected.AhrsAccel]
+counter = "AccCounter"
+"""
+    )
+    arguments = ("--dbc", folder / "foreign.dbc", "--map", tmp_path / "foreign.toml")
+    summary = replayed(tmp_path / "out", folder / "flight.log", *arguments)
+    assert frequency(summary) == pytest.approx(fed_directly(as_decoded(flight)), rel=1e-3)
+    assert summary["recording"]["mapping"]["notes"] == []
+    assert summary["recording"]["mapping"]["unprotected_frames"] == len(flight.time)
+
+
+def test_losses_are_counted_by_the_counter_that_the_mapping_names(
+    folder: Path, frames: list[can.Message], tmp_path: Path
+) -> None:
+    accelerations = [frame for frame in frames if frame.arbitration_id == 837]
+    gone = {id(frame) for frame in accelerations[100:103]} | {id(accelerations[200])}
+    kept = [frame for frame in frames if id(frame) not in gone]
+    place = kept.index(accelerations[300])
+    write_log(tmp_path / "lossy.log", [*kept[: place + 1], accelerations[300], *kept[place + 1 :]])
+    (tmp_path / "m.toml").write_text('[protected.AhrsAccel]\ncounter = "AccCounter"\n')
+    arguments = ("--dbc", folder / "foreign.dbc", "--map", tmp_path / "m.toml", *MAPPED)
+    summary = replayed(tmp_path / "out", tmp_path / "lossy.log", *arguments)
+    counts = summary["recording"]["mapping"]["messages"]["AhrsAccel"]
+    assert (counts["lost"], counts["repeated"], counts["corrupt"]) == (4, 1, 0)
+    assert summary["recording"]["mapping"]["inputs"]["z_ddot"]["missing"] == 4
+    assert "4 lost, 1 repeated" in summary["verdict"]
+
+
+@pytest.mark.parametrize("suffix", ["blf", "asc", "log"])
+def test_can_fd(suffix: str, folder: Path, frames: list[can.Message], flight: Flight, tmp_path: Path) -> None:
+    """The same frames as CAN FD, with 64 bytes of which the database describes eight."""
+    fd = [
+        can.Message(
+            *(frame.timestamp, frame.arbitration_id, frame.is_extended_id),
+            channel=0,
+            is_fd=True,
+            data=bytes(frame.data).ljust(64, b"\0"),
+        )
+        for frame in frames[: len(frames) // 3]
+    ]
+    log = write_log(tmp_path / f"fd.{suffix}", fd)
+    summary = replayed(tmp_path / "out", log, "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    assert summary["samples"] == len(flight.time) // 3
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.03)
+
+
+def test_an_acceleration_that_points_down_is_turned(flight: Flight, tmp_path: Path) -> None:
+    columns = np.column_stack((flight.time, flight.theta, -flight.z_ddot - 9.81))
+    np.savetxt(tmp_path / "down.csv", columns, "%.7f", ",", header="time_s,theta_rad,nz_m_s2", comments="")
+    summary = replayed(tmp_path / "out", tmp_path / "down.csv", "--map", "theta=theta_rad", "z_ddot=nz_m_s2")
+    assert summary["recording"]["mapping"]["inputs"]["z_ddot"]["sign"] == -1
+    assert "turned" in summary["verdict"]
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+def test_what_is_written_is_read_back(folder: Path, tmp_path: Path) -> None:
+    first = replayed(tmp_path / "first", folder / "columns.csv", "--map", *COLUMNS)
+    for name in ("trace.csv", "signals.mf4"):
+        again = replayed(tmp_path / name, tmp_path / "first" / name)
+        assert frequency(again) == pytest.approx(frequency(first), rel=1e-3)
+        assert again["samples"] == first["samples"]
+
+
+def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
+    arguments = ["--dbc", folder / "foreign.dbc", "--map", *MAPPED, "-o", tmp_path / "my.settings", "--length", "30"]
+    assert cli.main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
+    assert "sample_period = 0.002" in (tmp_path / "my.settings").read_text()
+
+
+# --- errors ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("mapped", "said"),
+    [
+        (("theta=Inceptor.LvrAngle",), "no message Inceptor; near to it: InceptorPosition"),
+        (("theta=LvrAngel",), "no signal LvrAngel; near to it: LvrAngle"),
+        (("angle=LvrAngle",), "the inputs are theta, theta_dot, z_ddot, tau_m, grip_force"),
+        (("theta=AccLat",), "it is in g, which is no unit of angle"),
+        (("theta=LvrAngle,unit=furlong",), "furlong is no unit of angle"),
+        (("theta=LvrAngle,sign=2",), "sign = 2; it may be 1 or -1"),
+        (("theta=LvrAngle,delay=4",), "delay = 4 s is more than a second"),
+        (("theta=LvrAngle,unit=rad",), "is it in degrees"),
+        (("theta=LvrAngle,channel=can7",), "InceptorPosition (0x18fef1fe) is not on can7, but on 0"),
+        (("nothing.toml",), "cannot read nothing.toml: No such file"),
+    ],
+)
+def test_what_is_wrong_with_a_mapping(
+    mapped: tuple[str, ...], said: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments: list[str | Path] = ["--dbc", folder / "foreign.dbc", "--map", "z_ddot=AccVert", *mapped]
+    assert said in refused(capsys, "replay", folder / "flight.blf", *arguments)
+
+
+def test_what_is_missing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, dbc = folder / "flight.blf", folder / "foreign.dbc"
+    assert "add --dbc FILE" in refused(capsys, "replay", log, "--map", *MAPPED)
+    assert "`lever map" in refused(capsys, "replay", log, "--dbc", dbc)
+    assert "has no z_ddot" in refused(capsys, "replay", log, "--dbc", dbc, "--map", "theta=LvrAngle")
+    assert "no database of CAN messages" in refused(capsys, "replay", log, "--dbc", log, "--map", *MAPPED)
+    assert "no column Angel" in refused(
+        capsys, "replay", folder / "columns.csv", "--map", "theta=Angel", "z_ddot=Vertical acc."
+    )
+    assert "--map theta=COLUMN" in refused(capsys, "replay", folder / "columns.csv")

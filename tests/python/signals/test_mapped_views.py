@@ -1,0 +1,103 @@
+"""Views of what has no estimator: the firmware in this process estimates from mapped signals."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections import deque
+from pathlib import Path
+
+import can
+import pytest
+from can.interfaces import BACKENDS
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.signals.mapping import read_mapping
+from lever_cdkf.host_tools.signals.online import Online
+from lever_cdkf.host_tools.watch.mapped import MappedBusSource
+from lever_cdkf.host_tools.watch.picture import Picture
+from python.can.test_record import Line
+from python.signals.flight import MAPPED, NATURAL_FREQUENCY
+from python.signals.test_mapped_replay import frequency, refused, replayed
+
+
+def shown_frequency(text: str) -> float:
+    found = re.search(r"natural frequency\s+([\d.]+)", text.replace("_", " "))
+    assert found is not None, text
+    return float(found[1])
+
+
+def test_a_log_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]
+    assert cli.main(["monitor", "--once", str(folder / "flight.blf"), *arguments]) == 0
+    assert shown_frequency(capsys.readouterr().out) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+def test_a_bus_gives_what_a_replay_of_its_log_gives(folder: Path, frames: list[can.Message], tmp_path: Path) -> None:
+    """All but the first two seconds, in which units and rates are found out."""
+    database = str(folder / "foreign.dbc")
+    online = Online(read_mapping(MAPPED), database)
+    sent = [
+        (frame.timestamp, made)
+        for frame in frames
+        for made in online.take(frame.arbitration_id, frame.is_extended_id, bytes(frame.data), frame.timestamp)
+    ]
+    assert online.period == 2e-3
+    assert any("gravity" in note for note in online.notes)
+    lines = [f"({at:.6f}) can0 {identifier:03X}#{data.hex().upper()}\n" for at, (identifier, data) in sent]
+    (tmp_path / "online.log").write_text("".join(lines))
+    live = replayed(tmp_path / "live", tmp_path / "online.log", "--set", "sample_period=0.002")
+    later = replayed(tmp_path / "log", folder / "flight.log", "--dbc", database, "--map", *MAPPED, "--start", "2")
+    assert live["samples"] == pytest.approx(later["samples"], abs=3)
+    assert (live["lost"], live["corrupt"]) == (0, 0)
+    assert frequency(live) == pytest.approx(frequency(later), rel=2e-3)
+
+
+def test_a_view_of_a_bus(folder: Path, frames: list[can.Message]) -> None:
+    online = Online(read_mapping(MAPPED), str(folder / "foreign.dbc"))
+    with can.Bus(interface="virtual", channel="foreign", preserve_timestamps=True) as other_end:
+        source = MappedBusSource("virtual", "foreign", online, Config())
+        picture = Picture()
+        source.start()
+        try:
+            for frame in frames[: len(frames) // 4]:
+                other_end.send(frame)
+            deadline = time.monotonic() + 30.0
+            while picture.traffic["PILOT_DYNAMICS"].frames < 100 and source.error is None:
+                assert time.monotonic() < deadline
+                picture.take(source.drain(), source.now)
+                time.sleep(0.01)
+        finally:
+            source.stop()
+    assert source.error is None
+
+
+def test_a_recording_says_what_has_come_of_the_mapped_signals(
+    folder: Path, frames: list[can.Message], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(BACKENDS, "kvaser", ("python.can.test_record", Line.__name__))
+    recording = ["record", "--interface", "kvaser", "--channel", "x", "--json", str(tmp_path / "rows.json")]
+    mapped = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]
+    Line.frames = deque(frames[:16000])
+    assert cli.main([*recording, "-o", str(tmp_path / "flight.log"), *mapped]) == 0
+    rows = json.loads((tmp_path / "rows.json").read_text())
+    assert [(row["input"], row["rate_hz"], row["missing"]) for row in rows["signals"]] == [
+        ("theta", 500.0, 0),
+        ("theta_dot", 500.0, 0),
+        ("z_ddot", 500.0, 0),
+    ]
+    assert {row["message"]: row["frames"] for row in rows["mapped messages"]} == {
+        "InceptorPosition": 5000,
+        "AhrsAccel": 5000,
+    }
+    Line.frames = deque(frames[2:3])  # of another message: the log is complete all the same
+    assert cli.main([*recording, "-o", str(tmp_path / "other.log"), *mapped]) == 0
+
+
+def test_what_a_bus_needs(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    bus = ("monitor", "--once", "--interface", "virtual", "--channel", "x")
+    assert "both --dbc FILE and --map" in refused(capsys, *bus, "--map", *MAPPED)
+    assert "no signal" in refused(
+        capsys, *bus, "--dbc", folder / "foreign.dbc", "--map", "theta=Nothing", "z_ddot=AccVert"
+    )

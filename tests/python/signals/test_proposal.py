@@ -1,0 +1,83 @@
+"""`lever map`: which signals of ten databases with other names and units are proposed, among many others."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import can
+import cantools.database
+import pytest
+from cantools.database.can import Database
+from lever_cdkf.host_tools import cli
+from python.signals.databases import AIRCRAFT, database
+from python.signals.flight import NATURAL_FREQUENCY, Flight, write_log
+from python.signals.test_mapped_replay import frequency, refused, replayed
+
+
+def recorded(index: int, flight: Flight, folder: Path) -> tuple[Path, Path, dict[str, str]]:
+    """Log, database, and the truth."""
+    text, fields, truth = database(index, flight)
+    loaded = cantools.database.load_string(text, strict=False)
+    assert isinstance(loaded, Database)
+    frames = []
+    for k, time in enumerate(flight.time.tolist()):
+        for number, message in enumerate(loaded.messages):
+            values = {field.name: float(field.values[k]) for field in fields if field.message == message.name}
+            data = message.encode(values, strict=False)
+            frames.append(can.Message(time + 1e-5 * number, message.frame_id, False, data=data, channel=0))
+    (folder / "foreign.dbc").write_text(text)
+    return write_log(folder / "flight.blf", frames), folder / "foreign.dbc", truth
+
+
+@pytest.fixture(scope="module")
+def short(flight: Flight) -> Flight:
+    """Half a minute at 100 Hz."""
+    slow = flight.every(5)
+    return Flight(*(values[:3000] for values in (slow.time, slow.theta, slow.theta_dot, slow.z_ddot)))
+
+
+def test_at_least_eight_of_ten_are_right(short: Flight, tmp_path: Path) -> None:
+    wrong = {}
+    for index in range(len(AIRCRAFT)):
+        folder = tmp_path / str(index)
+        folder.mkdir()
+        log, dbc, truth = recorded(index, short, folder)
+        found = {}
+        if cli.main(["map", str(log), "--dbc", str(dbc), "--json", str(folder / "map.json")]) == 0:
+            rows = json.loads((folder / "map.json").read_text())["mapping"]
+            found = {row["input"]: row["signal"] for row in rows}
+        if found != truth:
+            wrong[index] = (truth, found)
+    assert len(wrong) <= 2, wrong
+
+
+def test_the_proposal_can_be_used_as_it_is(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, dbc = folder / "flight.blf", folder / "foreign.dbc"
+    page, toml = tmp_path / "signals.html", tmp_path / "my.toml"
+    assert cli.main(["map", str(log), "--dbc", str(dbc), "--toml", str(toml), "-o", str(page)]) == 0
+    said = capsys.readouterr().out
+    assert "--map theta=InceptorPosition.LvrAngle theta_dot=InceptorPosition.LvrRate z_ddot=AhrsAccel.AccVert" in said
+    assert page.read_text().count("<svg") == 9  # as many as foreign.dbc has signals
+    assert "▁" in said
+    summary = replayed(tmp_path / "out", log, "--dbc", dbc, "--map", toml)
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+def test_columns_and_a_picture(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "signals.png"
+    assert cli.main(["map", str(folder / "columns.csv"), "-o", str(picture)]) == 0
+    assert "--map 'theta=Lever angle' 'theta_dot=Lever rate' 'z_ddot=Vertical acc.'" in capsys.readouterr().out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_proposed(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = folder / "flight.blf"
+    assert "add --dbc FILE" in refused(capsys, "map", log)
+    (tmp_path / "other.dbc").write_text('BU_: A\nBO_ 5 Nothing: 8 A\n SG_ Zero : 0|8@1+ (1,0) [0|0] "" A\n')
+    assert "is it the database of this bus?" in refused(capsys, "map", log, "--dbc", tmp_path / "other.dbc")
+    (tmp_path / "few.csv").write_text("time,rpm\n" + "".join(f"{k},{k % 7}\n" for k in range(100)))
+    assert "map it by hand" in refused(capsys, "map", tmp_path / "few.csv")
+    assert ".html or .png" in refused(
+        capsys, "map", log, "--dbc", folder / "foreign.dbc", "-o", tmp_path / "signals.pdf"
+    )
