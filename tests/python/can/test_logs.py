@@ -104,6 +104,14 @@ def test_a_line_that_is_no_frame_is_counted(line: str, tmp_path: Path) -> None:
     assert recording.ends_early == []
 
 
+def test_a_last_line_without_its_end_counts(tmp_path: Path) -> None:
+    log = tmp_path / "cut.log"
+    log.write_text("(1.0) can0 123#00\n(2.0) can0 124#00")
+    recording = Recording([log])
+    assert [frame["id"] for chunk in recording.chunks() for frame in chunk] == [0x123, 0x124]
+    assert (recording.damaged, recording.ends_early) == (0, [f"{log}: its last line has no end"])
+
+
 @pytest.mark.parametrize("block", [7, 64, 1000])
 def test_where_blocks_are_cut_makes_no_difference(
     block: int, session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -157,7 +165,9 @@ def test_several_logs_are_taken_in_the_order_of_time(session: Session, tmp_path:
 def test_standard_input_is_a_log(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     with session.log.open() as log:
         monkeypatch.setattr(sys, "stdin", log)
-        assert np.array_equal(frames_of(Path("-")), frames_of(session.log))
+        recording = Recording(["-"])
+        assert np.array_equal(np.concatenate(list(recording.chunks())), frames_of(session.log))
+    assert recording.done == recording.size == 0  # which nobody knows
 
 
 # --- what is no log --------------------------------------------------------------------------------------------------

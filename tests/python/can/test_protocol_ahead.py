@@ -70,6 +70,13 @@ def test_over_a_socket_until_the_other_end_closes() -> None:
                 port.read(1)
 
 
+def test_elsewhere_than_on_posix_a_channel_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "name", "nt")
+        channel = read_ahead("COM3")
+    assert channel == "COM3"
+
+
 def test_a_port_that_is_not_there_is_named_without_the_scheme() -> None:
     with pytest.raises(serial.SerialException, match="could not open port /dev/no_such_port"):
         serial.serial_for_url(read_ahead("/dev/no_such_port"))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.models.transfer import BAND, Transfer, roots
+from lever_cdkf.host_tools.models.transfer import Transfer, roots
 from scipy import signal
 
 
@@ -67,7 +67,7 @@ def test_shares_are_those_of_the_partial_fractions() -> None:
     numerator = np.polyadd(np.polymul(transfer.numerator[0], [1.0, 9.0]), 2.0 * transfer.denominator[0])
     denominator = np.polymul(transfer.denominator[0], [1.0, 9.0])
     residues, poles, _ = signal.residue(numerator, denominator)
-    s = 2j * math.pi * np.linspace(*BAND, 1000)
+    s = 2j * math.pi * np.linspace(2.0, 8.0, 1000)
     strength = {}
     for key in {(round(abs(pole), 6), round(pole.real, 6)) for pole in poles}:
         mine = [i for i, pole in enumerate(poles) if (round(abs(pole), 6), round(pole.real, 6)) == key]

@@ -16,7 +16,7 @@ import pytest
 from asammdf import MDF
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.replay import reduction
+from lever_cdkf.host_tools.replay import engine, reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
 from lever_cdkf.host_tools.replay.summary import verdict
 from python.conftest import Refused, Session, simulated
@@ -323,7 +323,9 @@ def test_the_summary_says_what_the_simulations_does(session: Session, replay: tu
 def test_a_long_log_is_reduced_for_the_page_and_nowhere_else(
     session: Session, replay: tuple[Path, Summary], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Also where it comes in many pieces."""
     monkeypatch.setattr(reduction.Stretches.__init__, "__defaults__", (256,))
+    monkeypatch.setattr(engine, "_ROWS_AT_ONCE", 700)
     assert replayed(tmp_path / "out", session.log) == replay[1]
     assert (tmp_path / "out/trace.csv").read_bytes() == (replay[0] / "trace.csv").read_bytes()
     short, whole = (figures(read(folder / "report.html")) for folder in (tmp_path / "out", replay[0]))

@@ -105,6 +105,7 @@ def test_cards_and_headline_say_what_the_summary_says(page: Reader, result: Resu
         expected = asdict(result.summary.parameters[key])
         assert f"{expected['rms_percent']:.1f} % {name}" in text
         assert f"{100 * expected['coverage_2sigma']:.0f} % {name}" in text
+    assert "in % of the truth, from 4 s after the start and each sudden change on." in text
     verdict = result.summary.verdict
     assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
 
@@ -222,6 +223,8 @@ def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result)
     signal = pytest.importorskip("scipy.signal")
     (trace,) = traces(page, "figure-slices", "measured coherence")
     frequency, coherence = unpack(trace["x"]), unpack(trace["y"])
+    assert (frequency[0], frequency[-1]) == pytest.approx((0.5, 12.0), abs=0.51)
+    assert frequency[0] == pytest.approx(0.5)
     inside = [np.where(np.isfinite(c), c, np.nanmean(c)) for c in (result.trace[name] for name in COHERENT)]
     expected_frequency, expected = signal.coherence(*inside, 1000.0, nperseg=2000)
     np.testing.assert_allclose(coherence, np.interp(frequency, expected_frequency, expected), atol=0.02)

@@ -115,6 +115,11 @@ def test_keys(flight: Flight) -> None:
             await pilot.press("f")
             await pilot.pause()
             assert "phase [deg]" in "\n".join(screen(app))
+            source.feed(flight.frames(100), flight.sample * 1e-3)
+            end = time.monotonic() + PATIENCE
+            while source._waiting and time.monotonic() < end:  # it goes on by itself
+                await pilot.pause(0.02)
+            assert not source._waiting
             await pilot.press("q")
         assert app.return_code == 0
         assert not source._thread.is_alive()
@@ -193,7 +198,7 @@ def test_bad_input_is_one_line(arguments: list[str], text: str, refused: Refused
 
 @pytest.mark.requires("tmux")
 def test_in_a_real_terminal(tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    server = ["tmux", "-L", f"lever-{tmp_path.name}", "-f", "/dev/null"]
+    server = ["tmux", "-S", str(tmp_path / "socket"), "-f", "/dev/null"]
 
     def tmux(*arguments: str) -> str:
         return subprocess.run([*server, *arguments], capture_output=True, text=True, check=True).stdout
