@@ -240,7 +240,7 @@ def encode_columns(name: str, counters: NDArray[np.int64], values: Mapping[str, 
     """encoder() of N frames at once, as (N, 8) bytes: every content of a message without multiplexing, by name."""
     import numpy as np
 
-    found, layout = message(name), _layout(name)
+    definition, layout = message(name), _layout(name)
     words = (np.asarray(counters, np.int64) & 15).astype(np.uint64) << np.uint64(layout.counter_start)
     for key, signal in layout.contents.items():
         mask = (1 << signal.length) - 1
@@ -251,7 +251,7 @@ def encode_columns(name: str, counters: NDArray[np.int64], values: Mapping[str, 
             fits = (steps > -most) & (steps < most)
             absent = np.where(np.isnan(steps) & (key + _VALID in layout.validity), 0.0, float(code))
             raw = np.where(fits, np.rint(np.where(fits, steps, 0.0)), absent)
-            for flag in (other for other in found.signals if other.name == key + _VALID):
+            for flag in (other for other in definition.signals if other.name == key + _VALID):
                 words |= fits.astype(np.uint64) << np.uint64(flag.start)
         words |= (raw.astype(np.int64) & mask).astype(np.uint64) << np.uint64(signal.start)
     data = words.astype("<u8").view(np.uint8).reshape(-1, 8)

@@ -15,7 +15,7 @@ from .sources import BusSource, LogSource
 
 
 class MappedLog:
-    """Of can.logs.Recording, what a LogSource needs: a mapped log with the estimator's answers."""
+    """A PlayedLog: a mapped log with the estimator's answers."""
 
     def __init__(self, path: str, reading: Reading, config: Config) -> None:
         """Reads all of it. Raises LeverError."""

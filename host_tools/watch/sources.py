@@ -15,7 +15,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..can import codec
 from ..can.buses import open_bus
@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     import can
 
     from ..arrays import ComplexArray, FloatArray
-    from ..can.logs import Recording
+    from ..can.bulk import Buses, Frames
     from ..firmware.config import Config
-    from .mapped import MappedLog
 
 MOST_WAITING = 65536
 """Frames: eight seconds of a full bus of 1 Mbit/s."""
@@ -178,6 +177,16 @@ class BusSource(Source):
         self._put((identifier, data))
 
 
+class PlayedLog(Protocol):
+    """What a LogSource plays: a can.logs.Recording, or frames that are made from a log of other signals."""
+
+    buses: Buses
+    damaged: int
+    ends_early: list[str]
+
+    def chunks(self) -> Iterator[Frames]: ...
+
+
 class LogSource(Source):
     """A recorded log; `channel` chooses among several in it. What is wrong in it is told in `error` at its end."""
 
@@ -185,7 +194,7 @@ class LogSource(Source):
         self,
         path: str,
         channel: str | None = None,
-        log: Recording | MappedLog | None = None,
+        log: PlayedLog | None = None,
         part: tuple[float, float] = (0.0, float("inf")),
     ) -> None:
         """Opens the log, unless `log` is it; of it `part` is played: start and length [s]. Raises LeverError."""
@@ -194,7 +203,7 @@ class LogSource(Source):
         super().__init__()
         self.title = path
         self._channel = channel
-        self._log = Recording([path]) if log is None else log
+        self._log: PlayedLog = Recording([path]) if log is None else log
         self._part = part
 
     def run(self) -> None:
@@ -244,7 +253,7 @@ class LogSource(Source):
             what = "in the part from --start on" if self._channel is None else f"of channel {self._channel} in it"
             raise LeverError(f"{self.title}: no CAN frame {what}")
         if self._log.damaged:
-            self.error = f"{self.title}: {self._log.damaged} lines of it are no frame"
+            self.error = f"{self.title}: {self._log.damaged} lines of it are not frames"
         if self._log.ends_early:
             self.error = self._log.ends_early[-1]
 

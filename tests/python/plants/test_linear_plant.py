@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from lever_cdkf.sil.plants.linear_plant import BlackBox, LinearTruth, Physical
 from python.plants.motion import PERIOD, TRIM, body, columns, moved
 from scipy import signal
 
-SYSTEMS = {  # matrix of the motion, and by z_ddot and tau_m, from the parameters of each
+SYSTEMS: dict[
+    type[LinearTruth], tuple[tuple[float, float, float], Any, Any]
+] = {  # matrix of the motion, and by z_ddot and tau_m, from the parameters of each
     Physical: ((3.2, 60.0, 2100.0), [[0, 1], [-2100.0 / 3.2, -60.0 / 3.2]], [[0, 0], [1, 1 / 3.2]]),
     BlackBox: ((-500.0, -14.0, -2.2), [[0, 1], [-500.0, -14.0]], [[0, 0], [-2.2, 0]]),
 }
@@ -27,7 +30,7 @@ def test_motion_dynamics_and_transfer_function_are_those_of_the_state_space(kind
     _, expected, _ = signal.lsim(system, np.column_stack((base, np.full(count, 0.4))), np.arange(count) * PERIOD)
     assert np.abs(path - expected).max() < 1e-4 * np.abs(expected).max()
     np.testing.assert_array_equal(list(truth.parameters.values()), columns(count, *parameters))
-    pole = np.linalg.eigvals(a)[0]
+    pole = np.linalg.eigvals(np.array(a, np.float64))[0]
     np.testing.assert_allclose(truth.dynamics.natural_frequency, abs(pole) / (2 * math.pi))
     np.testing.assert_allclose(truth.dynamics.damping_ratio, -pole.real / abs(pole))
     frequency = np.array([0.5, 3.0, 9.0])

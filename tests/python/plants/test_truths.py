@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,7 +73,8 @@ def test_the_motor_follows_its_command_with_its_lag(make: Make) -> None:
 def test_a_step_of_the_trim_takes_the_rest_position_along(make: Make) -> None:
     """That of the hysteretic arm by 99 %, since what relaxes slowest has not yet."""
     truth = make(3000, LEVER)
-    (truth.pilot if isinstance(truth, LeverTruth) else truth).trim[1000:] = 0.5  # type: ignore[attr-defined]
+    with_trim: Any = truth.pilot if isinstance(truth, LeverTruth) else truth
+    with_trim.trim[1000:] = 0.5
     last = moved(body(truth), 3000)[-1, 0] + TRIM
     assert last == pytest.approx(0.5, abs=1.5e-3 if isinstance(truth, Hysteretic) else 1e-5)
 

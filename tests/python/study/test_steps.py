@@ -76,7 +76,9 @@ def test_parameters_step_once(batch: Batch) -> None:
 
 
 def test_start_is_uniform_about_the_first_guess() -> None:
-    drawn = truth_of(stepped(Step(duration=2e-3, at=1e-3), 400, 3))[:, 0]
+    short = stepped(Step(duration=2e-3, at=1e-3), 400, 3)
+    assert short.samples == 2
+    drawn = truth_of(short)[:, 0]
     guess = [DEFAULTS[name] for name in ("m_p", "c_p", "k_p")]
     for index in range(3):
         assert kstest((drawn[:, index] / guess[index] - 0.75) / 0.5, "uniform").pvalue > 1e-3

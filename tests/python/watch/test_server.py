@@ -498,7 +498,7 @@ def test_a_source_that_fails_is_told_at_the_end(tmp_path: Any, capsys: pytest.Ca
     path = tmp_path / "garbage.log"
     path.write_text("(1.000000) can0 123#00\nnothing of the kind\n")
     assert cli.main(["live", str(path), "--port", "0", "--duration", "0.5"]) == 2
-    assert "garbage.log: 1 lines of it are no frame" in capsys.readouterr().err
+    assert "garbage.log: 1 lines of it are not frames" in capsys.readouterr().err
 
 
 def test_times_keep_their_resolution() -> None:
