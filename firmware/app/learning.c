@@ -193,8 +193,8 @@ static bool judge(
     if (fails || (held && learning->hands.off)) {
         whiteness_start(&learning->whiteness);
         take_back(learning, cdkf);
-    } else if (!held && !learning->hands.off) { /* another grip */
-        cdkf_open(cdkf); /* by whomever */
+    } else if (!held && !learning->hands.off) { /* another grip, by whomever */
+        cdkf_open(cdkf);
         keep_only(learning, cdkf);
         begin_grip(learning, true);
     } else {

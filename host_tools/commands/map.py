@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,8 +48,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--time", metavar="COLUMN", help="the column of time of a file (default: by its name)")
     parser.add_argument("--toml", metavar="FILE", type=Path, help="write the proposal as a mapping file")
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write plots of all signals: .html or .png")
-    add_part_options(parser)
-    parser.set_defaults(length=_LOOKED_AT)
+    add_part_options(parser, _LOOKED_AT)
     add_json_option(parser)
 
 
@@ -66,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
         check_not_input(path, [args.log, *([args.dbc] if args.dbc else [])])
     signals = _signals(args, start, length)
     mapping, proposed = propose(signals, args.log)
+    mapping = replace(mapping, time=args.time)
     inputs = {each.signal.name: each.key for each in proposed}
     rest = [_row("", signal) for signal in signals if signal.name not in inputs]
     print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rest}, args.json)
@@ -83,8 +84,6 @@ def run(args: argparse.Namespace) -> int:
 def _signals(args: argparse.Namespace, start: float, length: float) -> list[Signal]:
     from ..signals.reading import all_signals
 
-    if args.dbc is None and args.log.lower().endswith((".blf", ".asc", ".trc", ".log")):
-        raise LeverError(f"{args.log}: a log of a bus needs the database of its messages: add --dbc FILE")
     return all_signals(args.log, args.dbc, args.channel, args.time, start, length)
 
 

@@ -43,10 +43,11 @@ def add_signal_options(parser: argparse.ArgumentParser, *, part: bool = True) ->
         add_part_options(parser)
 
 
-def add_part_options(parser: argparse.ArgumentParser) -> None:
-    """--start and --length."""
+def add_part_options(parser: argparse.ArgumentParser, length: float | None = None) -> None:
+    """--start and --length, by default `length` [s], or all."""
+    usual = "all" if length is None else f"{length:g}"
     parser.add_argument("--start", metavar="S", type=float, default=0.0, help="first second used (default: 0)")
-    parser.add_argument("--length", metavar="S", type=float, default=None, help="seconds used (default: all)")
+    parser.add_argument("--length", metavar="S", type=float, default=length, help=f"seconds used (default: {usual})")
 
 
 def check_part(args: argparse.Namespace) -> tuple[float, float]:

@@ -202,19 +202,18 @@ def _gained(candidates: list[Candidate], gains: dict[tuple[str, str], tuple[floa
 
 def _coherence(base: Signal, lever: Signal) -> float:
     """Mean coherence of two signals from 2 to 8 Hz, less what chance gives."""
-    both = [np.where(np.isfinite(each), each, np.nanmean(each)) for each in together(base, lever) if len(each)]
-    if len(both) < 2 or len(both[0]) < 8 * _SEGMENT:
+    both = together(base, lever)
+    if len(both[0]) < 8 * _SEGMENT or not all(np.isfinite(each).any() for each in both):
         return 0.0
-    starts = range(0, len(both[0]) - _SEGMENT + 1, _SEGMENT // 2)
     window = np.hanning(_SEGMENT)
-    x, y = (
-        np.array(
-            [np.fft.rfft(window * np.diff(each[k : k + _SEGMENT + 1], prepend=each[k])[:_SEGMENT]) for k in starts]
-        )
-        for each in both
-    )
-    cross, power = np.mean(x.conj() * y, axis=0), np.mean(np.abs(x) ** 2, axis=0) * np.mean(np.abs(y) ** 2, axis=0)
+    spectra = []
+    for each in both:
+        filled = np.where(np.isfinite(each), each, np.nanmean(each))
+        pieces = np.lib.stride_tricks.sliding_window_view(np.diff(filled), _SEGMENT)[:: _SEGMENT // 2]
+        spectra.append(np.fft.rfft(window * pieces, axis=1))
+    cross = np.abs(np.mean(spectra[0].conj() * spectra[1], axis=0)) ** 2
+    power = np.mean(np.abs(spectra[0]) ** 2, axis=0) * np.mean(np.abs(spectra[1]) ** 2, axis=0)
     frequency = np.fft.rfftfreq(_SEGMENT, STEP)
     band = (frequency >= 2.0) & (frequency <= 8.0) & (power > 0.0)
-    chance = 2.0 / len(starts)
-    return max(float(np.mean(np.abs(cross[band]) ** 2 / power[band])) - chance, 0.0) if band.any() else 0.0
+    chance = 2.0 / len(spectra[0])
+    return max(float(np.mean(cross[band] / power[band])) - chance, 0.0) if band.any() else 0.0

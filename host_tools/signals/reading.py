@@ -73,6 +73,8 @@ class Loaded:
 def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> Loaded:
     """Samples of recorded logs, one after another in time, or of one file of columns. Raises LeverError."""
     paths = [str(path) for path in logs]
+    for path in paths:
+        _check_there(path)
     if any(is_table(path) for path in paths):
         if len(paths) > 1:
             raise LeverError(f"{', '.join(paths)}: files of columns are recordings of their own: add --each")
@@ -127,6 +129,7 @@ def all_signals(
     log: str, database: str | None, channel: str | None, time: str | None, start: float, length: float
 ) -> list[Signal]:
     """Every signal of a log or file, in a part of it. Raises LeverError."""
+    _check_there(log)
     if is_table(log):
         signals = read_table(log, time)
         first = min((float(each.time[0]) for each in signals if len(each.time)), default=0.0) + start
@@ -147,6 +150,11 @@ def all_signals(
     if not signals:
         raise LeverError(f"{log}: none of its frames is of a message of {database}: is it the database of this bus?")
     return signals
+
+
+def _check_there(path: str) -> None:
+    if path != "-" and not Path(path).exists():
+        raise LeverError(f"cannot read {path}: no such file")
 
 
 def _collect(reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None) -> int:

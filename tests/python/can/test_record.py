@@ -204,7 +204,11 @@ def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, refused: Refused) -
 def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """<linux/can/error.h>: byte 1 of class 4 has the controller's conditions; 0x40 is bus off, 0x100 restarted."""
 
-    count = Recorder._count
+    count, states = Recorder._count, list[str]()
+
+    def count_and_note(recorder: Recorder, frame: can.Message) -> None:
+        count(recorder, frame)
+        states.append(recorder.bus_state)
 
     class SocketcanBus(can.BusABC):
         channel_info = "a bus in a test"
@@ -225,13 +229,7 @@ def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path, m
 
     with SocketcanBus() as bus:
         recorder = Recorder(bus, tmp_path / "a.log", "can0")
-        states = []
-
-        def note(self: Recorder, frame: can.Message) -> None:
-            count(self, frame)
-            states.append(self.bus_state)
-
-        monkeypatch.setattr(Recorder, "_count", note)
+        monkeypatch.setattr(Recorder, "_count", count_and_note)
         recorder.run(lambda: not bus.frames, lambda _: None)
     assert states == ["active", "warning", "passive", "bus off", "active", "active"]
     assert recorder.error_frames == 6

@@ -109,7 +109,8 @@ def test_a_missing_extra(
         monkeypatch.delitem(sys.modules, package, raising=False)
     monkeypatch.setattr(sys, "meta_path", [type("Blocker", (), {"find_spec": find_spec})(), *sys.meta_path])
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "session.mf4").write_text("a log")
+    for name in ("session.mf4", "flight.parquet", "flight.mat"):
+        (tmp_path / name).write_text("a log")
     assert cli.main(arguments.split()) == 2
     names = " and ".join(PACKAGES[extra])
     assert capsys.readouterr() == (

@@ -74,7 +74,8 @@ def test_a_gap_is_longer_than_a_period_and_a_half(step: int, gaps: int) -> None:
     sender[50:] += step - 1000
     recorded[50:] += step - 1000
     _, timeline = seconds(recorded, sender)
-    assert [timeline.clocks.gaps, timeline.clocks.longest_gap_s] == pytest.approx([gaps, gaps * step * 1e-6])
+    assert timeline.clocks.gaps == gaps
+    assert timeline.clocks.longest_gap_s == pytest.approx(gaps * step * 1e-6)
 
 
 @pytest.mark.parametrize(("jump", "jumps"), [(990_000, 0), (1_010_000, 1)])

@@ -26,7 +26,8 @@ def test_figures_of_innovations_are_those_of_chi_square() -> None:
         innovations.add(values[piece], outputs[piece])
     used = (outputs > 0) & np.isfinite(values)
     told, expected = innovations.figures(), outputs[used].mean()
-    assert [told.mean, told.expected] == pytest.approx([values[used].mean(), expected])
+    assert told.mean == pytest.approx(values[used].mean())
+    assert told.expected == pytest.approx(expected)
     half = stats.norm.ppf(0.975) * math.sqrt(2.0 * expected / used.sum())  # the variance of chi-square is 2 n
     assert told.mean_band_95 == pytest.approx([expected - half, expected + half])
     inside = values[used] <= stats.chi2.ppf(0.95, outputs[used])

@@ -221,6 +221,9 @@ def test_what_is_wrong_with_a_mapping(
 def test_what_is_missing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, dbc = folder / "flight.blf", folder / "foreign.dbc"
     assert "add --dbc FILE" in refused(capsys, "replay", log, "--map", *MAPPED)
+    for suffix in ("csv", "parquet", "mat", "npz", "mf4", "blf"):
+        nothing = folder / f"nothing.{suffix}"
+        assert f"cannot read {nothing}: no such file" in refused(capsys, "replay", nothing, "--map", *MAPPED)
     assert "`lever map" in refused(capsys, "replay", log, "--dbc", dbc)
     assert "has no z_ddot" in refused(capsys, "replay", log, "--dbc", dbc, "--map", "theta=LvrAngle")
     assert "no database of CAN messages" in refused(capsys, "replay", log, "--dbc", log, "--map", *MAPPED)

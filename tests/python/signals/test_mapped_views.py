@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 import time
 from collections import deque
 from pathlib import Path
+from typing import ClassVar
 
 import can
 import pytest
@@ -17,9 +19,27 @@ from lever_cdkf.host_tools.signals.mapping import read_mapping
 from lever_cdkf.host_tools.signals.online import Online
 from lever_cdkf.host_tools.watch.mapped import MappedBusSource
 from lever_cdkf.host_tools.watch.picture import Picture
-from python.can.test_record import Line
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY
 from python.signals.test_mapped_replay import frequency, refused, replayed
+
+
+class Line(can.BusABC):
+    """A bus on which `frames` come, and then Ctrl-C."""
+
+    channel_info = "a bus in a test"
+    frames: ClassVar[deque[can.Message]] = deque()
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(channel)
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        if self.frames:
+            return self.frames.popleft()
+        signal.raise_signal(signal.SIGINT)
+        return None
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise NotImplementedError
 
 
 def shown_frequency(text: str) -> float:
@@ -76,7 +96,7 @@ def test_a_view_of_a_bus(folder: Path, frames: list[can.Message]) -> None:
 def test_a_recording_says_what_has_come_of_the_mapped_signals(
     folder: Path, frames: list[can.Message], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(BACKENDS, "kvaser", ("python.can.test_record", Line.__name__))
+    monkeypatch.setitem(BACKENDS, "kvaser", (__name__, Line.__name__))
     recording = ["record", "--interface", "kvaser", "--channel", "x", "--json", str(tmp_path / "rows.json")]
     mapped = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]
     Line.frames = deque(frames[:16000])

@@ -14,15 +14,15 @@ TOLERANCE = 0.02
 ACCEPT = "cmake --build build --target budget-accept"
 
 LIMITS = {
-    "instructions.dual.lever.mean": 2800,
+    "instructions.dual.lever.mean": 2500,
     "instructions.dual.lever.worst": 7500,
     "instructions.dual.lever.start_up_worst": 7500,
     "instructions.tick.dual.lever.mean": 4000,
     "instructions_after_gap.dual": 20000,
-    "cycles.dual.lever.mean": 4600,
+    "cycles.dual.lever.mean": 3900,
     "init.instructions": 100_000,
-    "text_bytes": 33 << 10,
-    "memory_bytes": 28 << 6,
+    "text_bytes": 32 << 10,
+    "memory_bytes": 27 << 6,
     "stack_bytes": 1 << 10,
     "data_bytes": 0,
     "bss_bytes": 0,
