@@ -72,6 +72,7 @@ def test_short_white_noise_is_called_coloured_once_in_twenty() -> None:
 
 def test_what_is_too_short_or_holds_nothing_is_not_judged() -> None:
     assert whiteness.measure(np.random.default_rng(8).standard_normal(4 * LAGS * SIZE - 1), PERIOD) is None
+    assert whiteness.measure(np.random.default_rng(8).standard_normal(4 * LAGS * SIZE), PERIOD) is not None
     assert whiteness.measure(np.zeros(60_000), PERIOD) is None
     assert whiteness.measure(np.full(60_000, np.nan), PERIOD) is None
 
