@@ -225,6 +225,9 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     if (!lesson->excited && (learning->wait < AWAKE)) {
         learning->wait = AWAKE;
     }
+    if (!lesson->measured) {
+        learning->followed = 2.0f * FOLLOWED_MOST; /* after an outage innovations are large for a while, too */
+    }
     learning->changed = (learning->changed > period) ? (learning->changed - period) : 0.0f;
     if (learning->hands.off) {
         disturb(s, cdkf, 1.0f);
