@@ -2,8 +2,6 @@
 #include "math/share.h"
 
 #define REPORTED 3.0f         /* time for which a change is reported [s] */
-#define FOLLOWED_MOST 3.0f    /* changes followed before others wait until none is reported: what looks like changes */
-#define FOLLOWED_MEMORY 10.0f /* may be noise that is not known yet [s] */
 #define HELD 0.7f             /* hands_t.residual over change: with less nobody may hold the lever any more */
 #define TRANSIENT 2.0f        /* left of it when innovations are noise again, and not of the change [s] */
 #define KEEP_PERIOD 1.0f      /* [s] */
@@ -38,7 +36,7 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
     learning->wait = 0.0f;
     learning->changed = 0.0f;
     learning->gripping = 0.0f;
-    learning->followed = 0.0f;
+    learning->calm = false;
     learning->held_again = false;
     learning->moved = false;
     learning->bounded = false;
@@ -114,14 +112,13 @@ static void follow_grip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf
     }
 }
 
-/* Another change soon after one is followed as well, but not while it may be that nobody holds the lever any more: then
- * the hands are to be judged first. */
+/* Another change soon after one is followed as well, if innovations were as expected in between: otherwise it may be noise
+ * that has grown. But not while it may be that nobody holds the lever any more: then the hands are to be judged first. */
 static bool may_follow(const learning_t *learning, const lever_settings_t *s)
 {
     const hands_t *hands = &learning->hands;
-    return (learning->changed <= 0.0f) ||
-           ((learning->changed <= (REPORTED - s->change_memory)) && (learning->followed < FOLLOWED_MOST) &&
-               is_known(learning) && (hands->residual > (HELD * hands->change)));
+    return (learning->changed <= 0.0f) || ((learning->changed <= (REPORTED - s->change_memory)) && learning->calm &&
+                                              is_known(learning) && (hands->residual > (HELD * hands->change)));
 }
 
 /* A sudden change of the pilot counts as change_walk seconds of the walk, once: a disturbance that only looks like
@@ -132,11 +129,11 @@ static float detect_change(
     const lever_settings_t *s = setup->settings;
     const bool detected =
         change_detection_step(&learning->change, correction, period, s->change_memory, s->change_threshold);
+    learning->calm = learning->calm || (learning->monitor.surprise < UNSURPRISED);
     const bool changed = detected && may_follow(learning, s);
-    learning->followed -= learning->followed * share_of(period, FOLLOWED_MEMORY);
     if (changed) {
         learning->changed = REPORTED;
-        learning->followed += 1.0f;
+        learning->calm = false;
         if (is_known(learning) && setup->constants.trim) {
             begin_grip(learning, false);
         } else if (unknown_part(learning) > 0.0f) { /* far from the truth, or noise set far too small */
@@ -224,9 +221,6 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     learning->wait = (learning->wait > period) ? (learning->wait - period) : 0.0f;
     if (!lesson->excited && (learning->wait < AWAKE)) {
         learning->wait = AWAKE;
-    }
-    if (!lesson->measured) {
-        learning->followed = 2.0f * FOLLOWED_MOST; /* after an outage innovations are large for a while, too */
     }
     learning->changed = (learning->changed > period) ? (learning->changed - period) : 0.0f;
     if (learning->hands.off) {

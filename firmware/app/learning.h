@@ -30,8 +30,8 @@ typedef struct learning {
     float elapsed;      /* since the parameters learnt last [s] */
     float wait;         /* time until anything is taught: what was before has to die away [s] */
     float changed;      /* time left to report a change [s] */
-    float followed;     /* changes that were followed, with exponential forgetting */
     float gripping;     /* time left until a new grip is complete; 0: none is under way [s] */
+    bool calm;          /* innovations have been as expected since the last change */
     bool held_again;    /* it is the first after hands off */
     bool moved;         /* it is complete, and has moved the lever: levels and state are to begin anew */
     bool bounded;       /* a parameter rested on a bound then */
