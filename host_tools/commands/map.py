@@ -47,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--channel", metavar="NAME", help="the bus that is looked at (default: all)")
     parser.add_argument("--time", metavar="COLUMN", help="the column of time of a file (default: by its name)")
     parser.add_argument("--toml", metavar="FILE", type=Path, help="write the proposal as a mapping file")
-    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write plots of all signals: .html or .png")
+    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write plots of what changes: .html or .png")
     add_part_options(parser, _LOOKED_AT)
     add_json_option(parser)
 
@@ -68,14 +68,18 @@ def run(args: argparse.Namespace) -> int:
     mapping, proposed = propose(signals, args.log)
     mapping = replace(mapping, time=args.time)
     inputs = {each.signal.name: each.key for each in proposed}
-    rest = [_row("", signal) for signal in signals if signal.name not in inputs]
-    print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rest}, args.json)
+    others = [signal for signal in signals if signal.name not in inputs]
+    changing = [signal for signal in others if signal.changes()]
+    rows = [_row("", signal) for signal in changing]
+    print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json)
+    if len(changing) < len(others):
+        print(f"{len(others) - len(changing)} other signals never change, and are not shown.")
     print(_command(args, mapping, proposed))
     if args.toml is not None:
         write_text(args.toml, as_toml(mapping))
     if args.out is not None:
         shown = [(each.key, each.signal) for each in proposed]
-        write(args.out, shown + [("", each) for each in signals if each.name not in inputs], Path(args.log).name)
+        write(args.out, shown + [("other", each) for each in changing], Path(args.log).name)
     if written := [str(path) for path in (args.toml, args.out) if path is not None]:
         print(f"Written: {', '.join(written)}")
     return 0

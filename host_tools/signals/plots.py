@@ -55,6 +55,11 @@ def _parts(signal: Signal, count: int) -> tuple[FloatArray, FloatArray]:
     return (np.arange(count) + 0.5) * (last - first) / count, means
 
 
+def _points(signal: Signal, most: int) -> int:
+    """So few that a slow signal has a value in each: a line has no gaps then."""
+    return max(min(most, len(signal.time) // 2), 1)
+
+
 def _extremes(signal: Signal) -> str:
     present = signal.values[np.isfinite(signal.values)]
     if not len(present):
@@ -81,7 +86,7 @@ def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
 
 
 def _svg(signal: Signal) -> str:
-    time, values = _parts(signal, _POINTS)
+    time, values = _parts(signal, _points(signal, _POINTS))
     present = values[np.isfinite(values)]
     low, span = (float(present.min()), float(np.ptp(present)) or 1.0) if len(present) else (0.0, 1.0)
     last = float(time[-1]) if len(time) else 1.0
@@ -102,7 +107,7 @@ def _picture(path: Path, signals: Sequence[tuple[str, Signal]], title: str) -> N
     figure.suptitle(title)
     axes = figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (heading, signal) in zip(axes, signals, strict=True):
-        time, values = _parts(signal, 4 * _POINTS)
+        time, values = _parts(signal, _points(signal, 4 * _POINTS))
         axis.plot(time, values, linewidth=0.7)
         axis.set_ylabel(signal.unit or "no unit")
         axis.set_title(f"{heading}: {signal.name}", fontsize="small", loc="left")

@@ -35,6 +35,11 @@ class Signal:
         usual = steps[(steps > 0.5 * middle) & (steps < 1.5 * middle)]  # without gaps; jitter does not move their mean
         return float(np.mean(usual))
 
+    def changes(self) -> bool:
+        """Whether it has more than one value."""
+        present = self.values[np.isfinite(self.values)]
+        return len(present) > 0 and bool((present != present[0]).any())
+
     def between(self, start: float, end: float) -> Signal:
         """The part from `start` to `end` [s]."""
         inside = (self.time >= start) & (self.time < end)
