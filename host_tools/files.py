@@ -30,7 +30,14 @@ def native_file(name: str) -> Path:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Writes `text` as UTF-8 so that the file holds either all of it or what it held before. Raises LeverError.
+    """Writes `text` as UTF-8, as whole() does. Raises LeverError."""
+    with whole(path) as target:
+        target.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Where to write so that the file `path` holds either all of it or what it held before. Raises LeverError.
 
     What is not a file (/dev/stdout, a named pipe) is written to as it is.
     """
@@ -40,11 +47,10 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         final = Path(os.path.realpath(final))  # of a symbolic link, the file and not the link is replaced
     target = final if in_place else final.with_name(f".{final.name}.{os.getpid()}.tmp")
     try:
-        target.write_text(text, encoding="utf-8")
-        if not in_place:
-            os.replace(target, final)
-    except OSError as error:
-        raise LeverError(f"cannot write {path}: {error.strerror}") from None
+        with writing(Path(path)):
+            yield target
+            if not in_place:
+                os.replace(target, final)
     finally:
         if not in_place:
             with suppress(OSError):

@@ -18,6 +18,7 @@ from ..firmware.quantities import Quantity, quantities
 from ..report.document import document
 from ..report.figure import Figure, axis, line
 from ..report.page import Page
+from ..report.summary_html import table
 from ..tables import Row
 from .engine import Options, Progress, replay
 from .summary import failure
@@ -126,12 +127,10 @@ def _page(replays: Sequence[Replayed]) -> str:
     caption = "The estimates of all logs over the time since the start of each."
     page.section("estimates", "Estimates", "Estimates", page.figure("overlay", _figure(shown), caption))
     rows = rows_of(replays)
-    cells = "".join(f"<tr>{''.join(f'<td>{_cell(cell)}</td>' for cell in row.values())}</tr>" for row in rows)
-    heads = "".join(f"<th>{html.escape(name)}</th>" for name in rows[0])
-    table = f'<div class="wide"><table><thead><tr>{heads}</tr></thead><tbody>{cells}</tbody></table></div>'
-    page.section("numbers", "At the end", "At the end of each", table)
+    cells = ([_cell(cell) for cell in row.values()] for row in rows)
+    page.section("numbers", "At the end", "At the end of each", table([html.escape(name) for name in rows[0]], cells))
     body = f"<header><h1>{html.escape(title)}</h1></header>{''.join(page.sections)}"
-    return document(title, body, {key: figure.spec() for key, figure in page.figures.items()}, ".wide{overflow-x:auto}")
+    return document(title, body, {key: figure.spec() for key, figure in page.figures.items()})
 
 
 def _cell(cell: Any) -> str:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
-from ..firmware.config import Config, setting
+from ..firmware.config import Config
 from ..firmware.estimator import run_samples
 from .arrays import columns_of, signals_by_input
 from .inputs import samples_of, understood
 from .mapping import Source
 from .recorded import Signal
+from .resample import at_period
 from .result import Result
 from .slope import slope_ratio
 from .units import KINDS, guess
@@ -55,11 +56,7 @@ def estimate(
     _check_units(signals)
     sources = {key: Source(signal.name, signal.unit or KINDS[key][1]) for key, signal in signals.items()}
     taken, notes = samples_of({key: understood(key, sources[key], signal) for key, signal in signals.items()})
-    config = config or Config()
-    settings = config.settings
-    if settings["sample_period"] == setting("sample_period").default:
-        settings["sample_period"] = taken.period
-    config = Config(**config.choices, settings=settings)
+    config = at_period(config or Config(), taken.period)
     return Result(config, taken.time_us, run_samples(config, taken.arrays()), tuple(notes))
 
 

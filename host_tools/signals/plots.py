@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..errors import LeverError
 from ..extras import require
-from ..files import write_text
+from ..files import whole, write_text
 from .recorded import Signal
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
@@ -112,18 +111,5 @@ def _picture(path: Path, signals: Sequence[tuple[str, Signal]], title: str) -> N
         axis.set_ylabel(signal.unit or "no unit")
         axis.set_title(f"{heading}: {signal.name}", fontsize="small", loc="left")
     axes[-1].set_xlabel("time [s]")
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=150)
-    write_bytes(path, picture.getvalue())
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """A file that is there whole or not at all. Raises LeverError."""
-    partial = path.with_name(f".{path.name}.tmp")
-    try:
-        partial.write_bytes(content)
-        partial.replace(path)
-    except OSError as error:
-        raise LeverError(f"cannot write {path}: {error.strerror}") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole(path) as target:
+        figure.savefig(target, format="png", dpi=150)

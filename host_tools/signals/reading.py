@@ -115,7 +115,7 @@ def _of_table(path: str, reading: Reading) -> Loaded:
     mapping = reading.mapping
     columns = read_table(path, None if mapping is None else mapping.time)
     mapping = mapping or own_mapping(columns, path)
-    start = min((float(each.time[0]) for each in columns if len(each.time)), default=0.0) + reading.start
+    start = _beginning(columns) + reading.start
     inputs = {}
     for key, source in mapping.sources.items():
         signal = column(columns, source.signal, path).between(start, start + reading.length)
@@ -132,7 +132,7 @@ def all_signals(
     _check_there(log)
     if is_table(log):
         signals = read_table(log, time)
-        first = min((float(each.time[0]) for each in signals if len(each.time)), default=0.0) + start
+        first = _beginning(signals) + start
         return [each.between(first, first + length) for each in signals]
     if database is None:
         raise LeverError(f"{log}: a log of a bus needs the database of its messages: add --dbc FILE")
@@ -150,6 +150,11 @@ def all_signals(
     if not signals:
         raise LeverError(f"{log}: none of its frames is of a message of {database}: is it the database of this bus?")
     return signals
+
+
+def _beginning(columns: Sequence[Signal]) -> float:
+    """The first time of a file [s]."""
+    return min((float(each.time[0]) for each in columns if len(each.time)), default=0.0)
 
 
 def _check_there(path: str) -> None:

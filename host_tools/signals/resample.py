@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..errors import LeverError
-from ..firmware.config import setting
+from ..firmware.config import Config, setting
 from .recorded import Signal, ordered
 
 _ALIKE = 1.33  # periods that differ by less are of one rate
@@ -79,6 +79,14 @@ def check_period(period: float, key: str, name: str) -> None:
             f"{key} = {name} comes {rate}; the firmware takes samples from {1.0 / row.greatest:g} to "
             f"{1.0 / row.least:g} Hz: take a faster signal, or record it faster"
         )
+
+
+def at_period(config: Config, period: float) -> Config:
+    """`config` with the period of the samples [s], unless it sets one that is not the default. Raises LeverError."""
+    settings = config.settings
+    if settings["sample_period"] == setting("sample_period").default:
+        settings["sample_period"] = period
+    return Config(**config.choices, settings=settings)
 
 
 def _clock(signals: Mapping[str, Signal]) -> str:

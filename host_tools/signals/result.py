@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import FloatArray, IntArray
 from ..extras import require
-from ..files import writing
+from ..files import whole
 from ..firmware.config import Config
 from ..firmware.estimator import fault_names
 from ..firmware.library import enum_names
@@ -123,14 +123,8 @@ class Result(Mapping[str, Estimated]):
             array = pyarrow.array(values.tolist() if values.dtype.kind == "U" else values)
             arrays.append(array)
             fields.append(pyarrow.field(name, array.type, metadata={"unit": unit} if unit else None))
-        path = Path(path)
-        partial = path.with_name(f".{path.name}.tmp")
-        try:
-            with writing(path):
-                parquet.write_table(pyarrow.table(arrays, schema=pyarrow.schema(fields)), partial)
-                partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+        with whole(path) as target:
+            parquet.write_table(pyarrow.table(arrays, schema=pyarrow.schema(fields)), target)
 
     def plot(self) -> Any:
         """The parameters, natural frequency and damping ratio over time with their bands of ±2 sigma, as a Figure of

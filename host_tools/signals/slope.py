@@ -24,15 +24,18 @@ def together(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
 
 def slope_likeness(angle: Signal, rate: Signal) -> float:
     """Correlation of the slope of an angle with a rate; 0 where there is too little of both."""
-    slope, value = _slope_and_rate(angle, rate)
-    return float(np.corrcoef(slope, value)[0, 1]) if len(slope) else 0.0
+    return _likeness(*_slope_and_rate(angle, rate))
 
 
 def slope_ratio(angle: Signal, rate: Signal) -> float:
     """A rate as a multiple of the slope of the angle, negative where their signs differ; 0 where they are not alike."""
     slope, value = _slope_and_rate(angle, rate)
-    likeness = slope_likeness(angle, rate)
+    likeness = _likeness(slope, value)
     return float(np.sign(likeness) * np.std(value) / np.std(slope)) if abs(likeness) > _ALIKE else 0.0
+
+
+def _likeness(slope: FloatArray, rate: FloatArray) -> float:
+    return float(np.corrcoef(slope, rate)[0, 1]) if len(slope) else 0.0
 
 
 def _slope_and_rate(angle: Signal, rate: Signal) -> tuple[FloatArray, FloatArray]:

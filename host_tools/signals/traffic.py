@@ -10,9 +10,9 @@ import numpy as np
 
 from ..can import codec
 from ..can.bulk import FRAME, Frames
-from ..firmware.config import Config, setting
+from ..firmware.config import Config
 from .reading import Loaded, Progress, Reading, read
-from .resample import Samples
+from .resample import Samples, at_period
 
 _SAMPLES_AT_ONCE = 1 << 15
 BUS = "mapped"
@@ -67,11 +67,8 @@ class MappedTraffic:
         self.first_us, self.last_us = int(time_us[0]), int(time_us[-1])
 
     def at_its_rate(self, config: Config) -> Config:
-        """`config` with the sample period of the log, unless it sets one that is not the default. Raises LeverError."""
-        settings = config.settings
-        if settings["sample_period"] == setting("sample_period").default:
-            settings["sample_period"] = self.loaded.samples.period
-        return Config(**config.choices, settings=settings)
+        """`config` with the sample period of the log, as at_period() says. Raises LeverError."""
+        return at_period(config, self.loaded.samples.period)
 
     def chunks(self) -> Iterator[Frames]:
         """The frames."""

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..can.bulk import Buses, Feeder, Frames
-from ..firmware.config import Config, setting
+from ..firmware.config import Config
 from ..firmware.estimator import FRAME_SAMPLE, Estimator
 from ..signals.online import Online
 from ..signals.reading import Reading
+from ..signals.resample import at_period
 from ..signals.traffic import MappedTraffic
 from .sources import BusSource, LogSource
 
@@ -71,15 +72,10 @@ class MappedBusSource(BusSource):
 
     def _feed(self, identifier: int, data: bytes) -> None:
         if self._estimator is None:
-            self._estimator = Estimator(self._at_its_rate())
+            assert self._online.period is not None  # it is known before the first frame
+            self._estimator = Estimator(at_period(self._config, self._online.period))
         self._put((identifier, data))
         if self._estimator.on_frame(identifier, data) == FRAME_SAMPLE:
             self._estimator.step()
         while (answer := self._estimator.next_frame()) is not None:
             self._put(answer)
-
-    def _at_its_rate(self) -> Config:
-        settings = self._config.settings
-        if settings["sample_period"] == setting("sample_period").default and self._online.period is not None:
-            settings["sample_period"] = self._online.period
-        return Config(**self._config.choices, settings=settings)

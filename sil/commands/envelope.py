@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,8 @@ from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder, write_text
 from lever_cdkf.host_tools.progress import Progress
+
+from .names import check_names
 
 if TYPE_CHECKING:
     from ..envelope.campaign import Result
@@ -121,11 +122,7 @@ def _chosen(args: argparse.Namespace) -> list[Condition]:
     """The conditions that were asked for. Raises LeverError for one that is not known."""
     from ..envelope.conditions import CONDITIONS
 
-    for name in args.only or ():
-        if name not in CONDITIONS:
-            near = difflib.get_close_matches(name, CONDITIONS, n=1)
-            hint = f"did you mean {near[0]}?" if near else "`lever envelope --list` lists them all"
-            raise LeverError(f"no condition {name!r}; {hint}")
+    check_names("condition", args.only or (), CONDITIONS, "lever envelope --list")
     if args.only:
         return [CONDITIONS[name] for name in dict.fromkeys(args.only)]
     return [condition for condition in CONDITIONS.values() if condition.quick or not args.quick]

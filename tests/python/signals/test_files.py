@@ -15,8 +15,9 @@ from asammdf import MDF
 from asammdf import Signal as Channel
 from lever_cdkf.host_tools.signals.tables import read_table
 from pyarrow import parquet
+from python.conftest import Refused
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight
-from python.signals.test_mapped_replay import fed_directly, frequency, refused, replayed
+from python.signals.test_mapped_replay import fed_directly, frequency, replayed
 from scipy.io import savemat
 
 Columns = dict[str, np.ndarray[tuple[int], np.dtype[np.float64]]]
@@ -148,9 +149,7 @@ def test_every_kind_of_csv(kind: str, packed: bool, columns: Columns, tmp_path: 
         ("broken.mf4", b"MDF     nothing", "it cannot be read"),
     ],
 )
-def test_what_is_no_table(
-    name: str, content: bytes, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_table(name: str, content: bytes, said: str, tmp_path: Path, refused: Refused) -> None:
     (tmp_path / name).write_bytes(content)
-    assert said in refused(capsys, "replay", tmp_path / name, "--map", "theta=a", "z_ddot=b", "-o", tmp_path / "out")
+    assert said in refused("replay", tmp_path / name, "--map", "theta=a", "z_ddot=b", "-o", tmp_path / "out")
     assert not list(tmp_path.glob("out/*"))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.firmware.native import Config, run_samples
+from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
 
 COLUMNS = ("theta=Lever angle", "theta_dot=Lever rate", "z_ddot=Vertical acc.")
@@ -21,16 +22,6 @@ def replayed(out: Path, log: Path, *arguments: str | Path) -> dict[str, Any]:
     assert cli.main(["replay", str(log), *map(str, arguments), "-o", str(out)]) == 0
     summary: dict[str, Any] = json.loads((out / "summary.json").read_text())
     return summary
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
-    """What a command says that must fail, in one line."""
-    capsys.readouterr()
-    assert cli.main([*map(str, arguments)]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("lever: error: ")
-    assert said.count("\n") == 1
-    return said
 
 
 def frequency(summary: dict[str, Any]) -> float:
@@ -88,11 +79,11 @@ def test_at_other_rates(step: int, flight: Flight, tmp_path: Path) -> None:
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
 
 
-def test_too_slow_is_refused(flight: Flight, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_slow_is_refused(flight: Flight, tmp_path: Path, refused: Refused) -> None:
     slow = flight.every(20)
     columns = np.column_stack((slow.time, slow.theta, slow.z_ddot))
     np.savetxt(tmp_path / "slow.csv", columns, "%.7f", ",", header="t,theta,z_ddot", comments="")
-    said = refused(capsys, "replay", tmp_path / "slow.csv", "-o", tmp_path / "out")
+    said = refused("replay", tmp_path / "slow.csv", "-o", tmp_path / "out")
     assert "every 40 ms (25 Hz); the firmware takes samples from 50 to 10000 Hz" in said
     assert not list(tmp_path.glob("out/*"))
 
@@ -211,23 +202,21 @@ def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
         (("nothing.toml",), "cannot read nothing.toml: No such file"),
     ],
 )
-def test_what_is_wrong_with_a_mapping(
-    mapped: tuple[str, ...], said: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_wrong_with_a_mapping(mapped: tuple[str, ...], said: str, folder: Path, refused: Refused) -> None:
     arguments: list[str | Path] = ["--dbc", folder / "foreign.dbc", "--map", "z_ddot=AccVert", *mapped]
-    assert said in refused(capsys, "replay", folder / "flight.blf", *arguments)
+    assert said in refused("replay", folder / "flight.blf", *arguments)
 
 
-def test_what_is_missing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_missing(folder: Path, refused: Refused) -> None:
     log, dbc = folder / "flight.blf", folder / "foreign.dbc"
-    assert "add --dbc FILE" in refused(capsys, "replay", log, "--map", *MAPPED)
+    assert "add --dbc FILE" in refused("replay", log, "--map", *MAPPED)
     for suffix in ("csv", "parquet", "mat", "npz", "mf4", "blf"):
         nothing = folder / f"nothing.{suffix}"
-        assert f"cannot read {nothing}: no such file" in refused(capsys, "replay", nothing, "--map", *MAPPED)
-    assert "`lever map" in refused(capsys, "replay", log, "--dbc", dbc)
-    assert "has no z_ddot" in refused(capsys, "replay", log, "--dbc", dbc, "--map", "theta=LvrAngle")
-    assert "no database of CAN messages" in refused(capsys, "replay", log, "--dbc", log, "--map", *MAPPED)
+        assert f"cannot read {nothing}: no such file" in refused("replay", nothing, "--map", *MAPPED)
+    assert "`lever map" in refused("replay", log, "--dbc", dbc)
+    assert "has no z_ddot" in refused("replay", log, "--dbc", dbc, "--map", "theta=LvrAngle")
+    assert "no database of CAN messages" in refused("replay", log, "--dbc", log, "--map", *MAPPED)
     assert "no column Angel" in refused(
-        capsys, "replay", folder / "columns.csv", "--map", "theta=Angel", "z_ddot=Vertical acc."
+        "replay", folder / "columns.csv", "--map", "theta=Angel", "z_ddot=Vertical acc."
     )
-    assert "--map theta=COLUMN" in refused(capsys, "replay", folder / "columns.csv")
+    assert "--map theta=COLUMN" in refused("replay", folder / "columns.csv")

@@ -19,8 +19,9 @@ from lever_cdkf.host_tools.signals.mapping import read_mapping
 from lever_cdkf.host_tools.signals.online import Online
 from lever_cdkf.host_tools.watch.mapped import MappedBusSource
 from lever_cdkf.host_tools.watch.picture import Picture
+from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY
-from python.signals.test_mapped_replay import frequency, refused, replayed
+from python.signals.test_mapped_replay import frequency, replayed
 
 
 class Line(can.BusABC):
@@ -115,9 +116,7 @@ def test_a_recording_says_what_has_come_of_the_mapped_signals(
     assert cli.main([*recording, "-o", str(tmp_path / "other.log"), *mapped]) == 0
 
 
-def test_what_a_bus_needs(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+def test_what_a_bus_needs(capsys: pytest.CaptureFixture[str], refused: Refused, folder: Path) -> None:
     bus = ("monitor", "--once", "--interface", "virtual", "--channel", "x")
-    assert "both --dbc FILE and --map" in refused(capsys, *bus, "--map", *MAPPED)
-    assert "no signal" in refused(
-        capsys, *bus, "--dbc", folder / "foreign.dbc", "--map", "theta=Nothing", "z_ddot=AccVert"
-    )
+    assert "both --dbc FILE and --map" in refused(*bus, "--map", *MAPPED)
+    assert "no signal" in refused(*bus, "--dbc", folder / "foreign.dbc", "--map", "theta=Nothing", "z_ddot=AccVert")

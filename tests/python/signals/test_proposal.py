@@ -10,9 +10,10 @@ import cantools.database
 import pytest
 from cantools.database.can import Database
 from lever_cdkf.host_tools import cli
+from python.conftest import Refused
 from python.signals.databases import AIRCRAFT, database
 from python.signals.flight import NATURAL_FREQUENCY, Flight, write_log
-from python.signals.test_mapped_replay import frequency, refused, replayed
+from python.signals.test_mapped_replay import frequency, replayed
 
 
 def recorded(index: int, flight: Flight, folder: Path) -> tuple[Path, Path, dict[str, str]]:
@@ -72,13 +73,11 @@ def test_columns_and_a_picture(folder: Path, tmp_path: Path, capsys: pytest.Capt
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_what_cannot_be_proposed(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_proposed(folder: Path, tmp_path: Path, refused: Refused) -> None:
     log = folder / "flight.blf"
-    assert "add --dbc FILE" in refused(capsys, "map", log)
+    assert "add --dbc FILE" in refused("map", log)
     (tmp_path / "other.dbc").write_text('BU_: A\nBO_ 5 Nothing: 8 A\n SG_ Zero : 0|8@1+ (1,0) [0|0] "" A\n')
-    assert "is it the database of this bus?" in refused(capsys, "map", log, "--dbc", tmp_path / "other.dbc")
+    assert "is it the database of this bus?" in refused("map", log, "--dbc", tmp_path / "other.dbc")
     (tmp_path / "few.csv").write_text("time,rpm\n" + "".join(f"{k},{k % 7}\n" for k in range(100)))
-    assert "map it by hand" in refused(capsys, "map", tmp_path / "few.csv")
-    assert ".html or .png" in refused(
-        capsys, "map", log, "--dbc", folder / "foreign.dbc", "-o", tmp_path / "signals.pdf"
-    )
+    assert "map it by hand" in refused("map", tmp_path / "few.csv")
+    assert ".html or .png" in refused("map", log, "--dbc", folder / "foreign.dbc", "-o", tmp_path / "signals.pdf")
