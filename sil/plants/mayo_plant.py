@@ -20,7 +20,7 @@ the poles of H.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,7 @@ from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
 from .linear_plant import LinearTruth, Plant, System
-from .truth import Conditions
+from .truth import Block, Conditions
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,20 @@ class Mayo(LinearTruth):
         return Transfer(numerator, np.pad(relative.denominator, ((0, 0), (0, 1))))
 
     def body(self, conditions: Conditions) -> Plant:
-        z_ddot = conditions.z_ddot
-        z_dot = np.zeros_like(z_ddot)
-        np.cumsum(0.5 * conditions.period * (z_ddot[1:] + z_ddot[:-1]), out=z_dot[1:])
-        shaken = z_ddot + self.hand.outside * z_dot
-        return super().body(dataclasses.replace(conditions, z_ddot=shaken))
+        return super().body(_InSpace(**vars(conditions), outside=self.hand.outside))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _InSpace(Conditions):
+    """The base shakes with z_ddot + outside * z_dot."""
+
+    outside: float
+
+    def blocks(self) -> Iterator[Block]:
+        z_dot = 0.0
+        for block in super().blocks():
+            z_ddot = self.z_ddot[block.periods.start : block.periods.stop + 1]
+            gained = 0.5 * self.period * (z_ddot[1:] + z_ddot[:-1])
+            speed = np.cumsum(np.append(z_dot, gained))
+            z_dot = float(speed[-1])
+            yield dataclasses.replace(block, z_ddot=self.middles(z_ddot + self.outside * speed))

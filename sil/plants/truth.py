@@ -49,6 +49,8 @@ class Conditions:
     """In a period; None: as few as LONGEST_SUBSTEP allows."""
     disturbance: FloatArray | float = 0.0
     """Unmeasured torque in the lever, at the samples [N m]; linear between them."""
+    ahead: int = _BLOCK
+    """Periods that are prepared at a time: 1 where z_ddot is known up to the next sample only."""
 
     @property
     def count(self) -> int:
@@ -73,16 +75,16 @@ class Conditions:
         """The periods between the samples in order, some thousand at a time."""
         disturbance = np.broadcast_to(self.disturbance, self.z_ddot.shape)
         last = len(self.z_ddot) - 1
-        for begin in range(0, last, _BLOCK):
-            end = min(begin + _BLOCK, last)
+        for begin in range(0, last, self.ahead):
+            end = min(begin + self.ahead, last)
             yield Block(
                 slice(begin, end),
-                self._middles(self.z_ddot[begin : end + 1]),
+                self.middles(self.z_ddot[begin : end + 1]),
                 self.kick * self.rng.standard_normal((end - begin, self.count)),
-                self.step * self._middles(disturbance[begin : end + 1]),
+                self.step * self.middles(disturbance[begin : end + 1]),
             )
 
-    def _middles(self, signal: FloatArray) -> FloatArray:
+    def middles(self, signal: FloatArray) -> FloatArray:
         """A signal, given at the samples and linear between them, in the middle of each substep."""
         part = (np.arange(self.count) + 0.5) / self.count
         middles: FloatArray = signal[:-1, None] + np.diff(signal)[:, None] * part

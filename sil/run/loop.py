@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time as clock
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import can
@@ -25,6 +25,7 @@ from lever_cdkf.host_tools.can.identity import Identity
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from numpy.typing import NDArray
 
+from ..aircraft.flight import Flight
 from ..plants import excitation, sensors
 from ..plants.truth import Body, Conditions, Truth
 from ..scenarios.scenario import Scenario
@@ -65,8 +66,9 @@ class Inputs:
     time: FloatArray
     truth: Truth
     z_ddot: FloatArray
-    """True base acceleration [m/s^2]."""
+    """True base acceleration [m/s^2]; with an aircraft the gust, until the run has made it that of the cabin."""
     z_ddot_measured: FloatArray
+    """With an aircraft, of the gust."""
     torque: FloatArray
     """Commanded by the scenario itself [N m]."""
     disturbance: FloatArray
@@ -92,6 +94,11 @@ class Recording:
     misplaced: int = 0
     """Estimates that belong to another sample than the one that was to be answered."""
     identity: Identity = field(default_factory=Identity)
+
+    @property
+    def z_ddot(self) -> FloatArray:
+        """Of the cabin, as far as it is known [m/s^2]."""
+        return self.inputs.z_ddot
 
     def frames(self) -> Frames:
         """All frames, with the time of their sample."""
@@ -309,7 +316,9 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
     """The samples, one after the other."""
     scenario, inputs = recording.scenario, recording.inputs
     count = len(inputs.time)
+    flight = _flight(scenario, inputs)
     body = _body(scenario, inputs)
+    advance = _advance(body, flight, inputs.z_ddot)
     commands = _commands(scenario, inputs.time)
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
@@ -318,7 +327,7 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
     measure = [_reader_of(recording, name) for name in ("theta", "theta_dot", "tau_m")]
     send_grip = _grip_sender(recording, link)
     no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
-    base = np.where(inputs.missing["z_ddot"], np.nan, inputs.z_ddot_measured).tolist()
+    read_base = _base_reader(recording, flight)
     period_us = round(scenario.period * 1e6)
     command, own_torque, last = 0.0, inputs.torque.tolist(), count - 1
 
@@ -334,16 +343,26 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
         if send_grip is not None:
             send_grip(sample)
         if not no_base[sample]:
-            send_base(sample, encode_base(sample, base[sample], sample * period_us))
+            send_base(sample, encode_base(sample, read_base(sample), sample * period_us))
             command = link.answer(sample)
         if sample != last:
-            body.advance(command + own_torque[sample])
+            advance(sample, command + own_torque[sample])
         if pace is not None:
             next(pace)
         if progress is not None and sample % _PROGRESS_EVERY == 0:
             progress(sample, count)
     if progress is not None:
         progress(count, count)
+
+
+def _flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
+    """The helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs` then."""
+    if scenario.aircraft is None:
+        return None
+    flight = Flight(scenario.aircraft, scenario.period, inputs.z_ddot.copy())
+    inputs.z_ddot[:] = np.nan
+    inputs.z_ddot[0] = flight.z_ddot
+    return flight
 
 
 def _body(scenario: Scenario, inputs: Inputs) -> Body:
@@ -355,8 +374,21 @@ def _body(scenario: Scenario, inputs: Inputs) -> Body:
             scenario.motor.lag,
             scenario.stream("process"),
             disturbance=inputs.disturbance,
+            **({} if scenario.aircraft is None else {"ahead": 1}),
         )
     )
+
+
+def _advance(body: Body, flight: Flight | None, z_ddot: FloatArray) -> Callable[[int, float], None]:
+    """A function that takes lever and cabin from a sample to the next, with the torque [N m] held."""
+    rest = body.theta
+
+    def advance(sample: int, torque: float) -> None:
+        if flight is not None:
+            z_ddot[sample + 1] = flight.advance(body.theta - rest)
+        body.advance(torque)
+
+    return advance
 
 
 def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec.Value]]:
@@ -371,6 +403,15 @@ def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec
         if rms > 0.0:
             commands |= {later: {} for later in range(sample + repetition, end, repetition)}
     return commands
+
+
+def _base_reader(recording: Recording, flight: Flight | None) -> Callable[[int], float]:
+    """The reading of the accelerometer at a sample; NaN when invalid."""
+    if flight is not None:
+        return _reader_of(recording, "z_ddot")
+    inputs = recording.inputs
+    readings: list[float] = np.where(inputs.missing["z_ddot"], np.nan, inputs.z_ddot_measured).tolist()
+    return readings.__getitem__
 
 
 def _reader_of(recording: Recording, name: str) -> Callable[[int], float]:
@@ -393,7 +434,7 @@ def _grip_sender(recording: Recording, link: _Link) -> Callable[[int], None] | N
 
 
 def _reader(
-    sensor: sensors.Sensor, history: list[float], offsets: list[float], period: float
+    sensor: sensors.Sensor, history: Sequence[float] | FloatArray, offsets: list[float], period: float
 ) -> Callable[[int], float]:
     """A sensor of a signal that is known only up to now; as Sensor.measure() otherwise."""
     gain = 1.0 + sensor.gain_error

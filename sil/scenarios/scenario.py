@@ -24,6 +24,7 @@ from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 
+from ..aircraft.aircraft import Coupled, read_aircraft
 from ..plants import excitation, lever_plant, pilots
 from ..plants.sensors import VALUES, Corruption, Sensor, Sensors
 from ..plants.truth import Truth
@@ -132,6 +133,7 @@ class Scenario:
     converged_after: float = quantity("s", CONVERGED_AFTER, least=0.0)
     seed: int = whole(1)
     pilot: pilots.Pilot = item(pilots.read_pilot)
+    aircraft: Coupled | None = item(read_aircraft, default=None)
     base: tuple[excitation.Excitation, ...] = tables(excitation.read_excitation, "m/s^2")
     torque: tuple[excitation.Excitation, ...] = tables(_read_torque, "N m")
     disturbance: tuple[excitation.Excitation, ...] = tables(excitation.read_excitation, "N m")
@@ -191,6 +193,10 @@ class Scenario:
     def check(self) -> None:
         """Raises ScenarioError for what only shows when the parts are put together."""
         truth = self.truth(self.time())
+        if self.aircraft is not None and self.aircraft.aircraft.delay < self.period:
+            raise ScenarioError(
+                f"{self.file}: aircraft.delay: must be at least the sample period of {1e3 * self.period:g} ms"
+            )
         for key, excitations in (("torque", self.torque), ("disturbance", self.disturbance)):
             if excitations and not truth.takes_torque:
                 raise ScenarioError(f"{self.file}: {key}: no torque acts on a pilot of model {truth.model}; remove it")

@@ -1,0 +1,1 @@
+"""The helicopter around the lever: what closes the loop of collective bounce."""
