@@ -117,7 +117,7 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1728 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1792 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];
@@ -230,6 +230,51 @@ typedef struct lever_feedthrough {
 /* At a frequency [Hz], after the last sample; collective bounce is at 2 to 8 Hz. Not finite where there is no response,
  * or an undamped model is in resonance. Not free (1,000 instructions). */
 void lever_feedthrough(const lever_t *lever, float frequency, lever_feedthrough_t *feedthrough);
+
+/* --- collective bounce ----------------------------------------------------------------------------------------- */
+
+enum lever_aircraft_limits { LEVER_AIRCRAFT_POINTS = 24 };
+
+/* How a helicopter answers to its collective lever: vertical acceleration of the cabin over the lever's angle, up and
+ * raised positive, with gearing, delays and actuator, at frequencies about those of bounce: 1.5 to 8 Hz. */
+typedef struct lever_aircraft {
+    uint8_t count;                          /* frequencies, at least 3 */
+    float frequency[LEVER_AIRCRAFT_POINTS]; /* rising [Hz] */
+    float real[LEVER_AIRCRAFT_POINTS];      /* [(m/s^2)/rad] */
+    float imaginary[LEVER_AIRCRAFT_POINTS]; /* negative where the acceleration lags */
+    float gain_sigma;                       /* how well that is known: of the gain, relative to it [1] */
+    float phase_sigma;                      /* [rad] */
+    float warning;                          /* gain margin below which there is a warning [dB] */
+    float alarm;                            /* and an alarm [dB] */
+} lever_aircraft_t;
+
+enum lever_bounce {
+    LEVER_BOUNCE_UNKNOWN = 0, /* no aircraft, or the estimate does not carry it */
+    LEVER_BOUNCE_CLEAR = 1,
+    LEVER_BOUNCE_WARNING = 2,
+    LEVER_BOUNCE_ALARM = 3
+};
+
+/* How near the loop through arm, lever and rotor is to instability. */
+typedef struct lever_stability {
+    uint8_t state;     /* enum lever_bounce */
+    float gain_margin; /* by which the loop may grow until it is unstable, at most 40 [dB] */
+    float gain_margin_sigma;
+    float modulus; /* least |1 - L| of the loop L, negative where it is unstable [1] */
+    float modulus_sigma;
+    float frequency; /* at which it becomes unstable [Hz] */
+    float frequency_sigma;
+} lever_stability_t;
+
+/* Watches the loop with this aircraft from now on; NULL: with none, as lever_init() leaves it. It is the caller's, and
+ * must outlive the instance unchanged. Returns false, changing nothing, if it is not usable. */
+bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft);
+
+/* As of the last publish_period; all but `state` is 0 before the first. A state is entered when the margin is below its
+ * limit with a probability of 80 %, and left when it is above with that. ALARM stays while nothing better is known. */
+void lever_stability(const lever_t *lever, lever_stability_t *stability);
+
+/* --- names ------------------------------------------------------------------------------------------------------ */
 
 /* Name ("m_p") and unit ("kg") of a parameter of a model; NULL for an index or model that does not exist. */
 const char *lever_parameter_name(uint8_t model, uint32_t index);

@@ -46,6 +46,13 @@ derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float 
     return derived_feedthrough(&estimator->cdkf, setup->model_in_use, &setup->constants, &step, frequency);
 }
 
+margin_t estimator_margin(const estimator_t *estimator, const lever_aircraft_t *aircraft)
+{
+    const setup_t *setup = &estimator->setup;
+    const model_step_t step = at_trim(estimator);
+    return margin_of(aircraft, &estimator->cdkf, setup->model_in_use, &setup->constants, &step);
+}
+
 #define LEVEL_NOISE 22.2f /* noise bandwidth of the level, 2 x integral of |1 - H|^2, in corners */
 
 /* Standard deviation of state i. The level, to which the deviation is added, has the noise of the samples too; while it

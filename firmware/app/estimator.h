@@ -5,6 +5,7 @@
 
 #include "app/learning.h"
 #include "app/setup.h"
+#include "bounce/margin.h"
 #include "filter/cdkf.h"
 #include "filter/derived.h"
 #include "filter/trim.h"
@@ -86,6 +87,7 @@ void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_P
 /* The quantities that are derived from the parameters; frequency [Hz]. */
 derived_dynamics_t estimator_dynamics(const estimator_t *estimator);
 derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float frequency);
+margin_t estimator_margin(const estimator_t *estimator, const lever_aircraft_t *aircraft);
 
 /* Mode, faults and counts; what concerns torque and machine is not the estimator's. */
 void estimator_health(const estimator_t *estimator, lever_health_t *health);

@@ -12,11 +12,20 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* The watch over the loop of arm, lever and rotor. */
+typedef struct bounce {
+    const lever_aircraft_t *aircraft; /* NULL: none */
+    margin_t margin;
+    uint32_t since_us; /* the margin was worked out */
+    uint8_t state;     /* enum lever_bounce */
+} bounce_t;
+
 struct lever {
     estimator_t estimator;
     dither_t dither;
     torque_gate_t gate;
     link_t link;
+    bounce_t bounce;
     lever_platform_t platform; /* the port's last report, if there was one */
     bool has_platform;
 };

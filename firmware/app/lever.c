@@ -1,5 +1,6 @@
 /* The façade: an instance in memory of the caller, and how its parts work together. */
 #include "app/instance.h"
+#include "bounce/alarm.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -38,6 +39,28 @@ static bool permits_torque(const lever_t *lever)
     return (mode >= LEVER_MODE_RUN) && (mode <= LEVER_MODE_FROZEN) && ((lever->platform.faults & broken) == 0u);
 }
 
+/* The estimate carries a margin: it is one, of an arm that the model is like, from sensors that work. */
+static bool carries_margin(const lever_t *lever)
+{
+    const uint32_t broken = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_CLOCK |
+                            (uint32_t)LEVER_FAULT_BOUND | (uint32_t)LEVER_FAULT_RECOVERED |
+                            (uint32_t)LEVER_FAULT_MISMATCH | (uint32_t)LEVER_FAULT_HANDS_OFF;
+    const enum lever_mode mode = lever->estimator.mode;
+    return ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) && ((lever->estimator.faults & broken) == 0u);
+}
+
+/* Once a publish_period. */
+static void watch_loop(lever_t *lever, uint32_t elapsed_us)
+{
+    bounce_t *bounce = &lever->bounce;
+    bounce->since_us += elapsed_us;
+    if ((bounce->aircraft != NULL) && (bounce->since_us >= lever->link.publish_us)) {
+        bounce->since_us = 0u;
+        bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
+        bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever));
+    }
+}
+
 enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
 {
     const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
@@ -51,6 +74,7 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
         .measured = ((faults & blind) != blind),
         .permitted = permits_torque(lever)};
     torque_gate_step(&lever->gate, dither_step(&lever->dither), &torque);
+    watch_loop(lever, torque.elapsed_us);
     return mode;
 }
 
@@ -149,6 +173,28 @@ void lever_feedthrough(const lever_t *lever, float frequency, lever_feedthrough_
     feedthrough->gain_sigma = derived.gain_sigma;
     feedthrough->phase_sigma = derived.phase_sigma;
     feedthrough->correlation = derived.correlation;
+}
+
+bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft)
+{
+    const bool accepted = (aircraft == NULL) || margin_accepts(aircraft);
+    if (accepted) {
+        const bounce_t watch = {.aircraft = aircraft, .state = (uint8_t)LEVER_BOUNCE_UNKNOWN};
+        lever->bounce = watch;
+    }
+    return accepted;
+}
+
+void lever_stability(const lever_t *lever, lever_stability_t *stability)
+{
+    const margin_t *margin = &lever->bounce.margin;
+    stability->state = lever->bounce.state;
+    stability->gain_margin = margin->gain;
+    stability->gain_margin_sigma = margin->gain_sigma;
+    stability->modulus = margin->modulus;
+    stability->modulus_sigma = margin->modulus_sigma;
+    stability->frequency = margin->frequency;
+    stability->frequency_sigma = margin->frequency_sigma;
 }
 
 void lever_health(const lever_t *lever, lever_health_t *health)

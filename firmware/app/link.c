@@ -2,6 +2,7 @@
 
 #include "app/instance.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #define BIT(output) ((uint32_t)1u << (uint32_t)(output))
@@ -12,15 +13,15 @@
 #define LONG_AGO_US 0x40000000u
 
 /* The divided messages, in the order in which they are sent in each publish_period. */
-static const uint16_t parts[] = {(uint16_t)BIT(OUTPUT_HEALTH), (uint16_t)BIT(OUTPUT_PARAMETERS),
-    (uint16_t)BIT(OUTPUT_SIGMA), (uint16_t)BIT(OUTPUT_DYNAMICS), (uint16_t)BIT(OUTPUT_FEEDTHROUGH),
-    (uint16_t)BIT(OUTPUT_LINK_HEALTH), (uint16_t)BIT(OUTPUT_PLATFORM)};
+static const uint16_t parts[] = {(uint16_t)(BIT(OUTPUT_HEALTH) | BIT(OUTPUT_STABILITY)),
+    (uint16_t)BIT(OUTPUT_PARAMETERS), (uint16_t)BIT(OUTPUT_SIGMA), (uint16_t)BIT(OUTPUT_DYNAMICS),
+    (uint16_t)BIT(OUTPUT_FEEDTHROUGH), (uint16_t)BIT(OUTPUT_LINK_HEALTH), (uint16_t)BIT(OUTPUT_PLATFORM)};
 #define PARTS ((uint32_t)(sizeof(parts) / sizeof(parts[0])))
 
 static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_COMMAND_ACK_DATA_ID,
     MESSAGE_PILOT_PARAMETERS_DATA_ID, MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID,
-    MESSAGE_FEEDTHROUGH_DATA_ID, MESSAGE_HEALTH_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID,
-    MESSAGE_IDENTITY_DATA_ID, MESSAGE_STATE_ESTIMATE_DATA_ID};
+    MESSAGE_FEEDTHROUGH_DATA_ID, MESSAGE_STABILITY_DATA_ID, MESSAGE_HEALTH_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID,
+    MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID, MESSAGE_STATE_ESTIMATE_DATA_ID};
 
 /* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame
  * that is repeated or one step late (which a sample's time would tell, too). */
@@ -265,6 +266,7 @@ enum lever_mode link_step(lever_t *lever)
         due |= (was_driving || instance_is_driving(lever)) ? BIT(OUTPUT_MOTOR_COMMAND) : 0u;
         due |= (link->pages != 0u) ? BIT(OUTPUT_IDENTITY) : 0u;
         due &= lever->has_platform ? UINT32_MAX : ~BIT(OUTPUT_PLATFORM);
+        due &= (lever->bounce.aircraft != NULL) ? UINT32_MAX : ~BIT(OUTPUT_STABILITY);
         link->due = (uint16_t)(link->due | due);
     }
     return lever->estimator.mode;

@@ -102,6 +102,20 @@ static bool encode_feedthrough(lever_t *lever, lever_frame_t *frame)
     return message_feedthrough_encode(frame, &message);
 }
 
+static bool encode_stability(lever_t *lever, lever_frame_t *frame)
+{
+    const margin_t *margin = &lever->bounce.margin;
+    const message_stability_t message = {.gain_margin = margin->gain,
+        .gain_margin_sigma = margin->gain_sigma,
+        .modulus = margin->modulus,
+        .modulus_sigma = margin->modulus_sigma,
+        .frequency = margin->frequency,
+        .bounce = lever->bounce.state,
+        .valid = is_estimating(lever) && (lever->bounce.state != (uint8_t)LEVER_BOUNCE_UNKNOWN) &&
+                 is_finite(margin->gain_sigma) && is_finite(margin->modulus_sigma)};
+    return message_stability_encode(frame, &message);
+}
+
 static bool encode_health(lever_t *lever, lever_frame_t *frame)
 {
     lever_health_t health;
@@ -177,8 +191,8 @@ static bool encode_state_estimate(lever_t *lever, lever_frame_t *frame)
 
 /* In the order of enum link_output. */
 static bool (*const encoders[OUTPUTS])(lever_t *lever, lever_frame_t *frame) = {encode_motor_command,
-    encode_command_ack, encode_parameters, encode_sigma, encode_dynamics, encode_feedthrough, encode_health,
-    encode_link_health, encode_platform, encode_identity, encode_state_estimate};
+    encode_command_ack, encode_parameters, encode_sigma, encode_dynamics, encode_feedthrough, encode_stability,
+    encode_health, encode_link_health, encode_platform, encode_identity, encode_state_estimate};
 
 bool link_encode(lever_t *lever, enum link_output output, lever_frame_t *frame)
 {

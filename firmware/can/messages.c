@@ -185,6 +185,38 @@ bool message_feedthrough_decode(message_feedthrough_t *message, const lever_fram
     return fits;
 }
 
+/* --- STABILITY ---------------------------------------------------------------------------------------------------- */
+
+static const place_t stability_code[] = {CODE(12u, 3u), CODE(14u, 1u)};
+static const quantity_t stability_quantity[] = {SIGNED(15u, 4095u, 50.0f), UNSIGNED(27u, 255u, 25.0f),
+    SIGNED(35u, 1023u, 100.0f), UNSIGNED(45u, 255u, 100.0f), UNSIGNED(53u, 2047u, 100.0f)};
+static const layout_t stability = LAYOUT(MESSAGE_STABILITY_ID, stability_code, stability_quantity);
+
+bool message_stability_encode(lever_frame_t *frame, const message_stability_t *message)
+{
+    const uint32_t code[] = {message->bounce, bit_of(message->valid)};
+    const float value[] = {
+        message->gain_margin, message->gain_margin_sigma, message->modulus, message->modulus_sigma, message->frequency};
+    return layout_encode(frame, &stability, code, value);
+}
+
+bool message_stability_decode(message_stability_t *message, const lever_frame_t *frame)
+{
+    uint32_t code[COUNT(stability_code)];
+    float value[COUNT(stability_quantity)];
+    const bool fits = layout_decode(code, value, &stability, frame);
+    if (fits) {
+        message->bounce = (uint8_t)code[0];
+        message->valid = (code[1] != 0u);
+        message->gain_margin = value[0];
+        message->gain_margin_sigma = value[1];
+        message->modulus = value[2];
+        message->modulus_sigma = value[3];
+        message->frequency = value[4];
+    }
+    return fits;
+}
+
 /* --- HEALTH ------------------------------------------------------------------------------------------------------- */
 
 static const place_t health_code[] = {CODE(12u, 15u), CODE(16u, 0xFFFFFFu), CODE(40u, 255u)};

@@ -43,7 +43,8 @@ enum message_id {
     MESSAGE_IDENTITY_ID = 0x217,
     MESSAGE_COMMAND_ACK_ID = 0x218,
     MESSAGE_LINK_HEALTH_ID = 0x219,
-    MESSAGE_FEEDTHROUGH_ID = 0x21A
+    MESSAGE_FEEDTHROUGH_ID = 0x21A,
+    MESSAGE_STABILITY_ID = 0x21B
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -62,7 +63,8 @@ enum message_data_id {
     MESSAGE_COMMAND_ACK_DATA_ID = 177,
     MESSAGE_LINK_HEALTH_DATA_ID = 193,
     MESSAGE_FEEDTHROUGH_DATA_ID = 209,
-    MESSAGE_GRIP_SAMPLE_DATA_ID = 225
+    MESSAGE_GRIP_SAMPLE_DATA_ID = 225,
+    MESSAGE_STABILITY_DATA_ID = 240
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -162,6 +164,19 @@ typedef struct message_feedthrough {
 
 bool message_feedthrough_encode(lever_frame_t *frame, const message_feedthrough_t *message);
 bool message_feedthrough_decode(message_feedthrough_t *message, const lever_frame_t *frame);
+
+typedef struct message_stability {
+    float gain_margin; /* [dB] */
+    float gain_margin_sigma;
+    float modulus; /* [1] */
+    float modulus_sigma;
+    float frequency; /* [Hz] */
+    uint8_t bounce;  /* enum lever_bounce */
+    bool valid;
+} message_stability_t;
+
+bool message_stability_encode(lever_frame_t *frame, const message_stability_t *message);
+bool message_stability_decode(message_stability_t *message, const lever_frame_t *frame);
 
 typedef struct message_health {
     float excitation; /* [rad/s] */

@@ -25,6 +25,24 @@ typedef struct derived_feedthrough {
     float correlation; /* of the errors of gain and phase [1]; 0 without any */
 } derived_feedthrough_t;
 
+/* Two quantities at a sigma point of the parameters, or their standard deviations. */
+typedef struct derived_couple {
+    float first;
+    float second;
+} derived_couple_t;
+
+/* Standard deviations of two quantities, given at the sigma points. */
+derived_couple_t derived_sigma(const cdkf_t *cdkf, const derived_couple_t value[MODEL_POINTS]);
+
+typedef struct derived_complex {
+    float real;
+    float imaginary;
+} derived_complex_t;
+
+/* theta/z_ddot of a model's dynamics at a frequency [Hz]; angle: base_motion_angle(). */
+derived_complex_t derived_response(
+    const model_dynamics_t *dynamics, const model_constants_t *constants, float angle, float frequency);
+
 /* Of the model linearised about the trim, whose angle, sine and cosine are in `step`; frequency [Hz]. */
 derived_dynamics_t derived_dynamics(
     const cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step);

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
+from .aircraft import AircraftResponse, Stability
 from .config import CHOICES, Config, choice_value
 from .library import enum_names, ffi, lib, struct_dtype
 
@@ -23,6 +24,7 @@ _SAMPLE_VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 """What a sample may hold besides its time, each with a flag: lever_sample_t."""
 
 _MODES = enum_names("lever_mode")
+_BOUNCE = enum_names("lever_bounce")
 
 
 class Estimate(NamedTuple):
@@ -112,6 +114,8 @@ class Estimator:
         self._estimate = ffi.new("lever_estimate_t *")
         self._feedthrough = ffi.new("lever_feedthrough_t *")
         self._health = ffi.new("lever_health_t *")
+        self._stability = ffi.new("lever_stability_t *")
+        self._aircraft: AircraftResponse | None = None  # which the instance reads
         self._received = ffi.new("lever_frame_t *")
         self._received_data = ffi.buffer(self._received.data)
         self._answer = ffi.new("lever_frame_t *")
@@ -178,6 +182,21 @@ class Estimator:
         lib.lever_feedthrough(self.pointer, frequency, raw)
         response = complex(raw.real, raw.imaginary)
         return Feedthrough(response, raw.gain_sigma, raw.phase_sigma, raw.correlation)
+
+    def watch(self, aircraft: AircraftResponse | None) -> None:
+        """Watches the loop with this aircraft from now on; None: with none. Raises LeverError."""
+        if not lib.lever_aircraft(self.pointer, ffi.NULL if aircraft is None else aircraft.pointer):
+            raise LeverError(
+                "the firmware refused the response of the aircraft: frequencies must rise from above 0, sigmas lie "
+                "between 0 and 1, the warning's limit not below the alarm's, and all of it be finite"
+            )
+        self._aircraft = aircraft
+
+    def stability(self) -> Stability:
+        """How near the loop is to collective bounce, as of the last publish_period."""
+        lib.lever_stability(self.pointer, self._stability)
+        values = {name: getattr(self._stability, name) for name in Stability._fields}
+        return Stability(**values | {"state": _BOUNCE[values["state"]]})
 
     def health(self) -> Health:
         """Mode, faults and counts after the last sample."""

@@ -143,3 +143,8 @@ class Coupled:
     aircraft: Aircraft
     gearing: float
     """Pitch over the lever's angle [1]."""
+
+    def response(self, s: ComplexArray) -> ComplexArray:
+        """z_ddot / delta [m/s^2 per rad] at the complex frequencies s [rad/s], without limits."""
+        response: ComplexArray = self.gearing * self.aircraft.response(s)
+        return response

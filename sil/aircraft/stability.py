@@ -20,7 +20,7 @@ Response = Callable[[ComplexArray], ComplexArray]
 
 BAND = (0.5, 20.0)
 """Where crossings are looked for [Hz]; below it is the pilot's own flying."""
-_POINTS = 4000
+_POINTS = 1000
 
 
 @dataclass(frozen=True)

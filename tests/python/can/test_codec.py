@@ -72,8 +72,8 @@ def by_cantools(message: Message, values: dict[str, float], counter: int) -> byt
 
 
 def test_catalogue_has_the_fields() -> None:
-    assert len(MESSAGES) == 15
-    assert len(FIELDS) == 22 + 2 * 3 * len(MODELS)
+    assert len(MESSAGES) == 16
+    assert len(FIELDS) == 27 + 2 * 3 * len(MODELS)
     assert codec.contract() == 2
     assert [name for name, (_, signal) in zip(FIELD_NAMES, FIELDS, strict=True) if code(signal) is None] == [
         "COMMAND.dither_rms"
