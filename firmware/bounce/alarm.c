@@ -1,6 +1,7 @@
 #include "bounce/alarm.h"
 
-#define QUANTILE 0.842f /* 80 % of a normal distribution lie below that many standard deviations */
+#define ALARM_SIGMA_MOST 3.0f /* a gain margin that is less certain says nothing [dB] */
+#define QUANTILE 0.842f       /* 80 % of a normal distribution lie below that many standard deviations */
 
 /* Whether a state with this limit goes on, or begins: it needs to be sure of either. */
 static bool is_below(bool was_below, float limit, const margin_t *margin)

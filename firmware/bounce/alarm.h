@@ -8,8 +8,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define ALARM_SIGMA_MOST 3.0f /* a gain margin that is less certain says nothing [dB] */
-
 /* The next state, of enum lever_bounce. `carried`: health lets the margin be believed. */
 uint8_t alarm_next(uint8_t state, const margin_t *margin, const lever_aircraft_t *aircraft, bool carried);
 

@@ -6,12 +6,14 @@
 
 #include <math.h>
 
+#define MARGIN_MOST 40.0f    /* where L does not cross the positive real axis, or not far from 0 [dB] */
 #define LEAST_HEIGHT 0.01f   /* of L on the real axis: MARGIN_MOST */
 #define DECIBELS 8.68588964f /* 20 / ln(10) */
 #define SECANTS 5u           /* to find a crossing */
 #define FIRST_STEP 0.1f      /* of them, in points of the table */
 #define LEAST_CHANGE 1.0e-6f /* of the imaginary part that still says where to go */
 #define FINE 0.25f           /* reach of the second parabola, likewise */
+#define LAST_INTERVAL ((uint32_t)LEVER_AIRCRAFT_POINTS - 2u)
 #define LEAST_POINTS 3u
 
 /* A loop: the model at one sigma point, and what the aircraft's response is off by. */
@@ -56,6 +58,7 @@ static point_t point_at(const loop_t *loop, float place)
     const uint32_t last = (uint32_t)aircraft->count - 2u;
     uint32_t i = (place > 0.0f) ? (uint32_t)place : 0u;
     i = (i < last) ? i : last;
+    i = (i < LAST_INTERVAL) ? i : LAST_INTERVAL; /* whatever has become of the caller's table */
     const float part = place - (float)i;
     const float frequency = between(aircraft->frequency[i], aircraft->frequency[i + 1u], part);
     const derived_complex_t response = {between(aircraft->real[i], aircraft->real[i + 1u], part),

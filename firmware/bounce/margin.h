@@ -14,10 +14,8 @@
 
 #include <stdbool.h>
 
-#define MARGIN_MOST 40.0f /* where L does not cross the positive real axis, or below 0.01 [dB] */
-
 typedef struct margin {
-    float gain; /* by which the loop may grow until it is unstable [dB] */
+    float gain; /* by which the loop may grow until it is unstable, at most 40 [dB] */
     float gain_sigma;
     float modulus; /* least |1 - L|, negative where the loop is unstable [1] */
     float modulus_sigma;
