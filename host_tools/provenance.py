@@ -49,6 +49,10 @@ class Provenance:
         """And of these files."""
         return replace(self, outputs={path.name: sha256(path) for path in paths})
 
+    def text(self) -> str:
+        """The content of provenance.json."""
+        return json.dumps({"software": SOFTWARE, **asdict(self)}, indent=2, ensure_ascii=False) + "\n"
+
     def properties(self, **more: Any) -> dict[str, str]:
         """Name and text of each property, for formats that keep pairs of text; `more` are further ones, as JSON."""
         known = {name: value for name, value in asdict(self).items() if value}

@@ -33,6 +33,7 @@ def write_report(trace: Mapping[str, NDArray[Any]], summary: Summary | None, pat
 
 def write_page(run: Run, path: str | os.PathLike[str]) -> None:
     """write_report() of a run that may have kept less than a whole trace."""
+    from .origin import with_provenance
     from .page import build
 
-    write_text(path, build(run))
+    write_text(path, with_provenance(build(run), run.summary.provenance if run.summary else None))
