@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import html
 import importlib.metadata
 import json
 import os
@@ -53,6 +54,12 @@ class Provenance:
         """The content of provenance.json."""
         return json.dumps({"software": SOFTWARE, **asdict(self)}, indent=2, ensure_ascii=False) + "\n"
 
+    def comment(self) -> str:
+        """As lines that begin with #."""
+        made = f"{SOFTWARE} {self.version}{f' ({self.revision})' if self.revision else ''}, {self.created}"
+        hashes = [f"{path} {digest or '(not a file)'}" for path, digest in self.inputs.items()]
+        return "".join(f"# {line}\n" for line in (made, self.command, *hashes))
+
     def properties(self, **more: Any) -> dict[str, str]:
         """Name and text of each property, for formats that keep pairs of text; `more` are further ones, as JSON."""
         known = {name: value for name, value in asdict(self).items() if value}
@@ -70,6 +77,20 @@ def provenance(inputs: Iterable[str | os.PathLike[str]] = ()) -> Provenance:
         command=_printable(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])),
         inputs={_printable(str(path)): sha256(path) for path in inputs},
     )
+
+
+def with_provenance(page: str, origin: Provenance | None) -> str:
+    """HTML with its provenance at the end, as a list to be opened, and as JSON in the element `provenance`."""
+    if origin is None:
+        return page
+    properties = origin.properties()
+    items = "".join(f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in properties.items())
+    made = html.escape(f"{properties['software']} {properties['version']}, {properties['created']}")
+    shown = f'<footer><details class="origin"><summary>{made}</summary><dl>{items}</dl></details></footer>'
+    content = json.dumps(properties, ensure_ascii=False).replace("</", "<\\/")
+    kept = f'<script type="application/json" id="provenance">{content}</script>\n'
+    head, end, tail = page.rpartition("</body>" if "</body>" in page else "</html>")
+    return f"{head}{shown}{kept}{end}{tail}"
 
 
 def version() -> str:

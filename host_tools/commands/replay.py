@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..files import check_not_input
 from ..formats import add_format_option, chosen_formats
 from ..tables import Row, Tables, add_json_option
-from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading, input_files
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -121,7 +121,8 @@ def _run_each(args: argparse.Namespace) -> int:
         replays = replay_each(args.logs, lambda log: _options(args, log, formats), args.out, progress.show)
     print_tables({"logs": rows_of(replays)}, args.json)
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join([*write(replays, args.out), 'a folder for each log'])}")
+        written = write(replays, args.out, input_files(args))
+        print(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
     for each in replays:
         if each.problem:
             print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)
@@ -136,11 +137,10 @@ def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Opti
     assignments = _assignments(args)
     chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
     reading = chosen_reading(args, log)
-    inputs = [args.settings, args.dbc, *(entry for entry in args.map if entry.endswith(".toml"))]
     return Options(
         *(make_config(assignments), chosen_here, args.channel, reading, *check_part(args)),
         formats=formats,
-        inputs=[path for path in inputs if path is not None],
+        inputs=input_files(args),
     )
 
 

@@ -93,8 +93,7 @@ def _make(names: Sequence[str], seed: int, width: str, folder: Path) -> list[str
     from lever_cdkf.host_tools.exports import pictures
     from lever_cdkf.host_tools.files import Outputs, writing
     from lever_cdkf.host_tools.progress import Progress
-    from lever_cdkf.host_tools.provenance import provenance
-    from lever_cdkf.host_tools.report.origin import with_provenance
+    from lever_cdkf.host_tools.provenance import provenance, with_provenance
 
     from ..study.figures import data, figures_page, printed
     from ..study.figures.catalogue import FIGURES
