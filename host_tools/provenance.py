@@ -74,8 +74,8 @@ def provenance(inputs: Iterable[str | os.PathLike[str]] = ()) -> Provenance:
         revision=revision(),
         library=_library(),
         created=created().strftime(_DATE),
-        command=_printable(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])),
-        inputs={_printable(str(path)): sha256(path) for path in inputs},
+        command=printable(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])),
+        inputs={printable(str(path)): sha256(path) for path in inputs},
     )
 
 
@@ -157,8 +157,8 @@ def sha256(path: str | os.PathLike[str]) -> str | None:
     return f"sha256:{digest.hexdigest()}"
 
 
-def _printable(text: str) -> str:
-    """What every format can hold: bytes that are no UTF-8, and control characters, as \\x07."""
+def printable(text: str) -> str:
+    """A name as every format can hold it: bytes that are no UTF-8, and control characters, as \\x07."""
     whole = text.encode("utf-8", "backslashreplace").decode("utf-8")
     return re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\x{ord(match[0]):02x}", whole)
 

@@ -21,7 +21,7 @@ from ..extras import missing
 from ..files import Outputs, write_text
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
-from ..provenance import provenance
+from ..provenance import printable, provenance
 from ..report import write_page
 from ..results.summary import SCHEMA, ReplaySummary, of
 from ..results.trace import Trace
@@ -217,7 +217,7 @@ class _Replay:
         recording = traffic.recording
         first, last = traffic.first_us, traffic.last_us
         return {
-            "logs": [Path(path).name for path in recording.paths],
+            "logs": [printable(Path(path).name) for path in recording.paths],
             "channel": traffic.channel,
             "start": _calendar(first),
             "duration_s": (last - first) * 1e-6,
@@ -264,4 +264,4 @@ def _calendar(time_us: int) -> str | None:
 def _without_folder(reason: str) -> str:
     """A reason that begins with the path of a log: the same wherever that is."""
     path, colon, rest = reason.partition(": ")
-    return f"{Path(path).name}{colon}{rest}"
+    return printable(f"{Path(path).name}{colon}{rest}")
