@@ -56,6 +56,7 @@ def answer(run: Run) -> str:
     text = html.escape(run.summary.verdict if run.summary else "A recorded run, whose truth is not known.")
     for quantity in run.parameters:
         text = re.sub(rf"\b{quantity.key}\b", quantity.symbol, text)
+    text = text.replace(" %", "\u00a0%")
     return f'{verdict(run)}{figures}<p class="said">{text}</p><p class="note">{note}</p>'
 
 

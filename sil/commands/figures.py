@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _DESCRIPTION = """\
 Computes the paper's figures for this system from simulated runs of the firmware, and writes into DIR
 
-  NAME.png       each figure for print: one column wide, 200 dots per inch
+  NAME.png       each figure for print: one column wide, 300 dots per inch
   figures.html   all of them as one page for a browser, to be turned and zoomed; figures.html#NAME is one of them
   captions.md    what each figure shows; its numbers are measured in these runs
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Sheet
 
-RESOLUTION = 200  # [dots per inch]
+RESOLUTION = 300  # [dots per inch]
 WIDTH = 3.5  # [inches], a column of IEEE's and of most two-column journals
 _HEADROOM = 0.55  # [inches] for legend, column titles and the label of the x axis
 _POINTS_A_PIXEL = 0.6  # line widths are told in pixels of the page

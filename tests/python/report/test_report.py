@@ -101,7 +101,7 @@ def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
 
 
 def test_the_answer_says_what_the_summary_says(page: Reader, result: Result) -> None:
-    text, shown = "".join(page.text), {row[0]: row[1:3] for row in page.tables[0]}
+    text, shown = "".join(page.text).replace("\u00a0", " "), {row[0]: row[1:3] for row in page.tables[0]}
     for key, name in ROWS.items():
         expected = asdict(result.summary.parameters[key])
         assert shown[name] == [f"{expected['rms_percent']:.1f} %", f"{100 * expected['coverage_2sigma']:.0f} %"]

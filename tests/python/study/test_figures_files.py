@@ -90,8 +90,8 @@ def test_every_figure_is_there_in_both_forms_and_nothing_else(folder: Path) -> N
 @every
 def test_a_picture_is_a_column_wide_on_white_with_nothing_cut_off(folder: Path, name: str) -> None:
     with Image.open(folder / f"{name}.png") as image:
-        assert image.width == round(3.5 * 200)
-        assert image.info["dpi"] == pytest.approx((200, 200), abs=0.1)
+        assert image.width == round(3.5 * 300)
+        assert image.info["dpi"] == pytest.approx((300, 300), abs=0.1)
         pixels = np.asarray(image.convert("L"))
     border = np.concatenate((pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
     assert (border == 255).all()
