@@ -1,7 +1,7 @@
 """The report of a run: one self-contained, interactive HTML page for somebody who has never seen the project.
 
 `write_report` is all that others need. Inside: `run` reads the trace, `charts` turn it into figures (plain plotly.js
-JSON, so plotly's Python classes are never loaded), `summary_html` makes verdict and tables, `models` says what is
+JSON, so plotly's Python classes are never loaded), `summary_html` makes answer and tables, `captions` says what is
 special in the estimator's model and in the truth, `page` puts it together with page.html, page.css, page.js and
 plotly.js from the plotly package.
 

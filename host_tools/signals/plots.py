@@ -76,15 +76,16 @@ def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
         caption = f"<b>{html.escape(heading)}</b> {html.escape(signal.name)}: {html.escape(_extremes(signal))}"
         figures.append(f"<figure><figcaption>{caption}</figcaption>{_svg(signal)}</figure>")
     style = (
-        ":root{color-scheme:light dark}body{font:15px/1.4 system-ui,sans-serif;max-width:60rem;margin:1rem auto;"
-        "padding:0 1rem}figure{margin:1rem 0}svg{width:100%;height:auto;border:1px solid #8886}"
+        ":root{color-scheme:light dark}body{font:15px/1.4 system-ui,sans-serif;max-width:84rem;margin:1rem auto;"
+        "padding:0 1rem}main{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,28rem),1fr));"
+        "gap:1rem 2rem}figure{margin:0;break-inside:avoid}figcaption{overflow-wrap:anywhere}svg{width:100%;height:auto;border:1px solid #8886}"
         "path{fill:none;stroke:#2a6fdb;stroke-width:1.2;vector-effect:non-scaling-stroke}"
     )
     seconds = max((float(np.ptp(each.time)) for _, each in signals if len(each.time)), default=0.0)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width"><style>{style}</style>'
-        f"<h1>{html.escape(title)}</h1><p>{seconds:.4g} s</p>{''.join(figures)}</html>\n"
+        f"<h1>{html.escape(title)}</h1><p>{seconds:.4g} s</p><main>{''.join(figures)}</main></html>\n"
     )
 
 

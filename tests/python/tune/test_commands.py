@@ -75,7 +75,7 @@ def test_the_page_holds_the_same(tuned: Path) -> None:
     page = read(tuned / "tune.html")
     text = "".join(page.text)
     for words in (
-        "Lever CDKF: settings from a log",
+        "Lever CDKF: Settings from a log",
         "What the log says",
         "held out",
         "From the dither (± one standard deviation): z_ddot_gain",
