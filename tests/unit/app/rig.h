@@ -4,7 +4,7 @@
 
 #include "../model/simulation.h"
 #include "lever_cdkf.h"
-#include "unity.h"
+#include "test.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -23,19 +23,6 @@ static inline lever_config_t rig_config(uint32_t combination)
     config.model = (uint8_t)(combination % (uint32_t)LEVER_MODEL_COUNT);
     config.estimator = (uint8_t)(combination / (uint32_t)LEVER_MODEL_COUNT);
     return config;
-}
-
-/* RUN_TEST(), with the combination in the name of the test. */
-#define RIG_RUN_TEST(test, combination) UnityDefaultTestRun((test), rig_test_name(#test, (combination)), __LINE__)
-
-static inline const char *rig_test_name(const char *test, uint32_t combination)
-{
-    static const char *const models[LEVER_MODEL_COUNT] = {"lever", "linear_physical", "linear_black_box", "hand"};
-    static const char *const estimators[LEVER_ESTIMATOR_COUNT] = {"dual", "joint"};
-    static char name[160];
-    const lever_config_t config = rig_config(combination);
-    (void)snprintf(name, sizeof name, "%s [%s, %s]", test, models[config.model], estimators[config.estimator]);
-    return name;
 }
 
 /* The setting of that name. */

@@ -3,7 +3,6 @@
 
 enum { PARAMETERS = LEVER_PARAMETERS };
 
-static uint32_t combination;
 static lever_config_t config;
 static lever_memory_t memory;
 static lever_t *lever;
@@ -19,12 +18,8 @@ static void start(void)
 
 void setUp(void)
 {
-    config = rig_config(combination);
+    config = rig_config(test_round);
     start();
-}
-
-void tearDown(void)
-{
 }
 
 static bool has_changed(void)
@@ -43,7 +38,7 @@ static uint32_t samples_until_change(uint32_t most)
     return samples;
 }
 
-static void test_a_sudden_grip_is_reported_for_a_second_and_opens_the_parameters(void)
+TEST_EACH(RIG_COMBINATIONS, a_sudden_grip_is_reported_for_a_second_and_opens_the_parameters)
 {
     (void)rig_run(&rig, lever, 20000u);
     const lever_estimate_t before = rig_estimate(lever);
@@ -62,7 +57,7 @@ static void test_a_sudden_grip_is_reported_for_a_second_and_opens_the_parameters
     TEST_ASSERT_FALSE(has_changed());
 }
 
-static void test_threshold_0_reports_no_change(void)
+TEST_EACH(RIG_COMBINATIONS, threshold_0_reports_no_change)
 {
     config.settings.change_threshold = 0.0f;
     start();
@@ -71,22 +66,11 @@ static void test_threshold_0_reports_no_change(void)
     TEST_ASSERT_EQUAL_UINT32(3000u, samples_until_change(3000u));
 }
 
-static void test_a_grip_at_rest_is_not_seen(void)
+TEST_EACH(RIG_COMBINATIONS, a_grip_at_rest_is_not_seen)
 {
     (void)rig_run(&rig, lever, 10000u);
     rig_let_rest(&rig);
     (void)rig_run(&rig, lever, 10000u);
     rig_grip(&rig);
     TEST_ASSERT_EQUAL_UINT32(10000u, samples_until_change(10000u));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    for (combination = 0u; combination < (uint32_t)RIG_COMBINATIONS; combination++) {
-        RIG_RUN_TEST(test_a_sudden_grip_is_reported_for_a_second_and_opens_the_parameters, combination);
-        RIG_RUN_TEST(test_threshold_0_reports_no_change, combination);
-        RIG_RUN_TEST(test_a_grip_at_rest_is_not_seen, combination);
-    }
-    return UNITY_END();
 }

@@ -27,13 +27,9 @@ void setUp(void)
     rig = rig_of(config.model, truth);
 }
 
-void tearDown(void)
-{
-}
-
 /* Commanded, or configured from the start: the same samples give the same estimates to the bit, and no other choice
  * does. */
-static void test_every_choice_can_be_commanded_and_makes_a_difference(void)
+TEST(every_choice_can_be_commanded_and_makes_a_difference)
 {
     static lever_estimate_t estimates[CHOICES];
     for (uint32_t choice = 0u; choice < (uint32_t)CHOICES; choice++) {
@@ -63,7 +59,7 @@ static void test_every_choice_can_be_commanded_and_makes_a_difference(void)
 }
 
 /* Model, preload and estimator; the first guesses are those of the chosen model, whatever those of the others are. */
-static void test_a_change_of_model_preload_or_estimator_starts_over_with_the_models_own_first_guess(void)
+TEST(a_change_of_model_preload_or_estimator_starts_over_with_the_models_own_first_guess)
 {
     const uint8_t models[] = {2u, 0u, 1u, 2u, 1u, 0u, 0u, 0u};
     const uint8_t preloads[] = {1u, 1u, 1u, 1u, 1u, 1u, 0u, 0u};
@@ -93,7 +89,7 @@ static void test_a_change_of_model_preload_or_estimator_starts_over_with_the_mod
     }
 }
 
-static void test_a_choice_that_is_there_already_or_kept_and_another_adaptation_do_not_start_over(void)
+TEST(a_choice_that_is_there_already_or_kept_and_another_adaptation_do_not_start_over)
 {
     lever_command_t command = rig_command();
     (void)rig_run(&rig, lever, 2000u);
@@ -107,13 +103,4 @@ static void test_a_choice_that_is_there_already_or_kept_and_another_adaptation_d
     const lever_estimate_t after = rig_estimate(lever);
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1u));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_every_choice_can_be_commanded_and_makes_a_difference);
-    RUN_TEST(test_a_change_of_model_preload_or_estimator_starts_over_with_the_models_own_first_guess);
-    RUN_TEST(test_a_choice_that_is_there_already_or_kept_and_another_adaptation_do_not_start_over);
-    return UNITY_END();
 }

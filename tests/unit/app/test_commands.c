@@ -15,10 +15,6 @@ void setUp(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 3000u));
 }
 
-void tearDown(void)
-{
-}
-
 static void assert_refused(const lever_command_t *command)
 {
     const lever_memory_t before = memory;
@@ -26,7 +22,7 @@ static void assert_refused(const lever_command_t *command)
     TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
 }
 
-static void test_unknown_codes_are_refused_and_change_nothing(void)
+TEST(unknown_codes_are_refused_and_change_nothing)
 {
     for (uint32_t part = 0u; part < 5u; part++) {
         for (uint32_t code = 0u; code < 256u; code++) {
@@ -44,7 +40,7 @@ static void test_unknown_codes_are_refused_and_change_nothing(void)
     }
 }
 
-static void test_a_command_with_one_unknown_part_is_refused_as_a_whole(void)
+TEST(a_command_with_one_unknown_part_is_refused_as_a_whole)
 {
     lever_command_t command = rig_command();
     command.request = (uint8_t)LEVER_REQUEST_RESET;
@@ -54,7 +50,7 @@ static void test_a_command_with_one_unknown_part_is_refused_as_a_whole(void)
     assert_refused(&command);
 }
 
-static void test_a_dither_that_is_no_amplitude_is_refused(void)
+TEST(a_dither_that_is_no_amplitude_is_refused)
 {
     const float bad[] = {NAN, INFINITY, -INFINITY, -0.1f};
     for (uint32_t k = 0u; k < 4u; k++) {
@@ -64,7 +60,7 @@ static void test_a_dither_that_is_no_amplitude_is_refused(void)
     }
 }
 
-static void test_reset_goes_back_to_the_first_guess(void)
+TEST(reset_goes_back_to_the_first_guess)
 {
     rig_request(lever, LEVER_REQUEST_RESET);
     const lever_estimate_t estimate = rig_estimate(lever);
@@ -75,7 +71,7 @@ static void test_reset_goes_back_to_the_first_guess(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
 }
 
-static void test_after_a_reset_it_is_like_new_but_for_its_counts(void)
+TEST(after_a_reset_it_is_like_new_but_for_its_counts)
 {
     lever_memory_t other_memory;
     lever_t *other = lever_init(&other_memory, &config);
@@ -88,7 +84,7 @@ static void test_after_a_reset_it_is_like_new_but_for_its_counts(void)
     TEST_ASSERT_EQUAL_UINT32(samples + 2000u, rig_health(lever).samples);
 }
 
-static void test_reset_accepts_a_time_that_starts_anew(void)
+TEST(reset_accepts_a_time_that_starts_anew)
 {
     rig_request(lever, LEVER_REQUEST_RESET);
     rig.time_us = 0u;
@@ -96,7 +92,7 @@ static void test_reset_accepts_a_time_that_starts_anew(void)
     TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).late);
 }
 
-static void test_reset_unfreezes(void)
+TEST(reset_unfreezes)
 {
     rig_request(lever, LEVER_REQUEST_FREEZE);
     (void)rig_run(&rig, lever, 1u);
@@ -104,7 +100,7 @@ static void test_reset_unfreezes(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
 }
 
-static void test_freeze_and_a_change_in_one_command_start_over_frozen(void)
+TEST(freeze_and_a_change_in_one_command_start_over_frozen)
 {
     lever_command_t command = rig_command();
     command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
@@ -113,7 +109,7 @@ static void test_freeze_and_a_change_in_one_command_start_over_frozen(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 400u));
 }
 
-static void test_dither_of_keep_or_more_stays_as_it_is(void)
+TEST(dither_of_keep_or_more_stays_as_it_is)
 {
     lever_command_t command = rig_command();
     command.dither_rms = 0.3f;
@@ -130,7 +126,7 @@ static void test_dither_of_keep_or_more_stays_as_it_is(void)
 }
 
 /* As a first run of a fresh instance has it: the same torque at the same sample. */
-static void test_reset_ends_dither_and_the_next_run_is_the_first_one_again(void)
+TEST(reset_ends_dither_and_the_next_run_is_the_first_one_again)
 {
     lever_memory_t other_memory;
     lever_t *other = lever_init(&other_memory, &config);
@@ -170,24 +166,7 @@ static float sigma_with(enum lever_adaptation adaptation)
 }
 
 /* Annealing begins at the ceiling of the walk, so less certain than at the floor. */
-static void test_a_chosen_adaptation_starts_its_walk_anew(void)
+TEST(a_chosen_adaptation_starts_its_walk_anew)
 {
     TEST_ASSERT_TRUE(sigma_with(LEVER_ADAPTATION_ANNEALING) > (1.001f * sigma_with(LEVER_ADAPTATION_FIXED)));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_unknown_codes_are_refused_and_change_nothing);
-    RUN_TEST(test_a_command_with_one_unknown_part_is_refused_as_a_whole);
-    RUN_TEST(test_a_dither_that_is_no_amplitude_is_refused);
-    RUN_TEST(test_reset_goes_back_to_the_first_guess);
-    RUN_TEST(test_after_a_reset_it_is_like_new_but_for_its_counts);
-    RUN_TEST(test_reset_accepts_a_time_that_starts_anew);
-    RUN_TEST(test_reset_unfreezes);
-    RUN_TEST(test_freeze_and_a_change_in_one_command_start_over_frozen);
-    RUN_TEST(test_dither_of_keep_or_more_stays_as_it_is);
-    RUN_TEST(test_reset_ends_dither_and_the_next_run_is_the_first_one_again);
-    RUN_TEST(test_a_chosen_adaptation_starts_its_walk_anew);
-    return UNITY_END();
 }

@@ -5,7 +5,6 @@
 
 enum { RUNS = 20, PARAMETERS = LEVER_PARAMETERS };
 
-static uint32_t combination;
 static lever_config_t config;
 static lever_memory_t memory;
 static lever_t *lever;
@@ -14,11 +13,7 @@ static double truth[PARAMETERS];
 
 void setUp(void)
 {
-    config = rig_config(combination);
-}
-
-void tearDown(void)
-{
+    config = rig_config(test_round);
 }
 
 /* A pilot from the filter's own prior, or from within it. */
@@ -80,7 +75,7 @@ static double squared_error_in_sigmas(void)
 }
 
 /* Rms error in standard deviations at 0.5, 1, 2 and 5 s must be below 1.4 (1 expected; too small is no harm). */
-static void test_standard_deviations_have_the_size_of_the_errors(void)
+TEST_EACH(RIG_COMBINATIONS, standard_deviations_have_the_size_of_the_errors)
 {
     const uint32_t samples[4] = {500u, 500u, 1000u, 3000u};
     double sum[4] = {0.0};
@@ -96,7 +91,7 @@ static void test_standard_deviations_have_the_size_of_the_errors(void)
     }
 }
 
-static void test_innovations_are_as_large_as_predicted_and_the_state_as_uncertain_as_said(void)
+TEST_EACH(RIG_COMBINATIONS, innovations_are_as_large_as_predicted_and_the_state_as_uncertain_as_said)
 {
     double nis = 0.0;
     double sum[2] = {0.0, 0.0};
@@ -115,14 +110,4 @@ static void test_innovations_are_as_large_as_predicted_and_the_state_as_uncertai
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 2.0, nis / 10000.0);
     TEST_ASSERT_DOUBLE_WITHIN(1.5, 0.0, sqrt(sum[0] / 10000.0)); /* that of the trim level is not in theta's */
     TEST_ASSERT_DOUBLE_WITHIN(1.2, 0.0, sqrt(sum[1] / 10000.0));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    for (combination = 0u; combination < (uint32_t)RIG_COMBINATIONS; combination++) {
-        RIG_RUN_TEST(test_standard_deviations_have_the_size_of_the_errors, combination);
-        RIG_RUN_TEST(test_innovations_are_as_large_as_predicted_and_the_state_as_uncertain_as_said, combination);
-    }
-    return UNITY_END();
 }

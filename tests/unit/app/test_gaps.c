@@ -14,17 +14,13 @@ void setUp(void)
     TEST_ASSERT_NOT_NULL(lever);
 }
 
-void tearDown(void)
-{
-}
-
 /* Through alignment and on for as many samples. */
 static void run_for(uint32_t samples)
 {
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u + samples));
 }
 
-static void test_a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew(void)
+TEST(a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew)
 {
     run_for(1000u);
     lever_sample_t sample = rig_sample_after(&rig, 500u);
@@ -40,7 +36,7 @@ static void test_a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_align
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 301u));
 }
 
-static void test_a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk(void)
+TEST(a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk)
 {
     rig_trust_calibration(&config); /* a standard deviation that does not grow */
     lever = lever_init(&memory, &config);
@@ -56,7 +52,7 @@ static void test_a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk(v
     }
 }
 
-static void test_jitter_of_less_than_half_a_period_is_no_gap(void)
+TEST(jitter_of_less_than_half_a_period_is_no_gap)
 {
     run_for(0u);
     lever_sample_t sample = rig_sample(&rig);
@@ -67,7 +63,7 @@ static void test_jitter_of_less_than_half_a_period_is_no_gap(void)
 }
 
 /* A gap is predicted in a bounded number of steps, which therefore get long; averages are shorter than that. */
-static void test_the_longest_gaps_that_the_settings_let_coast_need_no_restart(void)
+TEST(the_longest_gaps_that_the_settings_let_coast_need_no_restart)
 {
     config.settings.gap_limit = 1.0f;                               /* the greatest that may be set */
     config.settings.trim_corner = 1.5f / config.settings.gap_limit; /* lever_config_check() allows no more */
@@ -84,7 +80,7 @@ static void test_the_longest_gaps_that_the_settings_let_coast_need_no_restart(vo
     }
 }
 
-static void test_a_sample_much_too_early_is_taken(void)
+TEST(a_sample_much_too_early_is_taken)
 {
     run_for(1000u);
     lever_sample_t sample = rig_sample(&rig);
@@ -94,15 +90,4 @@ static void test_a_sample_much_too_early_is_taken(void)
     TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).lost + rig_health(lever).late);
     (void)rig_run(&rig, lever, 100u);
     TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew);
-    RUN_TEST(test_a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk);
-    RUN_TEST(test_jitter_of_less_than_half_a_period_is_no_gap);
-    RUN_TEST(test_the_longest_gaps_that_the_settings_let_coast_need_no_restart);
-    RUN_TEST(test_a_sample_much_too_early_is_taken);
-    return UNITY_END();
 }

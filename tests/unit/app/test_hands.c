@@ -3,7 +3,7 @@
 
 #include "../model/constants.h"
 #include "../model/simulation.h"
-#include "unity.h"
+#include "test.h"
 
 enum { SAMPLES = 20 }; /* in a block */
 
@@ -16,10 +16,6 @@ void setUp(void)
 {
     simulation = simulation_typical();
     hands_start(&hands);
-}
-
-void tearDown(void)
-{
 }
 
 static void hold(double m_p, double c_p, double k_p)
@@ -59,7 +55,7 @@ static uint32_t run(uint32_t blocks, bool counts)
 }
 
 /* Two minutes of each; the last two move the lever by base or by motor alone. */
-static void test_a_hand_on_the_lever_is_never_off(void)
+TEST(a_hand_on_the_lever_is_never_off)
 {
     const double arms[][3] = {
         {3.2, 60.0, 2100.0}, {1.0, 10.0, 200.0}, {5.0, 150.0, 4000.0}, {2.5, 18.0, 1500.0}, {2.5, 42.0, 1500.0}};
@@ -73,7 +69,7 @@ static void test_a_hand_on_the_lever_is_never_off(void)
     }
 }
 
-static void test_a_lever_that_is_let_go_is_off_within_a_second_and_held_again_within_one(void)
+TEST(a_lever_that_is_let_go_is_off_within_a_second_and_held_again_within_one)
 {
     const double base[] = {0.98, 0.98, 0.0};
     const double torque[] = {0.3, 0.0, 0.3};
@@ -92,7 +88,7 @@ static void test_a_lever_that_is_let_go_is_off_within_a_second_and_held_again_wi
 }
 
 /* One block that the lever alone explains may be chance. */
-static void test_the_first_blocks_decide_nothing(void)
+TEST(the_first_blocks_decide_nothing)
 {
     let_go();
     TEST_ASSERT_EQUAL_UINT32(0u, run(5u, true));
@@ -100,7 +96,7 @@ static void test_the_first_blocks_decide_nothing(void)
     TEST_ASSERT_TRUE(hands.off);
 }
 
-static void test_blocks_that_do_not_count_leave_the_verdict(void)
+TEST(blocks_that_do_not_count_leave_the_verdict)
 {
     (void)run(100u, true);
     let_go();
@@ -114,7 +110,7 @@ static void test_blocks_that_do_not_count_leave_the_verdict(void)
 }
 
 /* A block that the lever alone explains but for a part, in squares, of its change; between the thresholds it stays. */
-static void test_the_verdict_has_hysteresis(void)
+TEST(the_verdict_has_hysteresis)
 {
     const double part[] = {0.025, 0.035, 0.09, 0.11};
     const model_constants_t constants = {.inertia = 0.1f};
@@ -131,15 +127,4 @@ static void test_the_verdict_has_hysteresis(void)
         }
         TEST_ASSERT_EQUAL(was ? ((k % 4u) != 3u) : ((k % 4u) == 0u), hands.off);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_hand_on_the_lever_is_never_off);
-    RUN_TEST(test_a_lever_that_is_let_go_is_off_within_a_second_and_held_again_within_one);
-    RUN_TEST(test_the_first_blocks_decide_nothing);
-    RUN_TEST(test_blocks_that_do_not_count_leave_the_verdict);
-    RUN_TEST(test_the_verdict_has_hysteresis);
-    return UNITY_END();
 }

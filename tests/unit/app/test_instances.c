@@ -10,11 +10,7 @@ void setUp(void)
     lever_config_default(&config);
 }
 
-void tearDown(void)
-{
-}
-
-static void test_two_interleaved_instances_equal_two_separate_ones_whatever_was_in_their_memory(void)
+TEST(two_interleaved_instances_equal_two_separate_ones_whatever_was_in_their_memory)
 {
     static lever_memory_t alone_memory[2];
     lever_config_t configs[2] = {config, config};
@@ -38,7 +34,7 @@ static void test_two_interleaved_instances_equal_two_separate_ones_whatever_was_
     }
 }
 
-static void test_init_in_used_memory_starts_over_with_the_new_configuration(void)
+TEST(init_in_used_memory_starts_over_with_the_new_configuration)
 {
     rig_t rig = rig_typical();
     (void)rig_run(&rig, lever_init(&memory, &config), 1000u);
@@ -49,7 +45,7 @@ static void test_init_in_used_memory_starts_over_with_the_new_configuration(void
     TEST_ASSERT_EQUAL(LEVER_MODE_INIT, rig_health(lever).mode);
 }
 
-static void test_an_instance_writes_nothing_outside_its_memory(void)
+TEST(an_instance_writes_nothing_outside_its_memory)
 {
     struct {
         uint8_t before[64];
@@ -69,7 +65,7 @@ static void test_an_instance_writes_nothing_outside_its_memory(void)
     TEST_ASSERT_EQUAL_MEMORY(guard, guarded.after, sizeof guard);
 }
 
-static void test_a_copy_of_the_memory_is_an_instance_of_its_own(void)
+TEST(a_copy_of_the_memory_is_an_instance_of_its_own)
 {
     rig_t rig = rig_typical();
     lever_t *lever = lever_init(&memory, &config);
@@ -84,14 +80,4 @@ static void test_a_copy_of_the_memory_is_an_instance_of_its_own(void)
     rig_t whole = rig_typical();
     (void)rig_run(&whole, repeated, 2000u);
     rig_assert_same_estimates(copy, repeated);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_two_interleaved_instances_equal_two_separate_ones_whatever_was_in_their_memory);
-    RUN_TEST(test_init_in_used_memory_starts_over_with_the_new_configuration);
-    RUN_TEST(test_an_instance_writes_nothing_outside_its_memory);
-    RUN_TEST(test_a_copy_of_the_memory_is_an_instance_of_its_own);
-    return UNITY_END();
 }

@@ -6,7 +6,6 @@
 
 enum { PARAMETERS = LEVER_PARAMETERS };
 
-static uint32_t combination;
 static lever_config_t config;
 static estimator_t estimator;
 static rig_t rig;
@@ -22,12 +21,8 @@ static void start(uint8_t adaptation)
 
 void setUp(void)
 {
-    config = rig_config(combination);
+    config = rig_config(test_round);
     start((uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
-}
-
-void tearDown(void)
-{
 }
 
 static enum lever_mode run(uint32_t count, bool blind)
@@ -69,7 +64,7 @@ static void assert_less_certain(const lever_estimate_t *before, const lever_esti
 /* --- their own rate ----------------------------------------------------------------------------------------------- */
 
 /* The state moves with every sample, the parameters with the last sample of each block. */
-static void test_parameters_learn_once_a_learn_period_and_move_at_that_sample(void)
+TEST_EACH(RIG_COMBINATIONS, parameters_learn_once_a_learn_period_and_move_at_that_sample)
 {
     const float periods[] = {0.0f, 1.0e-3f, 2.0e-3f, 1.0e-2f, 0.1f};
     const uint32_t samples[] = {1u, 1u, 2u, 10u, 100u};
@@ -97,7 +92,7 @@ static void test_parameters_learn_once_a_learn_period_and_move_at_that_sample(vo
 
 /* --- frozen ------------------------------------------------------------------------------------------------------- */
 
-static void test_frozen_neither_learns_nor_walks_nor_forgets(void)
+TEST_EACH(RIG_COMBINATIONS, frozen_neither_learns_nor_walks_nor_forgets)
 {
     for (uint8_t adaptation = 0u; adaptation < (uint8_t)LEVER_ADAPTATION_COUNT; adaptation++) {
         start(adaptation);
@@ -121,7 +116,7 @@ static void test_frozen_neither_learns_nor_walks_nor_forgets(void)
 /* --- without excitation ------------------------------------------------------------------------------------------- */
 
 /* However wildly they walk, and whatever the adaptation: at the floor, no less certain than at the start. */
-static void test_without_excitation_nothing_winds_up(void)
+TEST_EACH(RIG_COMBINATIONS, without_excitation_nothing_winds_up)
 {
     const bool is_signed = (config.model == (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX);
     const cdkf_t *cdkf = &estimator.cdkf;
@@ -146,7 +141,7 @@ static void test_without_excitation_nothing_winds_up(void)
 }
 
 /* What moves the estimate at rest is noise of the sensors, which the next innovation holds, too. */
-static void test_without_excitation_nothing_is_learnt(void)
+TEST_EACH(RIG_COMBINATIONS, without_excitation_nothing_is_learnt)
 {
     for (uint8_t adaptation = 0u; adaptation < (uint8_t)LEVER_ADAPTATION_COUNT; adaptation++) {
         start(adaptation);
@@ -166,7 +161,7 @@ static void test_without_excitation_nothing_is_learnt(void)
 
 /* --- coasting ----------------------------------------------------------------------------------------------------- */
 
-static void test_coasting_holds_the_parameters_and_widens_everything(void)
+TEST_EACH(RIG_COMBINATIONS, coasting_holds_the_parameters_and_widens_everything)
 {
     start((uint8_t)LEVER_ADAPTATION_FORGETTING);
     (void)run(10310u, false);
@@ -184,7 +179,7 @@ static void test_coasting_holds_the_parameters_and_widens_everything(void)
 
 /* The state starts anew where it is measured. Until the levels have settled, 0.9 / trim_corner, nothing is learnt, as
  * at the start, and SETTLING says so. */
-static void test_after_an_outage_the_state_is_the_measurement_and_the_levels_settle_first(void)
+TEST_EACH(RIG_COMBINATIONS, after_an_outage_the_state_is_the_measurement_and_the_levels_settle_first)
 {
     for (uint32_t k = 0u; k < 2u; k++) {
         (void)run((k == 0u) ? 301u : 5000u, false);
@@ -206,17 +201,3 @@ static void test_after_an_outage_the_state_is_the_measurement_and_the_levels_set
 }
 
 /* --- what is known of them together ------------------------------------------------------------------------------- */
-
-int main(void)
-{
-    UNITY_BEGIN();
-    for (combination = 0u; combination < (uint32_t)RIG_COMBINATIONS; combination++) {
-        RIG_RUN_TEST(test_parameters_learn_once_a_learn_period_and_move_at_that_sample, combination);
-        RIG_RUN_TEST(test_frozen_neither_learns_nor_walks_nor_forgets, combination);
-        RIG_RUN_TEST(test_without_excitation_nothing_winds_up, combination);
-        RIG_RUN_TEST(test_without_excitation_nothing_is_learnt, combination);
-        RIG_RUN_TEST(test_coasting_holds_the_parameters_and_widens_everything, combination);
-        RIG_RUN_TEST(test_after_an_outage_the_state_is_the_measurement_and_the_levels_settle_first, combination);
-    }
-    return UNITY_END();
-}

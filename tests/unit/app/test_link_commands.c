@@ -14,10 +14,6 @@ void setUp(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_run(&sender, lever, 400u));
 }
 
-void tearDown(void)
-{
-}
-
 static void assert_counts(uint32_t corrupt, uint32_t late)
 {
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(corrupt, rig_health(lever).corrupt, "corrupt");
@@ -53,7 +49,7 @@ static lever_frame_t dither_frame(float rms)
 
 /* --- what it does, and the answer --------------------------------------------------------------------------------- */
 
-static void test_a_command_is_carried_out_before_the_next_sample(void)
+TEST(a_command_is_carried_out_before_the_next_sample)
 {
     lever_command_t command = rig_command();
     command.request = (uint8_t)LEVER_REQUEST_FREEZE;
@@ -61,7 +57,7 @@ static void test_a_command_is_carried_out_before_the_next_sample(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, sender_deliver(&sender, lever));
 }
 
-static void test_the_answer_has_the_choices_as_they_stand(void)
+TEST(the_answer_has_the_choices_as_they_stand)
 {
     lever_command_t command = rig_command();
     command.model = (uint8_t)LEVER_MODEL_LINEAR_BLACK_BOX;
@@ -79,7 +75,7 @@ static void test_the_answer_has_the_choices_as_they_stand(void)
     TEST_ASSERT_EQUAL_FLOAT(config.settings.torque_rms, ack.dither_rms);
 }
 
-static void test_an_unknown_command_is_refused_said_and_changes_nothing(void)
+TEST(an_unknown_command_is_refused_said_and_changes_nothing)
 {
     lever_command_t command = rig_command();
     command.request = 9u;
@@ -93,7 +89,7 @@ static void test_an_unknown_command_is_refused_said_and_changes_nothing(void)
     assert_counts(1u, 0u);
 }
 
-static void test_a_damaged_command_is_corrupt_and_gets_no_answer(void)
+TEST(a_damaged_command_is_corrupt_and_gets_no_answer)
 {
     lever_frame_t frames[FRAMES_MOST];
     lever_command_t command = rig_command();
@@ -106,7 +102,7 @@ static void test_a_damaged_command_is_corrupt_and_gets_no_answer(void)
     assert_counts(1u, 0u);
 }
 
-static void test_after_a_reset_a_sender_may_start_anew_with_any_counter_and_time(void)
+TEST(after_a_reset_a_sender_may_start_anew_with_any_counter_and_time)
 {
     lever_command_t command = rig_command();
     command.request = (uint8_t)LEVER_REQUEST_RESET;
@@ -120,7 +116,7 @@ static void test_after_a_reset_a_sender_may_start_anew_with_any_counter_and_time
 /* --- sequence ----------------------------------------------------------------------------------------------------- */
 
 /* Whoever asks for no torque gets none, whatever his counter says; all else of such a frame is refused. */
-static void test_off_is_obeyed_in_any_order(void)
+TEST(off_is_obeyed_in_any_order)
 {
     lever_command_t off = rig_command();
     const lever_frame_t on = dither_frame(0.3f);
@@ -136,7 +132,7 @@ static void test_off_is_obeyed_in_any_order(void)
 }
 
 /* Once it turned the dither on again. */
-static void test_an_on_that_is_sent_again_after_an_off_is_refused_however_often(void)
+TEST(an_on_that_is_sent_again_after_an_off_is_refused_however_often)
 {
     const lever_frame_t on = dither_frame(0.3f);
     TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, answer_to(&on).result);
@@ -154,7 +150,7 @@ static void test_an_on_that_is_sent_again_after_an_off_is_refused_however_often(
     TEST_ASSERT_TRUE(rig_health(lever).torque == 0.0f);
 }
 
-static void test_a_command_after_three_lost_ones_is_accepted_and_after_more_is_not(void)
+TEST(a_command_after_three_lost_ones_is_accepted_and_after_more_is_not)
 {
     const struct {
         uint8_t step;
@@ -171,7 +167,7 @@ static void test_a_command_after_three_lost_ones_is_accepted_and_after_more_is_n
     }
 }
 
-static void test_a_second_after_the_last_command_a_sender_may_start_anywhere(void)
+TEST(a_second_after_the_last_command_a_sender_may_start_anywhere)
 {
     const lever_command_t nothing = rig_command();
     TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, send(&nothing));
@@ -194,7 +190,7 @@ static lever_frame_t foreign_identity(void)
     return frame;
 }
 
-static void test_an_identity_on_the_bus_is_another_estimator_for_two_seconds(void)
+TEST(an_identity_on_the_bus_is_another_estimator_for_two_seconds)
 {
     const lever_frame_t frame = foreign_identity();
     TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
@@ -207,7 +203,7 @@ static void test_an_identity_on_the_bus_is_another_estimator_for_two_seconds(voi
     TEST_ASSERT_BITS_LOW(LEVER_FAULT_DUPLICATE, rig_health(lever).faults);
 }
 
-static void test_a_damaged_identity_is_corrupt_and_nobody(void)
+TEST(a_damaged_identity_is_corrupt_and_nobody)
 {
     lever_frame_t frame = foreign_identity();
     frame.data[3] ^= 4u;
@@ -217,7 +213,7 @@ static void test_a_damaged_identity_is_corrupt_and_nobody(void)
 }
 
 /* Each hears the other, and says so in HEALTH. */
-static void test_two_firmwares_on_one_bus_notice_each_other(void)
+TEST(two_firmwares_on_one_bus_notice_each_other)
 {
     lever_memory_t other_memory;
     lever_t *const both[2] = {lever, lever_init(&other_memory, &config)};
@@ -244,22 +240,4 @@ static void test_two_firmwares_on_one_bus_notice_each_other(void)
     }
     TEST_ASSERT_GREATER_THAN_UINT32(10u, told[0]);
     TEST_ASSERT_GREATER_THAN_UINT32(10u, told[1]);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_off_is_obeyed_in_any_order);
-    RUN_TEST(test_a_command_is_carried_out_before_the_next_sample);
-    RUN_TEST(test_the_answer_has_the_choices_as_they_stand);
-    RUN_TEST(test_an_unknown_command_is_refused_said_and_changes_nothing);
-    RUN_TEST(test_a_damaged_command_is_corrupt_and_gets_no_answer);
-    RUN_TEST(test_after_a_reset_a_sender_may_start_anew_with_any_counter_and_time);
-    RUN_TEST(test_an_on_that_is_sent_again_after_an_off_is_refused_however_often);
-    RUN_TEST(test_a_command_after_three_lost_ones_is_accepted_and_after_more_is_not);
-    RUN_TEST(test_a_second_after_the_last_command_a_sender_may_start_anywhere);
-    RUN_TEST(test_an_identity_on_the_bus_is_another_estimator_for_two_seconds);
-    RUN_TEST(test_a_damaged_identity_is_corrupt_and_nobody);
-    RUN_TEST(test_two_firmwares_on_one_bus_notice_each_other);
-    return UNITY_END();
 }

@@ -7,10 +7,6 @@ void setUp(void)
     start();
 }
 
-void tearDown(void)
-{
-}
-
 /* Answers until one has this identifier, which is returned. */
 static lever_frame_t next_with(uint32_t id)
 {
@@ -26,7 +22,7 @@ static lever_frame_t next_with(uint32_t id)
     return frames[0];
 }
 
-static void test_state_estimate_says_what_the_estimate_says(void)
+TEST(state_estimate_says_what_the_estimate_says)
 {
     message_state_estimate_t message;
     (void)sender_run(&sender, lever, 2000u);
@@ -40,7 +36,7 @@ static void test_state_estimate_says_what_the_estimate_says(void)
 }
 
 /* Valid: in RUN, COAST and FROZEN, while the sample clock advances; without measurement there is no innovation. */
-static void test_every_estimate_says_whether_it_may_be_used(void)
+TEST(every_estimate_says_whether_it_may_be_used)
 {
     const struct {
         bool blind;
@@ -86,7 +82,7 @@ static void test_every_estimate_says_whether_it_may_be_used(void)
     }
 }
 
-static void test_dynamics_say_what_the_estimate_says(void)
+TEST(dynamics_say_what_the_estimate_says)
 {
     message_pilot_dynamics_t message;
     publish_always();
@@ -102,7 +98,7 @@ static void test_dynamics_say_what_the_estimate_says(void)
 }
 
 /* Each of 2 to 8 Hz in its turn, and again from the first. */
-static void test_feedthrough_says_one_frequency_after_the_other(void)
+TEST(feedthrough_says_one_frequency_after_the_other)
 {
     publish_always();
     (void)sender_run(&sender, lever, 2000u);
@@ -123,7 +119,7 @@ static void test_feedthrough_says_one_frequency_after_the_other(void)
     }
 }
 
-static void test_health_says_mode_faults_and_excitation(void)
+TEST(health_says_mode_faults_and_excitation)
 {
     message_health_t message;
     publish_always();
@@ -138,7 +134,7 @@ static void test_health_says_mode_faults_and_excitation(void)
 }
 
 /* Sixty gaps gave four frames with the fault once. */
-static void test_health_has_every_fault_since_the_last_one(void)
+TEST(health_has_every_fault_since_the_last_one)
 {
     uint32_t told = 0u;
     (void)sender_run(&sender, lever, 400u);
@@ -163,7 +159,7 @@ static void test_health_has_every_fault_since_the_last_one(void)
     TEST_ASSERT_BITS_LOW(LEVER_FAULT_GAP, health.faults);
 }
 
-static void test_link_health_has_the_counts(void)
+TEST(link_health_has_the_counts)
 {
     message_link_health_t message;
     (void)sender_run(&sender, lever, 1000u);
@@ -181,7 +177,7 @@ static void test_link_health_has_the_counts(void)
     TEST_ASSERT_EQUAL_UINT16(1u, message.late);
 }
 
-static void test_motor_command_says_the_torque_of_health(void)
+TEST(motor_command_says_the_torque_of_health)
 {
     message_motor_command_t message;
     (void)sender_run(&sender, lever, 400u);
@@ -198,7 +194,7 @@ static void test_motor_command_says_the_torque_of_health(void)
 
 /* --- what the port reports ---------------------------------------------------------------------------------------- */
 
-static void test_platform_health_is_sent_from_the_first_report_on(void)
+TEST(platform_health_is_sent_from_the_first_report_on)
 {
     const lever_platform_t report = {
         .faults = (uint8_t)((uint8_t)LEVER_PLATFORM_CLOCK | (uint8_t)LEVER_PLATFORM_BUS_OFF),
@@ -219,7 +215,7 @@ static void test_platform_health_is_sent_from_the_first_report_on(void)
     TEST_ASSERT_EQUAL_UINT8(253u, message.dropped);
 }
 
-static void test_a_fault_of_the_platform_is_one_of_health_as_long_as_it_is_reported(void)
+TEST(a_fault_of_the_platform_is_one_of_health_as_long_as_it_is_reported)
 {
     lever_platform_t report = {.faults = (uint8_t)LEVER_PLATFORM_WATCHDOG};
     lever_platform(lever, &report);
@@ -229,20 +225,4 @@ static void test_a_fault_of_the_platform_is_one_of_health_as_long_as_it_is_repor
     lever_platform(lever, &report);
     (void)sender_run(&sender, lever, 1u);
     TEST_ASSERT_BITS_LOW(LEVER_FAULT_PLATFORM, rig_health(lever).faults);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_state_estimate_says_what_the_estimate_says);
-    RUN_TEST(test_every_estimate_says_whether_it_may_be_used);
-    RUN_TEST(test_dynamics_say_what_the_estimate_says);
-    RUN_TEST(test_feedthrough_says_one_frequency_after_the_other);
-    RUN_TEST(test_health_says_mode_faults_and_excitation);
-    RUN_TEST(test_health_has_every_fault_since_the_last_one);
-    RUN_TEST(test_link_health_has_the_counts);
-    RUN_TEST(test_motor_command_says_the_torque_of_health);
-    RUN_TEST(test_platform_health_is_sent_from_the_first_report_on);
-    RUN_TEST(test_a_fault_of_the_platform_is_one_of_health_as_long_as_it_is_reported);
-    return UNITY_END();
 }

@@ -14,10 +14,6 @@ void setUp(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_run(&sender, lever, 400u));
 }
 
-void tearDown(void)
-{
-}
-
 static uint32_t faults(void)
 {
     return rig_health(lever).faults;
@@ -33,7 +29,7 @@ static void assert_counts(uint32_t lost, uint32_t corrupt, uint32_t late)
 
 /* --- pairing ------------------------------------------------------------------------------------------------------ */
 
-static void test_a_pair_is_a_sample_without_fault(void)
+TEST(a_pair_is_a_sample_without_fault)
 {
     (void)sender_run(&sender, lever, 3000u);
     TEST_ASSERT_EQUAL_UINT32(0u, faults());
@@ -41,7 +37,7 @@ static void test_a_pair_is_a_sample_without_fault(void)
     TEST_ASSERT_EQUAL_UINT32(3400u, rig_health(lever).samples);
 }
 
-static void test_estimates_over_can_are_those_of_the_decoded_samples(void)
+TEST(estimates_over_can_are_those_of_the_decoded_samples)
 {
     lever_memory_t other_memory;
     static lever_config_t config;
@@ -66,7 +62,7 @@ static void test_estimates_over_can_are_those_of_the_decoded_samples(void)
     }
 }
 
-static void test_a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost(void)
+TEST(a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost)
 {
     sender_next(&sender);
     TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &sender.base));
@@ -77,7 +73,7 @@ static void test_a_base_sample_without_its_lever_sample_coasts_and_counts_it_los
     assert_counts(1u, 0u, 0u);
 }
 
-static void test_a_lever_sample_of_another_counter_is_not_paired(void)
+TEST(a_lever_sample_of_another_counter_is_not_paired)
 {
     sender_next(&sender);
     TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &sender.lever));
@@ -87,7 +83,7 @@ static void test_a_lever_sample_of_another_counter_is_not_paired(void)
     assert_counts(2u, 0u, 0u); /* this lever sample, and a sample by time */
 }
 
-static void test_a_lever_sample_serves_one_base_sample_only(void)
+TEST(a_lever_sample_serves_one_base_sample_only)
 {
     (void)sender_run(&sender, lever, 1u);
     for (uint32_t k = 0u; k < 16u; k++) { /* until the counter comes round again */
@@ -98,7 +94,7 @@ static void test_a_lever_sample_serves_one_base_sample_only(void)
     assert_counts(16u, 0u, 0u);
 }
 
-static void test_a_lever_sample_that_comes_after_its_base_sample_is_not_used(void)
+TEST(a_lever_sample_that_comes_after_its_base_sample_is_not_used)
 {
     sender_next(&sender);
     (void)lever_on_frame(lever, &sender.base);
@@ -108,7 +104,7 @@ static void test_a_lever_sample_that_comes_after_its_base_sample_is_not_used(voi
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
 }
 
-static void test_step_without_a_sample_does_nothing(void)
+TEST(step_without_a_sample_does_nothing)
 {
     lever_frame_t frames[FRAMES_MOST];
     (void)fetch_all(lever, frames);
@@ -118,7 +114,7 @@ static void test_step_without_a_sample_does_nothing(void)
     TEST_ASSERT_EQUAL_UINT32(0u, fetch_all(lever, frames));
 }
 
-static void test_validity_bits_are_those_of_each_value(void)
+TEST(validity_bits_are_those_of_each_value)
 {
     const uint32_t fault[4] = {(uint32_t)LEVER_FAULT_THETA, (uint32_t)LEVER_FAULT_THETA_DOT,
         (uint32_t)LEVER_FAULT_TORQUE, (uint32_t)LEVER_FAULT_BASE};
@@ -138,7 +134,7 @@ static void test_validity_bits_are_those_of_each_value(void)
 
 /* --- lost --------------------------------------------------------------------------------------------------------- */
 
-static void test_lost_pairs_are_counted_by_time(void)
+TEST(lost_pairs_are_counted_by_time)
 {
     sender_next(&sender);
     sender_next(&sender);
@@ -149,7 +145,7 @@ static void test_lost_pairs_are_counted_by_time(void)
 }
 
 /* An outage may end at any counter: those that look like a repetition or a step back cost a few frames more. */
-static void test_after_an_outage_of_any_length_samples_are_taken_again_within_three(void)
+TEST(after_an_outage_of_any_length_samples_are_taken_again_within_three)
 {
     for (uint32_t outage = 1u; outage < 70u; outage++) {
         setUp();
@@ -169,7 +165,7 @@ static void test_after_an_outage_of_any_length_samples_are_taken_again_within_th
 
 /* --- corrupt and repeated ----------------------------------------------------------------------------------------- */
 
-static void test_every_single_bit_error_is_refused_counted_and_said(void)
+TEST(every_single_bit_error_is_refused_counted_and_said)
 {
     sender_next(&sender);
     for (uint32_t bit = 0u; bit < 64u; bit++) {
@@ -189,7 +185,7 @@ static void test_every_single_bit_error_is_refused_counted_and_said(void)
     TEST_ASSERT_EQUAL_UINT32(0u, faults() & (uint32_t)LEVER_FAULT_COMMUNICATION);
 }
 
-static void test_a_wrong_length_is_corrupt(void)
+TEST(a_wrong_length_is_corrupt)
 {
     sender_next(&sender);
     sender.lever.length = 7u;
@@ -199,7 +195,7 @@ static void test_a_wrong_length_is_corrupt(void)
     assert_counts(0u, 2u, 0u);
 }
 
-static void test_a_repeated_pair_is_refused_as_late(void)
+TEST(a_repeated_pair_is_refused_as_late)
 {
     (void)sender_deliver(&sender, lever);
     TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.lever));
@@ -207,7 +203,7 @@ static void test_a_repeated_pair_is_refused_as_late(void)
     assert_counts(0u, 0u, 2u);
 }
 
-static void test_a_pair_that_was_overtaken_is_refused_as_late(void)
+TEST(a_pair_that_was_overtaken_is_refused_as_late)
 {
     sender_next(&sender);
     const sender_t overtaken = sender;
@@ -218,7 +214,7 @@ static void test_a_pair_that_was_overtaken_is_refused_as_late(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
 }
 
-static void test_a_frame_under_the_identifier_of_the_other_is_corrupt(void)
+TEST(a_frame_under_the_identifier_of_the_other_is_corrupt)
 {
     sender_next(&sender);
     sender.lever.id = (uint32_t)MESSAGE_BASE_SAMPLE_ID;
@@ -226,7 +222,7 @@ static void test_a_frame_under_the_identifier_of_the_other_is_corrupt(void)
     assert_counts(0u, 1u, 0u);
 }
 
-static void test_foreign_frames_are_ignored_without_a_trace(void)
+TEST(foreign_frames_are_ignored_without_a_trace)
 {
     const lever_memory_t before = memory;
     for (uint32_t id = 0u; id <= 0x7FFu; id++) {
@@ -241,7 +237,7 @@ static void test_foreign_frames_are_ignored_without_a_trace(void)
 }
 
 /* A code for "not available" is no measurement, whatever its flag says. */
-static void test_a_value_that_is_not_available_is_missing(void)
+TEST(a_value_that_is_not_available_is_missing)
 {
     (void)sender_run(&sender, lever, 3000u);
     sender_next(&sender);
@@ -256,27 +252,4 @@ static void test_a_value_that_is_not_available_is_missing(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
     TEST_ASSERT_EQUAL_UINT32((uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE, faults());
     assert_counts(0u, 0u, 0u);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_pair_is_a_sample_without_fault);
-    RUN_TEST(test_estimates_over_can_are_those_of_the_decoded_samples);
-    RUN_TEST(test_a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost);
-    RUN_TEST(test_a_lever_sample_of_another_counter_is_not_paired);
-    RUN_TEST(test_a_lever_sample_serves_one_base_sample_only);
-    RUN_TEST(test_a_lever_sample_that_comes_after_its_base_sample_is_not_used);
-    RUN_TEST(test_step_without_a_sample_does_nothing);
-    RUN_TEST(test_validity_bits_are_those_of_each_value);
-    RUN_TEST(test_lost_pairs_are_counted_by_time);
-    RUN_TEST(test_after_an_outage_of_any_length_samples_are_taken_again_within_three);
-    RUN_TEST(test_every_single_bit_error_is_refused_counted_and_said);
-    RUN_TEST(test_a_wrong_length_is_corrupt);
-    RUN_TEST(test_a_repeated_pair_is_refused_as_late);
-    RUN_TEST(test_a_pair_that_was_overtaken_is_refused_as_late);
-    RUN_TEST(test_a_frame_under_the_identifier_of_the_other_is_corrupt);
-    RUN_TEST(test_foreign_frames_are_ignored_without_a_trace);
-    RUN_TEST(test_a_value_that_is_not_available_is_missing);
-    return UNITY_END();
 }

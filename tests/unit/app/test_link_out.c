@@ -7,10 +7,6 @@ void setUp(void)
     start();
 }
 
-void tearDown(void)
-{
-}
-
 static void assert_ids(const uint32_t *wanted, uint32_t count, uint32_t found)
 {
     TEST_ASSERT_EQUAL_UINT32(count, found);
@@ -22,14 +18,14 @@ static void assert_ids(const uint32_t *wanted, uint32_t count, uint32_t found)
 
 /* --- which, and in what order ------------------------------------------------------------------------------------- */
 
-static void test_nothing_is_sent_before_the_first_sample(void)
+TEST(nothing_is_sent_before_the_first_sample)
 {
     TEST_ASSERT_EQUAL_UINT32(0u, fetch_all(lever, frames));
 }
 
 /* Part k of seven, of which PLATFORM_HEALTH is not sent without a report, at the first sample after k sevenths of the
  * period; the pages of IDENTITY each second. */
-static void test_a_set_of_divided_messages_is_spread_over_a_publish_period(void)
+TEST(a_set_of_divided_messages_is_spread_over_a_publish_period)
 {
     const struct {
         uint32_t sample;
@@ -51,7 +47,7 @@ static void test_a_set_of_divided_messages_is_spread_over_a_publish_period(void)
     }
 }
 
-static void test_when_all_are_due_state_estimate_comes_last(void)
+TEST(when_all_are_due_state_estimate_comes_last)
 {
     const uint32_t wanted[] = {0x215u, 0x218u, 0x211u, 0x212u, 0x213u, 0x21Au, 0x214u, 0x219u, 0x216u, 0x217u, 0x210u};
     const lever_platform_t report = {.faults = 0u};
@@ -65,7 +61,7 @@ static void test_when_all_are_due_state_estimate_comes_last(void)
     assert_ids(wanted, 11u, answers());
 }
 
-static void test_the_motor_comes_first_while_dither_is_on(void)
+TEST(the_motor_comes_first_while_dither_is_on)
 {
     const uint32_t wanted[] = {0x215u, 0x210u};
     (void)sender_run(&sender, lever, 421u);
@@ -74,7 +70,7 @@ static void test_the_motor_comes_first_while_dither_is_on(void)
     assert_ids(wanted, 2u, answers());
 }
 
-static void test_the_last_motor_command_of_a_fade_is_zero_and_then_there_is_none(void)
+TEST(the_last_motor_command_of_a_fade_is_zero_and_then_there_is_none)
 {
     message_motor_command_t command = {.torque = 1.0f};
     (void)sender_run(&sender, lever, 400u);
@@ -93,7 +89,7 @@ static void test_the_last_motor_command_of_a_fade_is_zero_and_then_there_is_none
     TEST_ASSERT_TRUE(command.torque == 0.0f);
 }
 
-static void test_dither_that_ends_at_once_is_told_so_once(void)
+TEST(dither_that_ends_at_once_is_told_so_once)
 {
     message_motor_command_t command;
     config.settings.dither_fade = 0.0f;
@@ -110,7 +106,7 @@ static void test_dither_that_ends_at_once_is_told_so_once(void)
     TEST_ASSERT_FALSE(message_motor_command_decode(&command, &frames[0]));
 }
 
-static void test_a_sample_that_is_late_by_time_is_answered_too(void)
+TEST(a_sample_that_is_late_by_time_is_answered_too)
 {
     (void)sender_run(&sender, lever, 100u);
     sender.rig.time_us -= 2000u;
@@ -119,7 +115,7 @@ static void test_a_sample_that_is_late_by_time_is_answered_too(void)
     TEST_ASSERT_EQUAL_HEX32(0x210u, frames[count - 1u].id);
 }
 
-static void test_frames_not_fetched_are_replaced_and_do_not_pile_up(void)
+TEST(frames_not_fetched_are_replaced_and_do_not_pile_up)
 {
     for (uint32_t k = 0u; k < 50u; k++) {
         (void)sender_deliver(&sender, lever);
@@ -145,7 +141,7 @@ static uint32_t publications_in(uint32_t samples)
     return count;
 }
 
-static void test_divided_messages_come_every_publish_period(void)
+TEST(divided_messages_come_every_publish_period)
 {
     TEST_ASSERT_EQUAL_UINT32(50u, publications_in(1000u));
     config.settings.publish_period = 0.1f;
@@ -153,14 +149,14 @@ static void test_divided_messages_come_every_publish_period(void)
     TEST_ASSERT_EQUAL_UINT32(10u, publications_in(1000u));
 }
 
-static void test_a_publish_period_shorter_than_a_sample_publishes_every_sample(void)
+TEST(a_publish_period_shorter_than_a_sample_publishes_every_sample)
 {
     publish_always();
     TEST_ASSERT_EQUAL_UINT32(99u, publications_in(100u)); /* the first sample begins a set, the second ends it */
 }
 
 /* Once there was no HEALTH at all then. */
-static void test_publication_goes_on_while_the_sample_clock_stands(void)
+TEST(publication_goes_on_while_the_sample_clock_stands)
 {
     (void)sender_run(&sender, lever, 400u);
     const uint32_t now = sender.rig.time_us;
@@ -179,7 +175,7 @@ static void test_publication_goes_on_while_the_sample_clock_stands(void)
     TEST_ASSERT_EQUAL_UINT32(50u, found);
 }
 
-static void test_publication_goes_on_when_time_wraps(void)
+TEST(publication_goes_on_when_time_wraps)
 {
     sender.rig.time_us = UINT32_MAX - 500000u;
     TEST_ASSERT_EQUAL_UINT32(50u, publications_in(1000u));
@@ -187,7 +183,7 @@ static void test_publication_goes_on_when_time_wraps(void)
 
 /* --- protection --------------------------------------------------------------------------------------------------- */
 
-static void test_every_message_has_its_own_gapless_counter_and_a_right_crc(void)
+TEST(every_message_has_its_own_gapless_counter_and_a_right_crc)
 {
     const uint8_t data_ids[11] = {
         49u, 65u, 81u, 97u, 113u, 129u, 145u, 161u, 177u, 193u, 209u}; /* E2EDataIdBase of the DBC */
@@ -212,23 +208,4 @@ static void test_every_message_has_its_own_gapless_counter_and_a_right_crc(void)
     }
     const uint32_t expected[11] = {1000u, 50u, 50u, 50u, 50u, 700u, 50u, 3u, 1000u, 50u, 50u};
     TEST_ASSERT_EQUAL_UINT32_ARRAY(expected, received, 11);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_nothing_is_sent_before_the_first_sample);
-    RUN_TEST(test_a_set_of_divided_messages_is_spread_over_a_publish_period);
-    RUN_TEST(test_when_all_are_due_state_estimate_comes_last);
-    RUN_TEST(test_the_motor_comes_first_while_dither_is_on);
-    RUN_TEST(test_the_last_motor_command_of_a_fade_is_zero_and_then_there_is_none);
-    RUN_TEST(test_dither_that_ends_at_once_is_told_so_once);
-    RUN_TEST(test_a_sample_that_is_late_by_time_is_answered_too);
-    RUN_TEST(test_frames_not_fetched_are_replaced_and_do_not_pile_up);
-    RUN_TEST(test_divided_messages_come_every_publish_period);
-    RUN_TEST(test_a_publish_period_shorter_than_a_sample_publishes_every_sample);
-    RUN_TEST(test_publication_goes_on_while_the_sample_clock_stands);
-    RUN_TEST(test_publication_goes_on_when_time_wraps);
-    RUN_TEST(test_every_message_has_its_own_gapless_counter_and_a_right_crc);
-    return UNITY_END();
 }

@@ -20,10 +20,6 @@ void setUp(void)
     start();
 }
 
-void tearDown(void)
-{
-}
-
 /* Through alignment and on for as many samples. */
 static void run_for(uint32_t samples)
 {
@@ -32,7 +28,7 @@ static void run_for(uint32_t samples)
 
 /* --- init and align ----------------------------------------------------------------------------------------------- */
 
-static void test_init_then_align_for_align_time_at_the_first_guess_then_run(void)
+TEST(init_then_align_for_align_time_at_the_first_guess_then_run)
 {
     TEST_ASSERT_EQUAL(LEVER_MODE_INIT, rig_health(lever).mode);
     TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).samples);
@@ -45,7 +41,7 @@ static void test_init_then_align_for_align_time_at_the_first_guess_then_run(void
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1u));
 }
 
-static void test_trim_after_alignment_is_the_mean_angle(void)
+TEST(trim_after_alignment_is_the_mean_angle)
 {
     double sum = 0.0;
     for (uint32_t k = 0u; k < 300u; k++) {
@@ -56,14 +52,14 @@ static void test_trim_after_alignment_is_the_mean_angle(void)
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, sum / 300.0, (double)rig_estimate(lever).trim);
 }
 
-static void test_alignment_waits_for_a_valid_theta(void)
+TEST(alignment_waits_for_a_valid_theta)
 {
     (void)rig_run(&rig, lever, 100u);
     TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, rig_run_blind(&rig, lever, 1000u));
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1u));
 }
 
-static void test_alignment_leaves_samples_without_theta_out_of_the_mean(void)
+TEST(alignment_leaves_samples_without_theta_out_of_the_mean)
 {
     lever_sample_t sample = rig_sample(&rig);
     sample.theta = 0.2f;
@@ -79,7 +75,7 @@ static void test_alignment_leaves_samples_without_theta_out_of_the_mean(void)
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, 0.3, (double)rig_estimate(lever).trim);
 }
 
-static void test_a_rate_that_was_never_measured_is_unknown(void)
+TEST(a_rate_that_was_never_measured_is_unknown)
 {
     for (uint32_t k = 0u; k < 302u; k++) {
         lever_sample_t sample = rig_sample(&rig);
@@ -93,7 +89,7 @@ static void test_a_rate_that_was_never_measured_is_unknown(void)
 
 /* --- coast -------------------------------------------------------------------------------------------------------- */
 
-static void test_without_theta_and_theta_dot_it_coasts_and_then_runs_again(void)
+TEST(without_theta_and_theta_dot_it_coasts_and_then_runs_again)
 {
     run_for(0u);
     TEST_ASSERT_EQUAL(LEVER_MODE_COAST, rig_run_blind(&rig, lever, 1u));
@@ -105,7 +101,7 @@ static void test_without_theta_and_theta_dot_it_coasts_and_then_runs_again(void)
 
 /* --- frozen ------------------------------------------------------------------------------------------------------- */
 
-static void test_run_leaves_frozen_and_learns_on(void)
+TEST(run_leaves_frozen_and_learns_on)
 {
     run_for(1000u);
     rig_request(lever, LEVER_REQUEST_FREEZE);
@@ -116,7 +112,7 @@ static void test_run_leaves_frozen_and_learns_on(void)
     TEST_ASSERT_TRUE(rig_estimate(lever).parameter[2] != before.parameter[2]);
 }
 
-static void test_frozen_before_the_first_sample_freezes_after_alignment(void)
+TEST(frozen_before_the_first_sample_freezes_after_alignment)
 {
     rig_request(lever, LEVER_REQUEST_FREEZE);
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 400u));
@@ -136,24 +132,9 @@ static void assert_can_be_frozen_at(float m_p, float c_p, float k_p)
     TEST_ASSERT_EQUAL_FLOAT(m_p, rig_estimate(lever).parameter[0]);
 }
 
-static void test_frozen_at_the_least_or_greatest_first_guess_is_no_fault(void)
+TEST(frozen_at_the_least_or_greatest_first_guess_is_no_fault)
 {
     const model_parameter_t *p = model_lever.parameter;
     assert_can_be_frozen_at(p[0].least, p[1].least, p[2].least);
     assert_can_be_frozen_at(p[0].greatest, p[1].greatest, p[2].greatest);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_init_then_align_for_align_time_at_the_first_guess_then_run);
-    RUN_TEST(test_trim_after_alignment_is_the_mean_angle);
-    RUN_TEST(test_alignment_waits_for_a_valid_theta);
-    RUN_TEST(test_alignment_leaves_samples_without_theta_out_of_the_mean);
-    RUN_TEST(test_a_rate_that_was_never_measured_is_unknown);
-    RUN_TEST(test_without_theta_and_theta_dot_it_coasts_and_then_runs_again);
-    RUN_TEST(test_run_leaves_frozen_and_learns_on);
-    RUN_TEST(test_frozen_before_the_first_sample_freezes_after_alignment);
-    RUN_TEST(test_frozen_at_the_least_or_greatest_first_guess_is_no_fault);
-    return UNITY_END();
 }

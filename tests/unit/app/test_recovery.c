@@ -4,7 +4,6 @@
 #include "app/estimator.h"
 #include "rig.h"
 
-static uint32_t combination;
 static lever_config_t config;
 static estimator_t estimator;
 static rig_t rig;
@@ -41,14 +40,10 @@ static void request(enum lever_request what)
 
 void setUp(void)
 {
-    config = rig_config(combination);
+    config = rig_config(test_round);
     rig = rig_of(config.model, truth);
     estimator_init(&estimator, &config);
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(2000u));
-}
-
-void tearDown(void)
-{
 }
 
 /* So many samples, each with the state's factor broken before it. */
@@ -84,7 +79,7 @@ static void assert_recovers(float *first, uint32_t count, uint32_t samples)
     }
 }
 
-static void test_recovers_from_damage_to_any_part_of_the_belief(void)
+TEST_EACH(RIG_COMBINATIONS, recovers_from_damage_to_any_part_of_the_belief)
 {
     cdkf_t *cdkf = &estimator.cdkf;
     assert_recovers(cdkf->x, (uint32_t)MODEL_STATES, 1u);
@@ -106,7 +101,7 @@ static void test_recovers_from_damage_to_any_part_of_the_belief(void)
     }
 }
 
-static void test_restarts_from_the_measurement_and_the_first_guess(void)
+TEST_EACH(RIG_COMBINATIONS, restarts_from_the_measurement_and_the_first_guess)
 {
     (void)run_damaged(1u);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, rig.simulation.theta, (double)estimate().theta);
@@ -114,7 +109,7 @@ static void test_restarts_from_the_measurement_and_the_first_guess(void)
     rig_assert_first_guess(&config, estimate());
 }
 
-static void test_restart_without_a_measurement_begins_at_the_trim_and_at_rest(void)
+TEST_EACH(RIG_COMBINATIONS, restart_without_a_measurement_begins_at_the_trim_and_at_rest)
 {
     const lever_sample_t sample = rig_sample_blind(&rig);
     estimator.cdkf.s_xx[0] = NAN;
@@ -126,7 +121,7 @@ static void test_restart_without_a_measurement_begins_at_the_trim_and_at_rest(vo
 }
 
 /* What was not a number for a sample must not make it deaf for what comes later. */
-static void test_after_a_restart_it_learns_and_notices_a_sudden_grip(void)
+TEST_EACH(RIG_COMBINATIONS, after_a_restart_it_learns_and_notices_a_sudden_grip)
 {
     (void)run_damaged(1u);
     (void)run(40000u);
@@ -139,7 +134,7 @@ static void test_after_a_restart_it_learns_and_notices_a_sudden_grip(void)
     }
 }
 
-static void test_six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none(void)
+TEST_EACH(RIG_COMBINATIONS, six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none)
 {
     for (uint32_t k = 0u; k < 20u; k++) {
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run_damaged(1u));
@@ -150,7 +145,7 @@ static void test_six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none(voi
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(1u));
 }
 
-static void test_only_a_reset_leaves_fault(void)
+TEST_EACH(RIG_COMBINATIONS, only_a_reset_leaves_fault)
 {
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(6u));
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(20000u));
@@ -171,7 +166,7 @@ static void test_only_a_reset_leaves_fault(void)
     TEST_ASSERT_EQUAL_UINT32(6u, estimator.recoveries); /* counts go on */
 }
 
-static void test_frozen_survives_a_restart(void)
+TEST_EACH(RIG_COMBINATIONS, frozen_survives_a_restart)
 {
     request(LEVER_REQUEST_FREEZE);
     (void)run(1u);
@@ -180,7 +175,7 @@ static void test_frozen_survives_a_restart(void)
     TEST_ASSERT_EQUAL_UINT32(1u, estimator.recoveries);
 }
 
-static void test_an_estimate_beyond_a_bound_is_held_there_and_said(void)
+TEST_EACH(RIG_COMBINATIONS, an_estimate_beyond_a_bound_is_held_there_and_said)
 {
     const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box, &model_hand};
     const float greatest = models[config.model]->parameter[0].greatest;
@@ -194,7 +189,7 @@ static void test_an_estimate_beyond_a_bound_is_held_there_and_said(void)
 }
 
 /* An angle a million standard deviations off after an outage is refused, and does not make the average deaf for what comes later. */
-static void test_a_huge_innovation_after_an_outage_does_not_spoil_the_average(void)
+TEST_EACH(RIG_COMBINATIONS, a_huge_innovation_after_an_outage_does_not_spoil_the_average)
 {
     config.settings.noise_window = 0.0f; /* or the noise would be found out */
     config.settings.theta_noise = 1.0e-6f;
@@ -218,21 +213,4 @@ static void test_a_huge_innovation_after_an_outage_does_not_spoil_the_average(vo
     (void)run(3000u);
     TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_INNOVATION));
     TEST_ASSERT_EQUAL_UINT32(0u, estimator.recoveries);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    for (combination = 0u; combination < (uint32_t)RIG_COMBINATIONS; combination++) {
-        RIG_RUN_TEST(test_recovers_from_damage_to_any_part_of_the_belief, combination);
-        RIG_RUN_TEST(test_restarts_from_the_measurement_and_the_first_guess, combination);
-        RIG_RUN_TEST(test_restart_without_a_measurement_begins_at_the_trim_and_at_rest, combination);
-        RIG_RUN_TEST(test_after_a_restart_it_learns_and_notices_a_sudden_grip, combination);
-        RIG_RUN_TEST(test_six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none, combination);
-        RIG_RUN_TEST(test_only_a_reset_leaves_fault, combination);
-        RIG_RUN_TEST(test_frozen_survives_a_restart, combination);
-        RIG_RUN_TEST(test_a_huge_innovation_after_an_outage_does_not_spoil_the_average, combination);
-        RIG_RUN_TEST(test_an_estimate_beyond_a_bound_is_held_there_and_said, combination);
-    }
-    return UNITY_END();
 }

@@ -2,7 +2,6 @@
  * With every model and estimator. */
 #include "rig.h"
 
-static uint32_t combination;
 static lever_memory_t memory;
 static lever_memory_t other_memory;
 static lever_t *lever;
@@ -13,7 +12,7 @@ static double truth[LEVER_PARAMETERS];
 static lever_t *make(lever_memory_t *in)
 {
     static lever_config_t config;
-    config = rig_config(combination);
+    config = rig_config(test_round);
     lever_t *made = lever_init(in, &config);
     TEST_ASSERT_NOT_NULL(made);
     return made;
@@ -21,13 +20,9 @@ static lever_t *make(lever_memory_t *in)
 
 void setUp(void)
 {
-    rig = rig_of(rig_config(combination).model, truth);
+    rig = rig_of(rig_config(test_round).model, truth);
     lever = make(&memory);
     other = make(&other_memory);
-}
-
-void tearDown(void)
-{
 }
 
 /* The same good samples into both. */
@@ -47,7 +42,7 @@ static uint32_t faults(void)
 
 /* --- what is missing ---------------------------------------------------------------------------------------------- */
 
-static void test_good_samples_have_no_fault(void)
+TEST_EACH(RIG_COMBINATIONS, good_samples_have_no_fault)
 {
     (void)rig_run(&rig, lever, 3000u);
     TEST_ASSERT_EQUAL_UINT32(0u, faults());
@@ -55,7 +50,7 @@ static void test_good_samples_have_no_fault(void)
     TEST_ASSERT_EQUAL_UINT8(2u, rig_estimate(lever).nis_size);
 }
 
-static void test_without_one_output_it_runs_on_the_other(void)
+TEST_EACH(RIG_COMBINATIONS, without_one_output_it_runs_on_the_other)
 {
     (void)rig_run(&rig, lever, 3000u);
     for (uint32_t missing = 0u; missing < 2u; missing++) {
@@ -69,7 +64,7 @@ static void test_without_one_output_it_runs_on_the_other(void)
 }
 
 /* Without dither nothing is asked of the motor. */
-static void test_torque_that_is_not_valid_counts_as_what_was_asked_of_the_motor(void)
+TEST_EACH(RIG_COMBINATIONS, torque_that_is_not_valid_counts_as_what_was_asked_of_the_motor)
 {
     run_both(1000u);
     for (uint32_t k = 0u; k < 20u; k++) {
@@ -86,7 +81,7 @@ static void test_torque_that_is_not_valid_counts_as_what_was_asked_of_the_motor(
 
 /* What it is does not matter; nothing is learnt, and the state is less certain. For more than 20 ms, the levels have to
  * settle again. */
-static void test_without_base_acceleration_nothing_is_learnt(void)
+TEST_EACH(RIG_COMBINATIONS, without_base_acceleration_nothing_is_learnt)
 {
     for (uint32_t k = 0u; k < 2u; k++) {
         const uint32_t missing = (k == 0u) ? 20u : 300u;
@@ -131,7 +126,7 @@ static lever_sample_t sample_with(uint32_t which, float value)
     return sample;
 }
 
-static void test_a_value_that_is_not_finite_is_corrupt_and_counts_as_invalid(void)
+TEST_EACH(RIG_COMBINATIONS, a_value_that_is_not_finite_is_corrupt_and_counts_as_invalid)
 {
     const uint32_t fault[4] = {(uint32_t)LEVER_FAULT_THETA, (uint32_t)LEVER_FAULT_THETA_DOT,
         (uint32_t)LEVER_FAULT_TORQUE, (uint32_t)LEVER_FAULT_BASE};
@@ -150,7 +145,7 @@ static void test_a_value_that_is_not_finite_is_corrupt_and_counts_as_invalid(voi
     TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
 }
 
-static void test_a_value_that_is_flagged_invalid_is_not_read(void)
+TEST_EACH(RIG_COMBINATIONS, a_value_that_is_flagged_invalid_is_not_read)
 {
     (void)rig_run(&rig, lever, 400u);
     lever_sample_t sample = rig_sample(&rig);
@@ -167,7 +162,7 @@ static void test_a_value_that_is_flagged_invalid_is_not_read(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 1u));
 }
 
-static void test_not_a_number_in_the_very_first_sample_does_no_harm(void)
+TEST_EACH(RIG_COMBINATIONS, not_a_number_in_the_very_first_sample_does_no_harm)
 {
     for (uint32_t which = 0u; which < 4u; which++) {
         setUp();
@@ -178,7 +173,7 @@ static void test_not_a_number_in_the_very_first_sample_does_no_harm(void)
     }
 }
 
-static void test_the_wildest_finite_values_need_no_restart(void)
+TEST_EACH(RIG_COMBINATIONS, the_wildest_finite_values_need_no_restart)
 {
     random_source_t source = {77u};
     (void)rig_run(&rig, lever, 400u);
@@ -196,7 +191,7 @@ static void test_the_wildest_finite_values_need_no_restart(void)
 
 enum { CLOCK = 4096 }; /* LEVER_FAULT_CLOCK: of a late sample it may be the only fault */
 
-static void test_a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothing(void)
+TEST_EACH(RIG_COMBINATIONS, a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothing)
 {
     const uint32_t older_us[] = {0u, 5000u, 1800000000u}; /* half a turn of the clock is 36 minutes */
     run_both(1500u);                                      /* settled */
@@ -230,7 +225,7 @@ static enum lever_mode run_lagging(uint32_t count, uint32_t lag_us)
 }
 
 /* A sender that restarts its clock is late for gap_limit; then the estimator aligns anew, parameters kept, and runs. */
-static void test_a_clock_that_starts_anew_is_followed_after_gap_limit(void)
+TEST_EACH(RIG_COMBINATIONS, a_clock_that_starts_anew_is_followed_after_gap_limit)
 {
     const uint32_t lags_us[] = {10000000u, 2000000000u, 1000000u};
     for (uint32_t k = 0u; k < 3u; k++) {
@@ -252,7 +247,7 @@ static void test_a_clock_that_starts_anew_is_followed_after_gap_limit(void)
 }
 
 /* A clock that stands, or jumps to and fro, is never a new one; nor is one whose late samples a good one interrupts. */
-static void test_late_samples_that_do_not_advance_are_no_new_clock(void)
+TEST_EACH(RIG_COMBINATIONS, late_samples_that_do_not_advance_are_no_new_clock)
 {
     (void)rig_run(&rig, lever, 1000u);
     const lever_sample_t standing = rig_sample(&rig);
@@ -273,7 +268,7 @@ static void test_late_samples_that_do_not_advance_are_no_new_clock(void)
     TEST_ASSERT_EQUAL_UINT32(1005u, rig_health(lever).samples);
 }
 
-static void test_time_may_wrap_at_2_to_the_32(void)
+TEST_EACH(RIG_COMBINATIONS, time_may_wrap_at_2_to_the_32)
 {
     const uint32_t shift = UINT32_MAX - 400000u; /* wraps 0.4 s after the start, running */
     for (uint32_t k = 0u; k < 2000u; k++) {
@@ -292,7 +287,7 @@ static void test_time_may_wrap_at_2_to_the_32(void)
 
 /* --- health ------------------------------------------------------------------------------------------------------- */
 
-static void test_excitation_is_the_rms_of_theta_dot(void)
+TEST_EACH(RIG_COMBINATIONS, excitation_is_the_rms_of_theta_dot)
 {
     double square = 0.0;
     (void)rig_run(&rig, lever, 5000u);
@@ -304,7 +299,7 @@ static void test_excitation_is_the_rms_of_theta_dot(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.3 * wanted, wanted, (double)rig_health(lever).excitation);
 }
 
-static void test_a_lever_at_rest_is_said_to_lack_excitation(void)
+TEST_EACH(RIG_COMBINATIONS, a_lever_at_rest_is_said_to_lack_excitation)
 {
     rig_let_rest(&rig);
     (void)rig_run(&rig, lever, 3000u);
@@ -321,11 +316,11 @@ static void set_noise(double factor)
 }
 
 /* Four times the noise that is set is found out when there is a noise window, and said when there is none. */
-static void test_innovations_larger_than_predicted_are_said(void)
+TEST_EACH(RIG_COMBINATIONS, innovations_larger_than_predicted_are_said)
 {
     for (uint32_t k = 0u; k < 2u; k++) {
         static lever_config_t config;
-        config = rig_config(combination);
+        config = rig_config(test_round);
         config.settings.noise_window = (k == 0u) ? 1.0f : 0.0f;
         lever = lever_init(&memory, &config);
         rig = rig_of(config.model, truth);
@@ -338,27 +333,4 @@ static void test_innovations_larger_than_predicted_are_said(void)
         (void)rig_run(&rig, lever, 5000u);
         TEST_ASSERT_EQUAL_UINT32(0u, faults() & (uint32_t)LEVER_FAULT_INNOVATION);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    for (combination = 0u; combination < (uint32_t)RIG_COMBINATIONS; combination++) {
-        RIG_RUN_TEST(test_good_samples_have_no_fault, combination);
-        RIG_RUN_TEST(test_without_one_output_it_runs_on_the_other, combination);
-        RIG_RUN_TEST(test_torque_that_is_not_valid_counts_as_what_was_asked_of_the_motor, combination);
-        RIG_RUN_TEST(test_without_base_acceleration_nothing_is_learnt, combination);
-        RIG_RUN_TEST(test_a_value_that_is_not_finite_is_corrupt_and_counts_as_invalid, combination);
-        RIG_RUN_TEST(test_a_value_that_is_flagged_invalid_is_not_read, combination);
-        RIG_RUN_TEST(test_not_a_number_in_the_very_first_sample_does_no_harm, combination);
-        RIG_RUN_TEST(test_the_wildest_finite_values_need_no_restart, combination);
-        RIG_RUN_TEST(test_a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothing, combination);
-        RIG_RUN_TEST(test_a_clock_that_starts_anew_is_followed_after_gap_limit, combination);
-        RIG_RUN_TEST(test_late_samples_that_do_not_advance_are_no_new_clock, combination);
-        RIG_RUN_TEST(test_time_may_wrap_at_2_to_the_32, combination);
-        RIG_RUN_TEST(test_excitation_is_the_rms_of_theta_dot, combination);
-        RIG_RUN_TEST(test_a_lever_at_rest_is_said_to_lack_excitation, combination);
-        RIG_RUN_TEST(test_innovations_larger_than_predicted_are_said, combination);
-    }
-    return UNITY_END();
 }

@@ -33,10 +33,6 @@ void setUp(void)
     start();
 }
 
-void tearDown(void)
-{
-}
-
 static bool has_fault(uint32_t fault)
 {
     return (rig_health(lever).faults & fault) != 0u;
@@ -57,7 +53,7 @@ static double largest_difference(void)
 /* --- what is missing ---------------------------------------------------------------------------------------------- */
 
 /* What was asked of the motor until the sample is what a perfect torque sensor would have said. */
-static void test_without_measured_torque_the_torque_asked_for_counts(void)
+TEST(without_measured_torque_the_torque_asked_for_counts)
 {
     lever_command_t command = rig_command();
     command.dither_rms = 0.3f;
@@ -80,7 +76,7 @@ static void test_without_measured_torque_the_torque_asked_for_counts(void)
 }
 
 /* The trim is taken to be where the lever's spring rests. */
-static void test_it_aligns_and_learns_by_the_rate_alone(void)
+TEST(it_aligns_and_learns_by_the_rate_alone)
 {
     for (uint32_t k = 0u; k < 40000u; k++) {
         lever_sample_t sample = rig_sample(&rig);
@@ -107,7 +103,7 @@ typedef struct defect {
 } defect_t;
 
 /* Fifteen seconds; flagged in time, nothing learnt that is wrong, and over in time. */
-static void test_a_signal_that_is_wrong_but_valid_is_flagged_and_not_learnt(void)
+TEST(a_signal_that_is_wrong_but_valid_is_flagged_and_not_learnt)
 {
     static const defect_t defects[] = {{0u, 0.0f, 1.0f, (uint32_t)LEVER_FAULT_THETA, 500u, 100u},
         {1u, 0.0f, 1.0f, (uint32_t)LEVER_FAULT_THETA_DOT, 500u, 100u},
@@ -140,7 +136,7 @@ static void test_a_signal_that_is_wrong_but_valid_is_flagged_and_not_learnt(void
 }
 
 /* One sample in a hundred, of either output. */
-static void test_spikes_are_refused_and_cost_nothing(void)
+TEST(spikes_are_refused_and_cost_nothing)
 {
     random_source_t source = {9u};
     for (uint32_t i = 0u; i < 2u; i++) {
@@ -170,7 +166,7 @@ static void test_spikes_are_refused_and_cost_nothing(void)
 
 /* Torque of 1 N m rms that nobody measures, with a correlation time of 0.3 s: no arm of this order does that. It is
  * said for a good part of the time, more than a third. */
-static void test_unknown_torque_is_a_mismatch_and_ordinary_flight_is_none(void)
+TEST(unknown_torque_is_a_mismatch_and_ordinary_flight_is_none)
 {
     const uint32_t either = (uint32_t)LEVER_FAULT_MISMATCH | (uint32_t)LEVER_FAULT_CALIBRATION;
     random_source_t source = {41u};
@@ -192,7 +188,7 @@ static void test_unknown_torque_is_a_mismatch_and_ordinary_flight_is_none(void)
 }
 
 /* Seen within a second, both ways; and what the lever does alone is not learnt of the arm. */
-static void test_hands_off_is_flagged_and_not_learnt(void)
+TEST(hands_off_is_flagged_and_not_learnt)
 {
     const plant_t held = rig.simulation.plant;
     uint32_t off = 0u;
@@ -212,16 +208,4 @@ static void test_hands_off_is_flagged_and_not_learnt(void)
         (void)rig_run(&rig, lever, 500u);
         rig_assert_within(4.0, truth, rig_estimate(lever));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_without_measured_torque_the_torque_asked_for_counts);
-    RUN_TEST(test_it_aligns_and_learns_by_the_rate_alone);
-    RUN_TEST(test_a_signal_that_is_wrong_but_valid_is_flagged_and_not_learnt);
-    RUN_TEST(test_spikes_are_refused_and_cost_nothing);
-    RUN_TEST(test_unknown_torque_is_a_mismatch_and_ordinary_flight_is_none);
-    RUN_TEST(test_hands_off_is_flagged_and_not_learnt);
-    return UNITY_END();
 }

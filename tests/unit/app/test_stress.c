@@ -22,10 +22,6 @@ void setUp(void)
     rig = rig_of(config.model, truth);
 }
 
-void tearDown(void)
-{
-}
-
 /* Noise of the simulation, and what the filter is told of it. */
 static void start(double theta_noise, double theta_dot_noise, double process_noise)
 {
@@ -40,7 +36,7 @@ static void start(double theta_noise, double theta_dot_noise, double process_noi
 }
 
 /* Every parameter within 2 % from 20 to 60 s, never a restart. */
-static void test_a_microradian_with_every_model_estimator_and_adaptation_converges_within_two_per_cent(void)
+TEST(a_microradian_with_every_model_estimator_and_adaptation_converges_within_two_per_cent)
 {
     for (uint32_t choice = 0u; choice < (uint32_t)CHOICES; choice++) {
         config = rig_config(choice % (uint32_t)RIG_COMBINATIONS);
@@ -86,7 +82,7 @@ static void set_extreme(lever_settings_t *s, const extreme_t *extreme)
     }
 }
 
-static void test_the_least_and_greatest_noise_that_may_be_set_never_lose_the_factor(void)
+TEST(the_least_and_greatest_noise_that_may_be_set_never_lose_the_factor)
 {
     const extreme_t extremes[] = {
         {1.0e-7, 1.0e-6, 5.0e-4, -1.0f, false}, {1.0e-7, 1.0e-6, 0.0, 0.0f, false}, {1.0e-3, 1.0e-2, 0.05, 1.0f, true}};
@@ -155,7 +151,7 @@ static lever_sample_t draw_sample(random_source_t *source, uint32_t *time_us)
     return sample;
 }
 
-static void test_any_accepted_configuration_with_any_samples_stays_finite(void)
+TEST(any_accepted_configuration_with_any_samples_stays_finite)
 {
     random_source_t source = {99u};
     for (uint32_t run = 0u; run < (uint32_t)CONFIGURATIONS; run++) {
@@ -176,7 +172,7 @@ static void test_any_accepted_configuration_with_any_samples_stays_finite(void)
 }
 
 /* Half of the settings as they are, samples as they should be: then nothing is ever refused either. */
-static void test_any_accepted_configuration_with_good_samples_needs_no_restart(void)
+TEST(any_accepted_configuration_with_good_samples_needs_no_restart)
 {
     random_source_t source = {7u};
     for (uint32_t run = 0u; run < ((uint32_t)CONFIGURATIONS / 10u); run++) {
@@ -200,14 +196,4 @@ static void test_any_accepted_configuration_with_good_samples_needs_no_restart(v
         rig_assert_finite(rig_estimate(lever));
         TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).recoveries);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_microradian_with_every_model_estimator_and_adaptation_converges_within_two_per_cent);
-    RUN_TEST(test_the_least_and_greatest_noise_that_may_be_set_never_lose_the_factor);
-    RUN_TEST(test_any_accepted_configuration_with_any_samples_stays_finite);
-    RUN_TEST(test_any_accepted_configuration_with_good_samples_needs_no_restart);
-    return UNITY_END();
 }

@@ -16,10 +16,6 @@ void setUp(void)
     sender = sender_typical();
 }
 
-void tearDown(void)
-{
-}
-
 static void command_dither(float rms)
 {
     lever_command_t command = rig_command();
@@ -114,7 +110,7 @@ static void blind_and_clock_crawls(lever_sample_t *sample, uint32_t k)
 }
 
 /* Through COAST, and in FROZEN, which does not tell. */
-static void test_torque_ends_when_no_output_is_valid_for_a_minute(void)
+TEST(torque_ends_when_no_output_is_valid_for_a_minute)
 {
     start_dithering();
     run_to_zero(blind, 60000u, 20u);
@@ -126,7 +122,7 @@ static void test_torque_ends_when_no_output_is_valid_for_a_minute(void)
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_health(lever).mode);
 }
 
-static void test_torque_ends_when_the_sample_clock_stands_or_runs_backwards(void)
+TEST(torque_ends_when_the_sample_clock_stands_or_runs_backwards)
 {
     start_dithering();
     run_to_zero(clock_stands, 10000u, 0u);
@@ -137,7 +133,7 @@ static void test_torque_ends_when_the_sample_clock_stands_or_runs_backwards(void
     TEST_ASSERT_BITS_HIGH(LEVER_FAULT_CLOCK, rig_health(lever).faults);
 }
 
-static void test_torque_ends_when_the_sample_clock_crawls(void)
+TEST(torque_ends_when_the_sample_clock_crawls)
 {
     start_dithering();
     run_to_zero(clock_crawls, 10000u, 0u);
@@ -148,7 +144,7 @@ static void test_torque_ends_when_the_sample_clock_crawls(void)
 }
 
 /* A sample whose clock stands counts as 5 ms: so late a port calls lever_idle(). */
-static void test_torque_ends_when_the_clock_stands_and_samples_are_few(void)
+TEST(torque_ends_when_the_clock_stands_and_samples_are_few)
 {
     config.settings.sample_period = 1.0e-4f;
     start_dithering();
@@ -160,7 +156,7 @@ static void test_torque_ends_when_the_clock_stands_and_samples_are_few(void)
 }
 
 /* Neither a reset nor a report of the port needs a sample to have its effect. */
-static void test_torque_ends_within_50_ms_of_a_reset_or_report_without_a_sample(void)
+TEST(torque_ends_within_50_ms_of_a_reset_or_report_without_a_sample)
 {
     const lever_platform_t broken = {.faults = (uint8_t)LEVER_PLATFORM_ROM};
     for (uint32_t report = 0u; report < 2u; report++) {
@@ -180,7 +176,7 @@ static void test_torque_ends_within_50_ms_of_a_reset_or_report_without_a_sample(
 }
 
 /* A process that was stopped, a debugger: one long time in one call, at any moment of a dither that uses its rms up. */
-static void test_a_long_idle_time_ends_torque_and_never_raises_it(void)
+TEST(a_long_idle_time_ends_torque_and_never_raises_it)
 {
     const uint32_t times_us[] = {100000u, 120000u, 150000u, 300000u, 0x7FFFFFFFu, UINT32_MAX};
     (void)sender_run(&sender, lever, 400u);
@@ -198,7 +194,7 @@ static void test_a_long_idle_time_ends_torque_and_never_raises_it(void)
 }
 
 /* A gap in the samples, and then silence: what was let through before it is all that may be left of it. */
-static void test_a_gap_and_idle_time_after_it_never_raise_torque(void)
+TEST(a_gap_and_idle_time_after_it_never_raise_torque)
 {
     (void)sender_run(&sender, lever, 400u);
     command_dither(0.9f);
@@ -223,7 +219,7 @@ static void test_a_gap_and_idle_time_after_it_never_raise_torque(void)
     }
 }
 
-static void test_torque_ends_a_second_after_the_last_command_and_goes_on_with_the_next(void)
+TEST(torque_ends_a_second_after_the_last_command_and_goes_on_with_the_next)
 {
     (void)sender_run(&sender, lever, 400u);
     command_dither(0.5f);
@@ -237,7 +233,7 @@ static void test_torque_ends_a_second_after_the_last_command_and_goes_on_with_th
     TEST_ASSERT_TRUE(torque_now() != 0.0f);
 }
 
-static void test_torque_ends_when_the_machine_is_broken_and_only_then(void)
+TEST(torque_ends_when_the_machine_is_broken_and_only_then)
 {
     for (uint32_t fault = 1u; fault <= 128u; fault *= 2u) {
         const bool ends = (fault == (uint32_t)LEVER_PLATFORM_ROM) || (fault == (uint32_t)LEVER_PLATFORM_SELF_TEST) ||
@@ -255,7 +251,7 @@ static void test_torque_ends_when_the_machine_is_broken_and_only_then(void)
     }
 }
 
-static void test_torque_ends_with_a_reset_and_does_not_come_back(void)
+TEST(torque_ends_with_a_reset_and_does_not_come_back)
 {
     start_dithering();
     rig_request(lever, LEVER_REQUEST_RESET);
@@ -265,7 +261,7 @@ static void test_torque_ends_with_a_reset_and_does_not_come_back(void)
 }
 
 /* No command but a reset leaves the mode, or makes torque. */
-static void test_torque_ends_in_fault_and_no_command_brings_it_back(void)
+TEST(torque_ends_in_fault_and_no_command_brings_it_back)
 {
     lever_command_t command = rig_command();
     command.dither_rms = 0.5f;
@@ -284,7 +280,7 @@ static void test_torque_ends_in_fault_and_no_command_brings_it_back(void)
 }
 
 /* No sample comes: the port's clock alone closes the gate, and every frame on the way is sent. */
-static void test_torque_ends_without_samples_by_the_clock_of_the_port(void)
+TEST(torque_ends_without_samples_by_the_clock_of_the_port)
 {
     lever_frame_t frames[FRAMES_MOST];
     message_motor_command_t command = {.torque = 1.0f};
@@ -323,7 +319,7 @@ static float greatest_over(uint32_t count, uint32_t periods)
 }
 
 /* A dither of 0.05 N m rms asked for 1.03 N m after a gap of 20 ms, and for the limit for 103 ms after one of 0.2 s. */
-static void test_a_gap_adds_nothing_to_the_torque(void)
+TEST(a_gap_adds_nothing_to_the_torque)
 {
     const uint32_t gaps[] = {2u, 19u, 20u, 21u, 200u, 2000u};
     for (uint32_t g = 0u; g < 6u; g++) {
@@ -340,7 +336,7 @@ static void test_a_gap_adds_nothing_to_the_torque(void)
 }
 
 /* NaN for good, once. */
-static void test_samples_twenty_times_as_far_apart_as_said_make_no_more_torque(void)
+TEST(samples_twenty_times_as_far_apart_as_said_make_no_more_torque)
 {
     config.settings.gap_limit = 1.0f;
     setUp();
@@ -350,24 +346,4 @@ static void test_samples_twenty_times_as_far_apart_as_said_make_no_more_torque(v
     const float greatest = greatest_over(3000u, 20u);
     TEST_ASSERT_TRUE((greatest > 0.1f) && (greatest <= config.settings.torque_limit));
     TEST_ASSERT_TRUE(greatest_over(5000u, 1u) > 0.1f);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_torque_ends_when_no_output_is_valid_for_a_minute);
-    RUN_TEST(test_torque_ends_when_the_sample_clock_stands_or_runs_backwards);
-    RUN_TEST(test_torque_ends_when_the_sample_clock_crawls);
-    RUN_TEST(test_torque_ends_when_the_clock_stands_and_samples_are_few);
-    RUN_TEST(test_torque_ends_within_50_ms_of_a_reset_or_report_without_a_sample);
-    RUN_TEST(test_a_long_idle_time_ends_torque_and_never_raises_it);
-    RUN_TEST(test_a_gap_and_idle_time_after_it_never_raise_torque);
-    RUN_TEST(test_torque_ends_a_second_after_the_last_command_and_goes_on_with_the_next);
-    RUN_TEST(test_torque_ends_when_the_machine_is_broken_and_only_then);
-    RUN_TEST(test_torque_ends_with_a_reset_and_does_not_come_back);
-    RUN_TEST(test_torque_ends_in_fault_and_no_command_brings_it_back);
-    RUN_TEST(test_torque_ends_without_samples_by_the_clock_of_the_port);
-    RUN_TEST(test_a_gap_adds_nothing_to_the_torque);
-    RUN_TEST(test_samples_twenty_times_as_far_apart_as_said_make_no_more_torque);
-    return UNITY_END();
 }

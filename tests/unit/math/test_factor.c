@@ -1,7 +1,7 @@
 /* The kernels of factor.h at their limits: rows without rank, no noise, no information, too much of either. */
 #include "math/factor.h"
 #include "random.h"
-#include "unity.h"
+#include "test.h"
 
 #include <float.h>
 #include <string.h>
@@ -15,10 +15,6 @@ static random_source_t source;
 void setUp(void)
 {
     source.state = 20240229u;
-}
-
-void tearDown(void)
-{
 }
 
 static double dot(const float *a, const float *b, uint32_t n)
@@ -49,7 +45,7 @@ static void assert_factorises(const float a[3], const float b[3], float s[4])
 }
 
 /* What is left of a row beside the other comes from a sum of squares, so it is right to its own last digits. */
-static void test_tria_of_nearly_dependent_rows_keeps_what_is_different(void)
+TEST(tria_of_nearly_dependent_rows_keeps_what_is_different)
 {
     for (double difference = 1.0e-1; difference > 1.0e-6; difference *= 0.1) {
         const float a[3] = {1.0f, 0.0f, 0.0f};
@@ -60,7 +56,7 @@ static void test_tria_of_nearly_dependent_rows_keeps_what_is_different(void)
     }
 }
 
-static void test_tria_of_dependent_or_zero_rows_is_deficient_not_nan(void)
+TEST(tria_of_dependent_or_zero_rows_is_deficient_not_nan)
 {
     const float rows[3][3] = {{1.0f, 2.0f, 2.0f}, {-2.0f, -4.0f, -4.0f}, {0.0f, 0.0f, 0.0f}};
     float s[4];
@@ -76,7 +72,7 @@ static void test_tria_of_dependent_or_zero_rows_is_deficient_not_nan(void)
 /* --- noise -------------------------------------------------------------------------------------------------------- */
 
 /* As for parameters that do not walk, for minutes. */
-static void test_no_noise_changes_nothing_to_the_bit(void)
+TEST(no_noise_changes_nothing_to_the_bit)
 {
     float s[MOST_ROWS * MOST_N];
     float before[MOST_ROWS * MOST_N];
@@ -91,7 +87,7 @@ static void test_no_noise_changes_nothing_to_the_bit(void)
 }
 
 /* Where nothing was known, other rows have nothing to do with what is known now. */
-static void test_noise_on_nothing_is_the_noise(void)
+TEST(noise_on_nothing_is_the_noise)
 {
     float s[8] = {0.0f, 0.0f, 0.0f, 0.0f, 0.75f, -2.0f, 0.5f, 3.0f};
     float rest[2][2];
@@ -105,7 +101,7 @@ static void test_noise_on_nothing_is_the_noise(void)
 }
 
 /* A millionth of the variance each time; and less than the diagonal can hold, where nothing else may drift either. */
-static void test_tiny_noise_adds_up_or_leaves_the_rest_as_it_is(void)
+TEST(tiny_noise_adds_up_or_leaves_the_rest_as_it_is)
 {
     const float noises[] = {5.0e-4f, 1.0e-6f};
     const double tolerances[] = {5.0e-3, 1.0e-5};
@@ -174,7 +170,7 @@ static void condition(known_t known, float *s, uint32_t rows, double *mean)
     }
 }
 
-static void test_no_information_changes_nothing_to_the_bit(void)
+TEST(no_information_changes_nothing_to_the_bit)
 {
     float s[MOST_ROWS * MOST_N];
     float before[MOST_ROWS * MOST_N];
@@ -197,7 +193,7 @@ static void assert_is_factor(const float s[9], const double mean[3])
 
 /* More than a float can tell from a matrix without rank; and the same precise outputs of three elements again and
  * again: what is left is anything, but a factor. */
-static void test_any_information_leaves_a_factor(void)
+TEST(any_information_leaves_a_factor)
 {
     for (double scale = 1.0e2; scale < 1.0e16; scale *= 3.0) {
         float s[9];
@@ -220,7 +216,7 @@ static void test_any_information_leaves_a_factor(void)
     }
 }
 
-static void test_a_precise_measurement_of_one_element_leaves_its_noise(void)
+TEST(a_precise_measurement_of_one_element_leaves_its_noise)
 {
     float s[4] = {0.5f, 0.0f, 0.25f, 0.75f};
     double mean[2];
@@ -232,25 +228,10 @@ static void test_a_precise_measurement_of_one_element_leaves_its_noise(void)
 
 /* --- sigma -------------------------------------------------------------------------------------------------------- */
 
-static void test_sigma_is_the_norm_of_the_row_up_to_the_diagonal(void)
+TEST(sigma_is_the_norm_of_the_row_up_to_the_diagonal)
 {
     const float s[9] = {2.0f, 9.0f, 9.0f, 3.0f, 4.0f, 9.0f, 1.0e-12f, 2.0e-12f, 2.0e-12f};
     TEST_ASSERT_TRUE(factor_sigma(s, 3u, 0u) == 2.0f);
     TEST_ASSERT_TRUE((factor_sigma(s, 3u, 1u) == 5.0f) && (factor_variance(s, 3u, 1u) == 25.0f));
     TEST_ASSERT_FLOAT_WITHIN(1.0e-18f, 3.0e-12f, factor_sigma(s, 3u, 2u));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_tria_of_nearly_dependent_rows_keeps_what_is_different);
-    RUN_TEST(test_tria_of_dependent_or_zero_rows_is_deficient_not_nan);
-    RUN_TEST(test_no_noise_changes_nothing_to_the_bit);
-    RUN_TEST(test_noise_on_nothing_is_the_noise);
-    RUN_TEST(test_tiny_noise_adds_up_or_leaves_the_rest_as_it_is);
-    RUN_TEST(test_no_information_changes_nothing_to_the_bit);
-    RUN_TEST(test_any_information_leaves_a_factor);
-    RUN_TEST(test_a_precise_measurement_of_one_element_leaves_its_noise);
-    RUN_TEST(test_sigma_is_the_norm_of_the_row_up_to_the_diagonal);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 /* What every model keeps to at its limits: rest, heavy and negative damping, a lever that falls. */
 #include "../math/random.h"
 #include "constants.h"
-#include "unity.h"
+#include "test.h"
 
 enum { MODELS = 4, KINDS = 2 * MODELS, REPEATS = 300, L = MODEL_PARAMETERS };
 
@@ -22,10 +22,6 @@ static random_source_t source;
 void setUp(void)
 {
     source.state = 11u;
-}
-
-void tearDown(void)
-{
 }
 
 /* --- subjects ----------------------------------------------------------------------------------------------------- */
@@ -100,7 +96,7 @@ static double mean_change(const subject_t *subject)
 /* --- limits ------------------------------------------------------------------------------------------------------- */
 
 /* In preload fixed the lever's arm rests where its spring bears its weight. */
-static void test_at_rest_it_stays_at_rest(void)
+TEST(at_rest_it_stays_at_rest)
 {
     const double p[MODELS][L] = {{2.5, 42.0, 1500.0}, {2.5, 42.0, 1500.0}, {-465.0, -13.7, -2.2}, {500.0, 13.5, 9.0}};
     for (uint32_t kind = 0u; kind < (uint32_t)KINDS; kind++) {
@@ -118,7 +114,7 @@ static void test_at_rest_it_stays_at_rest(void)
 
 /* The arm hangs on a trunk that has moved by s = seat l cos(trim): its spring and damper pull by l cos(theta) (k_p s + c_p
  * s_dot) more. To first order in seat. */
-static void test_a_trunk_that_gives_way_pulls_by_spring_and_damper_of_the_arm(void)
+TEST(a_trunk_that_gives_way_pulls_by_spring_and_damper_of_the_arm)
 {
     for (uint32_t repeat = 0u; repeat < (uint32_t)REPEATS; repeat++) {
         const double p[L] = {random_between(&source, 1.0, 5.0), random_between(&source, 10.0, 150.0),
@@ -142,7 +138,7 @@ static void test_a_trunk_that_gives_way_pulls_by_spring_and_damper_of_the_arm(vo
     }
 }
 
-static void test_heavy_damping_and_a_long_step_still_decay(void)
+TEST(heavy_damping_and_a_long_step_still_decay)
 {
     const double p[MODELS][L] = {{0.3, 400.0, 200.0}, {0.05, 600.0, 1.0}, {-1.0, -320.0, 0.0}, {20.0, 320.0, 0.1}};
     for (uint32_t model = 0u; model < (uint32_t)MODELS; model++) {
@@ -157,7 +153,7 @@ static void test_heavy_damping_and_a_long_step_still_decay(void)
     }
 }
 
-static void test_negative_damping_grows_in_any_step(void)
+TEST(negative_damping_grows_in_any_step)
 {
     for (uint32_t k = 1u; k <= 320u; k++) {
         const double p[L] = {0.0, (double)k, 0.0};
@@ -176,7 +172,7 @@ static model_dynamics_t dynamics_of(const subject_t *subject)
     return subject->model->dynamics(&subject->constants, &subject->step, &coefficients);
 }
 
-static void test_a_lever_that_falls_has_a_negative_stiffness(void)
+TEST(a_lever_that_falls_has_a_negative_stiffness)
 {
     const double soft[L] = {2.5, 42.0, 50.0};
     subject_t subject = subject_of(1u, soft, 1.0e-3, 0.0, 0.0);
@@ -189,7 +185,7 @@ static void test_a_lever_that_falls_has_a_negative_stiffness(void)
 /* --- descriptors -------------------------------------------------------------------------------------------------- */
 
 /* Bounds fit into the CAN signals (lever.dbc) and hold every pilot of the design with room. */
-static void test_descriptors_have_names_units_and_bounds(void)
+TEST(descriptors_have_names_units_and_bounds)
 {
     static const model_t expected[MODELS] = {{.name = "lever",
                                                  .parameter = {{"m_p", "kg", 0.001f, 65.535f},
@@ -218,16 +214,4 @@ static void test_descriptors_have_names_units_and_bounds(void)
             TEST_ASSERT_TRUE((model == 2u) || (parameter->greatest >= 1.5f * pilot[1][i]));
         }
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_at_rest_it_stays_at_rest);
-    RUN_TEST(test_a_trunk_that_gives_way_pulls_by_spring_and_damper_of_the_arm);
-    RUN_TEST(test_heavy_damping_and_a_long_step_still_decay);
-    RUN_TEST(test_negative_damping_grows_in_any_step);
-    RUN_TEST(test_a_lever_that_falls_has_a_negative_stiffness);
-    RUN_TEST(test_descriptors_have_names_units_and_bounds);
-    return UNITY_END();
 }
