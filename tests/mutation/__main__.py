@@ -36,6 +36,7 @@ def main() -> int:
         mutants = sorted(random.Random(args.seed).sample(mutants, args.random), key=lambda each: each.number)
     start = time.monotonic()
     programs = [measured(path) for path in sorted((args.build / "programs").iterdir())]
+    programs += [measured(args.build / "oracle", case) for case in sorted((args.build / "cases").glob("*.case"))]
     verdicts = []
     for verdict in judged(mutants, programs, args.jobs):
         verdicts.append(verdict)

@@ -22,38 +22,42 @@ GRACE = 1_000_000
 
 @dataclass(frozen=True)
 class Program:
-    """A test program, as it runs without a mutant."""
+    """A program of tests, or one with one case, as it runs without a mutant."""
 
-    path: Path
+    command: tuple[Path, ...]
     seconds: float
     expressions: int
     """Evaluated that could have held a mutant."""
     reached: frozenset[int]
     """Mutant.guard of those."""
 
+    @property
+    def name(self) -> str:
+        return self.command[-1].stem
+
     def kills(self, mutant: Mutant) -> bool:
         environment = {"MUTANT": str(mutant.number), "MUTANT_MOST": str(PATIENCE * self.expressions + GRACE)}
-        return _run(self.path, environment) != 0
+        return _run(self.command, environment) != 0
 
 
-def _run(program: Path, environment: dict[str, str]) -> int:
+def _run(command: tuple[Path, ...], environment: dict[str, str]) -> int:
     with tempfile.TemporaryDirectory() as folder:
         everything = os.environ | environment
         return subprocess.run(
-            program, cwd=folder, env=everything, stdout=DEVNULL, stderr=DEVNULL, check=False
+            command, cwd=folder, env=everything, stdout=DEVNULL, stderr=DEVNULL, check=False
         ).returncode
 
 
-def measured(program: Path) -> Program:
+def measured(*command: Path) -> Program:
     """Runs it without a mutant. Raises RuntimeError when it fails."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report"
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        if _run(program, {"MUTANT_REPORT": str(report)}) != 0:
-            raise RuntimeError(f"{program} fails without a mutant")
+        if _run(command, {"MUTANT_REPORT": str(report)}) != 0:
+            raise RuntimeError(f"{' '.join(map(str, command))} fails without a mutant")
         seconds = 0.005 + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
         expressions, *reached = map(int, report.read_text().split())
-    return Program(program, seconds, expressions, frozenset(reached))
+    return Program(command, seconds, expressions, frozenset(reached))
 
 
 @dataclass(frozen=True)
@@ -71,10 +75,10 @@ def judged(mutants: Sequence[Mutant], programs: Sequence[Program], jobs: int) ->
     def judge(mutant: Mutant) -> Verdict:
         record = kills[(mutant.path, mutant.function)]
         able = [program for program in programs if mutant.guard in program.reached]
-        for program in sorted(able, key=lambda p: p.seconds / (1 + record[p.path.name])):
+        for program in sorted(able, key=lambda p: p.seconds / (1 + record[p.name])):
             if program.kills(mutant):
-                record[program.path.name] += 1
-                return Verdict(mutant, program.path.name, True)
+                record[program.name] += 1
+                return Verdict(mutant, program.name, True)
         return Verdict(mutant, "", bool(able))
 
     with ThreadPoolExecutor(jobs) as pool:
