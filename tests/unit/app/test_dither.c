@@ -1,7 +1,11 @@
 /* The identification torque: off by default, of the rms that is asked, inside its band, faded in and out. */
 #include "app/dither.h"
 
-#include "rig.h"
+#include "lever_cdkf.h"
+#include "test.h"
+
+#include <math.h>
+#include <string.h>
 
 #define PERIOD 1.0e-3f
 
@@ -48,30 +52,6 @@ TEST(is_off_until_it_is_asked_for)
     TEST_ASSERT_FALSE(dither_is_on(&dither));
     TEST_ASSERT_TRUE(rms_over(5000u) == 0.0);
     TEST_ASSERT_FALSE(dither_is_on(&dither));
-}
-
-TEST(has_no_mean)
-{
-    double sum = 0.0;
-    ask(0.3f);
-    step(2000u);
-    for (uint32_t k = 0u; k < 200000u; k++) {
-        step(1u);
-        sum += (double)torque;
-    }
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.0, sum / 200000.0);
-}
-
-TEST(is_the_same_after_every_reset)
-{
-    ask(0.3f);
-    step(3000u);
-    const float first = torque;
-    dither_reset(&dither);
-    TEST_ASSERT_FALSE(dither_is_on(&dither));
-    ask(0.3f);
-    step(3000u);
-    TEST_ASSERT_TRUE(first == torque);
 }
 
 /* A keep-alive may repeat the command: once a sample, the fade still takes its time. */
@@ -137,14 +117,6 @@ TEST(fades_in_linearly_over_its_time)
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.3, (double)dither.level);
     step(251u);
     TEST_ASSERT_TRUE(dither.level == 0.4f);
-}
-
-TEST(fading_in_starts_with_less_torque_than_it_ends_with)
-{
-    ask(0.4f);
-    const double beginning = rms_over(200u);
-    step(1000u);
-    TEST_ASSERT_TRUE(beginning < 0.3 * rms_over(20000u));
 }
 
 TEST(fades_out_over_its_time_and_is_off)

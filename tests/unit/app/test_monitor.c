@@ -2,7 +2,7 @@
  * that is not about once what it should be. Each must be found, and none where nothing is wrong. */
 #include "app/monitor.h"
 
-#include "../math/random.h"
+#include "random.h"
 #include "test.h"
 
 enum { SAMPLES = 20 }; /* in a block */

@@ -2,7 +2,7 @@
  * distributed: vector = information b + noise of variance information. */
 #include "filter/calibration.h"
 
-#include "../math/random.h"
+#include "random.h"
 #include "test.h"
 
 enum { C = CDKF_CALIBRATION };
@@ -67,12 +67,6 @@ TEST(a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_g
         (void)run(3000u, c, 0.0, 100.0);
         TEST_ASSERT_FALSE(calibration.wrong);
     }
-}
-
-/* Of an error that is hardly seen nothing is said, however large. */
-TEST(noise_alone_decides_nothing)
-{
-    TEST_ASSERT_EQUAL_UINT32(0u, run(30000u, (uint32_t)CDKF_FRICTION, 4.0, 0.01));
 }
 
 /* Without noise: the score of many times MEMORY is what comes in MEMORY; the limits are 2 sigma +

@@ -110,36 +110,6 @@ static bool run_without(uint32_t missing, uint32_t samples, float x0)
     return back;
 }
 
-/* Back within 20 ms, the level is where samples on the straight line would have brought it. Before that the angle is
- * reported to have moved as the level would with the prediction. */
-TEST(a_short_outage_is_a_straight_line)
-{
-    const float x[MODEL_STATES] = {0.0f, 0.0f};
-    const bool both[MODEL_STATES] = {true, true};
-    for (uint32_t missing = 1u; missing < 20u; missing++) {
-        setUp();
-        (void)run_without(0u, 50u, 0.0f); /* theta_dot has moved nothing */
-        trim_t expected = trim;
-        for (uint32_t k = 1u; k <= (missing + 1u); k++) {
-            const float share = (float)k / (float)(missing + 1u);
-            float y[MODEL_STATES] = {0.35f + (0.1f * share), 0.0f};
-            (void)trim_outputs(&expected, x, y, both, PERIOD);
-        }
-        float deviation[MODEL_STATES] = {0.45f, 0.0f};
-        trim.last[0] = 0.35f;
-        trim.missing[0] = 0.0f;
-        (void)run_without(1u, missing, 0.1f);
-        TEST_ASSERT_TRUE(trim.ahead[0] > 0.0f);
-        TEST_ASSERT_FALSE(trim_outputs(&trim, x, deviation, both, PERIOD));
-        TEST_ASSERT_TRUE(trim.ahead[0] == 0.0f);
-        for (uint32_t k = 0u; k < (uint32_t)TRIM_SECTIONS; k++) {
-            const high_pass_t *section = &trim.output[0].section[k];
-            TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, expected.output[0].section[k].level, section->level);
-            TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, expected.output[0].section[k].slope, section->slope);
-        }
-    }
-}
-
 TEST(a_missing_level_waits_after_20_ms)
 {
     (void)run_without(1u, 20u, 0.1f);

@@ -1,7 +1,7 @@
 /* Whiteness: white innovations stay white however long, coloured ones are found; against their known correlations. */
 #include "filter/whiteness.h"
 
-#include "../math/random.h"
+#include "random.h"
 #include "test.h"
 
 enum { SAMPLES = 20 }; /* in a block */
@@ -33,16 +33,6 @@ static uint32_t run(uint32_t blocks, double share, double keep, bool counts)
         coloured += whiteness.coloured ? 1u : 0u;
     }
     return coloured;
-}
-
-/* Three minutes. */
-TEST(white_innovations_are_white)
-{
-    for (uint64_t seed = 1u; seed <= 20u; seed++) {
-        setUp();
-        source.state = seed;
-        TEST_ASSERT_EQUAL_UINT32(0u, run(9000u, 0.0, 0.0, true));
-    }
 }
 
 /* A share s of n samples' mean has the correlation keep^k s / (s + 1/n) at lag k: far below the noise of a sample,

@@ -17,6 +17,24 @@ void setUp(void)
     source.state = 20240229u;
 }
 
+static void random_floats(float *values, uint32_t count, double scale)
+{
+    for (uint32_t i = 0u; i < count; i++) {
+        values[i] = (float)(scale * random_between(&source, -1.0, 1.0));
+    }
+}
+
+/* A factor [n x n] with diagonal in [1/2, 1], and rows below it. */
+static void random_factor(float *s, uint32_t rows, uint32_t n)
+{
+    random_floats(s, rows * n, 1.0);
+    for (uint32_t i = 0u; i < (n * n); i++) {
+        if ((i % n) >= (i / n)) {
+            s[i] = ((i % n) == (i / n)) ? (float)random_between(&source, 0.5, 1.0) : 0.0f;
+        }
+    }
+}
+
 static double dot(const float *a, const float *b, uint32_t n)
 {
     double sum = 0.0;
@@ -77,7 +95,7 @@ TEST(no_noise_changes_nothing_to_the_bit)
     float s[MOST_ROWS * MOST_N];
     float before[MOST_ROWS * MOST_N];
     float rest[MOST_ROWS - MOST_N];
-    random_factor(&source, s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
+    random_factor(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
     (void)memcpy(before, s, sizeof before);
     for (uint32_t k = 0u; k < 100000u; k++) {
         factor_add_noise(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N, k % (uint32_t)MOST_N, 0.0f, rest);
@@ -149,8 +167,8 @@ static void sum_up(known_t *known)
 static known_t draw_known(uint32_t n, uint32_t outputs, double scale)
 {
     known_t known = {.n = n, .outputs = outputs};
-    random_floats(&source, known.c, outputs * n, scale);
-    random_floats(&source, known.nu, outputs, 1.0);
+    random_floats(known.c, outputs * n, scale);
+    random_floats(known.nu, outputs, 1.0);
     sum_up(&known);
     return known;
 }
@@ -175,7 +193,7 @@ TEST(no_information_changes_nothing_to_the_bit)
     float s[MOST_ROWS * MOST_N];
     float before[MOST_ROWS * MOST_N];
     double mean[MOST_ROWS];
-    random_factor(&source, s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
+    random_factor(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
     (void)memcpy(before, s, sizeof before);
     condition(draw_known((uint32_t)MOST_N, 0u, 1.0), s, (uint32_t)MOST_ROWS, mean);
     TEST_ASSERT_EQUAL_MEMORY(before, s, sizeof before);
@@ -199,7 +217,7 @@ TEST(any_information_leaves_a_factor)
         float s[9];
         double mean[3];
         for (uint32_t repeat = 0u; repeat < 3u * (uint32_t)REPEATS; repeat++) {
-            random_factor(&source, s, 3u, 3u);
+            random_factor(s, 3u, 3u);
             condition(draw_known(3u, 1u + (repeat % 4u), scale), s, 3u, mean);
             assert_is_factor(s, mean);
         }

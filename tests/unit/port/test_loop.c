@@ -44,9 +44,7 @@ typedef struct machine {
 } machine_t;
 
 static machine_t machine;
-static machine_t second;
 static port_t port;
-static port_t second_port;
 static machine_t *seen; /* whose estimator is spoken to */
 
 static void seen_idle(lever_t *lever, uint32_t elapsed_us)
@@ -220,21 +218,6 @@ static void assert_all_answered(const machine_t *it)
     TEST_ASSERT_EQUAL_UINT64(SAMPLES, it->loop.totals.samples);
     TEST_ASSERT_EQUAL_UINT64(0u, it->loop.totals.dropped);
     TEST_ASSERT_EQUAL_UINT64(0u, it->loop.totals.stale);
-}
-
-/* Two of them in turn, of which one has twice the excitation. */
-TEST(several_instances_answer_as_the_facade_does)
-{
-    start(&second, &second_port, LOOP_DROP, 2.0f);
-    while (second.received < INPUTS) {
-        (void)turn(&machine);
-        (void)turn(&second);
-    }
-    assert_all_answered(&machine);
-    assert_all_answered(&second);
-    TEST_ASSERT_NOT_EQUAL(0, memcmp(machine.sent, second.sent, sizeof machine.sent));
-    TEST_ASSERT_EQUAL_UINT64(0u, machine.loop.totals.held);
-    TEST_ASSERT_EQUAL_INT(LEVER_MODE_RUN, machine.loop.mode);
 }
 
 TEST(a_held_frame_is_sent_before_anything_is_received)

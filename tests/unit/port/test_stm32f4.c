@@ -1,40 +1,11 @@
-/* What of the STM32F405 port is arithmetic: addresses, PLL, bit timing; and its drivers on registers that are plain
- * memory here. How they do on a bxCAN that behaves like one: tests/target. */
+/* What of the STM32F405 port is arithmetic: addresses, PLL, bit timing. How its drivers do on a bxCAN and clocks that behave like
+ * ones: tests/target/bxcan. */
 #include <stddef.h>
-#include <string.h>
 
-#include "can/messages.h"
 #include "port/stm32f4/bit_timing.h"
-#include "port/stm32f4/can.c"   /* NOLINT(bugprone-suspicious-include): with memory for its registers */
-#include "port/stm32f4/clock.c" /* NOLINT(bugprone-suspicious-include) */
+#include "port/stm32f4/clock.h"
+#include "port/stm32f4/registers.h"
 #include "test.h"
-
-rcc_t rcc;
-pwr_t pwr;
-flash_t flash;
-gpio_t gpiob;
-can_t can1;
-nvic_t nvic;
-scb_t scb;
-
-static const clock_rates_t full = {.pll = true, .crystal = true};
-
-void setUp(void)
-{
-    (void)memset((void *)&rcc, 0, sizeof rcc);
-    (void)memset((void *)&flash, 0, sizeof flash);
-    (void)memset((void *)&gpiob, 0, sizeof gpiob);
-    (void)memset((void *)&can1, 0, sizeof can1);
-    ring_clear(&received);
-    ring_clear(&waiting);
-    (void)memset(since_ms, 0, sizeof since_ms);
-    time_ms = 0u;
-    crystal_state = 0u;
-    off = false;
-    counts.dropped = 0u;
-    counts.overruns = 0u;
-    counts.bus_offs = 0u;
-}
 
 /* Offsets as the register maps of RM0090 (7.3.24, 8.4.11, 30.6.8, 32.9.5) and PM0214 (4.4.20) print them. */
 TEST(registers_are_where_the_manual_says)
@@ -95,38 +66,4 @@ TEST(bit_timing_is_exact_or_refused)
     TEST_ASSERT_GREATER_THAN_INT(20, accepted);
     TEST_ASSERT_FALSE(BIT_TIMING_IS_GOOD(42500000)); /* no whole number of quanta */
     TEST_ASSERT_FALSE(BIT_TIMING_IS_GOOD(4000000));  /* too few of them */
-}
-
-/* RM0090 figure 342: a 16-bit identifier is STID[10:0] RTR IDE EXID[17:15]. */
-TEST(filter_lets_the_inputs_through)
-{
-    can_start(&full);
-    TEST_ASSERT_EQUAL_HEX32(0x22202200u, can1.FR[0][0]); /* 0x111, 0x110 */
-    TEST_ASSERT_EQUAL_HEX32(0x24002240u, can1.FR[0][1]); /* 0x120, 0x112 */
-    TEST_ASSERT_EQUAL_HEX32(0x42E042E0u, can1.FR[1][0]); /* 0x217, as often as there is room */
-    TEST_ASSERT_EQUAL_HEX32(0x42E042E0u, can1.FR[1][1]);
-    TEST_ASSERT_EQUAL_HEX32(3u, can1.FM1R);
-    TEST_ASSERT_EQUAL_HEX32(3u, can1.FA1R);
-    TEST_ASSERT_EQUAL_HEX32(0u, can1.FS1R | can1.FFA1R | (can1.FMR & 1u));
-}
-
-/* A clock tree of which nothing is ever ready, as in QEMU. */
-TEST(without_any_clock_the_internal_one_runs_on)
-{
-    const clock_rates_t rates = clock_start();
-
-    TEST_ASSERT_FALSE(rates.pll);
-    TEST_ASSERT_FALSE(rates.crystal);
-    TEST_ASSERT_EQUAL_UINT32(16000000u, rates.core_hz);
-    TEST_ASSERT_EQUAL_HEX32(0u, rcc.CFGR);
-}
-
-/* Registers of memory keep what is written, so a ready flag that is set here stays. */
-TEST(without_crystal_the_pll_runs_from_the_internal_oscillator)
-{
-    rcc.CR = RCC_CR_PLLRDY;
-    (void)clock_start();
-    TEST_ASSERT_EQUAL_HEX32(8u | (168u << 6) | (7u << 24), rcc.PLLCFGR); /* 16 MHz / 8 * 168, source HSI */
-    TEST_ASSERT_EQUAL_HEX32(0x705u, flash.ACR);
-    TEST_ASSERT_EQUAL_HEX32(0u, rcc.CR & (RCC_CR_HSEON | RCC_CR_CSSON));
 }
