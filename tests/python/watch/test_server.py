@@ -26,7 +26,7 @@ from processes import PATIENCE
 from python.conftest import Refused
 from python.watch.conftest import Flight
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
-from tornado.websocket import websocket_connect
+from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 
 class FlightSource(Source):
@@ -99,8 +99,15 @@ async def status_of_socket(server: Server, **headers: str) -> int:
         connection = await websocket_connect(HTTPRequest(url, headers=headers))
     except HTTPClientError as error:
         return error.code
-    connection.close()
+    await closed(connection)
     return 101
+
+
+async def closed(connection: WebSocketClientConnection, is_open: bool = True) -> None:
+    """Closes it, and waits until it is: what the loop would leave open is reported against another test."""
+    connection.close()
+    while is_open:
+        is_open = await connection.read_message() is not None
 
 
 class Visitor:
@@ -108,13 +115,14 @@ class Visitor:
 
     def __init__(self, server: Server) -> None:
         self._server = server
+        self._open = True
 
     async def __aenter__(self) -> Visitor:
         self._connection = await websocket_connect(self._server.address.replace("http", "ws") + "socket")
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        self._connection.close()
+        await closed(self._connection, self._open)
 
     async def ask(self, message: str) -> None:
         await self._connection.write_message(message)
@@ -123,6 +131,7 @@ class Visitor:
         """The content of the next message of a kind."""
         while True:
             text = await self._connection.read_message()
+            self._open = text is not None
             assert text is not None, "closed"
             message = json.loads(text, parse_constant=pytest.fail)  # NaN and Infinity are no JSON
             if kind in message:
