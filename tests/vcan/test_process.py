@@ -71,13 +71,6 @@ def test_a_signal_ends_it_well(start: rig.Starter, interface: str, number: signa
     host.bus.shutdown()
 
 
-def test_a_signal_ends_it_while_the_interface_is_down(start: rig.Starter, interface: str) -> None:
-    process = start()
-    rig.ip("link", "set", interface, "down")
-    process.wait_for("link lost")
-    assert process.stop()["outages"] == 1
-
-
 def test_a_signal_ends_it_under_full_load(start: rig.Starter, interface: str) -> None:
     process = start()
     flood = subprocess.Popen(["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "8"])
@@ -123,21 +116,6 @@ def test_it_goes_on_after_the_interface_was_deleted_and_made_again(start: rig.St
     assert answers == rig.in_process(2 * SAMPLES)
     assert process.stderr.count("\n") == 2
     process.stop()
-    host.bus.shutdown()
-
-
-def test_many_outages_in_a_row(start: rig.Starter, interface: str) -> None:
-    process = start()
-    host = rig.Host.on(interface)
-    answers = []
-    for outage in range(1, 4):
-        answers += host.run(20)
-        rig.ip("link", "set", interface, "down")
-        rig.ip("link", "set", interface, "up")
-        process.wait_for("link restored", times=outage)
-        host.reopen(interface)
-    assert answers == rig.in_process(60)
-    assert process.stop()["outages"] == 3
     host.bus.shutdown()
 
 

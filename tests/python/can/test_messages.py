@@ -131,24 +131,6 @@ def test_limits_and_beyond(codec: Codec, message: Message, signal: Signal) -> No
         assert got == (None if refused else expected), value
 
 
-@pytest.mark.parametrize(("message", "signal"), QUANTITIES)
-def test_counts_decode_to_the_nearest_float(codec: Codec, message: Message, signal: Signal) -> None:
-    """The C gives the float nearest to what cantools gives, and sends that as the same count."""
-    least, greatest = limits(signal)
-    step = 1 if greatest < 1024 else 37
-    around = context(message, signal)
-    for raw in [*range(least, greatest, step), greatest]:
-        if raw == not_available(signal):
-            continue
-        value = float(np.float32(scaled(signal, raw)))
-        data = codec.encode(message.name, as_members(message, around | {signal.name: value}))
-        blank = {other.name: 0 for other in signals_of(message, around.get(multiplexer(message) or "", 0))}
-        assert data == message.encode(blank | around | {signal.name: raw}, scaling=False, strict=False)
-        decoded = codec.decode(message.name, data or b"")
-        assert decoded is not None
-        assert as_signals(message, decoded)[signal.name] == value
-
-
 @pytest.mark.parametrize(("message", "signal"), CODES)
 def test_codes(codec: Codec, message: Message, signal: Signal) -> None:
     _, greatest = limits(signal)

@@ -196,11 +196,6 @@ def test_a_bus_on_which_nobody_else_is_is_refused(interface: str, tmp_path: Path
     assert os.listdir(tmp_path) == []
 
 
-def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, refused: Refused) -> None:
-    assert "can77" in refused("record", "--interface", "socketcan", "--channel", "can77", "-o", tmp_path / "a.log")
-    assert os.listdir(tmp_path) == []
-
-
 def test_the_state_of_the_controller_is_read_from_error_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """<linux/can/error.h>: byte 1 of class 4 has the controller's conditions; 0x40 is bus off, 0x100 restarted."""
 

@@ -173,8 +173,3 @@ def test_hand_is_what_mayo_has_measured(a: float, b: float, w: float, frequency:
     measured = 2.0 * (theta * np.exp(-s * time))[late].mean()
     expected = ((b * s + w) / (s**2 + a * s + w) - 1.0) / (s**2 * SETTINGS["lever_length"] * np.cos(trim))
     assert abs(measured - expected) < 0.01 * abs(expected)
-
-
-def test_lever_refuses_an_unknown_preload() -> None:
-    with pytest.raises(ValueError, match='"loose" is neither'):
-        Lever.from_settings(SETTINGS, "loose")

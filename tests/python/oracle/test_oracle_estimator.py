@@ -232,10 +232,3 @@ def test_the_parameters_do_not_follow_a_new_trim() -> None:
     feed(carried, moved, 1, 7000)
     assert (np.abs(still.belief.w - carried.belief.w) < 2.0 * cdkf.deviations(still.belief.w_factor)).all()
     assert carried.trim - still.trim == pytest.approx(0.05, abs=1e-3)
-
-
-@pytest.mark.parametrize("what", ["adaptation", "estimator", "model"])
-def test_unknown_choices_are_refused(what: str) -> None:
-    choice: dict[str, Any] = {what: "magic"}
-    with pytest.raises(ValueError, match=f'{what}: "magic" is none of'):
-        Estimator(SETTINGS, START, **choice)

@@ -262,23 +262,6 @@ def test_white_residuals_are_a_test_passed_and_no_proof_of_the_model() -> None:
     assert whiteness.verdict(None) == ""
 
 
-def test_a_file_is_read_back_as_it_was(recording: loop.Recording, tmp_path: Path) -> None:
-    made = summary.build(recording, perfect(recording)).timed(1.0)
-    file = tmp_path / "summary.json"
-    file.write_text(text(made))
-    assert read(file) == made
-    content = json.loads(file.read_text())
-    assert set(content) >= {
-        "schema", "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "restarts",
-        "unanswered", "misplaced", "firmware", "fault_shares", "flagged_share", "wall_time_s",
-        "simulated_time_s", "wall_time_per_simulated_time", "verdict",
-    }  # fmt: skip
-    assert set(content["parameters"]) == {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
-    assert set(content["parameters"]["m_p"]) == {
-        "rms_percent", "bias_percent", "coverage_2sigma", "time_to_10_percent_s", "time_to_5_percent_s",
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize(
     "wrong", ["{", "[]", "{}", '{"schema": 1, "scenario": {}}', '{"schema": 0}', '{"schema": 1, "x": 2}']
 )

@@ -54,12 +54,6 @@ def made(*overrides: str) -> tuple[loop.Recording, trace.Trace]:
     return recording, columns_of(recording, recording.frames())
 
 
-def test_the_columns_are_those_of_the_contract_in_its_order() -> None:
-    _, columns = made()
-    assert list(columns) == COLUMNS
-    assert {len(column) for column in columns.values()} == {500}
-
-
 @pytest.mark.parametrize(
     ("model", "parameters"),
     [

@@ -56,10 +56,6 @@ SINE_TORQUE = "[[torque]]\nkind = 'sine'\nrms = '1 N m'\nfrequency = '1 Hz'\n"
 Load = Callable[..., Scenario]
 
 
-def test_the_promised_scenarios_are_there() -> None:
-    assert set(scenario.names()) >= REQUIRED
-
-
 @pytest.mark.parametrize("name", scenario.names())
 def test_a_scenario_says_what_it_is_and_starts_from_a_wrong_guess(name: str) -> None:
     loaded = scenario.load(name)
@@ -88,18 +84,6 @@ def test_the_standard_values_are_used(name: str) -> None:
     assert loaded.pilot.process_noise == (0.5 if name == "rough_air" else 0.05)
     times = 5 if name == "high_noise" else 1
     assert (loaded.sensors.theta.noise, loaded.sensors.theta_dot.noise) == (times * 1e-3, times * 1e-2)
-
-
-def test_base_only_and_base_dither_are_the_same_pilot_in_the_same_air() -> None:
-    only, dither = scenario.load("base_only"), scenario.load("base_dither")
-    first, second = loop.prepare(only), loop.prepare(dither)
-    assert np.array_equal(first.z_ddot, second.z_ddot)
-    assert np.array_equal(first.z_ddot_measured, second.z_ddot_measured)
-    assert np.array_equal(first.truth.rest, second.truth.rest)
-    for name, values in first.truth.parameters.items():
-        assert np.array_equal(values, second.truth.parameters[name])
-    assert only.dithers() == []
-    assert dither.dithers() == [(0.0, 0.3)]
 
 
 def test_settings_are_the_firmwares_but_for_overrides(load: Load) -> None:

@@ -561,12 +561,3 @@ def test_a_small_campaign(
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
-
-
-def test_interrupted_it_writes_nothing(lever: Lever, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(campaign, "run", interrupted)
-    assert lever("compare", "--quick", "--out", str(tmp_path)) == 130
-    assert list(tmp_path.iterdir()) == []

@@ -73,27 +73,6 @@ def test_the_seed_makes_the_batch_to_the_bit(name: str) -> None:
     assert all(value.dtype == np.float64 for value in arrays(again).values())
 
 
-def test_purposes_have_random_numbers_of_their_own() -> None:
-    """No two of base, dither, walk, process and output noise go together: in all 8 runs."""
-    batch = drawn("linear_black_box trim")
-    assert batch.truth.p is not None
-    w = batch.knowledge.scaled(batch.truth.p)
-    pushed = batch.truth.x[:, 1:, 1] - np.stack([_moved(batch, k, w) for k in range(batch.samples - 1)], axis=1)
-    walk = np.diff(w[..., 0], axis=1)
-    noise = (batch.raw_y - batch.truth.x)[:, 1:, 0]
-    white = np.corrcoef(np.stack([part.ravel() for part in (pushed, walk, noise)]))
-    assert np.abs(white - np.eye(3)).max() < 4.0 / math.sqrt(pushed.size)
-    base, dither = batch.u[..., 0], batch.u[..., 1]
-    alike = np.mean(base * dither, axis=1) / np.sqrt(np.mean(base**2, axis=1) * np.mean(dither**2, axis=1))
-    assert np.abs(alike).max() < 4.0 / math.sqrt(2.0 * 9.0 * 3.0)  # as many free numbers as 9 Hz have in 3 s
-
-
-def _moved(batch: Batch, k: int, w: Array) -> Array:
-    """(B,) rate at sample k + 1 without noise."""
-    x = batch.truth.x[:, k] - np.stack((batch.trim[:, k], np.zeros(batch.runs)), axis=-1)
-    return batch.move(k, x, w[:, k])[:, 1]
-
-
 def test_one_purpose_does_not_shift_another() -> None:
     base = Condition(dither_rms=0.3)
     plain = matched(base, 2, 1.0, 3)
@@ -144,15 +123,6 @@ def test_process_noise_is_an_integrated_random_walk(name: str) -> None:
     assert product.mean() == pytest.approx(math.sqrt(3) / 2, abs=4.0 * product.std() / math.sqrt(product.size))
     later = scaled[:, 1:] * scaled[:, :-1]
     assert np.abs(later.mean(axis=(0, 1))).max() < 4.0 / math.sqrt(rest.shape[0] * rest.shape[1])
-
-
-@every
-def test_outputs_are_the_state_and_white_noise(name: str) -> None:
-    batch = drawn(name)
-    noise = batch.raw_y - batch.truth.x
-    for index, sigma in enumerate((DEFAULTS["theta_noise"], DEFAULTS["theta_dot_noise"])):
-        assert same_variance(noise[..., index], sigma)
-    assert abs(np.corrcoef(noise[..., 0].ravel(), noise[..., 1].ravel())[0, 1]) < 4.0 / math.sqrt(8 * 6000)
 
 
 @every
@@ -239,14 +209,6 @@ def test_parameters_stay_within_the_bounds_of_the_model() -> None:
         p = batch.truth.p[..., index]
         assert least <= p.min()
         assert 0.5 * greatest < p.max() <= greatest  # three standard deviations would be beyond
-
-
-def test_no_truth_falls_or_drives_itself() -> None:
-    wild = {"a21_sigma": 600.0, "a22_sigma": 20.0}
-    batch = matched(Condition("linear_black_box", settings=BLACK_BOX | wild), 30, 1.0, 3)
-    assert batch.truth.p is not None
-    assert (batch.truth.p[..., :2] < 0.0).all()
-    assert (batch.truth.dynamics > 0.0).all()
 
 
 def test_conditions_that_cannot_be_are_refused() -> None:

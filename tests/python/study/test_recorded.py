@@ -34,13 +34,6 @@ def test_dither_of_the_firmware_is_in_what_was_measured() -> None:
     assert plain.raw_u[0, 2000:, 1].std() < 0.01
 
 
-def test_truth_is_that_of_the_scenario() -> None:
-    batch, steady = recorded("steady", 1, 1, 1.0), scenario.load("steady")
-    assert batch.truth.p is not None
-    truth = steady.truth(steady.time())
-    np.testing.assert_array_equal(batch.truth.p[0, -1], [column[0] for column in truth.parameters.values()])
-
-
 def test_a_pilot_who_is_none_of_the_model_has_dynamics_and_no_parameters() -> None:
     batch, pilot = recorded("mayo_ectomorphic", 1, 1, 1.0), scenario.load("mayo_ectomorphic")
     assert batch.truth.p is None

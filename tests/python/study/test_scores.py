@@ -47,15 +47,6 @@ def test_errors_are_those_of_w_and_relative_ones_of_the_dynamics() -> None:
     np.testing.assert_allclose(found[..., 4], np.exp(0.2) / np.sqrt(1.1) - 1.0, rtol=1e-9)
 
 
-@pytest.mark.parametrize("preload", ["fixed", "trim"])
-def test_the_truth_has_no_errors(preload: str) -> None:
-    batch = matched(Condition(preload=preload), 2, 0.5, 1)
-    assert batch.truth.p is not None
-    at = np.arange(0, 500, 50)
-    w = batch.knowledge.scaled(batch.truth.p[:, at])
-    np.testing.assert_allclose(scores.errors(batch, Estimates(at, w, None)), 0.0, atol=1e-12)
-
-
 def test_of_a_truth_outside_the_model_only_the_dynamics_are_judged() -> None:
     batch = matched(Condition(), 2, 0.5, 1)
     batch = dataclasses.replace(batch, truth=dataclasses.replace(batch.truth, p=None))
@@ -132,12 +123,6 @@ def test_a_consistent_filter_is_found_so_in_95_of_100_batches_or_more(freedom: i
     assert np.mean([one.mean for one in found]) == pytest.approx(freedom, rel=0.02)
 
 
-def test_the_band_of_the_mean_is_chi_squares() -> None:
-    squares = np.random.default_rng(4).chisquare(3, (20, 10))
-    expected = stats.chi2.ppf((0.025, 0.975), 60) / 20
-    np.testing.assert_allclose(scores.consistency(squares, 3).mean_band, expected)
-
-
 @pytest.mark.parametrize("claim", [0.8, 1.25])
 def test_a_filter_that_lies_about_its_sigma_is_found_out(claim: float) -> None:
     rng = np.random.default_rng(9)
@@ -171,12 +156,6 @@ ELAPSED = np.arange(-2.0, 8.0)  # the change is at index 2
 def test_settling_time(relative: list[float], settled: float) -> None:
     both = np.array([relative, np.full(10, 0.5)])
     np.testing.assert_array_equal(scores.settling_times(both, ELAPSED), [settled, np.nan])
-
-
-def test_settling_time_within_another_limit() -> None:
-    decay = np.exp(-np.arange(0.0, 5.0, 1e-3))[None]
-    found = scores.settling_times(decay, np.arange(0.0, 5.0, 1e-3), within=0.1)
-    assert found[0] == pytest.approx(np.log(10.0), abs=1e-3)
 
 
 def test_median_and_worst() -> None:

@@ -57,12 +57,6 @@ def accepted(budget: dict[str, Any]) -> dict[str, Any]:
     return {"compiler": budget["compiler"], "values": golden.numbers(budget)}
 
 
-def test_a_budget_compares_with_itself(budget: dict[str, Any], accepted: dict[str, Any]) -> None:
-    assert golden.is_comparable(budget, accepted)
-    assert golden.regressions(budget, accepted) == []
-    assert golden.improvements(budget, accepted) == []
-
-
 @pytest.mark.parametrize(
     "name", ["instructions.joint.linear_physical.worst", "instructions.tick.dual.lever.mean", "stack_bytes"]
 )
