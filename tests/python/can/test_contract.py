@@ -103,9 +103,3 @@ def test_every_fault_has_its_named_bit(codec: Codec) -> None:
     bits = {signal.name: 1 << signal.start - 16 for signal in health.signals if signal.name.startswith("fault_")}
     expected = {name.removeprefix("LEVER_").lower(): bit for name, bit in codec.enum("lever_fault").items()}
     assert bits == expected
-
-
-def test_every_fault_of_the_platform_has_its_bit(codec: Codec) -> None:
-    faults = DBC.get_message_by_name("PLATFORM_HEALTH").get_signal_by_name("faults")
-    bits = codec.enum("lever_platform_fault").values()
-    assert sorted(bits) == [1 << k for k in range(faults.length)]

@@ -23,14 +23,6 @@ TABLES: Tables = {
 }
 
 
-def test_write_replaces(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    for text in ("old", "θ̇ new\n"):
-        files.write_text(path, text)
-        assert path.read_text(encoding="utf-8") == text
-    assert os.listdir(tmp_path) == ["a.txt"]
-
-
 def test_failed_write_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")

@@ -46,14 +46,6 @@ def test_plant_is_the_one_of_sil_by_another_integration() -> None:
         assert zeta == pytest.approx(truth.dynamics.damping_ratio[0], rel=1e-12)
 
 
-def test_a_moved_trim_is_a_rest() -> None:
-    given = motions.lanes(replace(QUIET, base=0.0, dither=0.0), SEEDS)
-    ramp = np.clip(np.arange(len(given.z_ddot)) / 2000.0, 0.0, 1.0)[:, None]
-    trim = given.trim + math.radians(8.0) * ramp
-    theta, _ = plant.run(replace(given, trim=trim, k_p=given.k_p * (1.0 + ramp)))
-    np.testing.assert_allclose(theta[-1], trim[-1], atol=1e-6)
-
-
 def test_friction_takes_its_share_of_each_half_swing() -> None:
     """Coulomb friction T on a spring K: each half swing is smaller by 2 T / K (Den Hartog)."""
     hardware = plant.Hardware(damping=0.0)
@@ -261,14 +253,6 @@ def test_spikes() -> None:
     off = measured(ramps(), Sensors(faults=(Fault("theta", "spikes"),)), SEEDS)["theta"] - clean
     np.testing.assert_allclose(np.abs(off[off != 0.0]), 0.3, rtol=1e-9)
     assert 0.005 < np.mean(off != 0.0) < 0.015
-
-
-def test_drawn_errors_differ_between_runs_only() -> None:
-    clean = measured(ramps(40), Sensors(), range(40))["tau_m"]
-    gain = measured(ramps(40), Sensors(tau_m_gain_sigma=0.02), range(40))["tau_m"] - clean
-    gain = gain[1:] / ramps(40).theta[1:]
-    np.testing.assert_allclose(gain, np.broadcast_to(gain[-1], gain.shape), atol=1e-9)
-    assert np.std(gain[-1]) == pytest.approx(0.02, rel=0.4)
 
 
 # --- figures ---------------------------------------------------------------------------------------------------------

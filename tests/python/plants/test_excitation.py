@@ -110,14 +110,6 @@ def test_pulses_have_their_amplitude_width_and_period_and_alternate() -> None:
     assert np.all(values[11_000:11_050] == -2.0)
 
 
-def test_several_excitations_add_up() -> None:
-    tables = NORMALISED[:2]
-    place = Place("x.toml", "base", "m/s^2")
-    both = [excitation.read_excitation(table, place) for table in tables]
-    total = excitation.total(both, TIME, [np.random.default_rng(0), np.random.default_rng(0)])
-    assert total == pytest.approx(made(tables[0]) + made(tables[1]), abs=1e-12)
-
-
 @pytest.mark.parametrize(
     ("table", "message"),
     [

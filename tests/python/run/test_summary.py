@@ -88,13 +88,6 @@ def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.R
     assert "In this run the stated σ of m_p is too small" in made.verdict
 
 
-def test_coverage_of_a_gaussian_error_is_that_of_two_sigma(recording: loop.Recording) -> None:
-    trace = perfect(recording)
-    trace["k_p_estimate_N_m"] += 0.01 * 2000 * np.random.default_rng(1).standard_normal(COUNT)
-    coverage = summary.build(recording, trace).parameters["k_p"].coverage_2sigma
-    assert coverage == pytest.approx(stats.norm.cdf(2) - stats.norm.cdf(-2), abs=0.01)
-
-
 @pytest.mark.parametrize(
     ("outside", "said"),
     [

@@ -78,17 +78,6 @@ def test_parameters_are_those_of_the_estimators_model(
         assert columns[f"{name}_true{ending}"][0] == recording.inputs.truth.parameters[name][0]
 
 
-def test_a_pilot_of_another_model_has_no_true_parameters(lever_bus: Callable[[Scenario], LeverBus]) -> None:
-    wanted = scenario.load("steady", ["duration=1 s", "estimator.model=linear_black_box", "limits={}"])
-    recording = loop.run(wanted, lever_bus(wanted))
-    columns = columns_of(recording, recording.frames())
-    assert {name for name in columns if "_true" in name} == {
-        "theta_true_rad", "theta_dot_true_rad_s", "z_ddot_true_m_s2", "tau_m_true_N_m", "trim_true_rad",
-        "natural_frequency_true_Hz", "damping_ratio_true",
-    }  # fmt: skip
-    assert np.isfinite(columns["a21_estimate_1_s2"][-1])
-
-
 def test_measured_is_what_was_on_the_bus_and_nan_where_it_was_not() -> None:
     recording, columns = made("sensors.dropout.2.start=0.1 s", "sensors.dropout.2.end=0.2 s")
     missing = recording.inputs.missing

@@ -73,19 +73,6 @@ def test_the_seed_makes_the_batch_to_the_bit(name: str) -> None:
     assert all(value.dtype == np.float64 for value in arrays(again).values())
 
 
-def test_one_purpose_does_not_shift_another() -> None:
-    base = Condition(dither_rms=0.3)
-    plain = matched(base, 2, 1.0, 3)
-    still = matched(dataclasses.replace(base, dither_rms=0.0), 2, 1.0, 3)
-    np.testing.assert_array_equal(still.u[..., 0], plain.u[..., 0])
-    np.testing.assert_array_equal(still.u[..., 1], 0.0)
-    np.testing.assert_array_equal(still.truth.p, plain.truth.p)
-    np.testing.assert_allclose(still.raw_y - still.truth.x, plain.raw_y - plain.truth.x, atol=1e-15)
-    silent = matched(dataclasses.replace(base, settings={"theta_dot_process_noise": 0.0}), 2, 1.0, 3)
-    np.testing.assert_array_equal(silent.truth.p, plain.truth.p)
-    np.testing.assert_array_equal(silent.u, plain.u)
-
-
 # --- the right statistics --------------------------------------------------------------------------------------------
 
 
@@ -137,15 +124,6 @@ def test_inputs_have_their_rms_and_band(name: str) -> None:
 
 
 # --- the right motion ------------------------------------------------------------------------------------------------
-
-
-@every
-def test_deviations_count_from_the_trim(name: str) -> None:
-    batch = drawn(name)
-    trim = math.radians(20.0) if name.endswith("trim") else 0.0
-    np.testing.assert_array_equal(batch.trim, trim)
-    np.testing.assert_allclose(batch.raw_y[..., 0] - batch.y[..., 0], trim, atol=1e-15)
-    np.testing.assert_array_equal(batch.raw_y[..., 1], batch.y[..., 1])
 
 
 @pytest.mark.parametrize("preload", ["fixed", "trim"])

@@ -11,15 +11,8 @@ from lever_cdkf.sil.study import scores
 from lever_cdkf.sil.study.data import Estimates
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
-from scipy import stats
 
 Array = NDArray[Any]  # of floats
-
-
-def random_covariance(rng: np.random.Generator) -> Array:
-    root = np.tril(rng.standard_normal((3, 3))) + 2.0 * np.eye(3)
-    covariance: Array = 1e-3 * root @ root.T
-    return covariance
 
 
 def correlated(rng: np.random.Generator, runs: int, times: int, memory: float) -> Array:
@@ -95,15 +88,6 @@ def test_spread_of_the_ratio_is_that_of_many_experiments() -> None:
 
 
 # --- consistency -----------------------------------------------------------------------------------------------------
-
-
-def test_normalised_squares_of_honest_errors_are_chi_square() -> None:
-    rng = np.random.default_rng(5)
-    covariance = np.stack([[random_covariance(rng) for _ in range(50)] for _ in range(40)])
-    deviations = np.einsum("btij,btj->bti", np.linalg.cholesky(covariance), rng.standard_normal((40, 50, 3)))
-    squares = scores.normalised_squares(deviations, covariance)
-    assert squares.shape == (40, 50)
-    assert stats.kstest(squares.ravel(), stats.chi2(3).cdf).pvalue > 1e-3
 
 
 @pytest.mark.parametrize(("freedom", "memory"), [(2, 1.0), (3, 0.95)])
