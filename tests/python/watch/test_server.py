@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import math
 import re
 import signal
 import socket
@@ -18,7 +17,6 @@ import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.library import ffi, lib
 from lever_cdkf.host_tools.watch.server import Server
 from lever_cdkf.host_tools.watch.sources import Source
 from lever_cdkf.host_tools.watch.state import State, command_of
@@ -252,19 +250,6 @@ def test_before_the_first_estimate_nothing_is_made_up(flight: Flight) -> None:
     assert (update["level"], update["condition"]) == ("watch", "no frame has come yet")
 
 
-def test_the_machine_is_shown_when_it_tells(flight: Flight) -> None:
-    state = State(FlightSource(flight), Config())
-    (message,) = state.advance()[-1:]
-    assert json.loads(message)["update"]["machine"] is None
-    for overruns in (250, 262):
-        report = {"transmit_errors": 96, "receive_errors": 3, "bus_offs": 1, "overruns": overruns}
-        lib.lever_platform(flight.bus.estimator.pointer, ffi.new("lever_platform_t *", report))
-        for _ in range(3):
-            (message,) = state.advance()[-1:]
-    shown = {"transmit_errors": 96, "receive_errors": 3, "bus_offs": 0, "overruns": 12, "dropped": 0}
-    assert json.loads(message)["update"]["machine"] == shown
-
-
 def test_the_past_that_is_kept_is_bounded(flight: Flight) -> None:
     state = State(FlightSource(flight), Config())
     for _ in range(3):
@@ -486,13 +471,6 @@ def test_ends_cleanly_when_interrupted(number: int, start_lever: Callable[..., s
     assert process.returncode == 130
 
 
-def test_a_duration(capsys: pytest.CaptureFixture[str]) -> None:
-    before = threading.active_count()
-    assert cli.main(["live", "--scenario", "steady", "--port", "0", "--duration", "0.3"]) == 0
-    assert capsys.readouterr().err == ""
-    assert threading.active_count() == before
-
-
 def test_an_open_port_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
     quick = ["--scenario", "steady", "--port", "0", "--duration", "0.1", "--host", "0.0.0.0"]
     assert cli.main(["live", *quick]) == 0
@@ -508,12 +486,3 @@ def test_a_source_that_fails_is_told_at_the_end(tmp_path: Any, capsys: pytest.Ca
     path.write_text("(1.000000) can0 123#00\nnothing of the kind\n")
     assert cli.main(["live", str(path), "--port", "0", "--duration", "0.5"]) == 2
     assert "garbage.log: 1 lines of it are not frames" in capsys.readouterr().err
-
-
-def test_times_keep_their_resolution() -> None:
-    from lever_cdkf.host_tools.watch.state import _short
-
-    assert _short(12345.678) == 12345.68
-    assert _short(0.00123456) == 0.001235
-    assert _short(math.inf) is None
-    assert _short(math.nan) is None
