@@ -141,13 +141,6 @@ def test_not_a_number(message: Message, signal: Signal, value: float | None) -> 
     assert frame[1:] == by_cantools(message, contents(message, signal) | told, 0)
 
 
-def test_flag_of_an_invalid_value() -> None:
-    values = {"theta": 0.5, "theta_dot": 0.5, "tau_m": 0.5}
-    frame = codec.encode("LEVER_SAMPLE", 0, {**values, "theta_dot_valid": False})
-    flags = {"theta_valid": 1, "theta_dot_valid": 0, "tau_m_valid": 1}
-    assert frame[1:] == by_cantools(MESSAGES["LEVER_SAMPLE"], {**values, **flags, "theta_dot": 0.0}, 0)
-
-
 def test_counts_and_time_wrap_but_codes_do_not() -> None:
     sample = MESSAGES["BASE_SAMPLE"]
     for time_us in (0, 1, 2**32 - 1):

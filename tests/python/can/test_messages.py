@@ -237,12 +237,3 @@ def test_another_length_or_identifier_is_refused(codec: Codec, message: Message)
         assert codec.decode(message.name, bytes(length)) is None
     for other in {0, 1, message.frame_id ^ 1, 0x7FF, *(each.frame_id for each in DBC.messages)} - {message.frame_id}:
         assert codec.decode(message.name, bytes(8), other) is None
-
-
-def test_just_below_half_a_count_is_zero(codec: Codec) -> None:
-    """Adding one half in single precision and cutting off would give one."""
-    theta = float(np.nextafter(np.float32(0.5 * 1e-4), np.float32(0.0)))
-    for value in (theta, -theta):
-        data = codec.encode("LEVER_SAMPLE", {"theta": value, "theta_valid": True})
-        assert data is not None
-        assert data[2:4] == bytes(2)

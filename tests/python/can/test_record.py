@@ -180,15 +180,6 @@ def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["a.log"]
 
 
-def test_a_recording_ends_after_its_duration(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("lever_cdkf.host_tools.can.buses._IN_PROCESS", ())
-    arguments = ["--interface", "virtual", "--channel", "x", "--duration", "0.2", "-o", str(tmp_path / "a.log")]
-    assert cli.main(["record", *arguments]) == 0
-    assert "0 frames" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("interface", ["lever", "virtual"])
 def test_a_bus_on_which_nobody_else_is_is_refused(interface: str, tmp_path: Path, refused: Refused) -> None:
     line = refused("record", "--interface", interface, "--channel", "x", "-o", tmp_path / "a.log")

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.host_tools.models.linear import LinearBlackBox
 from lever_cdkf.sil.plants import lever_plant
-from lever_cdkf.sil.study.data import Batch, rest_angle
+from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
 from scipy import signal
@@ -154,13 +153,6 @@ def test_without_noise_the_black_box_is_a_linear_system() -> None:
         exact = signal.lsim(system, batch.u[run, :, 0], time)[1]
         moved = batch.truth.x[run] - [math.radians(20.0), 0.0]
         assert np.abs(moved - exact).max(axis=0) == pytest.approx(0.0, abs=1e-3 * np.abs(exact).max())
-
-
-@pytest.mark.parametrize(("stiffness", "rest"), [(465.0, 0.2), (0.0, np.nan)])
-def test_what_nothing_holds_rests_nowhere(stiffness: float, rest: float) -> None:
-    p = np.array([-stiffness, -13.7, -2.2])[:, None]
-    found = rest_angle(LinearBlackBox(0.2, "fixed"), p, np.zeros(1), 1e-3)
-    np.testing.assert_allclose(found, rest, rtol=1e-9)
 
 
 def test_where_an_unknown_truth_rests_is_not_made_up() -> None:

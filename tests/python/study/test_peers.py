@@ -42,15 +42,6 @@ def test_high_pass_is_two_butterworths_of_second_order(frequency: float) -> None
     np.testing.assert_allclose(filters.high_pass(np.full((50, 2), 0.4), 1.0, np.full(2, 0.4)), 0.0, atol=1e-9)
 
 
-def test_low_pass_keeps_where_it_starts() -> None:
-    np.testing.assert_allclose(filters.low_pass(np.full((50, 2), 0.4), 1.0, np.full(2, 0.4)), 0.4)
-
-
-def test_the_last_valid_value_is_held() -> None:
-    signals = np.array([[np.nan, 1.0], [2.0, np.nan], [np.nan, np.nan], [3.0, 4.0]])
-    np.testing.assert_array_equal(filters.held(signals), [[0.0, 1.0], [2.0, 1.0], [2.0, 1.0], [3.0, 4.0]])
-
-
 # --- logs ------------------------------------------------------------------------------------------------------------
 
 
