@@ -15,7 +15,8 @@ MAY_INCLUDE = {
     "model": {"model", "math"},
     "filter": {"filter", "model", "math"},
     "can": {"can", "model", "math"},
-    "app": {"app", "filter", "can", "model", "math"},
+    "bounce": {"bounce", "filter", "model", "math"},
+    "app": {"app", "bounce", "filter", "can", "model", "math"},
 }
 PORT_MAY_INCLUDE = {
     "linux": {"port", "port/linux", "port/slcan", "can/messages.h"},

@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
-CORE = ("math", "model", "filter", "can", "app")
+CORE = ("math", "model", "filter", "bounce", "can", "app")
 """The folders of firmware/ that run on every machine."""
 
 
