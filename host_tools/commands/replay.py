@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..extras import warn_of_left_out
 from ..files import check_not_input
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
 from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
 
@@ -94,9 +95,9 @@ def run(args: argparse.Namespace) -> int:
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
     print_tables(_tables(summary), args.json)
-    print(summary["verdict"])
+    say(summary["verdict"])
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
+        say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
     if not summary["passed"]:
         print(f"lever: replay: {failure(summary)}", file=sys.stderr)
     return 0 if summary["passed"] else 1
@@ -120,7 +121,7 @@ def _run_each(args: argparse.Namespace) -> int:
         replays = replay_each(args.logs, lambda log: _options(args, log), args.out, progress.show)
     print_tables({"logs": rows_of(replays)}, args.json)
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join([*write(replays, args.out), 'a folder for each log'])}")
+        say(f"Written to {args.out}: {', '.join([*write(replays, args.out), 'a folder for each log'])}")
     for each in replays:
         if each.problem:
             print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     assignments |= dict(parse_assignment(text) for text in args.set)
     config = make_config(assignments)
     if args.settings is None and not args.set:
-        print_tables({"settings": _rows()}, args.json)
+        print_tables({"settings": _rows()}, args.json, digits=6)
         return 0
     if args.json is not None:
         values = config.choices | config.settings

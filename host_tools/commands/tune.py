@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import LeverError
 from ..extras import require
 from ..files import check_not_input
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
 from .signal_options import MAP_HELP, add_signal_options, chosen_reading
 
@@ -188,7 +189,7 @@ def _conclude(
     changed = sum(entry.after != entry.before for entry in tuned) + len(calibration.assignments)
     verdict = validation.verdict(fits, changed)
     print_tables(tables, args.json)
-    print(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
+    say(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
     if args.page is not None:
         from ..tune.tune_page import build
 
@@ -200,7 +201,7 @@ def _conclude(
         write_text(args.output, _file(args, f"{verdict} {calibration.text}", before, after))
     written = [str(path) for path in (args.output, args.page) if path is not None]
     if written:
-        print(f"Written: {', '.join(written)}")
+        say(f"Written: {', '.join(written)}")
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, add_json_option
 
@@ -106,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
     tables = table.tables(rows, claims)
     print_tables(tables, args.json)
     for case, verdict in by_case.items():
-        print(f"{case}: {verdict}")
+        say(f"{case}: {verdict}")
     if args.out is not None:
         from lever_cdkf.host_tools.files import Outputs, write_text
 
@@ -117,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
             page = compare_page.build(results, rows, by_case, claims, tables)
             write_text(outputs.path("compare.html"), page)
             outputs.finish()
-        print(f"Written to {args.out}: compare.html, compare.csv")
+        say(f"Written to {args.out}: compare.html, compare.csv")
     return 0
 
 

@@ -148,14 +148,13 @@ def test_dbc_path(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ([], "the following arguments are required: COMMAND (see `lever --help`)"),
         (["none"], "invalid choice: 'none'"),
         (["--none"], "(see `lever --help`)"),
         (["settings", "more"], "unrecognized arguments: more (see `lever --help`)"),
         (["settings", "--sett", "x"], "unrecognized arguments: --sett x"),
         (["settings", "--set"], "argument --set: expected one argument (see `lever settings --help`)"),
         (["settings", "--set", "m_p"], "'m_p' has no '=': write name = value"),
-        (["settings", "--set", "m_p=x"], "m_p = 'x' is not a number (give it in kg, without the unit)"),
+        (["settings", "--set", "m_p=x"], "m_p = 'x' is not a number (give it in kg, or with a unit: kg, g)"),
         (["settings", "--set", "m_p=100"], "m_p = 100.0 is out of range: it must be a number from 0.3 to 10 kg ("),
         (["settings", "--settings", "/none/x"], "/none/x: cannot be read: No such file or directory"),
         (["settings", "--json", "/none/x"], "cannot write /none/x: No such file or directory"),
