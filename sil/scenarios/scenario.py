@@ -21,7 +21,10 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.firmware import quantities
+from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
+from lever_cdkf.host_tools.firmware.settings_file import setting_value
+from lever_cdkf.host_tools.firmware.units import UnitError
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 
 from ..plants import excitation, lever_plant, pilots
@@ -100,8 +103,20 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
 
 
 def _read_settings() -> Reader:
-    """Reader of a table of settings by the names of lever_settings.def, each in a unit of its dimension."""
-    return _read_numbers({row.name: read_quantity(row.unit) for row in settings_table()})
+    """Reader of a table of settings by the names of lever_settings.def."""
+    return _read_numbers({row.name: _read_setting(row) for row in settings_table()})
+
+
+def _read_setting(row: Setting) -> Reader:
+    """Reader of a setting as everywhere: with a unit, or as a number in the unit of lever_settings.def."""
+
+    def reader(value: Any, place: Place) -> float:
+        try:
+            return setting_value(row, value if isinstance(value, str) else repr(value))
+        except UnitError as error:
+            raise place.error(str(error)) from None
+
+    return reader
 
 
 def _read_lever() -> Reader:
@@ -259,12 +274,19 @@ def _read(content: bytes, file: str, overrides: Iterable[str]) -> Scenario:
 
 
 def _override(values: dict[str, Any], override: str) -> None:
-    """Puts "key.subkey=value" into the table; a number as subkey goes into a list, as in base.0.rms="0.2 g"."""
+    """Puts "key.subkey=value" into the table; a number as subkey goes into a list, as in base.0.rms="0.2 g".
+
+    Settings and choices of the estimator may stand without the name of their table, as in all commands.
+    """
     key, equals, written = override.partition("=")
     *parents, last = key.strip().split(".")
     if not equals or not last:
         raise ScenarioError(f"--set {override}: must be KEY=VALUE, such as duration='10 s' or settings.m_p='3 kg'")
     target: Any = values
+    if not parents and last in {row.name for row in settings_table()}:
+        parents = ["settings"]
+    elif not parents and last in CHOICES and isinstance(_value(written), str):
+        parents = ["estimator"]
     try:
         for parent in parents:
             target = target[int(parent)] if isinstance(target, list) else target.setdefault(parent, {})
