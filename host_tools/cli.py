@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import codecs
 import importlib.metadata
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -94,7 +96,11 @@ def _has_streams() -> bool:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  for the life of the process
     if sys.stdout is None:
         print("lever: error: standard output is closed: send it to a file or to /dev/null", file=sys.stderr)
-    return sys.stdout is not None
+        return False
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it has not is no reason to end
+        is_utf8 = codecs.lookup(sys.stdout.encoding).name == "utf-8"
+        sys.stdout.reconfigure(errors="surrogateescape" if is_utf8 else "replace")
+    return True
 
 
 def _expected() -> tuple[type[Exception], ...]:

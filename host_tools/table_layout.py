@@ -69,9 +69,14 @@ def upright_lines(columns: Sequence[Column], row: int, width: int) -> Iterator[s
         if match is not None
     ]
     left = max(text_width(name) for name, _ in entries)
+    needed = max(text_width(word) for _, value in entries for word in words(value))
+    if left + needed + 4 > width:
+        for name, value in entries:
+            yield from (f"  {name}", *(f"{_INDENT}{line}" for line in wrapped(value, width - len(_INDENT))))
+        return
     for name, value in entries:
         first, *others = wrapped(value, width - left - 4)
-        yield f"  {name}{' ' * (left - text_width(name))}  {first}".rstrip()
+        yield f"  {name}{' ' * (left - text_width(name))}  {first}"
         yield from (f"  {' ' * left}  {other}" for other in others)
 
 

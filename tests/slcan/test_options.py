@@ -43,7 +43,7 @@ def test_choices_and_settings_count_in_their_order(program: str, tmp_path: Path)
     expected = Config(
         "hand", "fixed", "joint", "annealing", settings={"m_p": 4.0, "c_p": 30.0, "theta_noise": 1.23456e-3}
     )
-    found = runs_with(program, tmp_path, *choices, "--set", "m_p=3", "--set", "theta_noise = 0.00123456", *late)
+    found = runs_with(program, tmp_path, *choices, "--set", "m_p=3000 g", "--set", "theta_noise = 1.23456 mrad", *late)
     assert found == (expected.choices, expected.settings_crc)
 
 
