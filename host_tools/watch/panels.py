@@ -59,9 +59,10 @@ def estimates(picture: Picture, span: float, width: int, lines: int = 1) -> Tabl
     """
     table = Table.grid(padding=(0, 1), pad_edge=False)
     chart_width = max(0, width - ESTIMATES_WIDTH - (_SCALE_WIDTH + 1 if lines > 1 else 0))
-    columns = (*_COLUMNS, ("left", chart_width), *([("left", _SCALE_WIDTH)] if lines > 1 else []))
-    for justify, column_width in columns:
+    for justify, column_width in _COLUMNS:
         table.add_column(justify=justify, width=column_width, no_wrap=True)
+    for column_width in (chart_width, _SCALE_WIDTH)[: 1 if lines == 1 else 2]:
+        table.add_column(width=column_width, no_wrap=True)
     titles = ("", "estimate", "± σ", "unit", "σ [%]", f"{span:.0f} s [%]", "trend" if chart_width > 5 else "")
     table.add_row(*(Text(title, style="dim") for title in titles))
     for entry in (*picture.parameters(), *picture.dynamics()):

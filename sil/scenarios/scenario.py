@@ -25,6 +25,7 @@ from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.host_tools.firmware.settings_file import setting_value
 from lever_cdkf.host_tools.firmware.units import UnitError
+from lever_cdkf.host_tools.near_names import did_you_mean
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 
 from ..plants import excitation, lever_plant, pilots
@@ -252,9 +253,8 @@ def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
         name, file = name_or_path, f"{name_or_path}.toml"
         content = (files(__package__) / file).read_bytes()
     else:
-        raise ScenarioError(
-            f"no scenario {name_or_path!r}; there are {', '.join(names())}, or give a path to a .toml file"
-        )
+        hint = did_you_mean(name_or_path, names(), f"there are {', '.join(names())}, or give a path to a .toml file")
+        raise ScenarioError(f"no scenario {name_or_path!r}; {hint}")
     try:
         scenario = dataclasses.replace(_read(content, file, overrides), name=name, file=file)
     except RecursionError:
