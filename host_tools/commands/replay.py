@@ -42,7 +42,7 @@ examples:
   lever replay session.log
   lever replay session.log -o out/session
   lever replay session.log --model linear_physical --set theta_noise=0.002 -o out/other
-  lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
+  lever replay monday_1.log.gz monday_2.log.gz --channel can1 -o out/monday
   candump -L can0 | lever replay - -o out/live
   lever replay monday/*.blf --each --dbc aircraft.dbc --map aircraft.toml -o out/monday --json monday.json
   lever replay flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o out/flight
