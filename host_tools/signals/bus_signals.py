@@ -64,6 +64,11 @@ def find(database: Database, name: str, where: str) -> tuple[Message, Field]:
     raise LeverError(f"{where}: no signal {name}{_near(signal_name, names)}")
 
 
+def of_fd(message: Message) -> bool:
+    """Whether its frames are CAN FD."""
+    return bool(message.is_fd) or message.length > 8
+
+
 def _near(name: str, names: Iterable[str]) -> str:
     near = near_names(name, names)
     return f"; near to it: {', '.join(near)}" if near else ""

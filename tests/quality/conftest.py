@@ -60,7 +60,8 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rows = np.column_stack((trace["time_s"], trace["theta_measured_rad"], trace["z_ddot_measured_m_s2"] / 9.80665 + 1))
     np.savetxt(folder / "flight.csv", rows, "%.6f", ",", header="time,angle [rad],acc", comments="")
     (folder / "aircraft.toml").write_text('theta = "LEVER.Angle"\nz_ddot = "IMU.AccZ"\n', encoding="utf-8")
-    database = cantools.database.load_file(folder / "aircraft.dbc")
+    database = cantools.database.load_string(AIRCRAFT, "dbc")
+    assert isinstance(database, cantools.database.Database)
     (folder / "monday").mkdir()
     logs = [can.Logger(folder / name) for name in ("flight.blf", "monday/1.blf", "monday/2.blf")]
     for k, row in enumerate(trace):
