@@ -6,7 +6,9 @@ import re
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.can.commander import KEEP, Commander
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.native import run_samples
 from lever_cdkf.sil import fast
@@ -100,8 +102,10 @@ def test_unanswered_samples_are_counted_and_too_many_end_the_run(monkeypatch: py
 
 def test_a_command_that_is_refused_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     wanted = scenario.load("steady", ["duration=1 s"])
-    monkeypatch.setattr(inputs, "commands", lambda *_: {0: {"request": "reset"}, 100: {"request": 9}})
-    with pytest.raises(loop.RefusedError, match="does not know a value in it"):
+    first = codec.encode("COMMAND", 0, {"request": "reset", **KEEP})
+    monkeypatch.setattr(inputs, "commands", lambda *_: {0: {"request": "reset"}, 100: {}})
+    with monkeypatch.context() as patched, pytest.raises(loop.RefusedError, match="its counter is out of sequence"):
+        patched.setattr(Commander, "send", lambda _, values, put: put(0x120, first))
         in_process.run(wanted)
     monkeypatch.setattr(inputs, "commands", lambda *_: {0: {"request": "reset", "dither_rms": -1.0}})
     with pytest.raises(LeverError, match="refuses COMMAND"):
