@@ -36,7 +36,7 @@ def main() -> int:
     slow = []
     for name in SCENARIOS:
         wanted = scenario.load(name, [f"duration={_SECONDS:g} s"])
-        row: Row = {"scenario": name}
+        row: dict[str, str | float | bool | None] = {"scenario": name}
         for how, promised in PROMISED.items():
             seconds = processor_time(wanted, how != "by structs")
             row[f"{how} [ns a sample]"] = round(1e9 * seconds / len(wanted.time()))
