@@ -29,7 +29,7 @@ MAY_IMPORT = {
     "sil/run": {"fast", "scenarios", "plants", "firmware", "can", "results", "report", "watch"},
     "sil/envelope": {"fast", "plants", "firmware", "models", "report"},
     "sil/study": {
-        *("run", "scenarios", "plants", "oracle", "envelope"),
+        *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report"),
     },
     "sil/commands": {"run", "scenarios", "study", "envelope", "firmware", "can"},
