@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cffi
@@ -26,11 +27,16 @@ ffi: Any = cffi.FFI()
 def load(library: str) -> Any:
     """The functions of a shared library; what installing has made of its header declares them. Raises LeverError."""
     ffi.cdef(native_file(f"{library}_cdef.h").read_text(encoding="utf-8"))
-    path = native_file(_SHARED.format(library))
+    path = shared_file(library)
     try:
         return ffi.dlopen(str(path))
     except OSError as error:
         raise LeverError(f"cannot load {path}: {error}") from None
+
+
+def shared_file(library: str) -> Path:
+    """Where a shared library is. Raises LeverError."""
+    return native_file(_SHARED.format(library))
 
 
 lib = load("lever_cdkf")
