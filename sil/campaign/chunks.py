@@ -9,21 +9,19 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import lever_cdkf.sil
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import whole
 from lever_cdkf.host_tools.firmware.library import shared_file
 
-from . import design
+from . import design, figures
 from .entrants import ENTRANTS
-from .runs import Row, rows
-from .spec import Spec, judged
+from .runs import rows
+from .spec import Spec
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -102,18 +100,14 @@ def _rows_in(file: Path) -> int | None:
 
 @cache
 def _code() -> bytes:
-    """Digest of what makes rows besides the spec: the shared libraries and the simulation's sources."""
     digest = hashlib.sha256()
     for library in _LIBRARIES:
         digest.update(shared_file(library).read_bytes())
-    for root in lever_cdkf.sil.__path__:
-        for source in sorted(Path(root).rglob("*.py")):
-            digest.update(source.read_bytes())
     return digest.digest()
 
 
 def fingerprint(spec: Spec) -> str:
-    """What the names of a campaign's files begin with."""
+    """What the names of a campaign's files begin with: of the spec and of the shared libraries that make its rows."""
     return hashlib.sha256(spec.hashed.encode() + _code()).hexdigest()[:16]
 
 
@@ -125,7 +119,6 @@ def schema(plan: Plan) -> pa.Schema:
         pa.field(axis.key, pa.float64() if axis.is_number else pa.string(), metadata={"unit": axis.unit or "1"})
         for axis in plan.spec.vary
     ]
-    judged_columns = [f"{what}_{name}" for name in judged(plan.model) for what in ("rms", "bias", "coverage")]
     return pa.schema(
         [
             pa.field("run", pa.int64(), nullable=False),
@@ -133,27 +126,19 @@ def schema(plan: Plan) -> pa.Schema:
             pa.field("seed", pa.int64(), nullable=False),
             pa.field("estimator", pa.string(), nullable=False),
             *varied,
-            *(pa.field(name, pa.float64()) for name in (*judged_columns, "nees", "nis", "settled_s", "flagged")),
+            *(pa.field(name, pa.float64()) for name in figures.names(plan.model)),
             pa.field("error", pa.string()),
         ],
         metadata={"lever_campaign": plan.fingerprint, "title": plan.spec.title},
     )
 
 
-def make(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, int]:
-    """Runs a chunk and writes its file; returns how many rows it has, and how many of them are failed runs.
-
-    Raises LeverError.
-    """
+def make(plan: Plan, chunk: Chunk, folder: Path) -> int:
+    """Runs a chunk and writes its file; returns how many rows it has. Raises LeverError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    made: list[Row] = list(_rows(plan, chunk))
+    made = [{"error": None, **row} for row in rows(plan.spec, range(chunk.first, chunk.end))]
     with whole(folder / chunk.name(plan.fingerprint)) as target:
         pq.write_table(pa.Table.from_pylist(made, schema(plan)), target, compression="zstd")
-    return len(made), sum(row["error"] is not None for row in made)
-
-
-def _rows(plan: Plan, chunk: Chunk) -> Iterator[dict[str, Any]]:
-    for row in rows(plan.spec, range(chunk.first, chunk.end)):
-        yield {"error": None, **row}
+    return len(made)

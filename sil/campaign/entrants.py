@@ -156,11 +156,12 @@ def _of_estimates(batch: Batch, estimates: Estimates) -> Track:
     return Track(values, stated * size, scaled, estimates.covariance * scale[:, None] * scale, estimates.nis)
 
 
+FIRMWARE = ("dual", "joint")
+
 ENTRANTS: Mapping[str, Entrant] = {
     entrant.name: entrant
     for entrant in (
-        Firmware("dual"),
-        Firmware("joint"),
+        *(Firmware(name) for name in FIRMWARE),
         Published("dual_ekf", 1.0),
         Published("joint_ekf", 1.0),
         Published("joint_ukf", 1.0),

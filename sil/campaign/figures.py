@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.firmware.quantities import parameters
+from lever_cdkf.host_tools.firmware.quantities import parameters, quantities
 
 from ..run.summary import times_to
 from ..study.data import PARAMETERS
@@ -26,11 +25,14 @@ class BrokenDownError(ValueError):
     """An estimator whose values are no longer finite."""
 
 
-def of_run(flight: Flight, track: Track, run: int, judged: Sequence[str]) -> Figures:
-    """Of run `run` of a track, whose truth is that of `flight`; `judged`: names of the five quantities.
+def names(model: str) -> tuple[str, ...]:
+    """Of the columns of figures, for estimators with this model."""
+    judged = [f"{what}_{each.key}" for each in quantities(model) for what in ("rms", "bias", "coverage")]
+    return (*judged, "nees", "nis", "settled_s", "flagged")
 
-    Raises BrokenDownError.
-    """
+
+def of_run(flight: Flight, track: Track, run: int) -> Figures:
+    """Of run `run` of a track, whose truth is that of `flight`. Raises BrokenDownError."""
     counted = flight.judged
     values = track.values[run]
     broken = ~np.isfinite(values).all(axis=1)
@@ -41,7 +43,7 @@ def of_run(flight: Flight, track: Track, run: int, judged: Sequence[str]) -> Fig
         relative = values / truth - 1.0
         covered = np.abs(values - truth) <= 2.0 * sigma
     figures: Figures = {}
-    for index, name in enumerate(judged):
+    for index, name in enumerate(each.key for each in quantities(flight.scenario.config.choices["model"])):
         error, share = relative[counted, index], covered[counted, index]
         figures[f"rms_{name}"] = _finite(np.sqrt(np.mean(np.square(error))))
         figures[f"bias_{name}"] = _finite(np.mean(error))

@@ -11,7 +11,7 @@ from lever_cdkf.host_tools.errors import LeverError
 from . import design, figures
 from .entrants import ENTRANTS, Track
 from .flight import Flight, simulate
-from .spec import Spec, judged
+from .spec import Spec
 
 Row = dict[str, Any]
 """A value for each column of chunks.schema()."""
@@ -39,7 +39,7 @@ def _of_point(spec: Spec, point: int, numbers: Sequence[int]) -> Iterator[Row]:
     for number in numbers:
         try:
             flights[number] = simulate(spec.flight(values, spec.seed + number), spec.every)
-        except _EXPECTED as error:
+        except _EXPECTED as error:  # noqa: PERF203
             errors[number] = _line(error)
     found = {name: _figures(name, flights) for name in spec.estimators}
     for number in numbers:
@@ -62,11 +62,7 @@ def _figures(name: str, flights: dict[int, Flight]) -> dict[int, figures.Figures
         for index, number in enumerate(tracked):
             flight = flights[number]
             try:
-                if isinstance(track, str):
-                    found[number] = track
-                else:
-                    of_five = judged(flight.scenario.config.choices["model"])
-                    found[number] = figures.of_run(flight, track, index, of_five)
+                found[number] = track if isinstance(track, str) else figures.of_run(flight, track, index)
             except _EXPECTED as error:
                 found[number] = _line(error)
     return found

@@ -11,12 +11,9 @@ import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
-
-from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, parameters
 
 from ..scenarios import scenario as scenarios
 from ..scenarios.scenario import Scenario
@@ -188,9 +185,3 @@ def _check(spec: Spec) -> None:
     for name in spec.estimators:
         if reason := ENTRANTS[name].unfit(flight):
             raise ScenarioError(f"{spec.file}: estimators: {name} {reason}")
-
-
-@cache
-def judged(model: str) -> tuple[str, ...]:
-    """Names of what rows judge: three parameters, natural frequency, damping ratio."""
-    return (*(parameter.key for parameter in parameters(model)), *(each.key for each in DYNAMICS))
