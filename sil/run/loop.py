@@ -18,15 +18,14 @@ from dataclasses import dataclass, field
 
 import can
 import numpy as np
-from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, Commander, refusal, result_of
+from lever_cdkf.host_tools.can.commander import ACCEPTED, SEQUENCE, Commander, refusal, result_of
 from lever_cdkf.host_tools.can.identity import Identity
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
-from numpy.typing import NDArray
 
-from ..plants import excitation, sensors
-from ..plants.truth import Body, Conditions, Truth
+from ..plants import sensors
+from ..scenarios.inputs import Inputs, conditions, prepare, readings
+from ..scenarios.inputs import commands as commands_of
 from ..scenarios.scenario import Scenario
 from .buslog import Frames
 
@@ -58,23 +57,6 @@ class _UnrestedError(Exception):
     """A run has ended so recently that its torque, or the sequence of its COMMANDs, reaches into this one."""
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """What is known of a run before it starts: one value a sample."""
-
-    time: FloatArray
-    truth: Truth
-    z_ddot: FloatArray
-    """True base acceleration [m/s^2]."""
-    z_ddot_measured: FloatArray
-    torque: FloatArray
-    """Commanded by the scenario itself [N m]."""
-    disturbance: FloatArray
-    """Unmeasured torque in the lever [N m]."""
-    missing: dict[str, NDArray[np.bool_]]
-    """For each of sensors.VALUES and sensors.FRAMES."""
-
-
 @dataclass
 class Recording:
     """What a run left behind, in the order in which it happened."""
@@ -103,26 +85,6 @@ class Recording:
             np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8),
             np.isin(identifier, list(_from_estimator())),
         )
-
-
-def prepare(scenario: Scenario) -> Inputs:
-    """The parts of a run that do not depend on the estimator."""
-    time, period = scenario.time(), scenario.period
-    base = excitation.total(scenario.base, time, scenario.streams("base", scenario.base))
-    dropouts = scenario.sensors.dropout
-    gone = {}
-    for what in (*sensors.VALUES, *sensors.FRAMES):
-        gone[what] = sensors.missing(dropouts, what, time, period, scenario.streams("dropout", dropouts))
-    measured = scenario.sensors.z_ddot.measure(base, period, scenario.stream("z_ddot"))
-    return Inputs(
-        time=time,
-        truth=scenario.truth(time),
-        z_ddot=base,
-        z_ddot_measured=scenario.corruption("z_ddot", time).of(measured),
-        torque=excitation.total(scenario.torque, time, scenario.streams("torque", scenario.torque)),
-        disturbance=excitation.total(scenario.disturbance, time, scenario.streams("disturbance", scenario.disturbance)),
-        missing=gone,
-    )
 
 
 def run(
@@ -309,8 +271,8 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
     """The samples, one after the other."""
     scenario, inputs = recording.scenario, recording.inputs
     count = len(inputs.time)
-    body = _body(scenario, inputs)
-    commands = _commands(scenario, inputs.time)
+    body = inputs.truth.body(conditions(scenario, inputs))
+    commands = commands_of(scenario, inputs.time)
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
     encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
@@ -318,7 +280,7 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
     measure = [_reader_of(recording, name) for name in ("theta", "theta_dot", "tau_m")]
     send_grip = _grip_sender(recording, link)
     no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
-    base = np.where(inputs.missing["z_ddot"], np.nan, inputs.z_ddot_measured).tolist()
+    base = inputs.base.tolist()
     period_us = round(scenario.period * 1e6)
     command, own_torque, last = 0.0, inputs.torque.tolist(), count - 1
 
@@ -346,42 +308,12 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
         progress(count, count)
 
 
-def _body(scenario: Scenario, inputs: Inputs) -> Body:
-    return inputs.truth.body(
-        Conditions(
-            inputs.z_ddot,
-            scenario.period,
-            scenario.pilot.process_noise,
-            scenario.motor.lag,
-            scenario.stream("process"),
-            disturbance=inputs.disturbance,
-        )
-    )
-
-
-def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec.Value]]:
-    """What to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the start,
-    the dither as it changes, and while it is on, one that keeps it alive."""
-    changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
-    start: dict[str, codec.Value] = {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}
-    commands = {0: start}
-    repetition = max(1, round(KEEP_ALIVE / scenario.period))
-    for (sample, rms), end in zip(changes.items(), [*changes, len(time)][1:], strict=True):
-        commands[sample] = {**commands.get(sample, {}), "dither_rms": rms}
-        if rms > 0.0:
-            commands |= {later: {} for later in range(sample + repetition, end, repetition)}
-    return commands
-
-
 def _reader_of(recording: Recording, name: str) -> Callable[[int], float]:
     """The reading of a signal of the lever at a sample, from the history up to it; NaN when invalid."""
-    scenario, inputs = recording.scenario, recording.inputs
-    sensor: sensors.Sensor = getattr(scenario.sensors, name)
-    offsets = sensor.offsets(len(inputs.time), scenario.stream(name))
-    corruption = scenario.corruption(name, inputs.time)
-    corruption.offset[inputs.missing[name]] = np.nan
-    reader = _reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period)
-    return _corrupted(reader, corruption)
+    scenario = recording.scenario
+    given = readings(scenario, recording.inputs, name)
+    reader = _reader(given.sensor, getattr(recording, name), given.offsets.tolist(), scenario.period)
+    return reader if given.corruption is None else _corrupted(reader, given.corruption)
 
 
 def _grip_sender(recording: Recording, link: _Link) -> Callable[[int], None] | None:

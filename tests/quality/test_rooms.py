@@ -24,8 +24,9 @@ MAY_IMPORT = {
     "host_tools/commands": {"firmware", "board", "can", "replay", "tune", "watch", "signals"},
     "sil/plants": {"models"},
     "sil/oracle": {"models"},
-    "sil/scenarios": {"plants", "firmware", "results"},
-    "sil/run": {"scenarios", "plants", "firmware", "can", "results", "report", "watch"},
+    "sil/scenarios": {"plants", "firmware", "can", "results"},
+    "sil/fast": {"scenarios", "plants", "firmware", "can"},
+    "sil/run": {"fast", "scenarios", "plants", "firmware", "can", "results", "report", "watch"},
     "sil/envelope": {"plants", "firmware", "models", "report"},
     "sil/study": {
         *("run", "scenarios", "plants", "oracle", "envelope"),

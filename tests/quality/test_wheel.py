@@ -16,7 +16,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations")
+NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations", "lever_loop")
 _SDIST = "import sys; from scikit_build_core.build import build_sdist; build_sdist(sys.argv[1])"
 
 

@@ -9,8 +9,7 @@ import pytest
 from lever_cdkf.host_tools.firmware.config import Config, settings_table
 from lever_cdkf.host_tools.firmware.native import Estimator
 from lever_cdkf.sil.plants import excitation
-from lever_cdkf.sil.run import loop
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.sil.scenarios import inputs, scenario
 from lever_cdkf.sil.scenarios.random_streams import stream
 from lever_cdkf.sil.scenarios.scenario import Scenario
 from lever_cdkf.sil.toml_tables import ScenarioError
@@ -92,7 +91,7 @@ def test_the_standard_values_are_used(name: str) -> None:
 
 def test_base_only_and_base_dither_are_the_same_pilot_in_the_same_air() -> None:
     only, dither = scenario.load("base_only"), scenario.load("base_dither")
-    first, second = loop.prepare(only), loop.prepare(dither)
+    first, second = inputs.prepare(only), inputs.prepare(dither)
     assert np.array_equal(first.z_ddot, second.z_ddot)
     assert np.array_equal(first.z_ddot_measured, second.z_ddot_measured)
     assert np.array_equal(first.truth.rest, second.truth.rest)
@@ -133,7 +132,7 @@ def test_one_noise_does_not_shift_another(load: Load) -> None:
     plain = load(LEAST + base)
     more = load(LEAST + base + '[[base]]\nkind = "noise"\nrms = "1 mg"\nlow = "1 Hz"\nhigh = "10 Hz"\n'
                 + '[[sensors.dropout]]\nwhat = "theta"\nshare = "10 %"\n')  # fmt: skip
-    assert np.abs(loop.prepare(plain).z_ddot - loop.prepare(more).z_ddot).max() < 0.06
+    assert np.abs(inputs.prepare(plain).z_ddot - inputs.prepare(more).z_ddot).max() < 0.06
     assert np.array_equal(plain.stream("process").random(5), more.stream("process").random(5))
     assert not np.array_equal(load(LEAST + base, "seed=2").stream("base").random(5), plain.stream("base").random(5))
 
