@@ -30,7 +30,7 @@ WORK = 20.0
 """Processor time that a chunk is meant to take [s]: far above the 1 ms that Dask costs a task."""
 
 _NAME = re.compile(r"([0-9a-f]{16})-(\d{10})-(\d{10})\.parquet")
-_LIBRARIES = ("lever_cdkf",)
+_LIBRARIES = ("lever_cdkf", "lever_loop")
 
 
 @dataclass(frozen=True, order=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from ..study.detrended import detrended
 from ..study.firmware import covariance_of
 from ..study.matched import KINDS, knowledge
 from ..study.transitions import dynamics_gradient, with_dynamics
-from .flight import Flight, beside
+from .flight import Columns, Flight, beside
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class Firmware(Entrant):
 
     def track(self, flights: Sequence[Flight]) -> Track:
         columns = [self._run(flight) for flight in flights]
-        merged = {name: np.stack([each[name] for each in columns]).astype(np.float64) for name in columns[0]}
+        merged = {name: np.stack([each[name] for each in columns]).astype(np.float64) for name in _TAKEN}
         dynamics = ("natural_frequency", "damping_ratio")
         values = np.concatenate((merged["parameter"], *(merged[name][..., None] for name in dynamics)), axis=-1)
         sigma = np.concatenate(
@@ -85,14 +84,19 @@ class Firmware(Entrant):
         covariance = covariance_of(merged["parameter_sigma"] / scale, merged["parameter_correlation"])
         return Track(values, sigma, scaled, covariance, merged["nis"], merged["flagged"])
 
-    def _run(self, flight: Flight) -> dict[str, Array]:
+    def _run(self, flight: Flight) -> Columns:
+        columns = flight.firmware if self._flies_in(flight.scenario) else self._replayed(flight)
+        return columns | {"flagged": (columns["faults"] & _warnings() != 0).astype(np.float64)}
+
+    def _flies_in(self, scenario: Scenario) -> bool:
+        return scenario.config.choices["estimator"] == self.name
+
+    def _replayed(self, flight: Flight) -> Columns:
+        """To the bit what it would have said in flight, as dither does not depend on the estimator."""
         scenario = flight.scenario
-        choices = dataclasses.asdict(scenario.estimator) | {"estimator": self.name}
-        config = Config(**choices, settings=scenario.settings)
-        time_us = np.arange(len(scenario.time()), dtype=np.int64) * round(scenario.period * 1e6)
-        columns = run_samples(config, {"time_us": time_us, **flight.measured}, flight.at)
-        columns["flagged"] = (columns["faults"] & _warnings() != 0).astype(np.float64)
-        return {name: columns[name] for name in _TAKEN}
+        config = Config(**{**scenario.config.choices, "estimator": self.name}, settings=scenario.settings)
+        time_us = np.arange(len(flight.measured["theta"]), dtype=np.int64) * round(scenario.period * 1e6)
+        return run_samples(config, {"time_us": time_us, **flight.measured}, flight.at)
 
 
 _TAKEN = (

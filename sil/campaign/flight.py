@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array, BoolArray
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware import quantities
 from numpy.typing import NDArray
 
-from ..run import loop
-from ..run.columns import columns_of
+from ..fast.closed_loop import Loop
 from ..run.summary import judged_samples
+from ..scenarios import inputs as scenario_inputs
+from ..scenarios.inputs import Inputs
 from ..scenarios.scenario import Scenario
 
-MEASURED = ("theta", "theta_dot", "z_ddot", "tau_m")
-_COLUMNS = ("theta_measured_rad", "theta_dot_measured_rad_s", "z_ddot_measured_m_s2", "tau_m_measured_N_m")
+MEASURED = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
+
+Columns = dict[str, NDArray[Any]]
+"""Of lever_estimate_t and lever_health_t, at the samples that are looked at."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +29,14 @@ class Flight:
     """One flight of K samples, looked at T times."""
 
     scenario: Scenario
-    measured: dict[str, Array]
-    """(K,) each of MEASURED; NaN where it is missing."""
     at: NDArray[np.int64]
     """(T,) indices of the samples that are looked at."""
     truth: Array
     """(T, 5) parameters, NaN where the pilot has none of the model; natural frequency [Hz], damping ratio."""
+    firmware: Columns
+    """What the firmware that flew with it said."""
+    _loop: Loop
+    _inputs: Inputs
 
     @property
     def time(self) -> Array:
@@ -43,24 +49,36 @@ class Flight:
         """(T,) whether errors count: some time after the start and after each jump of the truth."""
         return judged_samples(self.scenario, self.time)
 
+    @cached_property
+    def measured(self) -> dict[str, Array]:
+        """(K,) each of MEASURED that there is; NaN where it is missing."""
+        columns = {name: self._reading(name) for name in self._loop.signals}
+        gone = self._inputs.missing
+        for values in columns.values():
+            values[gone["lever_frame"]] = np.nan
+        return columns | {"z_ddot": self._inputs.base}
+
+    def _reading(self, name: str) -> Array:
+        readings = scenario_inputs.readings(self.scenario, self._inputs, name)
+        stream = self.scenario.stream(name)
+        values = readings.sensor.measure(self._loop.signals[name], self.scenario.period, stream)
+        return values if readings.corruption is None else readings.corruption.of(values)
+
 
 def simulate(scenario: Scenario, every: float) -> Flight:
     """A flight, looked at `every` so many seconds. Raises LeverError."""
-    with LeverBus(f"campaign {scenario.name}", config=scenario.config) as bus:
-        recording = loop.run(scenario, bus)
-    trace = columns_of(recording, recording.frames())
-    at = looked_at(scenario, every)
-    model = scenario.config.choices["model"]
-    names = [quantity.column("true") for quantity in quantities.quantities(model)]
-    truth = np.stack([trace[name][at] if name in trace else np.full(len(at), np.nan) for name in names], axis=-1)
-    return Flight(scenario, {name: trace[column] for name, column in zip(MEASURED, _COLUMNS, strict=True)}, at, truth)
-
-
-def looked_at(scenario: Scenario, every: float) -> NDArray[np.int64]:
-    """(T,) samples, the last one among them."""
+    inputs = scenario_inputs.prepare(scenario)
     step = max(1, round(every / scenario.period))
-    count = len(scenario.time())
-    return np.arange((count - 1) % step, count, step, dtype=np.int64)
+    loop = Loop(scenario, inputs, by_frames=False, every=step)
+    loop.advance(len(inputs.time))
+    loop.check()
+    at = np.arange(0, len(inputs.time), step, dtype=np.int64)
+    seen = inputs.truth.at(slice(None, None, step))
+    values = {**seen.parameters, **vars(seen.dynamics)}
+    names = [quantity.key for quantity in quantities.quantities(scenario.config.choices["model"])]
+    truth = np.stack([values[name] if name in values else np.full(len(at), np.nan) for name in names], axis=-1)
+    firmware = {name: array[name] for array in loop.outputs for name in array.dtype.names or ()}
+    return Flight(scenario, at, truth, firmware, loop, inputs)
 
 
 def beside(flights: Sequence[Flight], name: str) -> Array:

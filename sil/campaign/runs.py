@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
 from lever_cdkf.host_tools.errors import LeverError
 
 from . import design, figures
+from .axis import Written
 from .entrants import ENTRANTS, Track
 from .flight import Flight, simulate
 from .spec import Spec
@@ -34,13 +36,7 @@ def rows(spec: Spec, flights: range) -> Iterator[Row]:
 def _of_point(spec: Spec, point: int, numbers: Sequence[int]) -> Iterator[Row]:
     values = design.point(spec, point)
     columns = design.columns(spec, values)
-    flights: dict[int, Flight] = {}
-    errors: dict[int, str] = {}
-    for number in numbers:
-        try:
-            flights[number] = simulate(spec.flight(values, spec.seed + number), spec.every)
-        except _EXPECTED as error:  # noqa: PERF203
-            errors[number] = _line(error)
+    flights, errors = _flights(spec, values, numbers)
     found = {name: _figures(name, flights) for name in spec.estimators}
     for number in numbers:
         for place, name in enumerate(spec.estimators):
@@ -53,6 +49,24 @@ def _of_point(spec: Spec, point: int, numbers: Sequence[int]) -> Iterator[Row]:
                 **columns,
             }
             yield row | ({"error": result} if isinstance(result, str) else result)
+
+
+def _flights(
+    spec: Spec, values: Mapping[str, Written], numbers: Sequence[int]
+) -> tuple[dict[int, Flight], dict[int, str]]:
+    """Those that could be simulated, and the errors of the others, by number."""
+    flights: dict[int, Flight] = {}
+    errors: dict[int, str] = {}
+    try:
+        scenario = spec.flight(values, spec.seed)
+    except _EXPECTED as error:
+        return {}, dict.fromkeys(numbers, _line(error))
+    for number in numbers:
+        try:
+            flights[number] = simulate(dataclasses.replace(scenario, seed=spec.seed + number), spec.every)
+        except _EXPECTED as error:  # noqa: PERF203
+            errors[number] = _line(error)
+    return flights, errors
 
 
 def _figures(name: str, flights: dict[int, Flight]) -> dict[int, figures.Figures | str]:
