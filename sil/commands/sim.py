@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -219,7 +220,10 @@ def _simulate(
 
     if out is not None:
         warn_of_left_out(_FILES)
-    with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
+    with ExitStack() as stack:
+        progress, bus = stack.enter_context(Progress(scenario.name)), None
+        if interface != "lever" or bus_options:
+            bus = stack.enter_context(open_bus(scenario, interface, channel, bus_options))
         result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
     print_tables(_tables(result), json_file)
     print(result.summary.verdict)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -27,6 +27,8 @@ from .library import Struct, lib
 
 STRIDE = 0.02
 """Time between two estimates that are kept [s]."""
+
+_FRAMES_AT_ONCE = 1 << 17
 
 
 @dataclass(frozen=True)
@@ -69,10 +71,21 @@ def run(scenario: Scenario, through_frames: bool = False, stride: float = STRIDE
     return loop.result()
 
 
+@dataclass(frozen=True)
+class Traffic:
+    """Frames of 8 bytes in the order in which they were on the bus; arrays of equal length."""
+
+    identifier: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
+    sample: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
+    data: NDArray[np.uint8] = field(default_factory=lambda: np.empty((0, 8), np.uint8))
+    """(count, 8)."""
+
+
 class Loop:
     """A run under way."""
 
     def __init__(self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int) -> None:
+        """`every`: of how many samples one has its estimate kept."""
         if not plants.has(inputs.truth):
             raise LeverError(f"a pilot of model {inputs.truth.model} runs in Python only: use run.runner.simulate()")
         self._scenario, self._inputs = scenario, inputs
@@ -124,13 +137,30 @@ class Loop:
         values = [commands[sample] for sample in samples]
         loop.commands = len(samples)
         loop.command_sample = self.struct.array("uint32_t", np.array(samples), np.uint32)
-        loop.command = self.struct.keep(_command_structs(values))
         if loop.by_frames:
             loop.command_frame = self.struct.keep(_command_frames(values))
+        else:
+            loop.command = self.struct.keep(_command_structs(values))
 
     def advance(self, until: int) -> int:
         """Goes on to a sample; returns the one that it came to."""
         return lib.loop_advance(self.struct.pointer, self._estimator.pointer, until)  # type: ignore[no-any-return]
+
+    def keep_frames(self) -> None:
+        """Has advance() stop where it has filled a Traffic with frames."""
+        loop, room = self.struct.pointer, _FRAMES_AT_ONCE
+        self._traffic = Traffic(np.empty(room, np.uint16), np.empty(room, np.uint32), np.empty((room, 8), np.uint8))
+        loop.frame_room = room
+        loop.frame_id = self.struct.array("uint16_t", self._traffic.identifier, np.uint16)
+        loop.frame_sample = self.struct.array("uint32_t", self._traffic.sample, np.uint32)
+        loop.frame_data = ffi.cast("uint8_t (*)[8]", self.struct.array("uint8_t", self._traffic.data, np.uint8))
+
+    def take_frames(self) -> Traffic:
+        """Those since they were taken last."""
+        loop, traffic = self.struct.pointer, self._traffic
+        taken = slice(0, loop.frames)
+        loop.frames = 0
+        return Traffic(traffic.identifier[taken].copy(), traffic.sample[taken].copy(), traffic.data[taken].copy())
 
     def check(self) -> None:
         """Raises LeverError when the firmware has refused a command."""

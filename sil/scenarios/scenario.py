@@ -150,7 +150,7 @@ class Scenario:
         except SettingsError as error:
             raise ScenarioError(f"{self.file}: settings: {error}") from None
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Sample period [s], in whole microseconds as the time in the frames."""
         return round(self.config.settings["sample_period"] * 1e6) * 1e-6
