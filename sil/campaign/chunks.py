@@ -18,7 +18,7 @@ from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import whole
 from lever_cdkf.host_tools.firmware.library import shared_file
 
-from . import design, figures
+from . import figures
 from .entrants import ENTRANTS
 from .runs import rows
 from .spec import Spec
@@ -49,7 +49,7 @@ class Plan:
     """How a campaign is cut into chunks: the same on every machine, whatever the number of workers."""
 
     def __init__(self, spec: Spec) -> None:
-        first = spec.flight(design.point(spec, 0), spec.seed)
+        first = spec.first
         self.spec = spec
         self.fingerprint = fingerprint(spec)
         self.minutes = first.duration / 60.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,6 @@ from ..run.summary import judged_samples
 from ..scenarios import inputs as scenario_inputs
 from ..scenarios.inputs import Inputs
 from ..scenarios.scenario import Scenario
-
-MEASURED = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 
 Columns = dict[str, NDArray[Any]]
 """Of lever_estimate_t and lever_health_t, at the samples that are looked at."""
@@ -35,8 +32,9 @@ class Flight:
     """(T, 5) parameters, NaN where the pilot has none of the model; natural frequency [Hz], damping ratio."""
     firmware: Columns
     """What the firmware that flew with it said."""
-    _loop: Loop
-    _inputs: Inputs
+    measured: dict[str, Array]
+    """(K,) each of theta, theta_dot, tau_m, z_ddot, and grip_force where there is one; NaN where it is missing. Empty
+    where nobody asked for it."""
 
     @property
     def time(self) -> Array:
@@ -49,24 +47,9 @@ class Flight:
         """(T,) whether errors count: some time after the start and after each jump of the truth."""
         return judged_samples(self.scenario, self.time)
 
-    @cached_property
-    def measured(self) -> dict[str, Array]:
-        """(K,) each of MEASURED that there is; NaN where it is missing."""
-        columns = {name: self._reading(name) for name in self._loop.signals}
-        gone = self._inputs.missing
-        for values in columns.values():
-            values[gone["lever_frame"]] = np.nan
-        return columns | {"z_ddot": self._inputs.base}
 
-    def _reading(self, name: str) -> Array:
-        readings = scenario_inputs.readings(self.scenario, self._inputs, name)
-        stream = self.scenario.stream(name)
-        values = readings.sensor.measure(self._loop.signals[name], self.scenario.period, stream)
-        return values if readings.corruption is None else readings.corruption.of(values)
-
-
-def simulate(scenario: Scenario, every: float) -> Flight:
-    """A flight, looked at `every` so many seconds. Raises LeverError."""
+def simulate(scenario: Scenario, every: float, *, measured: bool) -> Flight:
+    """A flight, looked at `every` so many seconds; with what was measured if that is asked for. Raises LeverError."""
     inputs = scenario_inputs.prepare(scenario)
     step = max(1, round(every / scenario.period))
     loop = Loop(scenario, inputs, by_frames=False, every=step)
@@ -78,7 +61,17 @@ def simulate(scenario: Scenario, every: float) -> Flight:
     names = [quantity.key for quantity in quantities.quantities(scenario.config.choices["model"])]
     truth = np.stack([values[name] if name in values else np.full(len(at), np.nan) for name in names], axis=-1)
     firmware = {name: array[name] for array in loop.outputs for name in array.dtype.names or ()}
-    return Flight(scenario, at, truth, firmware, loop, inputs)
+    return Flight(scenario, at, truth, firmware, _measured(scenario, inputs, loop) if measured else {})
+
+
+def _measured(scenario: Scenario, inputs: Inputs, loop: Loop) -> dict[str, Array]:
+    columns: dict[str, Array] = {}
+    for name, signal in loop.signals.items():
+        readings = scenario_inputs.readings(scenario, inputs, name)
+        values = readings.sensor.measure(signal, scenario.period, scenario.stream(name))
+        columns[name] = values if readings.corruption is None else readings.corruption.of(values)
+        columns[name][inputs.missing["lever_frame"]] = np.nan
+    return columns | {"z_ddot": inputs.base}
 
 
 def beside(flights: Sequence[Flight], name: str) -> Array:

@@ -18,8 +18,8 @@ from .spec import Spec
 Row = dict[str, Any]
 """A value for each column of chunks.schema()."""
 
-BESIDE = 32
-"""Flights of a point that a baseline is run on at a time: a minute of them is 70 MB."""
+SAMPLES = 1_500_000
+"""Of the flights of a point that a baseline is run on at a time: some 500 MB."""
 
 _EXPECTED = (LeverError, ArithmeticError, ValueError, OSError)
 """What may go wrong in a run and makes a row with its error. Anything else is a defect, and ends the campaign."""
@@ -27,10 +27,11 @@ _EXPECTED = (LeverError, ArithmeticError, ValueError, OSError)
 
 def rows(spec: Spec, flights: range) -> Iterator[Row]:
     """The rows of these flights: all estimators of each, in the order of their numbers."""
+    beside = max(1, SAMPLES // spec.samples)
     for point, own in groupby(flights, key=lambda flight: flight // spec.seeds):
         numbers = list(own)
-        for first in range(0, len(numbers), BESIDE):
-            yield from _of_point(spec, point, numbers[first : first + BESIDE])
+        for first in range(0, len(numbers), beside):
+            yield from _of_point(spec, point, numbers[first : first + beside])
 
 
 def _of_point(spec: Spec, point: int, numbers: Sequence[int]) -> Iterator[Row]:
@@ -61,9 +62,12 @@ def _flights(
         scenario = spec.flight(values, spec.seed)
     except _EXPECTED as error:
         return {}, dict.fromkeys(numbers, _line(error))
+    measured = any(not ENTRANTS[name].flies_in(scenario) for name in spec.estimators)
     for number in numbers:
         try:
-            flights[number] = simulate(dataclasses.replace(scenario, seed=spec.seed + number), spec.every)
+            flights[number] = simulate(
+                dataclasses.replace(scenario, seed=spec.seed + number), spec.every, measured=measured
+            )
         except _EXPECTED as error:  # noqa: PERF203
             errors[number] = _line(error)
     return flights, errors

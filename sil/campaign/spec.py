@@ -42,14 +42,20 @@ def _read_estimators(values: Any, place: Place) -> tuple[str, ...]:
     return tuple(values)
 
 
-def _read_values(values: Any, place: Place) -> dict[str, Written]:
+def _read_values(values: Any, place: Place) -> dict[str, Any]:
     """Reader of a table of scenario values by dotted key."""
     if not isinstance(values, dict):
         raise place.error("must be a table of dotted keys, in quotes")
-    for key, value in values.items():
-        if not isinstance(value, (str, int, float)):
-            raise place.error(f"{key}: {value!r} is not a quantity, a number or a name")
     return dict(values)
+
+
+def _toml(value: Any) -> str:
+    """A value as an override has it."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(part)}" for key, part in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value)
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ class Spec:
     title: str = text()
     description: str = text("")
     scenario: str = text()
-    set: Mapping[str, Written] = item(_read_values, default=())
+    set: Mapping[str, Any] = item(_read_values, default=())
     design: str = choice(*DESIGNS, default="grid")
     points: int | None = whole(None, least=1, greatest=MOST_RUNS)
     seeds: int = whole(1, least=1, greatest=MOST_RUNS)
@@ -117,13 +123,25 @@ class Spec:
         return self.size * self.seeds
 
     @property
+    def first(self) -> Scenario:
+        """The first flight."""
+        from .design import point
+
+        return self.flight(point(self, 0), self.seed)
+
+    @property
+    def samples(self) -> int:
+        """Of the first flight."""
+        return len(self.first.time())
+
+    @property
     def runs(self) -> int:
         """Rows: an estimator in a flight each."""
         return self.flights * len(self.estimators)
 
     def overrides(self, point: Mapping[str, Written]) -> list[str]:
         """What --set would be given for a point of the design."""
-        return [f"{key}={json.dumps(value)}" for key, value in {**dict(self.set), **point}.items()]
+        return [f"{key}={_toml(value)}" for key, value in {**dict(self.set), **point}.items()]
 
     def flight(self, point: Mapping[str, Written], seed: int) -> Scenario:
         """The scenario at a point. Raises ScenarioError."""

@@ -114,7 +114,7 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
     from lever_cdkf.host_tools.files import write_text
     from lever_cdkf.host_tools.tables import print_tables
 
-    from ..campaign import summary
+    from ..campaign import maps, summary
 
     found = summary.build(plan, folder, session)
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)
@@ -124,7 +124,8 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
         print(f"failed: {row['estimator']}, seed {row['seed']}: {row['error']}; alone: {alone}")
     factor = found["real_time_factor_per_core"]
     print(f"{found['runs']} runs, {found['failed']} failed" + (f", {factor:g} × real time a core." if factor else "."))
-    print(f"Written to {args.out}: {summary.FILE}, {plan.count - len(session.lost)} Parquet files")
+    written = [*maps.write(plan, folder), summary.FILE, f"{plan.count - len(session.lost)} Parquet files"]
+    print(f"Written to {args.out}: {', '.join(written)}")
     if session.lost:
         flights = ", ".join(f"{chunk.first} to {chunk.end - 1}" for chunk in session.lost)
         print(f"lever: campaign: flights {flights} killed the workers that tried them", file=sys.stderr)
