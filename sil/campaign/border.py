@@ -59,8 +59,8 @@ def _border(
     low, high = np.percentile(np.minimum(of_error, of_coverage)[1:], (2.5, 97.5), method="nearest")
     at = float(min(of_error[0], of_coverage[0]))
     cause = "" if at == math.inf else "error" if of_error[0] <= of_coverage[0] else "coverage"
-    values = (cells.x.value(float(each)) if math.isfinite(each) else float(each) for each in (at, low, high))
-    return Border(name, panel, y, *values, cause)
+    at, low, high = (cells.x.value(float(each)) if math.isfinite(each) else float(each) for each in (at, low, high))
+    return Border(name, panel, y, at, low, high, cause)
 
 
 def _draws(runs: Runs, rng: np.random.Generator) -> tuple[Array, Array]:

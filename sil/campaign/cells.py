@@ -6,7 +6,7 @@ The last axis of a spec is x, the one before y, the third from the end makes pan
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,13 +82,13 @@ class Map:
     runs: dict[str, dict[tuple[int, int, int], Runs]]
     """By estimator, and panel, y, x."""
 
-    def array(self, estimator: str, panel: int, statistic: object) -> Array:
+    def array(self, estimator: str, panel: int, statistic: Callable[[Runs], float]) -> Array:
         """(y, x) of a function of Runs; NaN for an empty cell."""
         cells = self.runs[estimator]
         values = np.full((len(self.y.values), len(self.x.values)), np.nan)
         for (at, row, column), runs in cells.items():
             if at == panel:
-                values[row, column] = statistic(runs)  # type: ignore[operator]
+                values[row, column] = statistic(runs)
         return values
 
 
@@ -127,12 +127,13 @@ def read(plan: Plan, folder: Path) -> Map:
     axes = plan.spec.vary[-3:]
     given = {axis.key: _scale(plan, axis) for axis in axes}
     scales = [_ONE] * (3 - len(axes)) + list(given.values())
+    panels, y, x = scales
     keys = [None] * (3 - len(axes)) + [axis.key for axis in axes]
     judged = tuple(each.key for each in parameters(plan.model))
     if plan.spec.first.pilot.model != plan.model:  # whose parameters have no true values
         judged = tuple(each.key for each in DYNAMICS)
     runs = {name: dict(_runs(folder, name, keys, scales, judged)) for name in plan.spec.estimators}
-    return Map(*scales, judged, runs)
+    return Map(panels, y, x, judged, runs)
 
 
 def _scale(plan: Plan, axis: Axis) -> Scale:

@@ -72,5 +72,5 @@ def _nees(flight: Flight, track: Track, run: int) -> float | None:
     return _finite(np.mean(squares))
 
 
-def _finite(value: float | np.floating) -> float | None:  # type: ignore[type-arg]
+def _finite(value: float | np.floating) -> float | None:
     return float(value) if math.isfinite(value) else None

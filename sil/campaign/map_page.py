@@ -65,12 +65,12 @@ QUANTITIES = (
 
 def build(plan: Plan, cells: Map, borders: Sequence[Border], rows: Sequence[Row], by_estimator: Sequence[Row]) -> str:
     """The whole page; `rows` of the border's table."""
-    page, figures = Page(), {}
+    page, figures = Page(), dict[str, Spec]()
     for quantity in QUANTITIES:
         if not any(np.isfinite(_values(cells, quantity, name)).any() for name in cells.runs):
             continue
-        spec = figures[f"map-{quantity.key}"] = _figure(cells, borders, quantity)
-        place = f'<div class="chart" id="map-{quantity.key}" style="height:{spec["layout"]["height"]}px"></div>'
+        drawn = figures[f"map-{quantity.key}"] = _figure(cells, borders, quantity)
+        place = f'<div class="chart" id="map-{quantity.key}" style="height:{drawn["layout"]["height"]}px"></div>'
         caption = f"<figcaption>{quantity.caption} {_LINE}</figcaption>"
         page.section(quantity.key, quantity.title, quantity.title, f"<figure>{place}{caption}</figure>")
     page.section("border", "Border", "Where tracking fails", _table(rows))
@@ -184,7 +184,7 @@ def _border(cells: Map, borders: Sequence[Border]) -> list[Spec]:
     y = _places(cells.y)[[each.y for each in borders]]
 
     def clipped(values: Sequence[float]) -> list[float]:
-        return np.clip(values, min(ends), max(ends)).tolist()  # type: ignore[no-any-return]
+        return [min(max(value, min(ends)), max(ends)) for value in values]
 
     low, high = clipped([each.low for each in borders]), clipped([each.high for each in borders])
     around = {"x": [*low, *reversed(high)], "y": [*y.tolist(), *reversed(y.tolist())]}

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
 
 from .border import Border
 from .cells import Map, Scale, error
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _WIDTH, _CELL = 7.16, 1.35  # [inches]: both columns of IEEE's; a chart
 _MOST = 50.0  # [%] of the colours
@@ -57,7 +61,7 @@ def _edges(scale: Scale) -> Array:
     return np.concatenate(([2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]))
 
 
-def _draw(chart, cells: Map, own: Sequence[Border]) -> None:  # type: ignore[no-untyped-def]
+def _draw(chart: Axes, cells: Map, own: Sequence[Border]) -> None:
     if len(own) < 2:
         return
     y = cells.y.position[[each.y for each in own]]
@@ -77,7 +81,7 @@ def _position(scale: Scale, value: float) -> float:
     return float(np.log(value)) if scale.is_log and np.isfinite(value) else value
 
 
-def _label(chart, cells: Map, name: str, panel: int) -> None:  # type: ignore[no-untyped-def]
+def _label(chart: Axes, cells: Map, name: str, panel: int) -> None:
     value = cells.panels.values[panel]
     chart.set_title(name if value == "" else f"{name}, {cells.panels.label} {value:.3g}", fontsize=6.5, loc="left")
     for scale, set_ticks in ((cells.x, chart.set_xticks), (cells.y, chart.set_yticks)):

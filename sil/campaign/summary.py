@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from lever_cdkf.host_tools.firmware.quantities import quantities
-from lever_cdkf.host_tools.tables import Row
+from lever_cdkf.host_tools.tables import Cell, Row
 
 from .chunks import Plan
 from .session import Session
@@ -90,7 +90,11 @@ def by_estimator(plan: Plan, folder: Path) -> list[Row]:
     for name in plan.spec.estimators:
         columns = [f"rms_{each}" for each in names] + [f"coverage_{each}" for each in names]
         of_one = table(folder, [*columns, "error"], ds.field("estimator") == name)
-        row: Row = {"estimator": name, "runs": of_one.num_rows, "failed": of_one.num_rows - of_one["error"].null_count}
+        row: dict[str, Cell] = {
+            "estimator": name,
+            "runs": of_one.num_rows,
+            "failed": of_one.num_rows - of_one["error"].null_count,
+        }
         for each in names:
             row[f"{each} [%]"] = _percent(np.nanmedian, of_one[f"rms_{each}"])
         covered = [_percent(np.nanmean, of_one[f"coverage_{each}"]) for each in names]

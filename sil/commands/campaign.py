@@ -105,7 +105,7 @@ def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
     if done == plan.count:
         return Session()
     with connected(args.scheduler, args.workers or os.cpu_count() or 1) as client, Progress("campaign") as progress:
-        print(f"{plan.spec.runs} runs in {plan.count} chunks; dashboard: {dashboard(client)}", file=sys.stderr)
+        print(f"{plan.spec.runs} runs in {plan.count} chunks; dashboard: {dashboard(client)}", flush=True)
         return run(plan, folder, client, progress.show)
 
 

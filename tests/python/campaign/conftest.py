@@ -1,12 +1,14 @@
-"""A campaign of half a second a flight, and its chunks as this process alone makes them."""
+"""A campaign of a second a flight, and its chunks as this process alone makes them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from lever_cdkf.sil.campaign import chunks, spec
 from lever_cdkf.sil.campaign.chunks import Plan
+from lever_cdkf.sil.campaign.spec import Spec
 
 SMALL = """
 title = "small"
@@ -44,6 +46,18 @@ def undisturbed(small: Plan, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     for number in range(small.count):
         chunks.make(small, small.chunk(number), folder)
     return files(folder)
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Callable[[str], Spec]:
+    """made(text): the spec of a TOML text."""
+
+    def from_text(text: str) -> Spec:
+        file = tmp_path / "made.toml"
+        file.write_text(text)
+        return spec.load(str(file))
+
+    return from_text
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -1,4 +1,4 @@
-"""A campaign whose worker, scheduler or client is killed loses nothing, does nothing twice, and writes the same bytes."""
+"""A campaign whose worker, scheduler or client is killed loses nothing, repeats nothing, and writes the same bytes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from python.campaign.conftest import files
@@ -55,7 +56,7 @@ def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A Dask scheduler with a worker, as somebody starts them on a command line: its address, and its process."""
     dask = [sys.executable, "-m", "dask"]
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    place = {"cwd": folder.parent, "text": True, "stderr": subprocess.PIPE, "stdout": subprocess.DEVNULL}
+    place: dict[str, Any] = {"cwd": folder.parent, "text": True, "stderr": subprocess.PIPE}
     scheduler = subprocess.Popen([*dask, "scheduler", *options], **place)
     worker = None
     try:
