@@ -13,10 +13,8 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.commander import Commander
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware import quantities
-from lever_cdkf.host_tools.firmware.config import CHOICES, choice_value
-from lever_cdkf.host_tools.firmware.estimator import Estimator
+from lever_cdkf.host_tools.firmware.estimator import Estimator, make_command
 from lever_cdkf.host_tools.firmware.library import ffi, struct_dtype
-from lever_cdkf.host_tools.firmware.library import lib as firmware
 from numpy.typing import NDArray
 
 from ..scenarios import inputs as scenario_inputs
@@ -96,7 +94,7 @@ class Loop:
         loop.count, loop.period_us, loop.stride = count, round(scenario.period * 1e6), every
         loop.by_frames, loop.has_grip = by_frames, scenario.sensors.grip_force is not None
         loop.most_unanswered = 0xFFFFFFFF
-        plants.fill(self.struct, inputs.truth, scenario_inputs.conditions(scenario, inputs))
+        plants.fill(self.struct, loop.plant, inputs.truth, scenario_inputs.conditions(scenario, inputs))
         loop.plant.has_grip_force = loop.has_grip
         names = OF_LEVER if loop.has_grip else OF_LEVER[:-1]
         self.signals = {name: np.empty(count) for name in names}
@@ -216,15 +214,8 @@ def _field(message: str, name: str) -> dict[str, float]:
 
 def _command_structs(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
     """Of type lever_command_t[]."""
-    structs = ffi.new("lever_command_t[]", len(commands))
-    for struct, values in zip(structs, commands, strict=True):
-        struct.request = choice_value("lever_request", "request", str(values.get("request", "none")))
-        for what in CHOICES:
-            name = values.get(what)
-            number = firmware.LEVER_KEEP if name is None else choice_value(f"lever_{what}", what, str(name))
-            setattr(struct, what, number)
-        struct.dither_rms = values.get("dither_rms", firmware.LEVER_KEEP)
-    return structs
+    made: list[Any] = [make_command(**values) for values in commands]  # type: ignore[arg-type]
+    return ffi.new("lever_command_t[]", [each[0] for each in made])
 
 
 def _command_frames(commands: Sequence[Mapping[str, codec.Value]]) -> Any:

@@ -27,25 +27,33 @@ def has(truth: Truth) -> bool:
     return isinstance(truth, tuple(_KINDS))
 
 
-def fill(loop: Struct, truth: Truth, conditions: Conditions) -> None:
-    """Puts a truth at rest, and what acts on it, into the plant of a loop."""
+def move(truth: Truth, conditions: Conditions, command: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """theta [rad], theta_dot [rad/s] and tau_m [N m] at every sample, from rest, with the torques `command` [N m]."""
+    struct, signals = Struct("plant_t"), np.empty((3, len(command)))
+    fill(struct, struct.pointer, truth, conditions)
+    pointers = [struct.doubles(signal) for signal in signals]
+    lib.plant_move(struct.pointer, struct.doubles(command), len(command), *pointers)
+    return signals[0], signals[1], signals[2]
+
+
+def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> None:
+    """Puts a truth at rest, and what acts on it, into a plant_t in a struct."""
     if isinstance(truth, linear_plant.LinearTruth):
         conditions = truth.felt(conditions)
-    plant, last = loop.pointer.plant, len(conditions.z_ddot) - 1
+    last = len(conditions.z_ddot) - 1
     plant.kind = getattr(lib, "PLANT_" + next(name for kind, name in _KINDS.items() if isinstance(truth, kind)))
     plant.substeps, plant.step = conditions.count, conditions.step
     plant.lag_middle, plant.lag, plant.kick = conditions.decay(0.5), conditions.decay(1.0), conditions.kick
-    plant.z_ddot = loop.doubles(conditions.z_ddot)
-    plant.disturbance = loop.doubles(np.broadcast_to(conditions.disturbance, conditions.z_ddot.shape))
-    plant.normal = loop.doubles(conditions.rng.standard_normal(last * conditions.count))
+    plant.z_ddot = struct.doubles(conditions.z_ddot)
+    plant.disturbance = struct.doubles(np.broadcast_to(conditions.disturbance, conditions.z_ddot.shape))
+    plant.normal = struct.doubles(conditions.rng.standard_normal(last * conditions.count))
     plant.theta = float(truth.rest[0])
-    for index, column in enumerate(_columns(loop, truth, conditions)):
-        plant.column[index] = loop.doubles(column)
+    for index, column in enumerate(_columns(struct, plant, truth, conditions)):
+        plant.column[index] = struct.doubles(column)
 
 
-def _columns(loop: Struct, truth: Truth, conditions: Conditions) -> _Columns:
+def _columns(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> _Columns:
     """The coefficients; puts what else there is of a kind into the plant."""
-    plant = loop.pointer.plant
     if isinstance(truth, linear_plant.LinearTruth):
         system = truth.system
         return system.stiffness, system.damping, system.gain, system.compliance, system.rest
@@ -57,7 +65,7 @@ def _columns(loop: Struct, truth: Truth, conditions: Conditions) -> _Columns:
         _fill_lever(plant.lever, truth.lever, arm.preload)
         plant.reflex.middle = 0.5 * conditions.period
         plant.reflex.late = reflex_plant.late(truth, conditions.period)
-        plant.reflex_force = loop.doubles(np.zeros(count))
+        plant.reflex_force = struct.doubles(np.zeros(count))
         arm_columns = lever_plant.coefficients(truth.lever, arm.pilot, arm.preload)
         return (*arm_columns, *reflex_plant.coefficients(truth))
     if isinstance(truth, two_dof_plant.TwoDof):

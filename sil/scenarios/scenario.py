@@ -155,7 +155,7 @@ class Scenario:
         """Sample period [s], in whole microseconds as the time in the frames."""
         return round(self.config.settings["sample_period"] * 1e6) * 1e-6
 
-    @property
+    @cached_property
     def true_lever(self) -> lever_plant.Lever:
         return lever_plant.Lever.from_settings(self.config.settings | dict(self.lever or {}))
 

@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "sil/scenarios": {"plants", "firmware", "can", "results"},
     "sil/fast": {"scenarios", "plants", "firmware", "can"},
     "sil/run": {"fast", "scenarios", "plants", "firmware", "can", "results", "report", "watch"},
-    "sil/envelope": {"plants", "firmware", "models", "report"},
+    "sil/envelope": {"fast", "plants", "firmware", "models", "report"},
     "sil/study": {
         *("run", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report"),

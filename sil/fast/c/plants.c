@@ -307,3 +307,15 @@ void plant_advance(plant_t *plant, uint32_t period, double command)
         break;
     }
 }
+
+void plant_move(plant_t *plant, const double *command, uint32_t count, double *theta, double *theta_dot, double *tau_m)
+{
+    for (uint32_t i = 0u; i < count; i++) {
+        theta[i] = plant->theta;
+        theta_dot[i] = plant->theta_dot;
+        tau_m[i] = plant->tau_m;
+        if ((i + 1u) < count) {
+            plant_advance(plant, i, command[i]);
+        }
+    }
+}

@@ -72,4 +72,8 @@ typedef struct plant {
 /* From sample `period` to the next one, with the torque `command` [N m] held. */
 void plant_advance(plant_t *plant, uint32_t period, double command);
 
+/* From the first of `count` samples to the last, with the torques `command` [N m], of which each is held for a period. Gives
+ * theta [rad], theta_dot [rad/s] and tau_m [N m] at the samples. */
+void plant_move(plant_t *plant, const double *command, uint32_t count, double *theta, double *theta_dot, double *tau_m);
+
 #endif

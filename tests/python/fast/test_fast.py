@@ -104,8 +104,8 @@ def test_a_command_that_is_refused_ends_the_run(monkeypatch: pytest.MonkeyPatch)
     wanted = scenario.load("steady", ["duration=1 s"])
     first = codec.encode("COMMAND", 0, {"request": "reset", **KEEP})
     monkeypatch.setattr(inputs, "commands", lambda *_: {0: {"request": "reset"}, 100: {}})
-    with monkeypatch.context() as patched, pytest.raises(loop.RefusedError, match="its counter is out of sequence"):
-        patched.setattr(Commander, "send", lambda _, values, put: put(0x120, first))
+    monkeypatch.setattr(Commander, "send", lambda _, values, put: put(0x120, first))
+    with pytest.raises(loop.RefusedError, match="its counter is out of sequence"):
         in_process.run(wanted)
     monkeypatch.setattr(inputs, "commands", lambda *_: {0: {"request": "reset", "dither_rms": -1.0}})
     with pytest.raises(LeverError, match="refuses COMMAND"):

@@ -1,0 +1,8 @@
+/* All that the shared library lever_loop has. */
+#ifndef LIBRARY_H
+#define LIBRARY_H
+
+#include "lanes.h"
+#include "loop.h"
+
+#endif
