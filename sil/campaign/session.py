@@ -80,7 +80,7 @@ def _results(
     def submit(count: int) -> None:
         for number in islice(todo, count):
             chunk = plan.chunk(number)
-            future = client.submit(_work, plan, chunk, folder, key=chunk.name(plan.fingerprint), pure=True)
+            future = client.submit(work, plan, chunk, folder, key=chunk.name(plan.fingerprint), pure=True)
             running[future.key] = chunk
             kept[future.key] = future
             future.add_done_callback(finished.put)
@@ -123,7 +123,7 @@ def dashboard(client: Client) -> str:
     return page if importlib.util.find_spec("bokeh") else page.replace("/status", "/info/main/workers.html")
 
 
-def _work(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, float]:
+def work(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, float]:
     """On a worker: makes a chunk; returns its rows and the processor time [s]."""
     here = socket.gethostname()
     if fingerprint(plan.spec) != plan.fingerprint:
