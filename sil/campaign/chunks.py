@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import whole
-from lever_cdkf.host_tools.firmware.library import shared_file
+from lever_cdkf.host_tools.files import native_file, shared_library, whole
 
 from . import figures
 from .entrants import ENTRANTS
@@ -30,7 +29,7 @@ WORK = 20.0
 """Processor time that a chunk is meant to take [s]: far above the 1 ms that Dask costs a task."""
 
 _NAME = re.compile(r"([0-9a-f]{16})-(\d{10})-(\d{10})\.parquet")
-_LIBRARIES = ("lever_cdkf", "lever_loop")
+_LIBRARIES = ("lever_cdkf", "lever_loop", "lever_bulk")
 
 
 @dataclass(frozen=True, order=True)
@@ -102,7 +101,7 @@ def _rows_in(file: Path) -> int | None:
 def _code() -> bytes:
     digest = hashlib.sha256()
     for library in _LIBRARIES:
-        digest.update(shared_file(library).read_bytes())
+        digest.update(native_file(shared_library(library)).read_bytes())
     return digest.digest()
 
 

@@ -28,6 +28,10 @@ class Struct:
         self._kept.append(pointer)
         return pointer
 
+    def cast(self, ctype: str, values: NDArray[np.float64]) -> Any:
+        """A pointer of that type to an array of doubles."""
+        return ffi.cast(ctype, self.doubles(values))
+
     def doubles(self, values: NDArray[np.float64]) -> Any:
         """The same, of the type double."""
         return self.array("double", values, np.float64)

@@ -89,13 +89,6 @@ def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.R
     assert "In this run the stated σ of m_p is too small" in made.verdict
 
 
-def test_coverage_of_a_gaussian_error_is_that_of_two_sigma(recording: loop.Recording) -> None:
-    trace = perfect(recording)
-    trace["k_p_estimate_N_m"] += 0.01 * 2000 * np.random.default_rng(1).standard_normal(COUNT)
-    coverage = summary.build(recording, trace).parameters["k_p"].coverage_2sigma
-    assert coverage == pytest.approx(stats.norm.cdf(2) - stats.norm.cdf(-2), abs=0.01)
-
-
 @pytest.mark.parametrize(
     ("outside", "said"),
     [
@@ -252,32 +245,15 @@ def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(
         assert denominator == pytest.approx(expected)
 
 
-def test_white_residuals_are_a_test_passed_and_no_proof_of_the_model() -> None:
-    white = Whiteness(0.02, [0.0] * 25, band_95=0.04, largest=0.08, largest_after_s=0.06, white=True)
+def test_white_residuals_are_no_proof_of_the_model() -> None:
+    white = Whiteness(0.02, [0.0] * 25, band_95=0.04, largest=0.05, largest_after_s=0.06, white=True)
     said = whiteness.verdict(white)
-    assert said.startswith(
-        "Residuals of the rate pass the test for whiteness up to a lag of 0.5 s (largest correlation 0.08"
-    )
-    assert all(unseen in said for unseen in ("friction", "gain", "delay"))
-    assert "coloured (correlation 0.08 after 60 ms; white" in whiteness.verdict(replace(white, white=False))
+    assert said.startswith("Residuals of the rate are white up to a lag of 0.5 s (chance alone: within ±0.06)")
+    beyond = whiteness.verdict(replace(white, largest=0.08))
+    assert beyond.startswith("Residuals of the rate are slightly correlated (0.08 after 60 ms; chance alone")
+    assert all(unseen in text for unseen in ("friction", "gain", "delay") for text in (said, beyond))
+    assert "coloured (correlation 0.05 after 60 ms; chance" in whiteness.verdict(replace(white, white=False))
     assert whiteness.verdict(None) == ""
-
-
-def test_a_file_is_read_back_as_it_was(recording: loop.Recording, tmp_path: Path) -> None:
-    made = summary.build(recording, perfect(recording)).timed(1.0)
-    file = tmp_path / "summary.json"
-    file.write_text(text(made))
-    assert read(file) == made
-    content = json.loads(file.read_text())
-    assert set(content) >= {
-        "schema", "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "restarts",
-        "unanswered", "misplaced", "firmware", "fault_shares", "flagged_share", "wall_time_s",
-        "simulated_time_s", "wall_time_per_simulated_time", "verdict",
-    }  # fmt: skip
-    assert set(content["parameters"]) == {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
-    assert set(content["parameters"]["m_p"]) == {
-        "rms_percent", "bias_percent", "coverage_2sigma", "time_to_10_percent_s", "time_to_5_percent_s",
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
