@@ -145,7 +145,8 @@ def verdict(summaries: Sequence[SimulationSummary]) -> str:
     sentences.append(f"Over all runs ±2σ covers every truth for at least {percent} % of the time (least: {least}).")
     tested = [summary.whiteness.white for summary in summaries if summary.whiteness is not None]
     if tested:
-        sentences.append(f"Residuals of {sum(tested)} of {len(tested)} runs pass the test for whiteness. {CANNOT_SEE}")
+        coloured = len(tested) - sum(tested)
+        sentences.append(f"Residuals of {coloured} of {len(tested)} runs are coloured. {CANNOT_SEE}")
     return " ".join(sentence for sentence in sentences if sentence)
 
 

@@ -23,6 +23,8 @@ def test_white_noise_is_white() -> None:
     assert told.white
     assert told.average_s == pytest.approx(AVERAGE)
     assert told.band_95 == pytest.approx(stats.norm.ppf(0.975) / np.sqrt(3000), rel=1e-3)
+    all_lags = stats.norm.ppf(0.5 + 0.5 * 0.95 ** (1.0 / whiteness.LAGS))
+    assert told.band_of_all == pytest.approx(all_lags / np.sqrt(3000), rel=1e-3)
     assert np.mean(np.abs(told.autocorrelation) <= told.band_95) >= 0.8
 
 

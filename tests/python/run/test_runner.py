@@ -255,7 +255,7 @@ def test_files_are_complete_or_not_there(short: Scenario, tmp_path: Path, monkey
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("lever_cdkf.host_tools.results.trace.write_csv", broken)
+    monkeypatch.setattr("lever_cdkf.host_tools.exports.csv.write_csv_rows", broken)
     with pytest.raises(LeverError, match=r"cannot write .*trace.csv: No space left on device"):
         runner.simulate(short, PuppetBus(always), tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []

@@ -80,7 +80,7 @@ def test_the_verdict_says_what_was_tested_and_what_that_cannot_see() -> None:
     assert said.startswith(
         "All limits kept. Over all runs ±2σ covers every truth for at least 70 % of the time (least: m_p)."
     )
-    assert "Residuals of 1 of 3 runs pass the test for whiteness. That test does not see friction" in said
+    assert "Residuals of 2 of 3 runs are coloured. That test does not see friction" in said
     assert seeds.verdict([summary(1, None, None, [None])]).startswith("Too short to judge")
 
 

@@ -244,14 +244,14 @@ def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(
         assert denominator == pytest.approx(expected)
 
 
-def test_white_residuals_are_a_test_passed_and_no_proof_of_the_model() -> None:
-    white = Whiteness(0.02, [0.0] * 25, band_95=0.04, largest=0.08, largest_after_s=0.06, white=True)
+def test_white_residuals_are_no_proof_of_the_model() -> None:
+    white = Whiteness(0.02, [0.0] * 25, band_95=0.04, largest=0.05, largest_after_s=0.06, white=True)
     said = whiteness.verdict(white)
-    assert said.startswith(
-        "Residuals of the rate pass the test for whiteness up to a lag of 0.5 s (largest correlation 0.08"
-    )
-    assert all(unseen in said for unseen in ("friction", "gain", "delay"))
-    assert "coloured (correlation 0.08 after 60 ms; white" in whiteness.verdict(replace(white, white=False))
+    assert said.startswith("Residuals of the rate are white up to a lag of 0.5 s (chance alone: within ±0.06)")
+    beyond = whiteness.verdict(replace(white, largest=0.08))
+    assert beyond.startswith("Residuals of the rate are slightly correlated (0.08 after 60 ms; chance alone")
+    assert all(unseen in text for unseen in ("friction", "gain", "delay") for text in (said, beyond))
+    assert "coloured (correlation 0.05 after 60 ms; chance" in whiteness.verdict(replace(white, white=False))
     assert whiteness.verdict(None) == ""
 
 

@@ -24,7 +24,7 @@ from lever_cdkf.sil.study.compare.evaluation import Row
 from lever_cdkf.sil.study.data import Batch, Estimates
 from numpy.typing import NDArray
 from python.conftest import Refused, Run
-from python.report.reading import unpack
+from python.report.reading import Reader, figures, unpack
 
 # --- who takes part ---------------------------------------------------------------------------------------------------
 
@@ -419,6 +419,11 @@ def test_a_claim_that_chance_may_miss_says_so(error: float, said: str) -> None:
     assert (first.measured, first.error, first.kept_in_words) == (1.2, error, said)
 
 
+def points(data: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The traces of a chart but those that are there for the legend."""
+    return [trace for trace in data if not np.isnan(unpack(trace["x"])).all()]
+
+
 def test_claims_stand_in_table_and_page() -> None:
     rows = everything(1.5)
     claims = verdicts.claims(rows)
@@ -432,10 +437,10 @@ def test_claims_stand_in_table_and_page() -> None:
     assert f'<p class="verdict bad">{kept} of {len(claims)} claims about the firmware hold.' in page
     cells = ("<strong>no</strong>", "1.58", "≤ 1.1", claims[0].where)
     assert "".join(f"<td>{cell}</td>" for cell in cells) in page.replace(' class="num"', "")
-    figures = json.loads(page.split('<script type="application/json" id="figures">')[1].split("</script>")[0])
-    shown = figures["noise-wrong_noise_fixed"]
-    assert [trace["name"] for trace in shown["data"]] == ["m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"]
-    np.testing.assert_allclose([unpack(trace["x"])[0] for trace in shown["data"]], fives(1.4 * 1.5))
+    shown = figures(Reader(page))["noise-wrong_noise_fixed"]
+    marks = points(shown["data"])
+    assert [trace["name"] for trace in marks] == ["m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"]
+    np.testing.assert_allclose([unpack(trace["x"])[0] for trace in marks], fives(1.4 * 1.5))
     assert not any("error_x" in trace for trace in shown["data"])
     assert [shape["x0"] for shape in shown["layout"]["shapes"]] == [1.0, 1.5]
 
@@ -447,7 +452,7 @@ def test_a_chart_shows_each_estimator_in_each_case_with_its_standard_error() -> 
     rows.append(row("joint", 0.1, case="lever_trim_base_quiet", linearised=fives(3.0)))
     shown = charts.linearised(rows, "lever", "fixed")
     assert shown is not None
-    first, second = shown.spec()["data"]
+    first, second = points(shown.spec()["data"])
     assert (first["name"], second["name"]) == (CASE, "lever_fixed_base_quiet")
     np.testing.assert_allclose(unpack(first["x"]), np.array((4.0, math.prod(fives(1.0)) ** 0.2)))
     np.testing.assert_allclose(unpack(first["y"]), [-0.15, 0.85])
@@ -459,10 +464,21 @@ def test_a_chart_shows_each_estimator_in_each_case_with_its_standard_error() -> 
     ):
         shown = chart(rows, "lever", "fixed")
         assert shown is not None
-        (only,) = shown.spec()["data"]
+        (only,) = points(shown.spec()["data"])
         np.testing.assert_allclose(unpack(only["x"]), [value], rtol=1e-6)
         assert [shape["x0"] for shape in shown.shapes] == marks
     assert charts.bound(rows, "linear_physical", "fixed") is None
+
+
+def test_an_estimator_has_one_colour_in_all_its_settings_and_cases() -> None:
+    names = ("dual", "dual_shipped", "joint", "joint_ekf", "rls")
+    rows = [row(name, 0.1, linearised=fives(1.0), bound=fives(1.0)) for name in names]
+    rows += [row(name, 0.1, case="lever_fixed_base_quiet", linearised=fives(1.0)) for name in names]
+    shown = [charts.linearised(rows, "lever", "fixed"), charts.bound(rows, "lever", "fixed")]
+    colours = {tuple(trace["marker"]["color"]) for figure in shown if figure for trace in points(figure.spec()["data"])}
+    ((first, second, *others),) = colours
+    assert first == second
+    assert len({first, *others}) == 4
 
 
 def test_csv_has_every_figure_with_all_digits() -> None:
@@ -520,9 +536,9 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     walk = next(line for line in lines if line["case"].startswith("lever") and line["estimator"] == "joint")
     assert 0.1 < float(walk["linearised_natural_frequency"]) < 10.0
     page = (out / "compare.html").read_text()
-    figures = json.loads(page.split('<script type="application/json" id="figures">')[1].split("</script>")[0])
-    assert {"linearised-lever", "bound-lever", "settling-step_up", "following-step_up"} <= figures.keys()
-    assert all(f'id="{key}"' in page for key in figures)
+    drawn = figures(Reader(page))
+    assert {"linearised-lever", "bound-lever", "settling-step_up", "following-step_up"} <= drawn.keys()
+    assert all(f'id="{key}"' in page for key in drawn)
     assert len(json.loads(tables.read_text())) == 2
     monkeypatch.setattr(interrupts, "worker_pool", None)  # not called for one process
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)

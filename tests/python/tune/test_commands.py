@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,8 @@ def test_it_writes_a_settings_file_with_the_noise_of_the_log(tuned: Path) -> Non
     for name in ("theta_noise", "theta_dot_noise"):
         assert found[name] == pytest.approx(NOISE[name], rel=0.02)
     assert "[rad] standard deviation of a theta sample; was 0.001" in text
-    assert text.startswith("# lever tune ")
+    assert text.startswith("# lever-cdkf ")
+    assert re.search(r"^# \S+ sha256:[0-9a-f]{64}$", text, re.MULTILINE), "of the log"
     assert "noise_window" not in found, "it stays as the user had it"
     assert make_config(found).settings["noise_window"] == 1.0
 
@@ -73,7 +75,7 @@ def test_the_page_holds_the_same(tuned: Path) -> None:
     page = read(tuned / "tune.html")
     text = "".join(page.text)
     for words in (
-        "Lever CDKF: settings from a log",
+        "Lever CDKF: Settings from a log",
         "What the log says",
         "held out",
         "From the dither (± one standard deviation): z_ddot_gain",
