@@ -137,13 +137,12 @@ def test_before_the_first_estimate_and_after_the_last(flight: Flight) -> None:
         app = Monitor(source)
         async with app.run_test(size=(80, 24)) as pilot:
             app.advance()
-            text = await shown(app, pilot, "no frame has come yet")
-            assert re.search(r"parameters +none yet", text)
+            assert "no frame has come yet" in await shown(app, pilot, r"parameters +none yet")
             fly(app, source, flight, 10)
             source.time += 5.0
             app.advance()
-            text = await shown(app, pilot, "no frame from the estimator for 5 s: what is shown is old")
-            assert re.search(r"m_p +– +± – ", text)
+            old = "no frame from the estimator for 5 s: what is shown is old"
+            assert old in await shown(app, pilot, r"m_p +– +± – ")
             source.error = "Network is down"
             app.advance()
             await shown(app, pilot, "● Network is down")
