@@ -74,7 +74,7 @@ def test_everything_fits_on_the_screen(size: tuple[int, int], flight: Flight) ->
         app = Monitor(source)
         async with app.run_test(size=size) as pilot:
             fly(app, source, flight, 50)
-            text = await shown(app, pilot, "q quit")
+            text = await shown(app, pilot, r"(?s)LEVER_SAMPLE +1000 .*q quit")
         lines = text.split("\n")
         assert [len(line) for line in lines] == [size[0]] * size[1]
         assert "a test · model lever" in lines[0]
