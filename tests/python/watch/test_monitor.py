@@ -50,7 +50,7 @@ def screen(app: Monitor) -> list[str]:
     return ["".join(segment.text for segment in Segment.strip_styles(strip)) for strip in lines]
 
 
-async def shown(app: Monitor, pilot: Pilot[object], pattern: str) -> str:
+async def shown(app: Monitor, pilot: Pilot[None], pattern: str) -> str:
     """What the terminal shows, once that is in it; a loaded machine draws late."""
     end = time.monotonic() + PATIENCE
     while not re.search(pattern, text := "\n".join(screen(app))):
