@@ -13,6 +13,7 @@ from . import interrupts
 from .errors import LeverError
 from .exit_status import INTERRUPTED
 from .extras import hide_mf4, reveal_mf4
+from .provenance import version
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has
@@ -101,7 +102,7 @@ def _expected() -> tuple[type[Exception], ...]:
 
 def _parser() -> Parser:
     parser = Parser(prog="lever", description=_DESCRIPTION, epilog=_EPILOG)
-    parser.add_argument("--version", action="version", version=f"lever {_version()}")
+    parser.add_argument("--version", action="version", version=f"lever {version()}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for entry in sorted(importlib.metadata.entry_points(group=COMMANDS)):
         try:
@@ -115,13 +116,6 @@ def _parser() -> Parser:
             if subparsers.choices[name].get_default("run") is None:
                 subparsers.choices[name].set_defaults(run=module.run)
     return parser
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version("lever-cdkf")
-    except importlib.metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 if __name__ == "__main__":

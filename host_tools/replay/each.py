@@ -15,6 +15,7 @@ from ..errors import LeverError
 from ..extras import missing, require
 from ..files import Outputs
 from ..firmware.quantities import Quantity, quantities
+from ..provenance import Provenance, provenance, with_provenance
 from ..report.figure import SERIES, Figure, axis, line, time_axis
 from ..report.page import Page
 from ..report.series import spread_indices
@@ -84,14 +85,17 @@ def rows_of(replays: Sequence[Replayed]) -> list[Row]:
     return [{name: row.get(name) for name in columns} for row in rows]
 
 
-def write(replays: Sequence[Replayed], out: Path) -> list[str]:
-    """Writes the page and the table, as far as their extras are installed; returns their names. Raises LeverError."""
+def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list[str]:
+    """Writes the page and the table, as far as their extras are installed; returns their names. `inputs` are files
+    beside the logs. Raises LeverError."""
+    logs = [each.log for each in replays]
+    origin = provenance([*logs, *inputs])
     names = [name for name, extra in ((PAGE, "report"), (TABLE, "files")) if not missing(extra)]
-    with Outputs(out, [each.log for each in replays], (PAGE, TABLE)) as outputs:
+    with Outputs(out, logs, (PAGE, TABLE)) as outputs:
         if PAGE in names:
-            outputs.path(PAGE).write_text(_page(replays), encoding="utf-8")
+            outputs.path(PAGE).write_text(with_provenance(_page(replays), origin), encoding="utf-8")
         if TABLE in names:
-            _write_table(rows_of(replays), outputs.path(TABLE))
+            _write_table(rows_of(replays), outputs.path(TABLE), origin)
         outputs.finish()
     return names
 
@@ -109,12 +113,13 @@ def _folders(logs: Sequence[str]) -> list[str]:
     return names
 
 
-def _write_table(rows: Sequence[Row], path: Path) -> None:
+def _write_table(rows: Sequence[Row], path: Path, origin: Provenance) -> None:
     require("files")
     import pyarrow
     from pyarrow import parquet
 
-    parquet.write_table(pyarrow.Table.from_pylist([dict(row) for row in rows]), path)
+    table = pyarrow.Table.from_pylist([dict(row) for row in rows])
+    parquet.write_table(table.replace_schema_metadata(origin.properties()), path)
 
 
 # --- the page ---------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from ..files import write_text
+from ..provenance import with_provenance
 
 if TYPE_CHECKING:
     from ..results.summary import Summary
@@ -35,4 +36,4 @@ def write_page(run: Run, path: str | os.PathLike[str]) -> None:
     """write_report() of a run that may have kept less than a whole trace."""
     from .page import build
 
-    write_text(path, build(run))
+    write_text(path, with_provenance(build(run), run.summary.provenance if run.summary else None))

@@ -63,6 +63,11 @@ def find(database: Database, name: str, where: str) -> tuple[Message, Field]:
     raise LeverError(f"{where}: no signal {name}{_near(signal_name, names)}")
 
 
+def of_fd(message: Message) -> bool:
+    """Whether its frames are CAN FD."""
+    return bool(message.is_fd) or message.length > 8
+
+
 def _near(name: str, names: Iterable[str]) -> str:
     import difflib
 

@@ -60,7 +60,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         help="folder for the page, envelope.html (default: %(default)s)",
     )
     parser.add_argument(
-        "--json", metavar="FILE", help='also write the rows to FILE: {"rows": [{"name", "measured", …}]}'
+        "--json", metavar="FILE", help='also write the rows to FILE: {"rows": [{"name", "measured", …}], …}'
     )
     parser.set_defaults(run=run)
 
@@ -101,13 +101,17 @@ def _run(chosen: Sequence[Condition], seeds: int) -> list[Result]:
 def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
     """The files that were asked for."""
     import json
+    from dataclasses import asdict
+
+    from lever_cdkf.host_tools.provenance import provenance, with_provenance
 
     from ..envelope import envelope_page, table
 
+    origin = provenance()
     if args.json is not None:
-        text = json.dumps({"rows": table.rows(results)}, indent=2, ensure_ascii=False, allow_nan=False)
-        write_text(args.json, text + "\n")
-    write_text(args.out / "envelope.html", envelope_page.build(results, seeds))
+        content = {"rows": table.rows(results), "provenance": asdict(origin)}
+        write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(args.out / "envelope.html", with_provenance(envelope_page.build(results, seeds), origin))
     print(f"Written to {args.out}: envelope.html")
 
 

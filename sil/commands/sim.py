@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from lever_cdkf.host_tools.can import buses
 from lever_cdkf.host_tools.can.buses import add_bus_options, chosen_options
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.extras import require, warn_of_left_out
+from lever_cdkf.host_tools.extras import require
+from lever_cdkf.host_tools.formats import FORMATS, add_format_option, chosen_formats
 from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -25,10 +26,13 @@ _DESCRIPTION = """\
 Simulates a pilot's arm on the lever and lets the firmware estimate it over CAN, in lock-step: every sample is answered
 before the next one is sent. Prints how good the estimates were; with --out also writes into DIR
 
-  bus.log       every frame both ways, in the format of candump, with simulated time
-  trace.csv     truth, measured, estimated, standard deviations and health, a row for each sample
-  summary.json  errors, coverage, times to converge, innovations, counts, and a verdict
-  report.html   all of it as one page for a browser
+  bus.log        every frame both ways, in the format of candump, with simulated time
+  trace.csv      truth, measured, estimated, standard deviations and health, a row for each sample
+  signals.mf4    with --format mf4: the same with units and comments, for asammdf, PlotJuggler and the like
+  signals.mcap   with --format mcap: the same as messages, for Foxglove
+  trace.parquet  with --format parquet: trace.csv with units, for pandas, polars and the like
+  summary.json   errors, coverage, times to converge, innovations, counts, a verdict, and where the files come from
+  report.html    all of it as one page for a browser
 
 With --seeds N it runs the scenario N times, each time with other random numbers, in as many processes as there are
 cores, and prints median and worst over the runs: a single run is one draw of noise and vibration. Its only file is
@@ -66,7 +70,7 @@ the median rms error and of the coverage of all runs together.
 """
 _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
 _DEMO = "demo"
-_FILES = ("report.html", "summary.json", "trace.csv", "bus.log")
+_FILES = ("report.html", "summary.json", *FORMATS.values(), "bus.log")
 _PRINT = ""  # --settings without a file
 
 
@@ -93,6 +97,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         const=_PRINT,
         help="use the estimator settings in FILE; without FILE: print a settings file with those of the run, and stop",
     )
+    add_format_option(sim, ("csv",))
     add_json_option(sim)
     sim.set_defaults(run=run, interface="lever")
     demo = subparsers.add_parser(
@@ -101,8 +106,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled.",
     )
     demo.add_argument("--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
+    add_format_option(demo, ("csv",))
     add_json_option(demo)
-    demo.set_defaults(run=run_demo)
+    demo.set_defaults(run=run_demo, realtime=False, settings=None)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -127,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
     channel = args.channel or _CHANNELS.get(args.interface)
     if channel is None:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
-    return _simulate(scenario, args.interface, channel, chosen_options(args), args.out, args.json, args.realtime)
+    return _simulate(scenario, args.interface, channel, chosen_options(args), args)
 
 
 def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
@@ -159,6 +165,7 @@ def _check_seeds(args: argparse.Namespace) -> None:
             raise LeverError(f"{option} {number}: must be at least 1")
     for option, given in (
         ("--out", args.out is not None),
+        ("--format", args.format is not None),
         ("--realtime", args.realtime),
         ("--settings without a file", args.settings == _PRINT),
         (f"--interface {args.interface}", args.interface != "lever"),
@@ -187,7 +194,7 @@ def run_demo(args: argparse.Namespace) -> int:
 
     from ..scenarios.scenario import load
 
-    return _simulate(load(_DEMO), "lever", "lever", {}, args.out, args.json, realtime=False)
+    return _simulate(load(_DEMO), "lever", "lever", {}, args)
 
 
 def _list(json_file: str | None) -> int:
@@ -208,23 +215,30 @@ def _simulate(
     interface: str,
     channel: str,
     bus_options: Mapping[str, Any],
-    out: Path | None,
-    json_file: str | None,
-    realtime: bool,
+    args: argparse.Namespace,
 ) -> int:
     from lever_cdkf.host_tools.progress import Progress
     from lever_cdkf.host_tools.tables import print_tables
 
     from ..run.runner import simulate
 
-    if out is not None:
-        warn_of_left_out(_FILES)
+    formats, inputs = (
+        chosen_formats(args),
+        [path for path in (scenario.file, args.settings) if Path(path or "").is_file()],
+    )
     with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
-        result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
-    print_tables(_tables(result), json_file)
+        result = simulate(
+            *(scenario, bus, args.out),
+            channel=channel,
+            realtime=args.realtime,
+            progress=progress.show,
+            formats=formats,
+            inputs=inputs,
+        )
+    print_tables(_tables(result), args.json)
     print(result.summary.verdict)
-    if out is not None:
-        print(f"Written to {out}: {', '.join(name for name in _FILES if (out / name).exists())}")
+    if args.out is not None:
+        print(f"Written to {args.out}: {', '.join(name for name in _FILES if (args.out / name).exists())}")
     if result.summary.passed:
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)

@@ -33,6 +33,13 @@ def columns_of(recording: Recording, frames: Frames) -> Trace:
     return trace
 
 
+def published(recording: Recording, frames: Frames) -> NDArray[np.bool_]:
+    """At which samples the estimator has sent its parameters, and what else comes at that rate."""
+    there = np.zeros(len(recording.inputs.time), np.bool_)
+    there[np.array(recording.sample, dtype=np.int64)[frames.of(codec.message("PILOT_PARAMETERS").frame_id)]] = True
+    return there
+
+
 def _truth(recording: Recording) -> Trace:
     inputs = recording.inputs
     values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}

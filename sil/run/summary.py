@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
-from lever_cdkf.host_tools.can.fields import COUNTS
 from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from lever_cdkf.host_tools.results import nis, summary, whiteness
@@ -46,7 +45,10 @@ def build(recording: Recording, trace: Trace) -> SimulationSummary:
     summary = SimulationSummary(
         estimator=Estimator(**scenario.config.choices, settings=dict(scenario.config.settings)),
         samples=count,
-        **{name: _last(trace[name]) for name in COUNTS},
+        lost=_last(trace["lost"]),
+        corrupt=_last(trace["corrupt"]),
+        late=_last(trace["late"]),
+        restarts=_last(trace["restarts"]),
         nis=_nis(scenario, trace),
         whiteness=_whiteness(scenario, trace),
         modes_s=modes,

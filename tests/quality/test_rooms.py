@@ -17,21 +17,22 @@ MAY_IMPORT = {
     "host_tools/can": {"firmware"},
     "host_tools/results": {"firmware"},
     "host_tools/report": {"firmware", "models", "results"},
-    "host_tools/signals": {"firmware", "can"},
-    "host_tools/replay": {"firmware", "can", "results", "report", "signals"},
+    "host_tools/signals": {"firmware", "can", "exports"},
+    "host_tools/exports": {"firmware", "can", "results"},
+    "host_tools/replay": {"firmware", "can", "results", "report", "signals", "exports"},
     "host_tools/tune": {"firmware", "can", "results", "report", "signals"},
     "host_tools/watch": {"firmware", "models", "can", "results", "report", "signals"},
     "host_tools/commands": {"firmware", "board", "can", "replay", "tune", "watch", "signals"},
     "sil/plants": {"models"},
     "sil/oracle": {"models"},
     "sil/scenarios": {"plants", "firmware", "results"},
-    "sil/run": {"scenarios", "plants", "firmware", "can", "results", "report", "watch"},
+    "sil/run": {"scenarios", "plants", "firmware", "can", "results", "report", "watch", "exports"},
     "sil/envelope": {"plants", "firmware", "models", "report"},
     "sil/study": {
         *("run", "scenarios", "plants", "oracle", "envelope"),
-        *("firmware", "models", "can", "results", "report"),
+        *("firmware", "models", "can", "results", "report", "exports"),
     },
-    "sil/commands": {"run", "scenarios", "study", "envelope", "firmware", "can"},
+    "sil/commands": {"run", "scenarios", "study", "envelope", "firmware", "can", "report", "exports"},
 }
 """By folder. What lies beside the folders is for all of its package, and imports nothing in them; sil may import
 that of host_tools too. Plants and oracle are what the firmware is compared with, and know neither it nor each other."""
