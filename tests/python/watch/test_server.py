@@ -243,7 +243,7 @@ def test_the_truth_comes_as_magnitude_and_phase(flight: Flight) -> None:
 
     (message,) = State(Known(flight), Config()).advance()[-1:]
     update = json.loads(message)["update"]
-    assert update["truth"] == pytest.approx([math.degrees(0.01)] * len(FREQUENCIES), abs=1e-5)
+    assert update["truth"] == pytest.approx([np.degrees(0.01)] * len(FREQUENCIES), abs=1e-5)
     assert update["truth_phase"] == pytest.approx(-180.0 - np.degrees(0.2 * FREQUENCIES), abs=1e-4)
 
 
