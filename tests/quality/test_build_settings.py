@@ -1,4 +1,6 @@
-"""LEVER_SETTINGS_FILE: a settings file becomes what the ports of a build start with, or ends its configuration."""
+"""LEVER_SETTINGS_FILE: a settings file becomes what the ports of a build start with, or ends its configuration.
+
+This is about CMake, so it is what runs here; its scripts configure nothing and build nothing."""
 
 from __future__ import annotations
 

@@ -158,20 +158,36 @@ def assert_found(faults: Array, samples: dict[str, Array], first: int, flags: tu
     assert not (faults & bits["hands_off"]).any()
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
-def test_float_agrees_with_double(case: Case) -> None:
+@dataclass(frozen=True)
+class Expected:
+    """What the oracle says after every EVERYth sample from the first estimate on, and what it was given."""
+
+    config: Config
+    samples: dict[str, Array]
+    first: int
+    values: dict[str, Array]
+
+
+def expected_of(case: Case) -> Expected:
     samples = recorded(case.model, case.preload, case.seconds)
     settings = PRELOADED | {"learn_period": 1e-3 * case.block} | dict(case.settings)
     settings |= UNADAPTED if case.form == "augmented" else {}
     if not case.force:
         samples = {name: values for name, values in samples.items() if name != "grip_force"}
     config = Config(case.model, case.preload, case.estimator, case.adaptation, settings)
-    firmware = run_samples(config, samples)
     inputs = {name: np.asarray(values, float) for name, values in samples.items()}
     inputs["time_s"] = inputs["time_us"] * 1e-6
     start, first = oracle.align(inputs, config.settings)
     choices = (case.preload, case.adaptation, BOUNDS[case.model], case.model, case.form or case.estimator)
-    expected = oracle.run(oracle.Estimator(config.settings, start, *choices), inputs, first, EVERY)
+    values = oracle.run(oracle.Estimator(config.settings, start, *choices), inputs, first, EVERY)
+    return Expected(config, samples, first, values)
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_float_agrees_with_double(case: Case) -> None:
+    of_oracle = expected_of(case)
+    samples, first, expected = of_oracle.samples, of_oracle.first, of_oracle.values
+    firmware = run_samples(of_oracle.config, samples)
 
     assert_found(firmware["faults"][first:], samples, first, case.flags)
     names, rows = PARAMETERS[case.model], slice(first, None, EVERY)

@@ -88,13 +88,6 @@ def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.R
     assert "In this run the stated σ of m_p is too small" in made.verdict
 
 
-def test_coverage_of_a_gaussian_error_is_that_of_two_sigma(recording: loop.Recording) -> None:
-    trace = perfect(recording)
-    trace["k_p_estimate_N_m"] += 0.01 * 2000 * np.random.default_rng(1).standard_normal(COUNT)
-    coverage = summary.build(recording, trace).parameters["k_p"].coverage_2sigma
-    assert coverage == pytest.approx(stats.norm.cdf(2) - stats.norm.cdf(-2), abs=0.01)
-
-
 @pytest.mark.parametrize(
     ("outside", "said"),
     [
@@ -260,23 +253,6 @@ def test_white_residuals_are_no_proof_of_the_model() -> None:
     assert all(unseen in text for unseen in ("friction", "gain", "delay") for text in (said, beyond))
     assert "coloured (correlation 0.05 after 60 ms; chance" in whiteness.verdict(replace(white, white=False))
     assert whiteness.verdict(None) == ""
-
-
-def test_a_file_is_read_back_as_it_was(recording: loop.Recording, tmp_path: Path) -> None:
-    made = summary.build(recording, perfect(recording)).timed(1.0)
-    file = tmp_path / "summary.json"
-    file.write_text(text(made))
-    assert read(file) == made
-    content = json.loads(file.read_text())
-    assert set(content) >= {
-        "schema", "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "restarts",
-        "unanswered", "misplaced", "firmware", "fault_shares", "flagged_share", "wall_time_s",
-        "simulated_time_s", "wall_time_per_simulated_time", "verdict",
-    }  # fmt: skip
-    assert set(content["parameters"]) == {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
-    assert set(content["parameters"]["m_p"]) == {
-        "rms_percent", "bias_percent", "coverage_2sigma", "time_to_10_percent_s", "time_to_5_percent_s",
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

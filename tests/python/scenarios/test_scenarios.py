@@ -59,17 +59,6 @@ def test_without_dither_the_frequency_is_known_and_the_scale_honestly_not() -> N
     assert min(parameters[key].coverage_2sigma or 0.0 for key in ("m_p", "c_p", "k_p")) >= 0.9
 
 
-def test_the_dither_makes_the_scale_more_certain() -> None:
-    for column in ("m_p_sigma_kg", "c_p_sigma_N_s_m", "k_p_sigma_N_m"):
-        assert result("base_dither").trace[column][-1] < 0.8 * result("base_only").trace[column][-1]
-
-
-def test_the_dither_on_the_bus_has_its_strength() -> None:
-    dither = result("steady").trace["dither_N_m"][2000:]
-    assert np.sqrt(np.mean(dither**2)) == pytest.approx(0.3, rel=0.05)
-    assert not result("base_only").trace["dither_N_m"].any()
-
-
 def test_poor_excitation_is_reported_and_does_not_make_anyone_certain() -> None:
     trace = result("poor_excitation").trace
     calm, rough = trace["time_s"] > 25, trace["time_s"] < 19

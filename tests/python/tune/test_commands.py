@@ -123,13 +123,6 @@ def test_sim_and_the_process_take_the_file(tuned: Path, lever: Run, build_dir: P
     assert "settings" not in said
 
 
-def test_replay_takes_the_file(tuned: Path, steady_log: Path, lever: Run, tmp_path: Path) -> None:
-    status, _, err = lever("replay", steady_log, "--settings", tuned / "my.settings", "-o", tmp_path)
-    assert (status, err) == (0, "")
-    used = json.loads((tmp_path / "summary.json").read_text())["estimator"]["settings"]
-    assert used["theta_noise"] == read_assignments(tuned / "my.settings")["theta_noise"]
-
-
 def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
     log = tmp_path / "slow.log"
     write_log(log, count=3000, period_us=10_000)
@@ -205,13 +198,6 @@ def test_a_sender_that_never_counts_is_told(tmp_path: Path, refused: Refused) ->
     why = "3,998 repeated or out of sequence (does the sender count each message from 0 to 15?)"
     assert line.endswith(f"x.log: too few samples to tune on, 1: {why}\n")
     assert not (tmp_path / "x.settings").exists()
-
-
-def test_two_buses_are_to_be_chosen_from(tmp_path: Path, refused: Refused) -> None:
-    for bus in ("can0", "can1"):
-        write_log(tmp_path / f"{bus}.log", 100, bus=bus)
-    line = refused("tune", tmp_path / "can0.log", tmp_path / "can1.log")
-    assert "choose by --channel can0 or --channel can1" in line
 
 
 def test_worse_on_the_part_held_out_writes_nothing(simulate: Simulate, tmp_path: Path, lever: Run) -> None:

@@ -1,22 +1,23 @@
 /* Commands: what each changes, what it leaves alone, and that unknown ones change nothing. */
 #include "rig.h"
 
-static lever_config_t config;
-static lever_memory_t memory;
-static lever_t *lever;
-static rig_t rig;
+enum { CHOICES = COMBINATIONS * LEVER_ADAPTATION_COUNT * LEVER_PRELOAD_COUNT };
+
+static lever_config_t other_config;
+static lever_memory_t other_memory;
 
 void setUp(void)
 {
-    rig = rig_typical();
     lever_config_default(&config);
-    lever = lever_init(&memory, &config);
-    TEST_ASSERT_NOT_NULL(lever);
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 3000u));
+    start();
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1000u));
 }
 
-void tearDown(void)
+static lever_t *another(void)
 {
+    lever_t *other = lever_init(&other_memory, &other_config);
+    TEST_ASSERT_NOT_NULL(other);
+    return other;
 }
 
 static void assert_refused(const lever_command_t *command)
@@ -26,168 +27,174 @@ static void assert_refused(const lever_command_t *command)
     TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
 }
 
-static void test_unknown_codes_are_refused_and_change_nothing(void)
+/* --- refused ------------------------------------------------------------------------------------------------------ */
+
+TEST(a_command_with_one_unknown_part_is_refused_as_a_whole)
 {
-    for (uint32_t part = 0u; part < 5u; part++) {
-        for (uint32_t code = 0u; code < 256u; code++) {
-            lever_command_t command = rig_command();
+    static const uint32_t known[5] = {(uint32_t)LEVER_REQUEST_RESET + 1u, LEVER_MODEL_COUNT, LEVER_PRELOAD_COUNT,
+        LEVER_ESTIMATOR_COUNT, LEVER_ADAPTATION_COUNT};
+    const float amplitudes[] = {NAN, INFINITY, -INFINITY, -0.1f};
+    for (uint32_t part = 0u; part < 6u; part++) {
+        for (uint32_t code = (part < 5u) ? known[part] : 252u; code < 256u; code++) {
+            lever_command_t command = {.request = LEVER_REQUEST_RESET, .dither_rms = 0.3f};
             uint8_t *const parts[5] = {
                 &command.request, &command.model, &command.preload, &command.estimator, &command.adaptation};
-            const uint32_t known[5] = {(uint32_t)LEVER_REQUEST_RESET + 1u, (uint32_t)LEVER_MODEL_COUNT,
-                (uint32_t)LEVER_PRELOAD_COUNT, (uint32_t)LEVER_ESTIMATOR_COUNT, (uint32_t)LEVER_ADAPTATION_COUNT};
-            const bool keep = (part > 0u) && (code == (uint32_t)LEVER_KEEP);
-            *parts[part] = (uint8_t)code;
-            if ((code >= known[part]) && !keep) {
+            if (part == 5u) {
+                command.dither_rms = amplitudes[code - 252u];
+            } else {
+                *parts[part] = (uint8_t)code;
+            }
+            if ((part == 0u) || (part == 5u) || (code != (uint32_t)LEVER_KEEP)) {
                 assert_refused(&command);
             }
         }
     }
 }
 
-static void test_a_command_with_one_unknown_part_is_refused_as_a_whole(void)
-{
-    lever_command_t command = rig_command();
-    command.request = (uint8_t)LEVER_REQUEST_RESET;
-    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
-    command.dither_rms = 0.3f;
-    command.adaptation = 7u;
-    assert_refused(&command);
-}
+/* --- reset -------------------------------------------------------------------------------------------------------- */
 
-static void test_a_dither_that_is_no_amplitude_is_refused(void)
+TEST(after_a_reset_it_is_like_new_but_for_its_counts)
 {
-    const float bad[] = {NAN, INFINITY, -INFINITY, -0.1f};
-    for (uint32_t k = 0u; k < 4u; k++) {
-        lever_command_t command = rig_command();
-        command.dither_rms = bad[k];
-        assert_refused(&command);
-    }
-}
-
-static void test_reset_goes_back_to_the_first_guess(void)
-{
-    rig_request(lever, LEVER_REQUEST_RESET);
-    const lever_estimate_t estimate = rig_estimate(lever);
-    TEST_ASSERT_EQUAL(LEVER_MODE_INIT, rig_health(lever).mode);
-    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p, estimate.parameter[2]);
-    TEST_ASSERT_EQUAL_FLOAT(config.settings.k_p * config.settings.k_p_sigma, estimate.parameter_sigma[2]);
-    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, rig_run(&rig, lever, 1u));
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
-}
-
-static void test_after_a_reset_it_is_like_new_but_for_its_counts(void)
-{
-    lever_memory_t other_memory;
-    lever_t *other = lever_init(&other_memory, &config);
-    const uint32_t samples = rig_health(lever).samples;
-    rig_request(lever, LEVER_REQUEST_RESET);
-    rig_t same = rig;
-    (void)rig_run(&rig, lever, 2000u);
-    (void)rig_run(&same, other, 2000u);
-    rig_assert_same_estimates(lever, other);
-    TEST_ASSERT_EQUAL_UINT32(samples + 2000u, rig_health(lever).samples);
-}
-
-static void test_reset_accepts_a_time_that_starts_anew(void)
-{
-    rig_request(lever, LEVER_REQUEST_RESET);
-    rig.time_us = 0u;
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
-    TEST_ASSERT_EQUAL_UINT32(0u, rig_health(lever).late);
-}
-
-static void test_reset_unfreezes(void)
-{
-    rig_request(lever, LEVER_REQUEST_FREEZE);
-    (void)rig_run(&rig, lever, 1u);
-    rig_request(lever, LEVER_REQUEST_RESET);
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, rig_run(&rig, lever, 310u));
-}
-
-static void test_freeze_and_a_change_in_one_command_start_over_frozen(void)
-{
-    lever_command_t command = rig_command();
-    command.preload = (uint8_t)LEVER_PRELOAD_FIXED;
-    command.request = (uint8_t)LEVER_REQUEST_FREEZE;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, rig_run(&rig, lever, 400u));
-}
-
-static void test_dither_of_keep_or_more_stays_as_it_is(void)
-{
-    lever_command_t command = rig_command();
-    command.dither_rms = 0.3f;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    (void)rig_run(&rig, lever, 900u);
-    command.dither_rms = (float)LEVER_KEEP;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    (void)rig_run(&rig, lever, 900u);
-    TEST_ASSERT_TRUE(rig_health(lever).torque != 0.0f);
-    command.dither_rms = 0.0f;
-    TEST_ASSERT_TRUE(lever_command(lever, &command));
-    (void)rig_run(&rig, lever, 1001u);
-    TEST_ASSERT_TRUE(rig_health(lever).torque == 0.0f);
+    other_config = config;
+    lever_t *other = another();
+    request(LEVER_REQUEST_FREEZE);
+    (void)run(1u);
+    request(LEVER_REQUEST_RESET);
+    assert_first_guess();
+    const simulation_t same = simulation;
+    time_us = 0u; /* it may start anew, too */
+    (void)run(2000u);
+    simulation = same;
+    time_us = 0u;
+    (void)run_with(other, 2000u, false);
+    assert_same_estimates(lever, other);
+    TEST_ASSERT_EQUAL_UINT32(3001u, health().samples);
+    TEST_ASSERT_EQUAL_UINT32(0u, health().late);
 }
 
 /* As a first run of a fresh instance has it: the same torque at the same sample. */
-static void test_reset_ends_dither_and_the_next_run_is_the_first_one_again(void)
+TEST(reset_ends_dither_and_the_next_run_is_the_first_one_again)
 {
-    lever_memory_t other_memory;
-    lever_t *other = lever_init(&other_memory, &config);
-    lever_command_t on = rig_command();
-    on.dither_rms = 0.3f;
-    TEST_ASSERT_TRUE(lever_command(lever, &on));
-    (void)rig_run(&rig, lever, 900u);
-    TEST_ASSERT_TRUE(rig_health(lever).torque != 0.0f);
-    rig_request(lever, LEVER_REQUEST_RESET);
-    rig_request(other, LEVER_REQUEST_RESET); /* a command, as the other had one */
-    rig_t same = rig;
+    lever_command_t command = command_none();
+    other_config = config;
+    lever_t *other = another();
+    dither(0.3f);
+    (void)run(900u);
+    TEST_ASSERT_TRUE(health().torque != 0.0f);
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    TEST_ASSERT_TRUE(lever_command(lever, &command) && lever_command(other, &command));
+    command = command_none();
+    command.dither_rms = 0.3f;
     for (uint32_t k = 0u; k < 1200u; k++) {
+        const lever_sample_t sample = sample_after(1u);
         if (k == 400u) {
-            TEST_ASSERT_TRUE(rig_health(lever).torque == 0.0f);
-            TEST_ASSERT_TRUE(lever_command(lever, &on));
-            TEST_ASSERT_TRUE(lever_command(other, &on));
+            TEST_ASSERT_TRUE(health().torque == 0.0f);
+            TEST_ASSERT_TRUE(lever_command(lever, &command) && lever_command(other, &command));
         }
-        (void)rig_run(&rig, lever, 1u);
-        (void)rig_run(&same, other, 1u);
+        (void)lever_update(lever, &sample);
+        (void)lever_update(other, &sample);
     }
-    rig_assert_same_estimates(lever, other);
-    TEST_ASSERT_TRUE(rig_health(other).torque != 0.0f);
-    TEST_ASSERT_TRUE(rig_health(lever).torque == rig_health(other).torque);
+    assert_same_estimates(lever, other);
+    TEST_ASSERT_TRUE((health().torque != 0.0f) && (health().torque == health_of(other).torque));
 }
 
-/* Standard deviation of k_p half a second on, in a copy of the instance with this adaptation. */
-static float sigma_with(enum lever_adaptation adaptation)
+/* --- choices ------------------------------------------------------------------------------------------------------ */
+
+/* Commanded, or configured from the start: the same samples give the same estimates to the bit, and no other choice
+ * does. */
+TEST(every_choice_can_be_commanded_and_makes_a_difference)
 {
-    lever_memory_t copy = memory;
-    lever_t *other = (lever_t *)(void *)&copy;
-    rig_t same = rig;
-    lever_command_t command = rig_command();
-    command.adaptation = (uint8_t)adaptation;
-    TEST_ASSERT_TRUE(lever_command(other, &command));
-    (void)rig_run(&same, other, 500u);
-    return rig_estimate(other).parameter_sigma[2];
+    static lever_estimate_t estimates[CHOICES];
+    for (uint32_t choice = 0u; choice < (uint32_t)CHOICES; choice++) {
+        other_config = config_of(choice % (uint32_t)COMBINATIONS);
+        other_config.adaptation = (uint8_t)((choice / (uint32_t)COMBINATIONS) % (uint32_t)LEVER_ADAPTATION_COUNT);
+        other_config.preload = (uint8_t)(choice / (uint32_t)(COMBINATIONS * LEVER_ADAPTATION_COUNT));
+        lever_t *other = another();
+        const lever_command_t command = {.request = (uint8_t)LEVER_REQUEST_RESET,
+            .model = other_config.model,
+            .preload = other_config.preload,
+            .estimator = other_config.estimator,
+            .adaptation = other_config.adaptation,
+            .dither_rms = (float)LEVER_KEEP};
+        TEST_ASSERT_TRUE(lever_command(lever, &command));
+        simulation.plant = plant_of_lever(4.5, 110.0, 3800.0); /* far from the first guess */
+        for (uint32_t k = 0u; k < 2000u; k++) {
+            const lever_sample_t sample = sample_after(1u);
+            (void)lever_update(lever, &sample);
+            (void)lever_update(other, &sample);
+        }
+        assert_same_estimates(lever, other);
+        estimates[choice] = estimate();
+        estimates[choice].time_us = 0u;
+        for (uint32_t k = 0u; k < choice; k++) {
+            TEST_ASSERT_TRUE(memcmp(&estimates[k], &estimates[choice], sizeof estimates[k]) != 0);
+        }
+    }
+}
+
+/* Model, preload and estimator; the first guesses are those of the chosen model, whatever those of the others are. */
+TEST(a_change_of_model_preload_or_estimator_starts_over_with_the_models_own_first_guess)
+{
+    const uint8_t models[] = {2u, 3u, 0u, 1u, 0u, 0u, 0u};
+    const uint8_t preloads[] = {1u, 1u, 1u, 1u, 1u, 0u, 0u};
+    const uint8_t estimators[] = {0u, 0u, 0u, 0u, 0u, 0u, 1u};
+    for (uint8_t model = 0u; model < (uint8_t)LEVER_MODEL_COUNT; model++) {
+        config.model = model;
+        for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
+            *parameter_setting(i, "") *= 1.0f + (0.1f * (float)(1u + i + model));
+            *parameter_setting(i, "_sigma") *= 1.0f - (0.1f * (float)(1u + i + model));
+        }
+    }
+    config.model = (uint8_t)LEVER_MODEL_LEVER;
+    start();
+    for (uint32_t k = 0u; k < (uint32_t)sizeof models; k++) {
+        lever_command_t command = command_none();
+        (void)run(500u);
+        command.request = (k == 0u) ? (uint8_t)LEVER_REQUEST_FREEZE : (uint8_t)LEVER_REQUEST_RUN;
+        command.model = models[k];
+        command.preload = preloads[k];
+        command.estimator = estimators[k];
+        config.model = models[k];
+        TEST_ASSERT_TRUE(lever_command(lever, &command));
+        TEST_ASSERT_EQUAL(LEVER_MODE_INIT, health().mode);
+        assert_first_guess();
+        TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, run(1u));
+        TEST_ASSERT_EQUAL((k == 0u) ? LEVER_MODE_FROZEN : LEVER_MODE_RUN, run(310u));
+        TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
+    }
+}
+
+TEST(what_is_there_already_or_kept_and_another_adaptation_do_not_start_over)
+{
+    lever_command_t command = command_none();
+    const lever_estimate_t before = estimate();
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    command.model = config.model;
+    command.preload = config.preload;
+    command.estimator = config.estimator;
+    command.adaptation = (uint8_t)LEVER_ADAPTATION_FORGETTING;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    const lever_estimate_t after = estimate();
+    TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1u));
 }
 
 /* Annealing begins at the ceiling of the walk, so less certain than at the floor. */
-static void test_a_chosen_adaptation_starts_its_walk_anew(void)
+TEST(a_chosen_adaptation_starts_its_walk_anew)
 {
-    TEST_ASSERT_TRUE(sigma_with(LEVER_ADAPTATION_ANNEALING) > (1.001f * sigma_with(LEVER_ADAPTATION_FIXED)));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_unknown_codes_are_refused_and_change_nothing);
-    RUN_TEST(test_a_command_with_one_unknown_part_is_refused_as_a_whole);
-    RUN_TEST(test_a_dither_that_is_no_amplitude_is_refused);
-    RUN_TEST(test_reset_goes_back_to_the_first_guess);
-    RUN_TEST(test_after_a_reset_it_is_like_new_but_for_its_counts);
-    RUN_TEST(test_reset_accepts_a_time_that_starts_anew);
-    RUN_TEST(test_reset_unfreezes);
-    RUN_TEST(test_freeze_and_a_change_in_one_command_start_over_frozen);
-    RUN_TEST(test_dither_of_keep_or_more_stays_as_it_is);
-    RUN_TEST(test_reset_ends_dither_and_the_next_run_is_the_first_one_again);
-    RUN_TEST(test_a_chosen_adaptation_starts_its_walk_anew);
-    return UNITY_END();
+    const uint8_t adaptations[] = {LEVER_ADAPTATION_FIXED, LEVER_ADAPTATION_ANNEALING};
+    const lever_memory_t kept = memory;
+    const simulation_t same = simulation;
+    float sigma[2];
+    for (uint32_t k = 0u; k < 2u; k++) {
+        lever_command_t command = command_none();
+        memory = kept;
+        simulation = same;
+        time_us = 1000u * (uint32_t)PERIOD_US;
+        command.adaptation = adaptations[k];
+        TEST_ASSERT_TRUE(lever_command(lever, &command));
+        (void)run(500u);
+        sigma[k] = estimate().parameter_sigma[2];
+    }
+    TEST_ASSERT_TRUE(sigma[1] > (1.001f * sigma[0]));
 }

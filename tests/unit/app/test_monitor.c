@@ -2,8 +2,8 @@
  * that is not about once what it should be. Each must be found, and none where nothing is wrong. */
 #include "app/monitor.h"
 
-#include "../math/random.h"
-#include "unity.h"
+#include "random.h"
+#include "test.h"
 
 enum { SAMPLES = 20 }; /* in a block */
 
@@ -16,10 +16,6 @@ void setUp(void)
 {
     monitor_start(&monitor);
     source.state = 21u;
-}
-
-void tearDown(void)
-{
 }
 
 /* --- stuck signals ------------------------------------------------------------------------------------------------ */
@@ -49,7 +45,7 @@ static bool is_alive(uint32_t which, float value)
 
 /* 100 ms without a change, when the innovations say that something is wrong; said once, and no longer as soon as it
  * changes. */
-static void test_a_signal_that_stands_still_against_the_innovations_is_stuck(void)
+TEST(a_signal_that_stands_still_against_the_innovations_is_stuck)
 {
     for (uint32_t which = 0u; which < (uint32_t)MONITOR_SIGNALS; which++) {
         setUp();
@@ -69,7 +65,7 @@ static void test_a_signal_that_stands_still_against_the_innovations_is_stuck(voi
 }
 
 /* Its sender says so itself: then it is missing, not stuck, however long, and counts anew when it is back. */
-static void test_a_signal_that_is_not_sent_or_not_valid_is_not_stuck(void)
+TEST(a_signal_that_is_not_sent_or_not_valid_is_not_stuck)
 {
     (void)block((uint32_t)MONITOR_THETA, 0.5f);
     surprise(4.0, 300u);
@@ -84,7 +80,7 @@ static void test_a_signal_that_is_not_sent_or_not_valid_is_not_stuck(void)
 }
 
 /* At rest a sensor of coarse resolution stands still, and is right. */
-static void test_outputs_that_stand_still_as_expected_are_not_stuck(void)
+TEST(outputs_that_stand_still_as_expected_are_not_stuck)
 {
     for (uint32_t which = 0u; which < (uint32_t)CDKF_OUTPUTS; which++) {
         setUp();
@@ -100,7 +96,7 @@ static void test_outputs_that_stand_still_as_expected_are_not_stuck(void)
 
 /* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never
  * stands still. */
-static void test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations(void)
+TEST(a_base_acceleration_that_always_changed_is_stuck_without_the_innovations)
 {
     for (uint32_t changes = 19u; changes <= 20u; changes++) {
         bool stuck = false;
@@ -121,7 +117,7 @@ static void test_a_base_acceleration_that_always_changed_is_stuck_without_the_in
     }
 }
 
-static void test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second(void)
+TEST(surprise_is_the_mean_of_nis_over_a_tenth_of_a_second)
 {
     surprise(3.0, 100u);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 + (2.0 * (1.0 - exp(-1.0))), (double)monitor.surprise);
@@ -146,7 +142,7 @@ static bool is_spike(uint32_t i, float sigmas, float level)
     return monitor_is_spike(&monitor, &cdkf, i, cdkf.x[i] + (sigmas * sigma), level, PERIOD);
 }
 
-static void test_an_output_beyond_eight_standard_deviations_is_refused(void)
+TEST(an_output_beyond_eight_standard_deviations_is_refused)
 {
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
         TEST_ASSERT_TRUE(!is_spike(i, 7.9f, 1.0f) && !is_spike(i, -7.9f, 1.0f));
@@ -156,7 +152,7 @@ static void test_an_output_beyond_eight_standard_deviations_is_refused(void)
     }
 }
 
-static void test_what_lasts_for_20_ms_is_no_spike(void)
+TEST(what_lasts_for_20_ms_is_no_spike)
 {
     for (uint32_t repeat = 0u; repeat < 3u; repeat++) {
         for (uint32_t k = 0u; k < 19u; k++) {
@@ -189,7 +185,7 @@ static uint32_t respond(uint32_t blocks, double gain, double rate)
     return said;
 }
 
-static void test_a_base_that_is_about_right_is_used_for_an_hour(void)
+TEST(a_base_that_is_about_right_is_used_for_an_hour)
 {
     const double gains[] = {1.0, 0.7, 1.3};
     for (uint32_t k = 0u; k < 3u; k++) {
@@ -200,7 +196,7 @@ static void test_a_base_that_is_about_right_is_used_for_an_hour(void)
 }
 
 /* No sensor, the wrong sign, the wrong unit: within a second, said once; and used again within one when it is right. */
-static void test_a_wrong_base_is_found_and_trusted_again(void)
+TEST(a_wrong_base_is_found_and_trusted_again)
 {
     const double gains[] = {0.0, -1.0, 9.81, 2.0};
     for (uint32_t k = 0u; k < 4u; k++) {
@@ -216,7 +212,7 @@ static void test_a_wrong_base_is_found_and_trusted_again(void)
 }
 
 /* Gains between: not wrong enough to be refused, not right enough to be trusted again. */
-static void test_the_verdict_on_the_base_has_hysteresis(void)
+TEST(the_verdict_on_the_base_has_hysteresis)
 {
     const double gains[] = {0.55, 1.45};
     const double beyond[] = {0.0, 9.81};
@@ -230,7 +226,7 @@ static void test_the_verdict_on_the_base_has_hysteresis(void)
     }
 }
 
-static void test_too_little_information_says_nothing_of_the_base(void)
+TEST(too_little_information_says_nothing_of_the_base)
 {
     TEST_ASSERT_EQUAL_UINT32(0u, respond(50000u, -1.0, 100.0)); /* known to 0.14 over the memory of half a second */
     TEST_ASSERT_EQUAL_UINT32(1u, respond(100u, -1.0, 400.0));
@@ -240,7 +236,7 @@ static void test_too_little_information_says_nothing_of_the_base(void)
     TEST_ASSERT_FALSE(monitor.base_wrong);
 }
 
-static void test_what_was_seen_of_the_base_can_be_forgotten(void)
+TEST(what_was_seen_of_the_base_can_be_forgotten)
 {
     (void)respond(100u, 0.0, 1000.0);
     TEST_ASSERT_TRUE(monitor.base_wrong);
@@ -250,22 +246,4 @@ static void test_what_was_seen_of_the_base_can_be_forgotten(void)
     monitor_trust_base(&monitor);
     (void)respond(10u, 0.0, 450.0); /* together it would be enough */
     TEST_ASSERT_FALSE(monitor.base_wrong);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_signal_that_stands_still_against_the_innovations_is_stuck);
-    RUN_TEST(test_a_signal_that_is_not_sent_or_not_valid_is_not_stuck);
-    RUN_TEST(test_outputs_that_stand_still_as_expected_are_not_stuck);
-    RUN_TEST(test_a_base_acceleration_that_always_changed_is_stuck_without_the_innovations);
-    RUN_TEST(test_surprise_is_the_mean_of_nis_over_a_tenth_of_a_second);
-    RUN_TEST(test_an_output_beyond_eight_standard_deviations_is_refused);
-    RUN_TEST(test_what_lasts_for_20_ms_is_no_spike);
-    RUN_TEST(test_a_base_that_is_about_right_is_used_for_an_hour);
-    RUN_TEST(test_a_wrong_base_is_found_and_trusted_again);
-    RUN_TEST(test_the_verdict_on_the_base_has_hysteresis);
-    RUN_TEST(test_too_little_information_says_nothing_of_the_base);
-    RUN_TEST(test_what_was_seen_of_the_base_can_be_forgotten);
-    return UNITY_END();
 }

@@ -1,54 +1,25 @@
-/* What breaks is refused, restarted and said; what breaks again and again is a fault that only a reset leaves. With
- * every model and estimator. Damage is done to the estimator's own memory, as nothing from outside should be able to do
- * it. */
-#include "app/estimator.h"
+/* What breaks is refused, restarted and said; what breaks again and again is a fault that only a reset leaves. Damage is done to
+ * the estimator's own memory, as nothing from outside should be able to do it. */
+#include "app/instance.h"
 #include "rig.h"
 
-static uint32_t combination;
-static lever_config_t config;
-static estimator_t estimator;
-static rig_t rig;
-static double truth[LEVER_PARAMETERS];
+static cdkf_t *cdkf;
+static lever_memory_t whole; /* as it was when it ran */
+static simulation_t then;
 
-static enum lever_mode run(uint32_t count)
+static void start_running(uint32_t combination)
 {
-    enum lever_mode mode = LEVER_MODE_INIT;
-    for (uint32_t k = 0u; k < count; k++) {
-        const lever_sample_t sample = rig_sample(&rig);
-        mode = estimator_update(&estimator, &sample, 0.0f);
-    }
-    return mode;
-}
-
-static bool has_fault(enum lever_fault fault)
-{
-    return (estimator.faults & (uint32_t)fault) != 0u;
-}
-
-static lever_estimate_t estimate(void)
-{
-    lever_estimate_t result;
-    estimator_estimate(&estimator, &result);
-    return result;
-}
-
-static void request(enum lever_request what)
-{
-    lever_command_t command = rig_command();
-    command.request = (uint8_t)what;
-    (void)estimator_command(&estimator, &command);
+    config = config_of(combination);
+    start();
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(2000u));
+    cdkf = &lever->estimator.cdkf;
+    whole = memory;
+    then = simulation;
 }
 
 void setUp(void)
 {
-    config = rig_config(combination);
-    rig = rig_of(config.model, truth);
-    estimator_init(&estimator, &config);
-    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(2000u));
-}
-
-void tearDown(void)
-{
+    start_running(0u);
 }
 
 /* So many samples, each with the state's factor broken before it. */
@@ -56,7 +27,7 @@ static enum lever_mode run_damaged(uint32_t count)
 {
     enum lever_mode mode = LEVER_MODE_RUN;
     for (uint32_t k = 0u; k < count; k++) {
-        estimator.cdkf.s_xx[0] = NAN;
+        cdkf->s_xx[0] = NAN;
         mode = run(1u);
     }
     return mode;
@@ -69,79 +40,63 @@ static void assert_recovers(float *first, uint32_t count, uint32_t samples)
     for (uint32_t k = 0u; k < (2u * count); k++) {
         const bool infinite = ((k % 2u) == 1u);
         uint32_t said = 0u;
-        setUp();
+        memory = whole;
+        simulation = then;
+        time_us = health().samples * (uint32_t)PERIOD_US;
         first[k / 2u] = infinite ? INFINITY : NAN;
         for (uint32_t taken = 0u; taken < samples; taken++) {
-            TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1u));
+            TEST_ASSERT_NOT_EQUAL(LEVER_MODE_FAULT, run(1u));
             said += has_fault(LEVER_FAULT_RECOVERED) ? 1u : 0u;
         }
-        TEST_ASSERT_TRUE(infinite || (estimator.recoveries == 1u));
-        TEST_ASSERT_TRUE(cdkf_is_valid(&estimator.cdkf));
+        TEST_ASSERT_TRUE(infinite || (health().recoveries == 1u));
+        TEST_ASSERT_TRUE(cdkf_is_valid(cdkf));
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(30u));
         TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_RECOVERED)); /* said of the sample of the restart only */
-        TEST_ASSERT_EQUAL_UINT32(said, estimator.recoveries);
-        rig_assert_finite(estimate());
+        TEST_ASSERT_EQUAL_UINT32(said, health().recoveries);
+        assert_finite(estimate());
     }
 }
 
-static void test_recovers_from_damage_to_any_part_of_the_belief(void)
+TEST_EACH(COMBINATIONS, recovers_from_damage_to_any_part_of_the_belief)
 {
-    cdkf_t *cdkf = &estimator.cdkf;
+    start_running(test_round);
     assert_recovers(cdkf->x, (uint32_t)MODEL_STATES, 1u);
     assert_recovers(&cdkf->s_xx[2], 2u, 1u);
     assert_recovers(&cdkf->s_xx[0], 1u, 1u);
-    assert_recovers(cdkf->w, (uint32_t)MODEL_PARAMETERS, 10u);
-    assert_recovers(cdkf->walk, (uint32_t)MODEL_PARAMETERS, 10u);
-    assert_recovers(&cdkf->growth, 1u, 10u);
-    assert_recovers(cdkf->response, (uint32_t)MODEL_STATES, 10u);
+    assert_recovers(cdkf->w, (uint32_t)MODEL_PARAMETERS, 20u);
+    assert_recovers(cdkf->walk, (uint32_t)MODEL_PARAMETERS, 20u);
+    assert_recovers(&cdkf->growth, 1u, 20u);
+    assert_recovers(cdkf->response, (uint32_t)MODEL_STATES, 20u);
     for (uint32_t i = 0u; i < (uint32_t)CDKF_ROWS; i++) { /* above the diagonal nothing is read */
-        assert_recovers(&cdkf->s[i * 3u], (i < 3u) ? (i + 1u) : 3u, 10u);
+        assert_recovers(&cdkf->s[i * 3u], (i < 3u) ? (i + 1u) : 3u, 20u);
     }
-    assert_recovers(cdkf->pending.vector, (uint32_t)MODEL_PARAMETERS, 10u);
+    assert_recovers(cdkf->pending.vector, (uint32_t)MODEL_PARAMETERS, 20u);
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
-        assert_recovers(&cdkf->pending.matrix[i * 4u], 3u - i, 10u);
+        assert_recovers(&cdkf->pending.matrix[i * 4u], 3u - i, 20u);
     }
     for (uint32_t point = 0u; point < (uint32_t)MODEL_POINTS; point++) {
-        assert_recovers(cdkf->points[point].c, 3u, 10u);
+        assert_recovers(cdkf->points[point].c, 3u, 20u);
     }
 }
 
-static void test_restarts_from_the_measurement_and_the_first_guess(void)
+TEST_EACH(COMBINATIONS, restarts_from_the_measurement_and_the_first_guess_or_without_one_at_the_trim_and_at_rest)
 {
+    start_running(test_round);
     (void)run_damaged(1u);
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, rig.simulation.theta, (double)estimate().theta);
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, rig.simulation.theta_dot, (double)estimate().theta_dot);
-    rig_assert_first_guess(&config, estimate());
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, simulation.measured_theta, (double)estimate().theta);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, simulation.measured_theta_dot, (double)estimate().theta_dot);
+    assert_first_guess();
+    cdkf->s_xx[0] = NAN;
+    (void)run_blind(1u);
+    TEST_ASSERT_EQUAL_UINT32(2u, health().recoveries);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, SIMULATION_TRIM, (double)estimate().theta);
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, 0.0, (double)estimate().theta_dot);
+    TEST_ASSERT_TRUE(cdkf_is_valid(cdkf));
 }
 
-static void test_restart_without_a_measurement_begins_at_the_trim_and_at_rest(void)
+TEST(six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none)
 {
-    const lever_sample_t sample = rig_sample_blind(&rig);
-    estimator.cdkf.s_xx[0] = NAN;
-    (void)estimator_update(&estimator, &sample, 0.0f);
-    TEST_ASSERT_EQUAL_UINT32(1u, estimator.recoveries);
-    TEST_ASSERT_DOUBLE_WITHIN(0.02, rig.simulation.plant.trim, (double)estimate().theta);
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.0, (double)estimate().theta_dot);
-    TEST_ASSERT_TRUE(cdkf_is_valid(&estimator.cdkf));
-}
-
-/* What was not a number for a sample must not make it deaf for what comes later. */
-static void test_after_a_restart_it_learns_and_notices_a_sudden_grip(void)
-{
-    (void)run_damaged(1u);
-    (void)run(40000u);
-    TEST_ASSERT_DOUBLE_WITHIN(0.0625 * fabs(truth[0]), truth[0], (double)estimate().parameter[0]);
-    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_CHANGE));
-    rig_grip(&rig);
-    for (uint32_t samples = 0u; !has_fault(LEVER_FAULT_CHANGE); samples++) {
-        (void)run(1u);
-        TEST_ASSERT_LESS_THAN_UINT32(2000u, samples);
-    }
-}
-
-static void test_six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none(void)
-{
-    for (uint32_t k = 0u; k < 20u; k++) {
+    for (uint32_t k = 0u; k < 7u; k++) {
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run_damaged(1u));
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(5000u));
     }
@@ -150,89 +105,71 @@ static void test_six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none(voi
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(1u));
 }
 
-static void test_only_a_reset_leaves_fault(void)
+TEST(only_a_reset_leaves_fault)
 {
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(6u));
-    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(20000u));
-    const lever_sample_t after_a_gap = rig_sample_after(&rig, 2000u);
-    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, estimator_update(&estimator, &after_a_gap, 0.0f));
-    request(LEVER_REQUEST_FREEZE);
-    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(1u));
-    request(LEVER_REQUEST_RUN);
-    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(1u));
-    rig.time_us = 0u; /* nor a clock that starts anew */
+    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(2000u));
+    const lever_sample_t after_a_gap = sample_after(2000u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, lever_update(lever, &after_a_gap));
+    for (uint8_t what = 0u; what < (uint8_t)LEVER_REQUEST_RESET; what++) {
+        lever_command_t command = command_none();
+        command.request = what;
+        (void)lever_command(lever, &command);
+        TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(1u));
+    }
+    time_us = 0u; /* nor a clock that starts anew */
     for (uint32_t k = 0u; k < 1000u; k++) {
         TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run(1u));
     }
     request(LEVER_REQUEST_RESET);
-    TEST_ASSERT_EQUAL(LEVER_MODE_INIT, estimator.mode);
-    rig_assert_first_guess(&config, estimate());
+    TEST_ASSERT_EQUAL(LEVER_MODE_INIT, health().mode);
+    assert_first_guess();
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(310u));
-    TEST_ASSERT_EQUAL_UINT32(6u, estimator.recoveries); /* counts go on */
+    TEST_ASSERT_EQUAL_UINT32(6u, health().recoveries); /* counts go on */
 }
 
-static void test_frozen_survives_a_restart(void)
+TEST(frozen_survives_a_restart)
 {
     request(LEVER_REQUEST_FREEZE);
     (void)run(1u);
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, run_damaged(1u));
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, run(100u));
-    TEST_ASSERT_EQUAL_UINT32(1u, estimator.recoveries);
+    TEST_ASSERT_EQUAL_UINT32(1u, health().recoveries);
 }
 
-static void test_an_estimate_beyond_a_bound_is_held_there_and_said(void)
+TEST_EACH(COMBINATIONS, an_estimate_beyond_a_bound_is_held_there_and_said)
 {
     const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box, &model_hand};
+    start_running(test_round);
     const float greatest = models[config.model]->parameter[0].greatest;
-    estimator.cdkf.w[0] = estimator.cdkf.scaling.greatest[0] + 1.0f;
+    cdkf->w[0] = cdkf->scaling.greatest[0] + 1.0f;
     for (uint32_t samples = 0u; !has_fault(LEVER_FAULT_BOUND); samples++) {
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1u));
         TEST_ASSERT_LESS_THAN_UINT32(20u, samples); /* learn_period */
     }
     TEST_ASSERT_FLOAT_WITHIN(2.0e-6f * greatest, greatest, estimate().parameter[0]);
-    TEST_ASSERT_EQUAL_UINT32(0u, estimator.recoveries);
+    TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
 }
 
-/* An angle a million standard deviations off after an outage is refused, and does not make the average deaf for what comes later. */
-static void test_a_huge_innovation_after_an_outage_does_not_spoil_the_average(void)
+/* An angle a million standard deviations off after an outage is refused, and does not make the average deaf for what comes
+ * later: more noise than is set, with no window to find it in. */
+TEST(a_huge_innovation_after_an_outage_does_not_spoil_the_average)
 {
-    config.settings.noise_window = 0.0f; /* or the noise would be found out */
-    config.settings.theta_noise = 1.0e-6f;
-    config.settings.theta_dot_noise = 1.0e-5f;
-    estimator_init(&estimator, &config);
-    rig.simulation.theta_noise = 1.0e-6;
-    rig.simulation.theta_dot_noise = 1.0e-5;
+    config.settings.noise_window = 0.0f;
+    start();
     (void)run(2000u);
     request(LEVER_REQUEST_FREEZE);
-    lever_sample_t sample = rig_sample_blind(&rig);
-    (void)estimator_update(&estimator, &sample, 0.0f);
-    sample = rig_sample_blind(&rig);
-    sample.theta += 2.0f;
+    (void)run_blind(1u);
+    lever_sample_t sample = sample_blind();
+    sample.theta += 20.0f;
     sample.theta_valid = true;
-    (void)estimator_update(&estimator, &sample, 0.0f);
-    TEST_ASSERT_TRUE(isfinite(estimator.averages.innovation) && has_fault(LEVER_FAULT_THETA));
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_TRUE(isfinite(lever->estimator.averages.innovation) && has_fault(LEVER_FAULT_THETA));
     (void)run(16000u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_INNOVATION));
-    rig.simulation.theta_noise *= 4.0;
-    rig.simulation.theta_dot_noise *= 4.0;
+    simulation.theta_noise *= 4.0;
+    simulation.theta_dot_noise *= 4.0;
     (void)run(3000u);
     TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_INNOVATION));
-    TEST_ASSERT_EQUAL_UINT32(0u, estimator.recoveries);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    for (combination = 0u; combination < (uint32_t)RIG_COMBINATIONS; combination++) {
-        RIG_RUN_TEST(test_recovers_from_damage_to_any_part_of_the_belief, combination);
-        RIG_RUN_TEST(test_restarts_from_the_measurement_and_the_first_guess, combination);
-        RIG_RUN_TEST(test_restart_without_a_measurement_begins_at_the_trim_and_at_rest, combination);
-        RIG_RUN_TEST(test_after_a_restart_it_learns_and_notices_a_sudden_grip, combination);
-        RIG_RUN_TEST(test_six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none, combination);
-        RIG_RUN_TEST(test_only_a_reset_leaves_fault, combination);
-        RIG_RUN_TEST(test_frozen_survives_a_restart, combination);
-        RIG_RUN_TEST(test_a_huge_innovation_after_an_outage_does_not_spoil_the_average, combination);
-        RIG_RUN_TEST(test_an_estimate_beyond_a_bound_is_held_there_and_said, combination);
-    }
-    return UNITY_END();
+    TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
 }

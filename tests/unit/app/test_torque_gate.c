@@ -13,10 +13,6 @@ void setUp(void)
     seed = 1u;
 }
 
-void tearDown(void)
-{
-}
-
 static float uniform(void)
 {
     seed = (seed * 1664525u) + 1013904223u;
@@ -42,7 +38,7 @@ static lever_settings_t random_settings(void)
     return settings;
 }
 
-static void test_no_request_passes_a_limit_at_any_settings(void)
+TEST(no_request_passes_a_limit_at_any_settings)
 {
     uint32_t open = 0u;
     for (uint32_t run = 0u; run < 300u; run++) {
@@ -64,7 +60,7 @@ static void test_no_request_passes_a_limit_at_any_settings(void)
 }
 
 /* Gaps, silence that the port tells of, outputs that are missing, clocks that stand, commands that end: at random. */
-static void test_no_course_of_events_passes_a_limit(void)
+TEST(no_course_of_events_passes_a_limit)
 {
     for (uint32_t run = 0u; run < 300u; run++) {
         torque_gate_t gate;
@@ -96,7 +92,7 @@ static void test_no_course_of_events_passes_a_limit(void)
     }
 }
 
-static void test_what_is_within_the_limits_passes_as_it_is(void)
+TEST(what_is_within_the_limits_passes_as_it_is)
 {
     torque_gate_t gate;
     torque_gate_init(&gate, &config.settings);
@@ -107,13 +103,4 @@ static void test_what_is_within_the_limits_passes_as_it_is(void)
         torque_gate_step(&gate, asked, &sample);
         TEST_ASSERT_TRUE((k < 101u) || (gate.torque == asked));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_no_request_passes_a_limit_at_any_settings);
-    RUN_TEST(test_no_course_of_events_passes_a_limit);
-    RUN_TEST(test_what_is_within_the_limits_passes_as_it_is);
-    return UNITY_END();
 }

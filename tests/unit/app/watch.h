@@ -3,7 +3,7 @@
 #define UNIT_APP_WATCH_H
 
 #include "lever_cdkf.h"
-#include "unity.h"
+#include "test.h"
 
 #include <math.h>
 #include <string.h>

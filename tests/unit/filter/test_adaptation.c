@@ -2,7 +2,7 @@
 #include "filter/adaptation.h"
 
 #include "lever_cdkf.h"
-#include "unity.h"
+#include "test.h"
 
 #include <math.h>
 
@@ -23,10 +23,6 @@ void setUp(void)
         .averaging_time = 2.0f,
         .memory = 0.5f,
         .forgetting_time = 4.0f};
-}
-
-void tearDown(void)
-{
 }
 
 static void start(uint8_t kind)
@@ -52,7 +48,7 @@ static void assert_walk(double floors, double relative)
     }
 }
 
-static void test_each_kind_starts_and_ends_where_it_is_said_to(void)
+TEST(each_kind_starts_and_ends_where_it_is_said_to)
 {
     const double starts[LEVER_ADAPTATION_COUNT] = {1.0, 100.0, 1.0, 1.0};
     const double wildest[LEVER_ADAPTATION_COUNT] = {1.0, 100.0, 100.0, 1.0};
@@ -69,7 +65,7 @@ static void test_each_kind_starts_and_ends_where_it_is_said_to(void)
     }
 }
 
-static void test_a_period_longer_than_the_averaging_time_counts_fully_and_stays_between_floor_and_ceiling(void)
+TEST(a_period_longer_than_the_averaging_time_counts_fully_and_stays_between_floor_and_ceiling)
 {
     const float five_floors[L] = {sqrtf(1.25e-4f), -sqrtf(5.0e-4f), sqrtf(11.25e-4f)}; /* 2 drift^2 / 0.5 s */
     start((uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
@@ -89,7 +85,7 @@ static void test_a_period_longer_than_the_averaging_time_counts_fully_and_stays_
     }
 }
 
-static void test_without_excitation_every_kind_is_at_its_floor_and_forgets_nothing(void)
+TEST(without_excitation_every_kind_is_at_its_floor_and_forgets_nothing)
 {
     for (uint8_t kind = 0u; kind < (uint8_t)LEVER_ADAPTATION_COUNT; kind++) {
         start(kind);
@@ -97,13 +93,4 @@ static void test_without_excitation_every_kind_is_at_its_floor_and_forgets_nothi
         assert_walk(1.0, 0.0);
         TEST_ASSERT_TRUE(cdkf.growth == 0.0f);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_each_kind_starts_and_ends_where_it_is_said_to);
-    RUN_TEST(test_a_period_longer_than_the_averaging_time_counts_fully_and_stays_between_floor_and_ceiling);
-    RUN_TEST(test_without_excitation_every_kind_is_at_its_floor_and_forgets_nothing);
-    return UNITY_END();
 }

@@ -2,8 +2,8 @@
  * distributed: vector = information b + noise of variance information. */
 #include "filter/calibration.h"
 
-#include "../math/random.h"
-#include "unity.h"
+#include "random.h"
+#include "test.h"
 
 enum { C = CDKF_CALIBRATION };
 
@@ -24,10 +24,6 @@ void setUp(void)
     cdkf.considered_sigma[CDKF_FRICTION] = 0.06f;
 }
 
-void tearDown(void)
-{
-}
-
 /* Blocks in which error c is so many of its standard deviations, and nothing is said of the others; `rate` is the
  * information of a second about it, in 1 / sigma^2. Returns how many blocks had the verdict wrong at their end. */
 static uint32_t run(uint32_t blocks, uint32_t c, double sigmas, double rate)
@@ -46,7 +42,7 @@ static uint32_t run(uint32_t blocks, uint32_t c, double sigmas, double rate)
 }
 
 /* Ten minutes each. */
-static void test_an_error_within_what_is_stated_is_tolerated(void)
+TEST(an_error_within_what_is_stated_is_tolerated)
 {
     const double sigmas[] = {0.0, 1.5, -1.5};
     const double rates[] = {0.01, 1.0, 100.0};
@@ -59,7 +55,7 @@ static void test_an_error_within_what_is_stated_is_tolerated(void)
 }
 
 /* Twice what is stated, and four standard deviations of the innovations' noise. */
-static void test_a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_gone(void)
+TEST(a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_gone)
 {
     for (uint32_t c = 0u; c < (uint32_t)C; c++) {
         const double sign = ((c % 2u) == 0u) ? 1.0 : -1.0;
@@ -73,15 +69,9 @@ static void test_a_larger_one_is_found_for_each_error_and_sign_and_again_within_
     }
 }
 
-/* Of an error that is hardly seen nothing is said, however large. */
-static void test_noise_alone_decides_nothing(void)
-{
-    TEST_ASSERT_EQUAL_UINT32(0u, run(30000u, (uint32_t)CDKF_FRICTION, 4.0, 0.01));
-}
-
 /* Without noise: the score of many times MEMORY is what comes in MEMORY; the limits are 2 sigma +
  * 4 / sqrt(information), and three quarters of that. */
-static void test_limits_and_memory_are_what_is_said(void)
+TEST(limits_and_memory_are_what_is_said)
 {
     const double information = 1.0e4;
     for (uint32_t k = 0u; k < 4u; k++) {
@@ -101,14 +91,4 @@ static void test_limits_and_memory_are_what_is_said(void)
         TEST_ASSERT_DOUBLE_WITHIN(
             0.02 * information * MEMORY, information * MEMORY, (double)calibration.score[CDKF_BASE_GAIN].information);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_an_error_within_what_is_stated_is_tolerated);
-    RUN_TEST(test_a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_gone);
-    RUN_TEST(test_noise_alone_decides_nothing);
-    RUN_TEST(test_limits_and_memory_are_what_is_said);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 /* The belief by itself: how it starts and is opened, the bounds of w, and the invariant that damage breaks. */
 #include "filter/cdkf.h"
 
-#include "unity.h"
+#include "test.h"
 
 #include <math.h>
 #include <string.h>
@@ -34,13 +34,9 @@ void setUp(void)
     cdkf_draw(cdkf, &model_lever, &constants);
 }
 
-void tearDown(void)
-{
-}
-
 /* --- start and opening -------------------------------------------------------------------------------------------- */
 
-static void test_starts_at_the_guess_uncorrelated_with_the_standard_deviations_of_the_prior(void)
+TEST(starts_at_the_guess_uncorrelated_with_the_standard_deviations_of_the_prior)
 {
     float correlation[L];
     (void)memset(cdkf, 0xA5, sizeof *cdkf);
@@ -54,7 +50,7 @@ static void test_starts_at_the_guess_uncorrelated_with_the_standard_deviations_o
     TEST_ASSERT_TRUE((cdkf->trust == 0.0f) && (cdkf->growth == 0.0f) && (cdkf->pending.vector[2] == 0.0f));
 }
 
-static void test_correlations_are_those_of_the_factor(void)
+TEST(correlations_are_those_of_the_factor)
 {
     static const float s[9] = {1.0f, 0.0f, 0.0f, 0.6f, 0.8f, 0.0f, 0.0f, 0.6f, 0.8f};
     float correlation[L];
@@ -66,7 +62,7 @@ static void test_correlations_are_those_of_the_factor(void)
 }
 
 /* The state keeps its uncertainty, which is its own now. */
-static void test_opening_forgets_what_was_learnt_and_keeps_estimate_and_state(void)
+TEST(opening_forgets_what_was_learnt_and_keeps_estimate_and_state)
 {
     correction_t correction;
     cdkf->walk[1] = 0.01f;
@@ -90,7 +86,7 @@ static void test_opening_forgets_what_was_learnt_and_keeps_estimate_and_state(vo
     TEST_ASSERT_TRUE((correction.variance[0] == 0.0f) && (correction.variance[2] == 0.0f));
 }
 
-static void test_a_state_that_starts_anew_is_independent_of_w_and_drops_what_is_pending(void)
+TEST(a_state_that_starts_anew_is_independent_of_w_and_drops_what_is_pending)
 {
     const float x[N] = {0.3f, -0.2f};
     const float sigma[N] = {0.02f, 0.5f};
@@ -109,7 +105,7 @@ static void test_a_state_that_starts_anew_is_independent_of_w_and_drops_what_is_
 
 /* --- learning and walk at their limits ---------------------------------------------------------------------------- */
 
-static void test_w_is_held_at_its_bounds_and_said_to_rest_there(void)
+TEST(w_is_held_at_its_bounds_and_said_to_rest_there)
 {
     correction_t correction;
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
@@ -123,7 +119,7 @@ static void test_w_is_held_at_its_bounds_and_said_to_rest_there(void)
     }
 }
 
-static void test_without_walk_or_forgetting_nothing_changes(void)
+TEST(without_walk_or_forgetting_nothing_changes)
 {
     const float none[L] = {0.0f, 0.0f, 0.0f};
     const cdkf_t before = *cdkf;
@@ -134,7 +130,7 @@ static void test_without_walk_or_forgetting_nothing_changes(void)
     TEST_ASSERT_EQUAL_MEMORY(&before, cdkf, sizeof before);
 }
 
-static void test_drawing_caps_standard_deviations_at_the_prior(void)
+TEST(drawing_caps_standard_deviations_at_the_prior)
 {
     cdkf->s[0] = 7.0f;
     cdkf_draw(cdkf, &model_lever, &constants);
@@ -149,7 +145,7 @@ typedef struct damage {
     bool of_state; /* a sample notices, not only the end of a block */
 } damage_t;
 
-static void test_the_invariant_refuses_every_kind_of_damage(void)
+TEST(the_invariant_refuses_every_kind_of_damage)
 {
     const damage_t damages[] = {{&cdkf->x[0], NAN, true}, {&cdkf->x[1], INFINITY, true}, {&cdkf->x[0], 26.0f, true},
         {&cdkf->x[1], -1.1e4f, true}, {&cdkf->s_xx[0], NAN, true}, {&cdkf->s_xx[0], 0.0f, false},
@@ -174,18 +170,4 @@ static void test_the_invariant_refuses_every_kind_of_damage(void)
             TEST_ASSERT_FALSE(cdkf_is_valid(cdkf));
         }
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_starts_at_the_guess_uncorrelated_with_the_standard_deviations_of_the_prior);
-    RUN_TEST(test_correlations_are_those_of_the_factor);
-    RUN_TEST(test_opening_forgets_what_was_learnt_and_keeps_estimate_and_state);
-    RUN_TEST(test_a_state_that_starts_anew_is_independent_of_w_and_drops_what_is_pending);
-    RUN_TEST(test_w_is_held_at_its_bounds_and_said_to_rest_there);
-    RUN_TEST(test_without_walk_or_forgetting_nothing_changes);
-    RUN_TEST(test_drawing_caps_standard_deviations_at_the_prior);
-    RUN_TEST(test_the_invariant_refuses_every_kind_of_damage);
-    return UNITY_END();
 }

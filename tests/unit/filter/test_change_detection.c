@@ -1,7 +1,7 @@
 /* Detection of sudden changes: a drift is one as soon as its chi-square says so. */
 #include "filter/change_detection.h"
 
-#include "unity.h"
+#include "test.h"
 
 enum { L = MODEL_PARAMETERS };
 
@@ -15,10 +15,6 @@ static const double sigma[L] = {1.0e-3, 3.0e-4, 2.0e-2}; /* of a correction: sca
 void setUp(void)
 {
     change_detection_init(&change);
-}
-
-void tearDown(void)
-{
 }
 
 /* How many of so many corrections are changes; each is `drift` sigmas off. */
@@ -38,7 +34,7 @@ static uint32_t detections(uint32_t steps, double drift, float threshold)
 
 /* Without noise the sum of n corrections of d sigmas has the statistic 3 (d sum r^k)^2 / sum r^2k, r = 1 -
  * period/memory. */
-static void test_a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts_anew(void)
+TEST(a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts_anew)
 {
     const double keep = 1.0 - ((double)PERIOD / (double)MEMORY);
     const double drift = 1.2;
@@ -63,7 +59,7 @@ static void test_a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts
 }
 
 /* Nor is it evidence when nothing was learnt, or when rounding let a variance grow. */
-static void test_a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_not_count(void)
+TEST(a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_not_count)
 {
     const correction_t correction = {.w = {1.0f, 1.0f, 1.0f}, .variance = {0.0f, -1.0e-9f, 0.0f}};
     TEST_ASSERT_EQUAL_UINT32(0u, detections(1000u, 100.0, 0.0f));
@@ -73,12 +69,4 @@ static void test_a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_
         TEST_ASSERT_FALSE(change_detection_step(&change, &correction, PERIOD, MEMORY, THRESHOLD));
     }
     TEST_ASSERT_TRUE((change.average <= 1.0f) && (change.variance[1] == 0.0f));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts_anew);
-    RUN_TEST(test_a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_not_count);
-    return UNITY_END();
 }

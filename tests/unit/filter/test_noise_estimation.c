@@ -1,7 +1,7 @@
 /* Noise estimated on line: windows by hand, and the limits of what they change. */
 #include "filter/noise_estimation.h"
 
-#include "unity.h"
+#include "test.h"
 
 static cdkf_t cdkf;
 static noise_estimation_t noise;
@@ -16,10 +16,6 @@ void setUp(void)
     valid[0] = true;
     valid[1] = true;
     noise_estimation_begin(&noise);
-}
-
-void tearDown(void)
-{
 }
 
 static void add(const innovation_t innovation[CDKF_OUTPUTS], uint32_t samples)
@@ -60,7 +56,7 @@ typedef struct window {
  * Too little gain, 1.25: innovations 2 and 1.2 times too large leave R, half of what it was raised by (in logarithms)
  * is taken back, and the process noise goes with the square of 1.25.
  * Innovations half as large as expected lower R whatever the gain. */
-static void test_a_window_changes_the_noise_by_the_stated_formulas(void)
+TEST(a_window_changes_the_noise_by_the_stated_formulas)
 {
     static const window_t windows[] = {{{8.0f, 1.2f}, -80.0f, 1.0f, {4.0f, 1.02f}, 1.8879f, true},
         {{4.0f, 1.2f}, 16.0f, 1.0f, {1.0f, 1.0f}, 1.5625f, true},
@@ -86,7 +82,7 @@ static void test_a_window_changes_the_noise_by_the_stated_formulas(void)
     }
 }
 
-static void test_without_a_window_and_within_one_the_noise_stays_as_set(void)
+TEST(without_a_window_and_within_one_the_noise_stays_as_set)
 {
     const innovation_t innovation[CDKF_OUTPUTS] = {
         {.value = 9.0f, .inverse_variance = 1.0f}, {.value = 9.0f, .inverse_variance = 1.0f}};
@@ -102,7 +98,7 @@ static void test_without_a_window_and_within_one_the_noise_stays_as_set(void)
     TEST_ASSERT_TRUE(cdkf.output_noise[0] > setting.output_noise[0]);
 }
 
-static void test_never_leaves_its_range(void)
+TEST(never_leaves_its_range)
 {
     const float excess[] = {1.0e3f, 1.0e-3f};
     setting.range = 3.0f;
@@ -118,7 +114,7 @@ static void test_never_leaves_its_range(void)
 }
 
 /* Fewer than twenty samples of an output say nothing of it. */
-static void test_an_output_that_is_missing_keeps_its_noise(void)
+TEST(an_output_that_is_missing_keeps_its_noise)
 {
     const innovation_t innovation[CDKF_OUTPUTS] = {{.value = 2.0f, .inverse_variance = 1.0f, .noise_variance = 0.5f},
         {.value = 2.0f, .inverse_variance = 1.0f, .noise_variance = 0.5f}};
@@ -130,7 +126,7 @@ static void test_an_output_that_is_missing_keeps_its_noise(void)
     assert_as_set(1u);
 }
 
-static void test_a_window_that_is_begun_anew_forgets_what_was_in_it(void)
+TEST(a_window_that_is_begun_anew_forgets_what_was_in_it)
 {
     const innovation_t wild[CDKF_OUTPUTS] = {
         {.value = 1.0e3f, .inverse_variance = 1.0f, .noise_variance = 0.5f, .response = 1.0f},
@@ -142,15 +138,4 @@ static void test_a_window_that_is_begun_anew_forgets_what_was_in_it(void)
     assert_as_set(0u);
     assert_as_set(1u);
     TEST_ASSERT_TRUE(cdkf.process_noise[1] == setting.process_noise);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_window_changes_the_noise_by_the_stated_formulas);
-    RUN_TEST(test_without_a_window_and_within_one_the_noise_stays_as_set);
-    RUN_TEST(test_never_leaves_its_range);
-    RUN_TEST(test_an_output_that_is_missing_keeps_its_noise);
-    RUN_TEST(test_a_window_that_is_begun_anew_forgets_what_was_in_it);
-    return UNITY_END();
 }

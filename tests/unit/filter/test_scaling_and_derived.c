@@ -2,7 +2,7 @@
 #include "filter/derived.h"
 
 #include "model/scaling.h"
-#include "unity.h"
+#include "test.h"
 
 #include <math.h>
 
@@ -14,14 +14,6 @@ static const model_t *const models[2] = {&model_lever, &model_linear_black_box};
 
 static scaling_t scaling;
 static model_t plain;
-
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
 
 /* --- scale -------------------------------------------------------------------------------------------------------- */
 
@@ -38,7 +30,7 @@ static double parameter_at(uint32_t i, double w)
     return scaling.positive ? (guess * exp(w)) : (guess + ((double)scaling.prior.sigma[i] * w));
 }
 
-static void test_bounds_are_those_of_the_model_on_either_scale_or_the_guess_where_that_is_outside(void)
+TEST(bounds_are_those_of_the_model_on_either_scale_or_the_guess_where_that_is_outside)
 {
     for (uint32_t scale = 0u; scale < 2u; scale++) {
         start(scale);
@@ -57,7 +49,7 @@ static void test_bounds_are_those_of_the_model_on_either_scale_or_the_guess_wher
     }
 }
 
-static void test_w_is_kept_within_its_bounds(void)
+TEST(w_is_kept_within_its_bounds)
 {
     start(0u);
     for (uint32_t i = 0u; i < (uint32_t)L; i++) {
@@ -72,7 +64,7 @@ static void test_w_is_kept_within_its_bounds(void)
     }
 }
 
-static void test_the_prior_has_standard_deviation_sigma_on_a_logarithmic_scale_and_1_on_a_linear_one(void)
+TEST(the_prior_has_standard_deviation_sigma_on_a_logarithmic_scale_and_1_on_a_linear_one)
 {
     start(0u);
     TEST_ASSERT_TRUE(scaling_prior_sigma(&scaling, 1u) == 0.6f);
@@ -83,7 +75,7 @@ static void test_the_prior_has_standard_deviation_sigma_on_a_logarithmic_scale_a
 /* --- derived ------------------------------------------------------------------------------------------------------ */
 
 /* A falling lever has no natural frequency, but answers the base. */
-static void test_without_stiffness_there_is_no_natural_frequency(void)
+TEST(without_stiffness_there_is_no_natural_frequency)
 {
     const model_constants_t constants = {.trim = true};
     const model_step_t step = {.trim_cosine = 1.0f};
@@ -96,14 +88,4 @@ static void test_without_stiffness_there_is_no_natural_frequency(void)
         derived_feedthrough(&cdkf, &model_linear_black_box, &constants, &step, 0.0f);
     TEST_ASSERT_TRUE((dynamics.natural_frequency == 0.0f) && (dynamics.damping_ratio == 0.0f));
     TEST_ASSERT_EQUAL_FLOAT(0.1f, feedthrough.real);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_bounds_are_those_of_the_model_on_either_scale_or_the_guess_where_that_is_outside);
-    RUN_TEST(test_w_is_kept_within_its_bounds);
-    RUN_TEST(test_the_prior_has_standard_deviation_sigma_on_a_logarithmic_scale_and_1_on_a_linear_one);
-    RUN_TEST(test_without_stiffness_there_is_no_natural_frequency);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 /* The trim: which signals pass its high-pass, and what it does when an output is missing. */
 #include "filter/trim.h"
 
-#include "unity.h"
+#include "test.h"
 
 #include <math.h>
 
@@ -18,10 +18,6 @@ void setUp(void)
     trim_start(&trim, 0.35f, CORNER, true);
 }
 
-void tearDown(void)
-{
-}
-
 /* --- high-pass ---------------------------------------------------------------------------------------------------- */
 
 static double step_with(float value)
@@ -29,7 +25,7 @@ static double step_with(float value)
     return (double)high_pass_step(&filter, value, (float)TURN * CORNER * PERIOD, HIGH_PASS_BUTTERWORTH);
 }
 
-static void test_a_constant_has_no_deviation_and_a_value_is_compared_with_the_level_before_it(void)
+TEST(a_constant_has_no_deviation_and_a_value_is_compared_with_the_level_before_it)
 {
     for (uint32_t k = 0u; k < 1000u; k++) {
         TEST_ASSERT_TRUE(step_with(0.35f) == 0.0);
@@ -61,7 +57,7 @@ static void pass_all(float signal, float deviation[4])
 }
 
 /* Outputs and inputs of a linear system obey it after the same high-pass, too: all four must pass the same. */
-static void test_every_signal_passes_the_same_high_pass(void)
+TEST(every_signal_passes_the_same_high_pass)
 {
     for (uint32_t k = 0u; k < 3000u; k++) {
         float deviation[4];
@@ -74,7 +70,7 @@ static void test_every_signal_passes_the_same_high_pass(void)
     TEST_ASSERT_FLOAT_WITHIN(5.0e-6f, 0.35f + trim.origin[1], trim.origin[0]);
 }
 
-static void test_in_preload_fixed_signals_stay_and_only_the_trim_angle_follows(void)
+TEST(in_preload_fixed_signals_stay_and_only_the_trim_angle_follows)
 {
     const float x[MODEL_STATES] = {0.0f, 0.0f};
     const bool valid[MODEL_STATES] = {true, true};
@@ -90,7 +86,7 @@ static void test_in_preload_fixed_signals_stay_and_only_the_trim_angle_follows(v
     TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 0.5f, trim_angle(&trim));
 }
 
-static void test_nothing_can_be_learnt_for_nine_tenths_of_the_corners_period(void)
+TEST(nothing_can_be_learnt_for_nine_tenths_of_the_corners_period)
 {
     trim_start(&trim, 0.35f, 0.5f, true);
     TEST_ASSERT_EQUAL_FLOAT(1.8f, trim.unsettled);
@@ -114,37 +110,7 @@ static bool run_without(uint32_t missing, uint32_t samples, float x0)
     return back;
 }
 
-/* Back within 20 ms, the level is where samples on the straight line would have brought it. Before that the angle is
- * reported to have moved as the level would with the prediction. */
-static void test_a_short_outage_is_a_straight_line(void)
-{
-    const float x[MODEL_STATES] = {0.0f, 0.0f};
-    const bool both[MODEL_STATES] = {true, true};
-    for (uint32_t missing = 1u; missing < 20u; missing++) {
-        setUp();
-        (void)run_without(0u, 50u, 0.0f); /* theta_dot has moved nothing */
-        trim_t expected = trim;
-        for (uint32_t k = 1u; k <= (missing + 1u); k++) {
-            const float share = (float)k / (float)(missing + 1u);
-            float y[MODEL_STATES] = {0.35f + (0.1f * share), 0.0f};
-            (void)trim_outputs(&expected, x, y, both, PERIOD);
-        }
-        float deviation[MODEL_STATES] = {0.45f, 0.0f};
-        trim.last[0] = 0.35f;
-        trim.missing[0] = 0.0f;
-        (void)run_without(1u, missing, 0.1f);
-        TEST_ASSERT_TRUE(trim.ahead[0] > 0.0f);
-        TEST_ASSERT_FALSE(trim_outputs(&trim, x, deviation, both, PERIOD));
-        TEST_ASSERT_TRUE(trim.ahead[0] == 0.0f);
-        for (uint32_t k = 0u; k < (uint32_t)TRIM_SECTIONS; k++) {
-            const high_pass_t *section = &trim.output[0].section[k];
-            TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, expected.output[0].section[k].level, section->level);
-            TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, expected.output[0].section[k].slope, section->slope);
-        }
-    }
-}
-
-static void test_a_missing_level_waits_after_20_ms(void)
+TEST(a_missing_level_waits_after_20_ms)
 {
     (void)run_without(1u, 20u, 0.1f);
     TEST_ASSERT_TRUE(!trim_is_waiting(&trim, 0u) && (trim_angle(&trim) == 0.35f));
@@ -158,7 +124,7 @@ static void test_a_missing_level_waits_after_20_ms(void)
     }
 }
 
-static void test_the_end_of_an_outage_is_said_once_and_a_short_one_is_none(void)
+TEST(the_end_of_an_outage_is_said_once_and_a_short_one_is_none)
 {
     (void)run_without(2u, 20u, 0.0f);
     TEST_ASSERT_FALSE(run_without(0u, 1u, 0.0f));
@@ -169,7 +135,7 @@ static void test_the_end_of_an_outage_is_said_once_and_a_short_one_is_none(void)
     TEST_ASSERT_TRUE(run_without(1u, 1u, 0.0f)); /* the other comes back later */
 }
 
-static void test_a_prediction_that_is_none_does_not_reach_the_level(void)
+TEST(a_prediction_that_is_none_does_not_reach_the_level)
 {
     const float wild[] = {NAN, INFINITY, -INFINITY, 1.0e30f};
     for (uint32_t k = 0u; k < 4u; k++) {
@@ -177,18 +143,4 @@ static void test_a_prediction_that_is_none_does_not_reach_the_level(void)
         (void)run_without(1u, 5u, wild[k]);
         TEST_ASSERT_TRUE(trim_angle(&trim) == 0.35f);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_a_constant_has_no_deviation_and_a_value_is_compared_with_the_level_before_it);
-    RUN_TEST(test_every_signal_passes_the_same_high_pass);
-    RUN_TEST(test_in_preload_fixed_signals_stay_and_only_the_trim_angle_follows);
-    RUN_TEST(test_nothing_can_be_learnt_for_nine_tenths_of_the_corners_period);
-    RUN_TEST(test_a_short_outage_is_a_straight_line);
-    RUN_TEST(test_a_missing_level_waits_after_20_ms);
-    RUN_TEST(test_the_end_of_an_outage_is_said_once_and_a_short_one_is_none);
-    RUN_TEST(test_a_prediction_that_is_none_does_not_reach_the_level);
-    return UNITY_END();
 }

@@ -1,8 +1,8 @@
 /* Whiteness: white innovations stay white however long, coloured ones are found; against their known correlations. */
 #include "filter/whiteness.h"
 
-#include "../math/random.h"
-#include "unity.h"
+#include "random.h"
+#include "test.h"
 
 enum { SAMPLES = 20 }; /* in a block */
 
@@ -17,10 +17,6 @@ void setUp(void)
     source.state = 17u;
     state = 0.0;
     whiteness_start(&whiteness);
-}
-
-void tearDown(void)
-{
 }
 
 /* Blocks of white noise of variance 1, on top of which is a first-order process of variance `share` that keeps the
@@ -39,19 +35,9 @@ static uint32_t run(uint32_t blocks, double share, double keep, bool counts)
     return coloured;
 }
 
-/* Three minutes. */
-static void test_white_innovations_are_white(void)
-{
-    for (uint64_t seed = 1u; seed <= 20u; seed++) {
-        setUp();
-        source.state = seed;
-        TEST_ASSERT_EQUAL_UINT32(0u, run(9000u, 0.0, 0.0, true));
-    }
-}
-
 /* A share s of n samples' mean has the correlation keep^k s / (s + 1/n) at lag k: far below the noise of a sample,
  * which nis = 1 + s would show. Sign does not matter. */
-static void test_a_coloured_part_far_below_the_noise_of_a_sample_is_found_within_seconds(void)
+TEST(a_coloured_part_far_below_the_noise_of_a_sample_is_found_within_seconds)
 {
     const double keep[] = {0.9, -0.9, 0.7};
     for (uint32_t k = 0u; k < 3u; k++) {
@@ -73,7 +59,7 @@ static void test_a_coloured_part_far_below_the_noise_of_a_sample_is_found_within
 }
 
 /* Each alone of the lags is looked at: blocks that repeat k blocks later. */
-static void test_every_lag_of_20_to_80_ms_is_seen(void)
+TEST(every_lag_of_20_to_80_ms_is_seen)
 {
     for (uint32_t lag = 1u; lag <= (uint32_t)WHITENESS_LAGS + 1u; lag++) {
         float before[WHITENESS_LAGS + 1] = {0.0f};
@@ -92,7 +78,7 @@ static void test_every_lag_of_20_to_80_ms_is_seen(void)
     }
 }
 
-static void test_blocks_that_do_not_count_and_the_first_two_seconds_say_nothing(void)
+TEST(blocks_that_do_not_count_and_the_first_two_seconds_say_nothing)
 {
     (void)run(99u, 10.0, 0.99, true);
     TEST_ASSERT_TRUE(!whiteness.coloured && (whiteness_correlation(&whiteness) == 0.0f));
@@ -108,7 +94,7 @@ static void test_blocks_that_do_not_count_and_the_first_two_seconds_say_nothing(
 }
 
 /* Between the two thresholds a verdict stays what it is. */
-static void test_a_verdict_has_hysteresis(void)
+TEST(a_verdict_has_hysteresis)
 {
     for (uint32_t was = 0u; was < 2u; was++) {
         setUp();
@@ -119,15 +105,4 @@ static void test_a_verdict_has_hysteresis(void)
         whiteness_step(&whiteness, 1.0e-6f, true);
         TEST_ASSERT_EQUAL(was == 1u, whiteness.coloured);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_white_innovations_are_white);
-    RUN_TEST(test_a_coloured_part_far_below_the_noise_of_a_sample_is_found_within_seconds);
-    RUN_TEST(test_every_lag_of_20_to_80_ms_is_seen);
-    RUN_TEST(test_blocks_that_do_not_count_and_the_first_two_seconds_say_nothing);
-    RUN_TEST(test_a_verdict_has_hysteresis);
-    return UNITY_END();
 }

@@ -6,15 +6,7 @@
 #include <string.h>
 
 #include "bulk.h"
-#include "unity.h"
-
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
+#include "test.h"
 
 static const char *const lines[] = {
     "(1436509052.249713) vcan0 044#2A366C2BBA\n",
@@ -74,7 +66,7 @@ static size_t some_text(char *text)
     return size;
 }
 
-static void test_any_damage_is_a_frame_or_a_damaged_line(void)
+TEST(any_damage_is_a_frame_or_a_damaged_line)
 {
     char text[512];
     bulk_frame_t frames[512];
@@ -92,7 +84,7 @@ static void test_any_damage_is_a_frame_or_a_damaged_line(void)
     }
 }
 
-static void test_room_that_ends_is_gone_on_from(void)
+TEST(room_that_ends_is_gone_on_from)
 {
     char text[512] = "";
     bulk_frame_t frames[2];
@@ -104,7 +96,7 @@ static void test_room_that_ends_is_gone_on_from(void)
     TEST_ASSERT_EQUAL_UINT64(2u * strlen(lines[0]), parsed.used);
 }
 
-static void test_more_buses_than_there_is_room_for_are_damage(void)
+TEST(more_buses_than_there_is_room_for_are_damage)
 {
     static bulk_buses_t buses;
     bulk_frame_t frame;
@@ -119,13 +111,4 @@ static void test_more_buses_than_there_is_room_for_are_damage(void)
     const int size = snprintf(line, sizeof line, "(1.0) bus7 123#00\n");
     TEST_ASSERT_EQUAL_UINT64(1u, bulk_parse(line, (uint64_t)size, &buses, &frame, 1u, &parsed));
     TEST_ASSERT_EQUAL_UINT16(7u, frame.bus);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_any_damage_is_a_frame_or_a_damaged_line);
-    RUN_TEST(test_room_that_ends_is_gone_on_from);
-    RUN_TEST(test_more_buses_than_there_is_room_for_are_damage);
-    return UNITY_END();
 }

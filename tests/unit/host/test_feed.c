@@ -7,17 +7,9 @@
 #include "can/e2e.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
-#include "unity.h"
+#include "test.h"
 
 enum { SAMPLES = 60, FRAMES = 2 * SAMPLES, MOST_OUT = FRAMES * 9 };
-
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
 
 static void put(bulk_frame_t *frame, const lever_frame_t *made, int64_t time_us)
 {
@@ -81,7 +73,7 @@ static void run(const bulk_frame_t *frames, uint64_t out_room, uint64_t row_room
     free(rows);
 }
 
-static void test_room_makes_no_difference(void)
+TEST(room_makes_no_difference)
 {
     static bulk_frame_t frames[FRAMES];
     static result_t much;
@@ -94,11 +86,4 @@ static void test_room_makes_no_difference(void)
     TEST_ASSERT_EQUAL_UINT64(much.out, little.out);
     TEST_ASSERT_EQUAL_MEMORY(much.frames, little.frames, (size_t)much.out * sizeof much.frames[0]);
     TEST_ASSERT_EQUAL_MEMORY(much.row, little.row, (size_t)much.rows * sizeof much.row[0]);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_room_makes_no_difference);
-    return UNITY_END();
 }

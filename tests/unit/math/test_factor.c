@@ -1,7 +1,7 @@
 /* The kernels of factor.h at their limits: rows without rank, no noise, no information, too much of either. */
 #include "math/factor.h"
 #include "random.h"
-#include "unity.h"
+#include "test.h"
 
 #include <float.h>
 #include <string.h>
@@ -17,8 +17,22 @@ void setUp(void)
     source.state = 20240229u;
 }
 
-void tearDown(void)
+static void random_floats(float *values, uint32_t count, double scale)
 {
+    for (uint32_t i = 0u; i < count; i++) {
+        values[i] = (float)(scale * random_between(&source, -1.0, 1.0));
+    }
+}
+
+/* A factor [n x n] with diagonal in [1/2, 1], and rows below it. */
+static void random_factor(float *s, uint32_t rows, uint32_t n)
+{
+    random_floats(s, rows * n, 1.0);
+    for (uint32_t i = 0u; i < (n * n); i++) {
+        if ((i % n) >= (i / n)) {
+            s[i] = ((i % n) == (i / n)) ? (float)random_between(&source, 0.5, 1.0) : 0.0f;
+        }
+    }
 }
 
 static double dot(const float *a, const float *b, uint32_t n)
@@ -49,7 +63,7 @@ static void assert_factorises(const float a[3], const float b[3], float s[4])
 }
 
 /* What is left of a row beside the other comes from a sum of squares, so it is right to its own last digits. */
-static void test_tria_of_nearly_dependent_rows_keeps_what_is_different(void)
+TEST(tria_of_nearly_dependent_rows_keeps_what_is_different)
 {
     for (double difference = 1.0e-1; difference > 1.0e-6; difference *= 0.1) {
         const float a[3] = {1.0f, 0.0f, 0.0f};
@@ -60,7 +74,7 @@ static void test_tria_of_nearly_dependent_rows_keeps_what_is_different(void)
     }
 }
 
-static void test_tria_of_dependent_or_zero_rows_is_deficient_not_nan(void)
+TEST(tria_of_dependent_or_zero_rows_is_deficient_not_nan)
 {
     const float rows[3][3] = {{1.0f, 2.0f, 2.0f}, {-2.0f, -4.0f, -4.0f}, {0.0f, 0.0f, 0.0f}};
     float s[4];
@@ -76,12 +90,12 @@ static void test_tria_of_dependent_or_zero_rows_is_deficient_not_nan(void)
 /* --- noise -------------------------------------------------------------------------------------------------------- */
 
 /* As for parameters that do not walk, for minutes. */
-static void test_no_noise_changes_nothing_to_the_bit(void)
+TEST(no_noise_changes_nothing_to_the_bit)
 {
     float s[MOST_ROWS * MOST_N];
     float before[MOST_ROWS * MOST_N];
     float rest[MOST_ROWS - MOST_N];
-    random_factor(&source, s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
+    random_factor(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
     (void)memcpy(before, s, sizeof before);
     for (uint32_t k = 0u; k < 100000u; k++) {
         factor_add_noise(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N, k % (uint32_t)MOST_N, 0.0f, rest);
@@ -91,7 +105,7 @@ static void test_no_noise_changes_nothing_to_the_bit(void)
 }
 
 /* Where nothing was known, other rows have nothing to do with what is known now. */
-static void test_noise_on_nothing_is_the_noise(void)
+TEST(noise_on_nothing_is_the_noise)
 {
     float s[8] = {0.0f, 0.0f, 0.0f, 0.0f, 0.75f, -2.0f, 0.5f, 3.0f};
     float rest[2][2];
@@ -105,7 +119,7 @@ static void test_noise_on_nothing_is_the_noise(void)
 }
 
 /* A millionth of the variance each time; and less than the diagonal can hold, where nothing else may drift either. */
-static void test_tiny_noise_adds_up_or_leaves_the_rest_as_it_is(void)
+TEST(tiny_noise_adds_up_or_leaves_the_rest_as_it_is)
 {
     const float noises[] = {5.0e-4f, 1.0e-6f};
     const double tolerances[] = {5.0e-3, 1.0e-5};
@@ -153,8 +167,8 @@ static void sum_up(known_t *known)
 static known_t draw_known(uint32_t n, uint32_t outputs, double scale)
 {
     known_t known = {.n = n, .outputs = outputs};
-    random_floats(&source, known.c, outputs * n, scale);
-    random_floats(&source, known.nu, outputs, 1.0);
+    random_floats(known.c, outputs * n, scale);
+    random_floats(known.nu, outputs, 1.0);
     sum_up(&known);
     return known;
 }
@@ -174,12 +188,12 @@ static void condition(known_t known, float *s, uint32_t rows, double *mean)
     }
 }
 
-static void test_no_information_changes_nothing_to_the_bit(void)
+TEST(no_information_changes_nothing_to_the_bit)
 {
     float s[MOST_ROWS * MOST_N];
     float before[MOST_ROWS * MOST_N];
     double mean[MOST_ROWS];
-    random_factor(&source, s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
+    random_factor(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
     (void)memcpy(before, s, sizeof before);
     condition(draw_known((uint32_t)MOST_N, 0u, 1.0), s, (uint32_t)MOST_ROWS, mean);
     TEST_ASSERT_EQUAL_MEMORY(before, s, sizeof before);
@@ -197,13 +211,13 @@ static void assert_is_factor(const float s[9], const double mean[3])
 
 /* More than a float can tell from a matrix without rank; and the same precise outputs of three elements again and
  * again: what is left is anything, but a factor. */
-static void test_any_information_leaves_a_factor(void)
+TEST(any_information_leaves_a_factor)
 {
     for (double scale = 1.0e2; scale < 1.0e16; scale *= 3.0) {
         float s[9];
         double mean[3];
         for (uint32_t repeat = 0u; repeat < 3u * (uint32_t)REPEATS; repeat++) {
-            random_factor(&source, s, 3u, 3u);
+            random_factor(s, 3u, 3u);
             condition(draw_known(3u, 1u + (repeat % 4u), scale), s, 3u, mean);
             assert_is_factor(s, mean);
         }
@@ -220,7 +234,7 @@ static void test_any_information_leaves_a_factor(void)
     }
 }
 
-static void test_a_precise_measurement_of_one_element_leaves_its_noise(void)
+TEST(a_precise_measurement_of_one_element_leaves_its_noise)
 {
     float s[4] = {0.5f, 0.0f, 0.25f, 0.75f};
     double mean[2];
@@ -232,25 +246,10 @@ static void test_a_precise_measurement_of_one_element_leaves_its_noise(void)
 
 /* --- sigma -------------------------------------------------------------------------------------------------------- */
 
-static void test_sigma_is_the_norm_of_the_row_up_to_the_diagonal(void)
+TEST(sigma_is_the_norm_of_the_row_up_to_the_diagonal)
 {
     const float s[9] = {2.0f, 9.0f, 9.0f, 3.0f, 4.0f, 9.0f, 1.0e-12f, 2.0e-12f, 2.0e-12f};
     TEST_ASSERT_TRUE(factor_sigma(s, 3u, 0u) == 2.0f);
     TEST_ASSERT_TRUE((factor_sigma(s, 3u, 1u) == 5.0f) && (factor_variance(s, 3u, 1u) == 25.0f));
     TEST_ASSERT_FLOAT_WITHIN(1.0e-18f, 3.0e-12f, factor_sigma(s, 3u, 2u));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_tria_of_nearly_dependent_rows_keeps_what_is_different);
-    RUN_TEST(test_tria_of_dependent_or_zero_rows_is_deficient_not_nan);
-    RUN_TEST(test_no_noise_changes_nothing_to_the_bit);
-    RUN_TEST(test_noise_on_nothing_is_the_noise);
-    RUN_TEST(test_tiny_noise_adds_up_or_leaves_the_rest_as_it_is);
-    RUN_TEST(test_no_information_changes_nothing_to_the_bit);
-    RUN_TEST(test_any_information_leaves_a_factor);
-    RUN_TEST(test_a_precise_measurement_of_one_element_leaves_its_noise);
-    RUN_TEST(test_sigma_is_the_norm_of_the_row_up_to_the_diagonal);
-    return UNITY_END();
 }

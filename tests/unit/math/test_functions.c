@@ -4,19 +4,11 @@
 #include "math/rounding.h"
 #include "math/trigonometry.h"
 #include "random.h"
-#include "unity.h"
+#include "test.h"
 
 #include <float.h>
 
 enum { GRID = 300000 };
-
-void setUp(void)
-{
-}
-
-void tearDown(void)
-{
-}
 
 /* NaN counts as greatest. */
 static double greater_of(double a, double b)
@@ -48,7 +40,7 @@ static double rounding_error(float x)
     return fabs((double)nearest_integer(x) - nearbyint((double)x));
 }
 
-static void test_nearest_integer_is_exact_below_two_to_the_22_with_ties_to_even(void)
+TEST(nearest_integer_is_exact_below_two_to_the_22_with_ties_to_even)
 {
     TEST_ASSERT_TRUE(greatest_error(rounding_error, -1000.0, 1000.0, 0.5) == 0.0);
     TEST_ASSERT_TRUE(greatest_error(rounding_error, -4194303.5, 4194303.5, 1000.5) == 0.0);
@@ -74,13 +66,13 @@ static double logarithm_of_exponential_error(float x)
     return fabs((double)logarithm(exponential(x)) - (double)x);
 }
 
-static void test_exponential_is_2e_minus_7_off_within_80_and_exact_at_0(void)
+TEST(exponential_is_2e_minus_7_off_within_80_and_exact_at_0)
 {
     TEST_ASSERT_DOUBLE_WITHIN(2.0e-7, 0.0, greatest_error(exponential_error, -80.0, 80.0, 0.5 * log(2.0)));
     TEST_ASSERT_TRUE(exponential(0.0f) == 1.0f);
 }
 
-static void test_exponential_beyond_80_is_that_of_the_nearer_end_and_of_nan_that_of_80(void)
+TEST(exponential_beyond_80_is_that_of_the_nearer_end_and_of_nan_that_of_80)
 {
     const float above[] = {80.001f, 1.0e30f, INFINITY, NAN};
     const float below[] = {-80.001f, -1.0e30f, -INFINITY};
@@ -90,7 +82,7 @@ static void test_exponential_beyond_80_is_that_of_the_nearer_end_and_of_nan_that
     }
 }
 
-static void test_logarithm_is_2e_minus_6_off_from_1e_minus_4_to_1e4_and_undoes_the_exponential(void)
+TEST(logarithm_is_2e_minus_6_off_from_1e_minus_4_to_1e4_and_undoes_the_exponential)
 {
     TEST_ASSERT_DOUBLE_WITHIN(2.0e-6, 0.0, greatest_error(logarithm_error, -4.0, 4.0, 1.0));
     TEST_ASSERT_DOUBLE_WITHIN(7.0e-7, 0.0, greatest_error(logarithm_of_exponential_error, -6.0, 6.0, log(2.0)));
@@ -114,12 +106,12 @@ static double small_error(float angle)
     return error_against(sine_cosine_small(angle), (double)angle);
 }
 
-static void test_sine_and_cosine_are_1_2e_minus_7_off_within_30_rad(void)
+TEST(sine_and_cosine_are_1_2e_minus_7_off_within_30_rad)
 {
     TEST_ASSERT_DOUBLE_WITHIN(1.2e-7, 0.0, greatest_error(sine_cosine_error, -30.0, 30.0, 0.7853981633974483));
 }
 
-static void test_beyond_30_rad_and_not_a_number_give_the_result_of_zero(void)
+TEST(beyond_30_rad_and_not_a_number_give_the_result_of_zero)
 {
     const float refused[] = {nextafterf(30.0f, 31.0f), -nextafterf(30.0f, 31.0f), 1.0e30f, INFINITY, -INFINITY, NAN};
     for (uint32_t k = 0u; k < 6u; k++) {
@@ -129,7 +121,7 @@ static void test_beyond_30_rad_and_not_a_number_give_the_result_of_zero(void)
 }
 
 /* Within 0.1 rad, where sigma points mostly are, nothing is left but rounding. */
-static void test_the_variant_for_small_angles_keeps_its_bounds(void)
+TEST(the_variant_for_small_angles_keeps_its_bounds)
 {
     const double bounds[3][2] = {{0.1, (double)FLT_EPSILON}, {0.25, 5.0e-7}, {0.5, 3.0e-5}};
     for (uint32_t k = 0u; k < 3u; k++) {
@@ -138,7 +130,7 @@ static void test_the_variant_for_small_angles_keeps_its_bounds(void)
     }
 }
 
-static void test_tiny_angles_are_their_own_sine_and_the_small_variant_is_odd_and_even_to_the_bit(void)
+TEST(tiny_angles_are_their_own_sine_and_the_small_variant_is_odd_and_even_to_the_bit)
 {
     const float angles[] = {0.0f, 1.0e-38f, -1.0e-20f, 1.0e-6f, -1.0e-4f};
     for (uint32_t k = 0u; k < 5u; k++) {
@@ -152,18 +144,4 @@ static void test_tiny_angles_are_their_own_sine_and_the_small_variant_is_odd_and
         const sine_cosine_t minus = sine_cosine_small(-angle);
         TEST_ASSERT_TRUE((plus.sine == -minus.sine) && (plus.cosine == minus.cosine));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(test_nearest_integer_is_exact_below_two_to_the_22_with_ties_to_even);
-    RUN_TEST(test_exponential_is_2e_minus_7_off_within_80_and_exact_at_0);
-    RUN_TEST(test_exponential_beyond_80_is_that_of_the_nearer_end_and_of_nan_that_of_80);
-    RUN_TEST(test_logarithm_is_2e_minus_6_off_from_1e_minus_4_to_1e4_and_undoes_the_exponential);
-    RUN_TEST(test_sine_and_cosine_are_1_2e_minus_7_off_within_30_rad);
-    RUN_TEST(test_beyond_30_rad_and_not_a_number_give_the_result_of_zero);
-    RUN_TEST(test_the_variant_for_small_angles_keeps_its_bounds);
-    RUN_TEST(test_tiny_angles_are_their_own_sine_and_the_small_variant_is_odd_and_even_to_the_bit);
-    return UNITY_END();
 }

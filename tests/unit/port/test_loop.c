@@ -4,7 +4,7 @@
 #include "can/e2e.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
-#include "unity.h"
+#include "test.h"
 
 /* What the loop says to the estimator passes through here. */
 static void seen_idle(lever_t *lever, uint32_t elapsed_us);
@@ -44,9 +44,7 @@ typedef struct machine {
 } machine_t;
 
 static machine_t machine;
-static machine_t second;
 static port_t port;
-static port_t second_port;
 static machine_t *seen; /* whose estimator is spoken to */
 
 static void seen_idle(lever_t *lever, uint32_t elapsed_us)
@@ -177,10 +175,6 @@ void setUp(void)
     start(&machine, &port, LOOP_HOLD, 1.0f);
 }
 
-void tearDown(void)
-{
-}
-
 static enum port_result turn(machine_t *it)
 {
     seen = it;
@@ -226,22 +220,7 @@ static void assert_all_answered(const machine_t *it)
     TEST_ASSERT_EQUAL_UINT64(0u, it->loop.totals.stale);
 }
 
-/* Two of them in turn, of which one has twice the excitation. */
-static void several_instances_answer_as_the_facade_does(void)
-{
-    start(&second, &second_port, LOOP_DROP, 2.0f);
-    while (second.received < INPUTS) {
-        (void)turn(&machine);
-        (void)turn(&second);
-    }
-    assert_all_answered(&machine);
-    assert_all_answered(&second);
-    TEST_ASSERT_NOT_EQUAL(0, memcmp(machine.sent, second.sent, sizeof machine.sent));
-    TEST_ASSERT_EQUAL_UINT64(0u, machine.loop.totals.held);
-    TEST_ASSERT_EQUAL_INT(LEVER_MODE_RUN, machine.loop.mode);
-}
-
-static void a_held_frame_is_sent_before_anything_is_received(void)
+TEST(a_held_frame_is_sent_before_anything_is_received)
 {
     machine.refusals = 3;
     turn_until_empty(&machine);
@@ -259,7 +238,7 @@ static void a_held_frame_is_sent_before_anything_is_received(void)
     TEST_ASSERT_EQUAL_INT32(LOOP_RETRY_MS, machine.timeout_ms);
 }
 
-static void without_room_a_frame_is_dropped_and_counted(void)
+TEST(without_room_a_frame_is_dropped_and_counted)
 {
     start(&machine, &port, LOOP_DROP, 1.0f);
     machine.refusals = FOREVER;
@@ -272,7 +251,7 @@ static void without_room_a_frame_is_dropped_and_counted(void)
 }
 
 /* A COMMAND_ACK belongs to no sample. */
-static void every_frame_may_be_answered(void)
+TEST(every_frame_may_be_answered)
 {
     machine.answer_id = 0x218u;
     TEST_ASSERT_EQUAL_INT(PORT_DONE, turn(&machine));
@@ -282,7 +261,7 @@ static void every_frame_may_be_answered(void)
 }
 
 /* Linux sent one that was 2,999 ms old, after an outage. */
-static void only_a_motor_command_goes_stale(void)
+TEST(only_a_motor_command_goes_stale)
 {
     static const struct {
         uint32_t id;
@@ -316,7 +295,7 @@ static void only_a_motor_command_goes_stale(void)
 
 /* The process was stopped for 3 s, say, and samples from then wait: no torque is asked for until one is known to be
  * new. */
-static void a_motor_command_to_an_old_sample_is_stale(void)
+TEST(a_motor_command_to_an_old_sample_is_stale)
 {
     machine.received = INPUTS;
     (void)turn(&machine);
@@ -334,7 +313,7 @@ static void a_motor_command_to_an_old_sample_is_stale(void)
     TEST_ASSERT_EQUAL_HEX32(MESSAGE_MOTOR_COMMAND_ID, machine.sent[machine.sends - 2].id); /* before STATE_ESTIMATE */
 }
 
-static void without_a_sample_the_estimator_is_told_each_5_ms(void)
+TEST(without_a_sample_the_estimator_is_told_each_5_ms)
 {
     const uint32_t since_us = machine.clock_us;
 
@@ -362,7 +341,7 @@ static void without_a_sample_the_estimator_is_told_each_5_ms(void)
     TEST_ASSERT_EQUAL_UINT32(0u, machine.idles);
 }
 
-static void in_lock_step_time_is_that_of_the_samples(void)
+TEST(in_lock_step_time_is_that_of_the_samples)
 {
     machine.loop.lock_step = true;
     machine.received = INPUTS;
@@ -373,7 +352,7 @@ static void in_lock_step_time_is_that_of_the_samples(void)
 }
 
 /* The torque of a dither that is on when samples cease is zero 100 ms later at the latest, and was not cut off. */
-static void torque_fades_when_no_sample_comes(void)
+TEST(torque_fades_when_no_sample_comes)
 {
     const lever_command_t dither = {.model = LEVER_KEEP,
         .preload = LEVER_KEEP,
@@ -397,7 +376,7 @@ static void torque_fades_when_no_sample_comes(void)
     TEST_ASSERT_EQUAL_HEX8_ARRAY(zero, &machine.sent[machine.sends - 1].data[2], 2);
 }
 
-static void a_request_to_end_is_seen_under_full_load(void)
+TEST(a_request_to_end_is_seen_under_full_load)
 {
     machine.turns_left = 1;
     for (int i = 1; i < LOOP_BATCH; i++) {
@@ -409,7 +388,7 @@ static void a_request_to_end_is_seen_under_full_load(void)
 }
 
 /* A link that is lost while the loop receives, or holds a frame, and comes back: nothing is lost or sent twice. */
-static void an_outage_leaves_everything_as_it_was(void)
+TEST(an_outage_leaves_everything_as_it_was)
 {
     port.restore = restore_link;
     for (int i = 1; machine.received < INPUTS; i++) {
@@ -427,7 +406,7 @@ static void an_outage_leaves_everything_as_it_was(void)
     TEST_ASSERT_EQUAL_UINT64(machine.attempts, machine.loop.totals.outages);
 }
 
-static void pauses_of_an_outage_double_up_to_a_bound(void)
+TEST(pauses_of_an_outage_double_up_to_a_bound)
 {
     static const uint32_t pauses_ms[] = {10u, 20u, 40u, 80u, 160u, 320u, 500u, 500u, 500u};
     uint32_t since_us = machine.clock_us;
@@ -451,7 +430,7 @@ static void pauses_of_an_outage_double_up_to_a_bound(void)
 }
 
 /* Whoever prints that waits for no frame first, which may never come in lock-step. */
-static void the_turn_that_restores_a_link_ends_at_once(void)
+TEST(the_turn_that_restores_a_link_ends_at_once)
 {
     port.restore = restore_link;
     machine.loop.lock_step = true;
@@ -465,7 +444,7 @@ static void the_turn_that_restores_a_link_ends_at_once(void)
     TEST_ASSERT_EQUAL_INT(waits, machine.waits);
 }
 
-static void what_is_beyond_repair_ends_it(void)
+TEST(what_is_beyond_repair_ends_it)
 {
     machine.says = PORT_BROKEN;
     TEST_ASSERT_EQUAL_INT(PORT_BROKEN, turn(&machine));
@@ -478,7 +457,7 @@ static void what_is_beyond_repair_ends_it(void)
     TEST_ASSERT_EQUAL_INT(PORT_BROKEN, turn(&machine));
 }
 
-static void the_state_of_the_machine_reaches_the_bus(void)
+TEST(the_state_of_the_machine_reaches_the_bus)
 {
     message_health_t health = {0};
 
@@ -491,25 +470,4 @@ static void the_state_of_the_machine_reaches_the_bus(void)
         }
     }
     TEST_ASSERT_BITS_HIGH(LEVER_FAULT_PLATFORM, health.faults);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(several_instances_answer_as_the_facade_does);
-    RUN_TEST(a_held_frame_is_sent_before_anything_is_received);
-    RUN_TEST(without_room_a_frame_is_dropped_and_counted);
-    RUN_TEST(every_frame_may_be_answered);
-    RUN_TEST(only_a_motor_command_goes_stale);
-    RUN_TEST(a_motor_command_to_an_old_sample_is_stale);
-    RUN_TEST(without_a_sample_the_estimator_is_told_each_5_ms);
-    RUN_TEST(in_lock_step_time_is_that_of_the_samples);
-    RUN_TEST(torque_fades_when_no_sample_comes);
-    RUN_TEST(a_request_to_end_is_seen_under_full_load);
-    RUN_TEST(an_outage_leaves_everything_as_it_was);
-    RUN_TEST(pauses_of_an_outage_double_up_to_a_bound);
-    RUN_TEST(the_turn_that_restores_a_link_ends_at_once);
-    RUN_TEST(what_is_beyond_repair_ends_it);
-    RUN_TEST(the_state_of_the_machine_reaches_the_bus);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "port/embedded/ring.h"
-#include "unity.h"
+#include "test.h"
 
 enum { SIZE = 16 };
 
@@ -14,11 +14,7 @@ void setUp(void)
     ring = (ring_t){.bytes = bytes, .size = SIZE};
 }
 
-void tearDown(void)
-{
-}
-
-static void empty_gives_nothing(void)
+TEST(empty_gives_nothing)
 {
     uint8_t byte = 0x5A;
 
@@ -27,7 +23,7 @@ static void empty_gives_nothing(void)
     TEST_ASSERT_EQUAL_HEX8(0x5A, byte);
 }
 
-static void takes_exactly_its_size(void)
+TEST(takes_exactly_its_size)
 {
     const uint8_t record[SIZE + 1] = {1, 2, 3};
 
@@ -38,7 +34,7 @@ static void takes_exactly_its_size(void)
     TEST_ASSERT_EQUAL_UINT32(SIZE, ring_used(&ring));
 }
 
-static void a_record_that_has_not_all_come_stays(void)
+TEST(a_record_that_has_not_all_come_stays)
 {
     const uint8_t record[3] = {7, 8, 9};
     uint8_t got[4] = {0};
@@ -50,7 +46,7 @@ static void a_record_that_has_not_all_come_stays(void)
 }
 
 /* From any start of the indices, with records that wrap at every place of the buffer, and over the wrap at 2^32. */
-static void keeps_order_over_every_wrap(void)
+TEST(keeps_order_over_every_wrap)
 {
     ring.put = UINT32_MAX - 100u;
     ring.got = ring.put;
@@ -74,7 +70,7 @@ static void keeps_order_over_every_wrap(void)
     TEST_ASSERT_EQUAL_UINT32((uint8_t)(next_in - next_out), ring_used(&ring));
 }
 
-static void clear_empties(void)
+TEST(clear_empties)
 {
     const uint8_t record[5] = {1, 2, 3, 4, 5};
     uint8_t byte = 0u;
@@ -85,15 +81,4 @@ static void clear_empties(void)
     TEST_ASSERT_TRUE(ring_put(&ring, record, 5u));
     TEST_ASSERT_TRUE(ring_get(&ring, &byte, 1u));
     TEST_ASSERT_EQUAL_HEX8(1, byte);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(empty_gives_nothing);
-    RUN_TEST(takes_exactly_its_size);
-    RUN_TEST(a_record_that_has_not_all_come_stays);
-    RUN_TEST(keeps_order_over_every_wrap);
-    RUN_TEST(clear_empties);
-    return UNITY_END();
 }

@@ -1,47 +1,14 @@
-/* What of the STM32F405 port is arithmetic: addresses, PLL, bit timing; and its drivers on registers that are plain
- * memory here. How they do on a bxCAN that behaves like one: tests/target. */
+/* What of the STM32F405 port is arithmetic: addresses, PLL, bit timing. How its drivers do on a bxCAN and clocks that behave like
+ * ones: tests/target/bxcan. */
 #include <stddef.h>
-#include <string.h>
 
-#include "can/messages.h"
 #include "port/stm32f4/bit_timing.h"
-#include "port/stm32f4/can.c"   /* NOLINT(bugprone-suspicious-include): with memory for its registers */
-#include "port/stm32f4/clock.c" /* NOLINT(bugprone-suspicious-include) */
-#include "unity.h"
-
-rcc_t rcc;
-pwr_t pwr;
-flash_t flash;
-gpio_t gpiob;
-can_t can1;
-nvic_t nvic;
-scb_t scb;
-
-static const clock_rates_t full = {.pll = true, .crystal = true};
-
-void setUp(void)
-{
-    (void)memset((void *)&rcc, 0, sizeof rcc);
-    (void)memset((void *)&flash, 0, sizeof flash);
-    (void)memset((void *)&gpiob, 0, sizeof gpiob);
-    (void)memset((void *)&can1, 0, sizeof can1);
-    ring_clear(&received);
-    ring_clear(&waiting);
-    (void)memset(since_ms, 0, sizeof since_ms);
-    time_ms = 0u;
-    crystal_state = 0u;
-    off = false;
-    counts.dropped = 0u;
-    counts.overruns = 0u;
-    counts.bus_offs = 0u;
-}
-
-void tearDown(void)
-{
-}
+#include "port/stm32f4/clock.h"
+#include "port/stm32f4/registers.h"
+#include "test.h"
 
 /* Offsets as the register maps of RM0090 (7.3.24, 8.4.11, 30.6.8, 32.9.5) and PM0214 (4.4.20) print them. */
-static void registers_are_where_the_manual_says(void)
+TEST(registers_are_where_the_manual_says)
 {
     TEST_ASSERT_EQUAL_HEX(0x30, offsetof(rcc_t, AHB1ENR));
     TEST_ASSERT_EQUAL_HEX(0x40, offsetof(rcc_t, APB1ENR));
@@ -63,7 +30,7 @@ static void registers_are_where_the_manual_says(void)
 }
 
 /* VCO of 336 MHz and its input of 1 to 2 MHz (RM0090 7.3.2), for the crystals that boards have. */
-static void pll_reaches_168_mhz_from_every_crystal(void)
+TEST(pll_reaches_168_mhz_from_every_crystal)
 {
     for (int mhz = 4; mhz <= 26; mhz++) {
         const int m = CLOCK_PLL_M(mhz);
@@ -75,7 +42,7 @@ static void pll_reaches_168_mhz_from_every_crystal(void)
 
 /* By hand from RM0090 32.7.7: 42 MHz / 2 is 21 quanta a bit, 1 + 15 before the sample point (76.2 %) and 5 after it; 16
  * MHz is 16 quanta, 1 + 11 (75 %) and 4. The jump width is 4. */
-static void bit_timing_is_what_one_gets_by_hand(void)
+TEST(bit_timing_is_what_one_gets_by_hand)
 {
     TEST_ASSERT_EQUAL_HEX32(0x034E0001u, BIT_TIMING_BTR(42000000));
     TEST_ASSERT_EQUAL_HEX32(0x033A0000u, BIT_TIMING_BTR(16000000));
@@ -84,7 +51,7 @@ static void bit_timing_is_what_one_gets_by_hand(void)
 }
 
 /* Every clock that is accepted gives 1 Mbit/s within the hardware's limits; some must be refused. */
-static void bit_timing_is_exact_or_refused(void)
+TEST(bit_timing_is_exact_or_refused)
 {
     int accepted = 0;
 
@@ -99,51 +66,4 @@ static void bit_timing_is_exact_or_refused(void)
     TEST_ASSERT_GREATER_THAN_INT(20, accepted);
     TEST_ASSERT_FALSE(BIT_TIMING_IS_GOOD(42500000)); /* no whole number of quanta */
     TEST_ASSERT_FALSE(BIT_TIMING_IS_GOOD(4000000));  /* too few of them */
-}
-
-/* RM0090 figure 342: a 16-bit identifier is STID[10:0] RTR IDE EXID[17:15]. */
-static void filter_lets_the_inputs_through(void)
-{
-    can_start(&full);
-    TEST_ASSERT_EQUAL_HEX32(0x22202200u, can1.FR[0][0]); /* 0x111, 0x110 */
-    TEST_ASSERT_EQUAL_HEX32(0x24002240u, can1.FR[0][1]); /* 0x120, 0x112 */
-    TEST_ASSERT_EQUAL_HEX32(0x42E042E0u, can1.FR[1][0]); /* 0x217, as often as there is room */
-    TEST_ASSERT_EQUAL_HEX32(0x42E042E0u, can1.FR[1][1]);
-    TEST_ASSERT_EQUAL_HEX32(3u, can1.FM1R);
-    TEST_ASSERT_EQUAL_HEX32(3u, can1.FA1R);
-    TEST_ASSERT_EQUAL_HEX32(0u, can1.FS1R | can1.FFA1R | (can1.FMR & 1u));
-}
-
-/* A clock tree of which nothing is ever ready, as in QEMU. */
-static void without_any_clock_the_internal_one_runs_on(void)
-{
-    const clock_rates_t rates = clock_start();
-
-    TEST_ASSERT_FALSE(rates.pll);
-    TEST_ASSERT_FALSE(rates.crystal);
-    TEST_ASSERT_EQUAL_UINT32(16000000u, rates.core_hz);
-    TEST_ASSERT_EQUAL_HEX32(0u, rcc.CFGR);
-}
-
-/* Registers of memory keep what is written, so a ready flag that is set here stays. */
-static void without_crystal_the_pll_runs_from_the_internal_oscillator(void)
-{
-    rcc.CR = RCC_CR_PLLRDY;
-    (void)clock_start();
-    TEST_ASSERT_EQUAL_HEX32(8u | (168u << 6) | (7u << 24), rcc.PLLCFGR); /* 16 MHz / 8 * 168, source HSI */
-    TEST_ASSERT_EQUAL_HEX32(0x705u, flash.ACR);
-    TEST_ASSERT_EQUAL_HEX32(0u, rcc.CR & (RCC_CR_HSEON | RCC_CR_CSSON));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(registers_are_where_the_manual_says);
-    RUN_TEST(pll_reaches_168_mhz_from_every_crystal);
-    RUN_TEST(bit_timing_is_what_one_gets_by_hand);
-    RUN_TEST(bit_timing_is_exact_or_refused);
-    RUN_TEST(filter_lets_the_inputs_through);
-    RUN_TEST(without_any_clock_the_internal_one_runs_on);
-    RUN_TEST(without_crystal_the_pll_runs_from_the_internal_oscillator);
-    return UNITY_END();
 }

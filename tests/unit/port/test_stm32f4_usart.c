@@ -4,7 +4,7 @@
 
 #include "port/stm32f4/transport_slcan.c" /* NOLINT(bugprone-suspicious-include): with memory for the registers */
 #include "port/stm32f4/usart.c"           /* NOLINT(bugprone-suspicious-include) */
-#include "unity.h"
+#include "test.h"
 
 rcc_t rcc;
 gpio_t gpioa;
@@ -28,10 +28,6 @@ void setUp(void)
     transport_start(&full);
 }
 
-void tearDown(void)
-{
-}
-
 /* The bytes, as if they had come by interrupt. */
 static void receive_text(const char *text)
 {
@@ -41,7 +37,7 @@ static void receive_text(const char *text)
 }
 
 /* RM0090 30.3.4: 84 MHz and 16 MHz by 1 Mbit/s. */
-static void start_gives_rate_and_pins(void)
+TEST(start_gives_rate_and_pins)
 {
     const clock_rates_t raw = {.pll = false};
 
@@ -53,7 +49,7 @@ static void start_gives_rate_and_pins(void)
     TEST_ASSERT_EQUAL_UINT32(16u, usart1.BRR);
 }
 
-static void received_byte_is_read_and_counted_as_overrun_when_one_was_lost(void)
+TEST(received_byte_is_read_and_counted_as_overrun_when_one_was_lost)
 {
     uint8_t byte = 0u;
 
@@ -70,7 +66,7 @@ static void received_byte_is_read_and_counted_as_overrun_when_one_was_lost(void)
 }
 
 /* A receiver that says for ever that it has a byte must not hold the processor. */
-static void an_interrupt_takes_so_many_bytes_and_a_full_ring_counts(void)
+TEST(an_interrupt_takes_so_many_bytes_and_a_full_ring_counts)
 {
     usart1.SR = BIT(5);
     usart_interrupt();
@@ -82,7 +78,7 @@ static void an_interrupt_takes_so_many_bytes_and_a_full_ring_counts(void)
     TEST_ASSERT_EQUAL_UINT32(32u, usart_overruns());
 }
 
-static void what_the_hardware_has_no_room_for_goes_by_interrupt(void)
+TEST(what_the_hardware_has_no_room_for_goes_by_interrupt)
 {
     TEST_ASSERT_TRUE(usart_write("ab", 2u));
     TEST_ASSERT_EQUAL_UINT32(2u, ring_used(&waiting));
@@ -94,7 +90,7 @@ static void what_the_hardware_has_no_room_for_goes_by_interrupt(void)
     TEST_ASSERT_BITS_LOW(BIT(7), usart1.CR1);
 }
 
-static void a_line_without_room_is_dropped_whole(void)
+TEST(a_line_without_room_is_dropped_whole)
 {
     static const char line[31];
 
@@ -105,7 +101,7 @@ static void a_line_without_room_is_dropped_whole(void)
     TEST_ASSERT_EQUAL_UINT32(66u * 31u, ring_used(&waiting));
 }
 
-static void only_data_frames_with_11_bit_identifiers_reach_the_estimator(void)
+TEST(only_data_frames_with_11_bit_identifiers_reach_the_estimator)
 {
     lever_frame_t frame;
 
@@ -119,7 +115,7 @@ static void only_data_frames_with_11_bit_identifiers_reach_the_estimator(void)
 }
 
 /* 2,000 bytes take 20 ms at 1 Mbit/s; a line has 22. */
-static void a_motor_command_that_would_leave_late_has_no_room(void)
+TEST(a_motor_command_that_would_leave_late_has_no_room)
 {
     static const lever_frame_t motor = {.id = 0x215u, .length = 8u};
     static const lever_frame_t state = {.id = 0x210u, .length = 8u};
@@ -135,7 +131,7 @@ static void a_motor_command_that_would_leave_late_has_no_room(void)
     TEST_ASSERT_EQUAL_INT(PORT_DONE, transport_send(NULL, &state));
 }
 
-static void losses_are_in_the_status_and_in_the_flags(void)
+TEST(losses_are_in_the_status_and_in_the_flags)
 {
     static const lever_frame_t frame = {.id = 0x210u, .length = 8u};
     lever_platform_t status = {0};
@@ -156,18 +152,4 @@ static void losses_are_in_the_status_and_in_the_flags(void)
     transport_status(&status);
     TEST_ASSERT_GREATER_THAN_UINT32(0u, status.overruns);
     TEST_ASSERT_BITS_HIGH(SLCAN_STATUS_DATA_OVERRUN, peer.status);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(start_gives_rate_and_pins);
-    RUN_TEST(received_byte_is_read_and_counted_as_overrun_when_one_was_lost);
-    RUN_TEST(an_interrupt_takes_so_many_bytes_and_a_full_ring_counts);
-    RUN_TEST(what_the_hardware_has_no_room_for_goes_by_interrupt);
-    RUN_TEST(a_line_without_room_is_dropped_whole);
-    RUN_TEST(only_data_frames_with_11_bit_identifiers_reach_the_estimator);
-    RUN_TEST(a_motor_command_that_would_leave_late_has_no_room);
-    RUN_TEST(losses_are_in_the_status_and_in_the_flags);
-    return UNITY_END();
 }
