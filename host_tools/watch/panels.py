@@ -51,12 +51,13 @@ def condition(picture: Picture, source: Source) -> Text:
     return Text(f"● {text}", style=_COLOURS[level], no_wrap=True, overflow="ellipsis")
 
 
-def estimates(picture: Picture, span: float, width: int) -> Table:
-    """Parameters and dynamics with sigma, and how they went in the last `span` seconds; `width` [characters]."""
+def estimates(picture: Picture, span: float, width: int, height: int = 1) -> Table:
+    """Parameters and dynamics with sigma, and how they went in the last `span` seconds; `width` [characters], and
+    `height` [lines] of each."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     for justify, column_width in _COLUMNS:
         table.add_column(justify=justify, width=column_width, no_wrap=True)
-    sparkline_width = max(0, width - ESTIMATES_WIDTH)
+    sparkline_width, apart = max(0, width - ESTIMATES_WIDTH), "\n" if height > 1 else ""
     table.add_column(width=sparkline_width, no_wrap=True)
     titles = ("", "estimate", "± σ", "unit", "σ [%]", f"{span:.0f} s [%]", "trend" if sparkline_width > 5 else "")
     table.add_row(*(Text(title, style="dim") for title in titles))
@@ -69,7 +70,7 @@ def estimates(picture: Picture, span: float, width: int) -> Table:
             _UNIT.get(entry.unit, entry.unit),
             _number(100.0 * entry.sigma / abs(entry.value) if entry.value else math.nan, 2),
             _change(entry, recent),
-            Text(sparkline(recent, entry.sigma, sparkline_width), style="cyan"),
+            Text(sparkline(recent, entry.sigma, sparkline_width, max(height - 1, 1)) + apart, style="cyan"),
         )
     if not picture.parameters():
         table.add_row(Text("parameters", style="bold"), Text("none yet", style="dim"))
@@ -106,8 +107,8 @@ def _at(measured: Measured | None, frequency: float) -> float:
     return math.nan if measured is None else float(np.interp(frequency, measured.frequency, measured.coherence))
 
 
-def sparkline(values: Sequence[float], least_range: float, width: int) -> str:
-    """The values as blocks, oldest left; a range smaller than `least_range` does not fill the height."""
+def sparkline(values: Sequence[float], least_range: float, width: int, height: int = 1) -> str:
+    """The values as blocks, oldest left, in `height` lines; a range smaller than `least_range` does not fill them."""
     if width < 1 or not values:
         return ""
     chosen = [values[min(len(values) - 1, int((k + 0.5) * len(values) / width))] for k in range(width)]
@@ -118,8 +119,10 @@ def sparkline(values: Sequence[float], least_range: float, width: int) -> str:
     least = least_range if math.isfinite(least_range) else 0.0
     half = max(high - low, least, 1e-12 * max(abs(low), abs(high)), 1e-30) / 2.0
     bottom = (low + high) / 2.0 - half
-    steps = len(_BLOCKS) - 1
-    return "".join(_BLOCKS[round((v - bottom) / (2.0 * half) * steps)] if math.isfinite(v) else " " for v in chosen)
+    eighths = height * len(_BLOCKS)
+    levels = [1 + round((v - bottom) / (2.0 * half) * (eighths - 1)) if math.isfinite(v) else 0 for v in chosen]
+    lines = range(eighths - len(_BLOCKS), -1, -len(_BLOCKS))  # by the level of their foot, from the top
+    return "\n".join("".join((" " + _BLOCKS)[min(max(level - foot, 0), 8)] for level in levels) for foot in lines)
 
 
 def health(picture: Picture, source: Source) -> Table:

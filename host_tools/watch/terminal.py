@@ -19,6 +19,9 @@ SPANS = (30.0, 120.0, 300.0, 10.0)
 TALL = 32
 """[lines] from which on the feedthrough is shown unasked."""
 
+_FEEDTHROUGH_LINES = 8
+_OTHER_LINES = 25  # headline, condition, frame and titles of the estimates, health and messages, keys
+
 
 class Monitor(App[None]):
     """The view of a source, which it starts and stops; for `duration` [s], or until the user ends it."""
@@ -86,10 +89,18 @@ class Monitor(App[None]):
         picture, source, tables = self.picture, self.source, self._tables
         self._lines["headline"].update(panels.headline(picture, source))
         self._lines["condition"].update(panels.condition(picture, source))
-        tables["estimates"].update(panels.estimates(picture, self.span, tables["estimates"].size.width))
+        tables["estimates"].update(
+            panels.estimates(picture, self.span, tables["estimates"].size.width, self._trend_height())
+        )
         tables["feedthrough"].update(panels.feedthrough(picture))
         tables["health"].update(panels.health(picture, source))
         tables["messages"].update(panels.messages(picture))
+
+    def _trend_height(self) -> int:
+        """[lines] of each trend: what the other panels leave."""
+        taken = _OTHER_LINES + (_FEEDTHROUGH_LINES if self._panels["feedthrough"].display else 0)
+        entries = len(self.picture.parameters()) + len(self.picture.dynamics())
+        return max(1, (self.size.height - taken) // entries)
 
     def action_hold(self) -> None:
         """Stops or goes on redrawing; frames are counted meanwhile."""
