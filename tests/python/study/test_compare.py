@@ -559,7 +559,6 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
-<<<<<<< HEAD
 
 
 def test_a_figure_for_print_is_what_the_page_shows() -> None:
@@ -585,14 +584,3 @@ def test_a_figure_for_print_is_what_the_page_shows() -> None:
         words = "".join(ElementTree.fromstring(svg).itertext())
         assert all(name in words for name in (("joint", "rls", "error") if shown is figure else ("median", "time [s]")))
         assert printed.render(shown.spec(), "name", "pdf", provenance()).startswith(b"%PDF")
-
-
-def test_interrupted_it_writes_nothing(lever: Lever, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(campaign, "run", interrupted)
-    assert lever("compare", "--quick", "--out", str(tmp_path)) == 130
-    assert list(tmp_path.iterdir()) == []
-=======
->>>>>>> main
