@@ -79,7 +79,7 @@ def _lay_out(axes: Axes, figure: Spec) -> None:
 
 
 def _draw(axes: Axes, figure: Spec) -> None:
-    below: Array | None = None  # the lower edge of a band
+    below: Array = np.zeros(0)  # the lower edge of a band
     for trace in figure["data"]:
         x, y = _values(trace["x"]), _values(trace["y"])
         label = in_mathtext(trace["name"]) if trace.get("showlegend", True) else None

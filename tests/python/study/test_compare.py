@@ -17,7 +17,7 @@ import pytest
 from lever_cdkf.host_tools import interrupts
 from lever_cdkf.host_tools.firmware.native import enum_names, settings_table
 from lever_cdkf.host_tools.provenance import provenance
-from lever_cdkf.host_tools.report import figure as chart
+from lever_cdkf.host_tools.report import figure as drawing
 from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.study.baselines import BASELINES
 from lever_cdkf.sil.study.compare import (
@@ -564,17 +564,17 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
 def test_a_figure_for_print_is_what_the_page_shows() -> None:
     """Lanes of two estimators, of which one has no error, and a band about a curve."""
     lanes: dict[str, Any] = {"tickvals": [0, 1], "ticktext": ["joint", "rls"], "range": [1.5, -0.5]}
-    figure = chart.Figure([lanes], chart.axis("error", type="log"), 200, over_time=False)
+    figure = drawing.Figure([lanes], drawing.axis("error", type="log"), 200, over_time=False)
     marker = {"color": ["@estimate", "@joint"], "size": 8, "symbol": "square"}
     errors = {"type": "data", "array": [0.25, 0.0], "color": "@mark"}
-    figure.add(chart.dots(np.array([1.5, 2.5]), np.array([0.0, 1.0]), "rough", "text", marker=marker, error_x=errors))
+    figure.add(drawing.dots(np.array([1.5, 2.5]), np.array([0.0, 1.0]), "rough", "text", marker=marker, error_x=errors))
     assert list(csv.reader(io.StringIO(printed.table(figure.spec())))) == [
         list(printed.COLUMNS), ["rough", "joint", "1.5", "0", "0.25"], ["rough", "rls", "2.5", "1", ""]
     ]  # fmt: skip
     x = np.linspace(0.0, 1.0, 50)
-    curve = chart.Figure([chart.axis("y", range=[0, 10])], chart.axis("time [s]"), 380, over_time=False)
-    curve.add(*chart.band(x, 2.0 + x, 4.0 + x, "middle half", "estimate-band"))
-    curve.add(chart.line(x, 3.0 + x, "median", "estimate"))
+    curve = drawing.Figure([drawing.axis("y", range=[0, 10])], drawing.axis("time [s]"), 380, over_time=False)
+    curve.add(*drawing.band(x, 2.0 + x, 4.0 + x, "middle half", "estimate-band"))
+    curve.add(drawing.line(x, 3.0 + x, "median", "estimate"))
     curve.level(5.0)
     for shown in (figure, curve):
         svg = printed.render(shown.spec(), "name", "svg", provenance()).decode()
