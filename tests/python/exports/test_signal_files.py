@@ -277,7 +277,8 @@ def test_an_input_is_not_written_over(session: Session, refused: Refused, tmp_pa
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_full_disk_is_an_error_that_names_the_file(name: str, tmp_path: Path) -> None:
     count = 50_000
-    trace: Trace = {"time_s": np.arange(count) * 1e-3, "theta_measured_rad": np.random.default_rng(1).random(count)}
+    time = np.linspace(0.0, 50.0, count)
+    trace: Trace = {"time_s": time, "theta_measured_rad": np.random.default_rng(1).random(count)}
     rows = np.ones(count, np.bool_)
 
     def write() -> None:
