@@ -43,33 +43,6 @@ static float pass_input(enum trim_signal input, float value)
     return passed;
 }
 
-/* Value k of each signal into the trim; the deviations of theta, theta_dot, z_ddot, tau_m. */
-static void pass_all(float signal, float deviation[4])
-{
-    const float x[MODEL_STATES] = {0.0f, 0.0f};
-    const bool valid[MODEL_STATES] = {true, true};
-    float y[MODEL_STATES] = {0.35f + signal, signal}; /* the level of theta starts at the trim angle */
-    TEST_ASSERT_FALSE(trim_outputs(&trim, x, y, valid, PERIOD));
-    deviation[0] = y[0];
-    deviation[1] = y[1];
-    deviation[2] = pass_input(TRIM_Z_DDOT, signal);
-    deviation[3] = pass_input(TRIM_TAU_M, signal);
-}
-
-/* Outputs and inputs of a linear system obey it after the same high-pass, too: all four must pass the same. */
-TEST(every_signal_passes_the_same_high_pass)
-{
-    for (uint32_t k = 0u; k < 3000u; k++) {
-        float deviation[4];
-        pass_all((float)sin(TURN * 2.3 * (double)PERIOD * (double)k) + 0.5f, deviation);
-        TEST_ASSERT_TRUE((deviation[1] == deviation[2]) && (deviation[1] == deviation[3]));
-        TEST_ASSERT_FLOAT_WITHIN(5.0e-6f, deviation[1], deviation[0]);
-    }
-    trim_set_origin(&trim);
-    TEST_ASSERT_TRUE(trim.origin[0] == trim_angle(&trim));
-    TEST_ASSERT_FLOAT_WITHIN(5.0e-6f, 0.35f + trim.origin[1], trim.origin[0]);
-}
-
 TEST(in_preload_fixed_signals_stay_and_only_the_trim_angle_follows)
 {
     const float x[MODEL_STATES] = {0.0f, 0.0f};
