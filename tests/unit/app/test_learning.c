@@ -56,7 +56,8 @@ TEST_EACH(COMBINATIONS, frozen_neither_learns_nor_walks_nor_forgets)
     TEST_ASSERT_TRUE(estimate().parameter[0] != before.parameter[0]);
 }
 
-/* However wildly they walk, and whatever the adaptation: at the floor of the walk, no less certain than at the start. */
+/* However wildly they walk, and whatever the adaptation: at the floor of the walk, no less certain than at the
+ * start. */
 TEST_EACH(COMBINATIONS, without_excitation_nothing_is_learnt_and_nothing_winds_up)
 {
     config = config_of(test_round);

@@ -79,21 +79,6 @@ TEST(a_signal_that_is_not_sent_or_not_valid_is_not_stuck)
     TEST_ASSERT_FALSE(monitor_has_just_stuck(&monitor) || monitor_has_stuck(&monitor));
 }
 
-/* At rest a sensor of coarse resolution stands still, and is right. */
-TEST(outputs_that_stand_still_as_expected_are_not_stuck)
-{
-    for (uint32_t which = 0u; which < (uint32_t)CDKF_OUTPUTS; which++) {
-        setUp();
-        for (uint32_t k = 0u; k < 50u; k++) {
-            (void)block(which, (float)k);
-        }
-        for (uint32_t k = 0u; k < 1000u; k++) {
-            surprise(1.2, (uint32_t)SAMPLES);
-            TEST_ASSERT_FALSE(block(which, 0.5f));
-        }
-    }
-}
-
 /* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never
  * stands still. */
 TEST(a_base_acceleration_that_always_changed_is_stuck_without_the_innovations)
@@ -214,16 +199,4 @@ TEST(the_verdict_on_the_base_has_hysteresis)
         (void)respond(500u, gains[k], 1.0e5);
         TEST_ASSERT_TRUE(monitor.base_wrong);
     }
-}
-
-TEST(what_was_seen_of_the_base_can_be_forgotten)
-{
-    (void)respond(100u, 0.0, 1000.0);
-    TEST_ASSERT_TRUE(monitor.base_wrong);
-    monitor_trust_base(&monitor);
-    TEST_ASSERT_FALSE(monitor.base_wrong);
-    (void)respond(10u, 0.0, 450.0);
-    monitor_trust_base(&monitor);
-    (void)respond(10u, 0.0, 450.0); /* together it would be enough */
-    TEST_ASSERT_FALSE(monitor.base_wrong);
 }

@@ -1,5 +1,5 @@
-/* What breaks is refused, restarted and said; what breaks again and again is a fault that only a reset leaves. Damage is done to
- * the estimator's own memory, as nothing from outside should be able to do it. */
+/* What breaks is refused, restarted and said; what breaks again and again is a fault that only a reset leaves.
+ * Damage is done to the estimator's own memory, as nothing from outside should be able to do it. */
 #include "app/instance.h"
 #include "rig.h"
 
@@ -151,8 +151,8 @@ TEST_EACH(COMBINATIONS, an_estimate_beyond_a_bound_is_held_there_and_said)
     TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
 }
 
-/* An angle a million standard deviations off after an outage is refused, and does not make the average deaf for what comes
- * later: more noise than is set, with no window to find it in. */
+/* An angle a million standard deviations off after an outage is refused, and does not make the average deaf for what
+ * comes later: more noise than is set, with no window to find it in. */
 TEST(a_huge_innovation_after_an_outage_does_not_spoil_the_average)
 {
     config.settings.noise_window = 0.0f;

@@ -7,30 +7,12 @@
 
 #define CORNER 1.0f    /* [Hz] */
 #define PERIOD 1.0e-3f /* [s] */
-#define TURN 6.283185307179586
 
-static high_pass_t filter;
 static trim_t trim;
 
 void setUp(void)
 {
-    filter = (high_pass_t){.level = 0.35f};
     trim_start(&trim, 0.35f, CORNER, true);
-}
-
-/* --- high-pass ---------------------------------------------------------------------------------------------------- */
-
-static double step_with(float value)
-{
-    return (double)high_pass_step(&filter, value, (float)TURN * CORNER * PERIOD, HIGH_PASS_BUTTERWORTH);
-}
-
-TEST(a_constant_has_no_deviation_and_a_value_is_compared_with_the_level_before_it)
-{
-    for (uint32_t k = 0u; k < 1000u; k++) {
-        TEST_ASSERT_TRUE(step_with(0.35f) == 0.0);
-    }
-    TEST_ASSERT_TRUE(step_with(0.45f) == (double)(0.45f - 0.35f));
 }
 
 /* --- trim --------------------------------------------------------------------------------------------------------- */

@@ -1,5 +1,6 @@
-/* The loop of every port, against a port and a clock that are played here: what is dropped or held, what goes stale, what the
- * estimator is told of time, outages. That frames are those of the estimator, and whole processes: tests/vcan, tests/slcan. */
+/* The loop of every port, against a port and a clock that are played here: what is dropped or held, what goes stale,
+ * what the estimator is told of time, outages. That frames are those of the estimator, and whole processes:
+ * tests/vcan, tests/slcan. */
 #include <string.h>
 
 #include "can/e2e.h"

@@ -1,0 +1,72 @@
+/* Detection of sudden changes: a drift is one as soon as its chi-square says so. */
+#include "filter/change_detection.h"
+
+#include "test.h"
+
+enum { L = MODEL_PARAMETERS };
+
+#define PERIOD 0.01f
+#define MEMORY 0.3f
+#define THRESHOLD 30.0f
+
+static change_detection_t change;
+static const double sigma[L] = {1.0e-3, 3.0e-4, 2.0e-2}; /* of a correction: scales do not matter */
+
+void setUp(void)
+{
+    change_detection_init(&change);
+}
+
+/* How many of so many corrections are changes; each is `drift` sigmas off. */
+static uint32_t detections(uint32_t steps, double drift, float threshold)
+{
+    uint32_t count = 0u;
+    for (uint32_t k = 0u; k < steps; k++) {
+        correction_t correction;
+        for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+            correction.w[i] = (float)(sigma[i] * drift);
+            correction.variance[i] = (float)(sigma[i] * sigma[i]);
+        }
+        count += change_detection_step(&change, &correction, PERIOD, MEMORY, threshold) ? 1u : 0u;
+    }
+    return count;
+}
+
+/* Without noise the sum of n corrections of d sigmas has the statistic 3 (d sum r^k)^2 / sum r^2k, r = 1 -
+ * period/memory. */
+TEST(a_drift_is_found_when_its_chi_square_says_so_and_the_sum_starts_anew)
+{
+    const double keep = 1.0 - ((double)PERIOD / (double)MEMORY);
+    const double drift = 1.2;
+    double sum = 0.0;
+    double squares = 0.0;
+    uint32_t wanted = 0u;
+    while ((3.0 * drift * drift * sum * sum) <= ((double)THRESHOLD * squares)) {
+        sum = (keep * sum) + 1.0;
+        squares = (keep * keep * squares) + 1.0;
+        wanted++;
+    }
+    TEST_ASSERT_TRUE((wanted > 3u) && (wanted < 30u));
+    TEST_ASSERT_EQUAL_UINT32(0u, detections(wanted - 1u, drift, THRESHOLD));
+    uint32_t late = 0u; /* the long average has risen a little, too */
+    while (detections(1u, drift, THRESHOLD) == 0u) {
+        late++;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(1u, late);
+    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+        TEST_ASSERT_TRUE((change.sum[i] == 0.0f) && (change.variance[i] == 0.0f));
+    }
+}
+
+/* Nor is it evidence when nothing was learnt, or when rounding let a variance grow. */
+TEST(a_threshold_of_zero_finds_nothing_and_what_was_not_learnt_does_not_count)
+{
+    const correction_t correction = {.w = {1.0f, 1.0f, 1.0f}, .variance = {0.0f, -1.0e-9f, 0.0f}};
+    TEST_ASSERT_EQUAL_UINT32(0u, detections(1000u, 100.0, 0.0f));
+    change_detection_init(&change);
+    TEST_ASSERT_TRUE(change.average == 1.0f);
+    for (uint32_t k = 0u; k < 1000u; k++) {
+        TEST_ASSERT_FALSE(change_detection_step(&change, &correction, PERIOD, MEMORY, THRESHOLD));
+    }
+    TEST_ASSERT_TRUE((change.average <= 1.0f) && (change.variance[1] == 0.0f));
+}
