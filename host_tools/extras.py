@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from .errors import LeverError
 
 PACKAGES = {
-    "files": ("asammdf", "h5py", "pyarrow", "scipy"),
+    "files": ("asammdf", "h5py", "mcap", "pyarrow", "scipy"),
     "flash": ("pyocd",),
     "live": ("textual", "tornado"),
     "mf4": ("asammdf",),
@@ -20,7 +20,7 @@ PACKAGES = {
 }
 """What each extra brings; imported by the same names."""
 
-_FILES = {"report.html": "report", "signals.mf4": "mf4"}
+_FILES = {"report.html": "report", "signals.mf4": "mf4", "signals.mcap": "files", "trace.parquet": "files"}
 """Files of a run that need an extra. Without it they are left out."""
 
 
@@ -43,10 +43,21 @@ def require(extra: str) -> None:
         raise LeverError(reason)
 
 
+def missing_of_file(name: str) -> str:
+    """missing() of the extra that a file of a run needs."""
+    return missing(_FILES[name]) if name in _FILES else ""
+
+
+def require_for_file(name: str) -> None:
+    """Raises LeverError where a file of a run needs an extra that is missing."""
+    if reason := missing_of_file(name):
+        raise LeverError(reason)
+
+
 def warn_of_left_out(files: Iterable[str]) -> None:
     """Says on standard error which of a run's files will not be written."""
     for name in files:
-        if name in _FILES and (reason := missing(_FILES[name])):
+        if reason := missing_of_file(name):
             print(f"lever: warning: no {name}: {reason}", file=sys.stderr)
 
 

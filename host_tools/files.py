@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -27,6 +28,11 @@ def native_file(name: str) -> Path:
             return folder / name
     searched = ", ".join(str(folder) for folder in folders)
     raise LeverError(f"{name} is not in {searched}: install the package (pip install .) or set {LIBRARY_DIR}")
+
+
+def shared_library(name: str) -> str:
+    """The file name of a shared library on this system."""
+    return {"darwin": f"lib{name}.dylib", "win32": f"{name}.dll"}.get(sys.platform, f"lib{name}.so")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -113,6 +119,10 @@ class Outputs:
             raise LeverError(f"cannot write {final}: it is a folder")
         self._names.append(name)
         return self._unfinished / name
+
+    def written(self, *names: str) -> list[Path]:
+        """Where those of these files are that have been asked for."""
+        return [self._unfinished / name for name in names if name in self._names]
 
     def finish(self) -> None:
         """Puts the files into their place; the last one asked for is there only when all are. Raises LeverError."""

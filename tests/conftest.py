@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
@@ -71,20 +71,28 @@ def build_dir() -> Path:
     return Path(os.environ.get("LEVER_BUILD_DIR", ROOT / "build"))
 
 
-def _image(build_dir: Path, transport: str) -> Path:
-    path = build_dir / f"stm32f4/lever_stm32f4_{transport}.elf"
-    if not path.is_file():
-        pytest.skip(f"no {path}: apt install gcc-arm-none-eabi libnewlib-arm-none-eabi, and build the target stm32f4")
-    return path
+Built = Callable[[str, str], Path]
 
 
 @pytest.fixture(scope="session")
-def can_image(build_dir: Path) -> Path:
+def built(build_dir: Path) -> Built:
+    """built(path, name): what the entry `name` of ctest builds there in the build tree, before the tests."""
+
+    def file(path: str, name: str) -> Path:
+        if not (build_dir / path).exists():
+            pytest.skip(f"no {build_dir / path}: ctest --test-dir {build_dir} -R {name}")
+        return build_dir / path
+
+    return file
+
+
+@pytest.fixture(scope="session")
+def can_image(built: Built) -> Path:
     """The image for the STM32F405 whose frames travel over bxCAN; .bin, .hex and .map are beside it."""
-    return _image(build_dir, "can")
+    return built("stm32f4/lever_stm32f4_can.elf", "build.stm32f4")
 
 
 @pytest.fixture(scope="session")
-def slcan_image(build_dir: Path) -> Path:
+def slcan_image(built: Built) -> Path:
     """The image whose frames travel as SLCAN over USART1; .bin, .hex and .map are beside it."""
-    return _image(build_dir, "slcan")
+    return built("stm32f4/lever_stm32f4_slcan.elf", "build.stm32f4")

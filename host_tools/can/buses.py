@@ -34,11 +34,12 @@ def add_bus_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def chosen_options(args: argparse.Namespace) -> dict[str, Any]:
-    """Options for open_bus(), numbers and truth values as such. Raises LeverError."""
+def chosen_options(args: argparse.Namespace, *, fd: bool = False) -> dict[str, Any]:
+    """Options for open_bus(), numbers and truth values as such; with `fd` of a bus with CAN FD, which other interfaces
+    than SocketCAN need more options for. Raises LeverError."""
     from can.util import cast_from_string
 
-    options = {}
+    options: dict[str, Any] = {"fd": True} if fd and args.interface == "socketcan" else {}
     for assignment in args.bus_option:
         key, equals, value = assignment.partition("=")
         if not (key and equals):

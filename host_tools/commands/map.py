@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import layout
 from ..errors import LeverError
 from ..files import check_not_input
 from ..tables import Row, add_json_option
@@ -47,21 +48,24 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--channel", metavar="NAME", help="the bus that is looked at (default: all)")
     parser.add_argument("--time", metavar="COLUMN", help="the column of time of a file (default: by its name)")
     parser.add_argument("--toml", metavar="FILE", type=Path, help="write the proposal as a mapping file")
-    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write plots of what changes: .html or .png")
+    parser.add_argument(
+        "-o", "--out", metavar="FILE", type=Path, help="write plots of what changes: .html, .pdf, .svg, .png"
+    )
     add_part_options(parser, _LOOKED_AT)
     add_json_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     from ..files import write_text
+    from ..provenance import provenance
     from ..signals.mapping import as_toml
-    from ..signals.plots import write
+    from ..signals.plots import KINDS, write
     from ..signals.proposal import propose
     from ..tables import print_tables
 
     start, length = check_part(args)
-    if args.out is not None and args.out.suffix.lower() not in (".html", ".png"):
-        raise LeverError(f"cannot write {args.out}: plots are .html or .png; --toml FILE writes the mapping")
+    if args.out is not None and args.out.suffix.lower() not in KINDS:
+        raise LeverError(f"cannot write {args.out}: plots are {', '.join(KINDS)}; --toml FILE writes the mapping")
     for path in (args.toml, args.out, args.json):
         check_not_input(path, [args.log, *([args.dbc] if args.dbc else [])])
     signals = _signals(args, start, length)
@@ -73,15 +77,16 @@ def run(args: argparse.Namespace) -> int:
     rows = [_row("", signal) for signal in changing]
     print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json)
     if len(changing) < len(others):
-        print(f"{len(others) - len(changing)} other signals never change, and are not shown.")
-    print(_command(args, mapping, proposed))
+        layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
+    print(*layout.command_lines(_command(args, mapping, proposed), layout.terminal_width()), sep="\n")
+    origin = provenance([args.log, *([args.dbc] if args.dbc else [])])
     if args.toml is not None:
-        write_text(args.toml, as_toml(mapping))
+        write_text(args.toml, origin.comment() + as_toml(mapping))
     if args.out is not None:
         shown = [(each.key, each.signal) for each in proposed]
-        write(args.out, shown + [("other", each) for each in changing], Path(args.log).name)
+        write(args.out, shown + [("other", each) for each in changing], Path(args.log).name, origin)
     if written := [str(path) for path in (args.toml, args.out) if path is not None]:
-        print(f"Written: {', '.join(written)}")
+        layout.say(f"Written: {', '.join(written)}")
     return 0
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options, open_bus
 from ..errors import LeverError
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
 from .signal_options import add_signal_options
 
@@ -59,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
     if args.interface is None:
         raise LeverError("record what? give a bus such as --interface socketcan --channel can0")
     check_others_can_be_heard(args.interface)
-    reading = _reading(args)
-    with open_bus(args.interface, args.channel, chosen_options(args)) as bus, _stopping() as stopped:
+    reading, fd = _reading(args)
+    with open_bus(args.interface, args.channel, chosen_options(args, fd=fd)) as bus, _stopping() as stopped:
         recorder = Recorder(bus, out, args.channel or args.interface)
         print(f"recording {bus.channel_info} into {out}; Ctrl-C ends", file=sys.stderr)
         line = _Line()
@@ -73,24 +74,24 @@ def run(args: argparse.Namespace) -> int:
         finally:
             line.end()
     print_tables({"recorded": _rows(recorder), **_mapped(out, reading)}, args.json)
-    print(f"{out}: {_summary(recorder)}")
+    say(f"{out}: {_summary(recorder)}")
     return 0
 
 
-def _reading(args: argparse.Namespace) -> Reading | None:
-    """How the log will be read by others, checked before it is recorded. Raises LeverError."""
+def _reading(args: argparse.Namespace) -> tuple[Reading | None, bool]:
+    """How the log will be read by others, checked before it is recorded, and whether that is CAN FD. Raises
+    LeverError."""
     if not (args.map or args.dbc or args.clock):
-        return None
+        return None, False
     if not (args.map and args.dbc):
         raise LeverError("mapped signals need both --dbc FILE and --map KEY=MESSAGE.SIGNAL")
-    from ..signals.bus_signals import find, load_database
+    from ..signals.bus_signals import find, load_database, of_fd
     from ..signals.mapping import read_mapping
     from ..signals.reading import Reading
 
     mapping, database = read_mapping(args.map), load_database(args.dbc)
-    for source in mapping.sources.values():
-        find(database, source.signal, args.dbc)
-    return Reading(mapping, args.dbc, clock=args.clock)
+    messages = [find(database, source.signal, args.dbc)[0] for source in mapping.sources.values()]
+    return Reading(mapping, args.dbc, clock=args.clock), any(map(of_fd, messages))
 
 
 def _mapped(log: Path, reading: Reading | None) -> Tables:

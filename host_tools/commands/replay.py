@@ -7,12 +7,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..extras import warn_of_left_out
 from ..files import check_not_input
+from ..formats import add_format_option, chosen_formats
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
-from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading, input_files
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..firmware.settings_file import Assignments
     from ..replay.engine import Options
 
@@ -20,11 +23,13 @@ _DESCRIPTION = f"""\
 Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints its estimates; with --out also
 writes into DIR
 
-  bus.log       what the estimator got and what it answered, in the format of candump, on recorded time
-  trace.csv     measured, estimated, standard deviations and health, a row for each sample
-  signals.mf4   the same signals with their units, for asammdf, PlotJuggler and the like
-  summary.json  estimates, innovations, what was found in the log, and a verdict
-  report.html   all of it as one page for a browser
+  bus.log        what the estimator got and what it answered, in the format of candump, on recorded time
+  trace.csv      measured, estimated, standard deviations and health, a row for each sample
+  signals.mf4    the same signals with units and comments, for asammdf, PlotJuggler and the like
+  signals.mcap   with --format mcap: the same as messages, for Foxglove
+  trace.parquet  with --format parquet: trace.csv with units, for pandas, polars and the like
+  summary.json   estimates, innovations, what was found in the log, a verdict, and where the files come from
+  report.html    all of it as one page for a browser
 
 LOG is a log of candump -L (.log, or - for standard input), or .blf, .asc, .mf4, .trc, .csv or .db, compressed (.gz) or
 not, or a file of columns (see below). Several logs are taken one after another in the order of their first frames, or
@@ -41,7 +46,7 @@ examples:
   lever replay session.log
   lever replay session.log -o out/session
   lever replay session.log --model linear_physical --set theta_noise=0.002 -o out/other
-  lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
+  lever replay monday_1.log.gz monday_2.log.gz --channel can1 -o out/monday
   candump -L can0 | lever replay - -o out/live
   lever replay monday/*.blf --each --dbc aircraft.dbc --map aircraft.toml -o out/monday --json monday.json
   lever replay flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o out/flight
@@ -75,6 +80,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         help="set one value; may be repeated, the last counts",
     )
     add_signal_options(parser)
+    add_format_option(parser, ("csv", "mf4"))
     add_json_option(parser)
 
 
@@ -88,15 +94,13 @@ def run(args: argparse.Namespace) -> int:
     check_not_input(args.json, args.logs)
     if args.each:
         return _run_each(args)
-    options = _options(args, args.logs[0])
-    if args.out is not None:
-        warn_of_left_out(FILES)
+    options = _options(args, args.logs[0], chosen_formats(args))
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
     print_tables(_tables(summary), args.json)
-    print(summary["verdict"])
+    say(summary["verdict"])
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
+        say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
     if not summary["passed"]:
         print(f"lever: replay: {failure(summary)}", file=sys.stderr)
     return 0 if summary["passed"] else 1
@@ -106,7 +110,6 @@ def _run_each(args: argparse.Namespace) -> int:
     from ..firmware.settings_file import make_config
     from ..progress import Progress
     from ..replay.each import replay_each, rows_of, write
-    from ..replay.outputs import FILES
     from ..signals.mapping import read_mapping
     from ..tables import print_tables
 
@@ -114,20 +117,20 @@ def _run_each(args: argparse.Namespace) -> int:
     if args.map:
         read_mapping(args.map)
     check_part(args)
-    if args.out is not None:
-        warn_of_left_out(FILES)
+    formats = chosen_formats(args)
     with Progress("replay") as progress:
-        replays = replay_each(args.logs, lambda log: _options(args, log), args.out, progress.show)
+        replays = replay_each(args.logs, lambda log: _options(args, log, formats), args.out, progress.show)
     print_tables({"logs": rows_of(replays)}, args.json)
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join([*write(replays, args.out), 'a folder for each log'])}")
+        written = write(replays, args.out, input_files(args))
+        say(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
     for each in replays:
         if each.problem:
             print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)
     return 1 if any(each.problem for each in replays) else 0
 
 
-def _options(args: argparse.Namespace, log: str) -> Options:
+def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Options:
     from ..firmware.config import CHOICES
     from ..firmware.settings_file import make_config
     from ..replay.engine import Options
@@ -135,7 +138,11 @@ def _options(args: argparse.Namespace, log: str) -> Options:
     assignments = _assignments(args)
     chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
     reading = chosen_reading(args, log)
-    return Options(make_config(assignments), chosen_here, args.channel, reading, *check_part(args))
+    return Options(
+        *(make_config(assignments), chosen_here, args.channel, reading, *check_part(args)),
+        formats=formats,
+        inputs=input_files(args),
+    )
 
 
 def _assignments(args: argparse.Namespace) -> Assignments:

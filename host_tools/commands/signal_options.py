@@ -58,6 +58,12 @@ def check_part(args: argparse.Namespace) -> tuple[float, float]:
     return args.start, length
 
 
+def input_files(args: argparse.Namespace) -> list[str]:
+    """The files that the options name: settings, database, mappings."""
+    named = [getattr(args, "settings", None), args.dbc]
+    return [path for path in named if path is not None] + [each for each in args.map if each.lower().endswith(".toml")]
+
+
 def chosen_reading(args: argparse.Namespace, log: str) -> Reading | None:
     """How `log` is to be read; None for a log of lever.dbc. Raises LeverError."""
     start, length = check_part(args)

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 from ..errors import LeverError
 from ..extras import require
 from ..files import check_not_input
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
-from .signal_options import MAP_HELP, add_signal_options, chosen_reading
+from .signal_options import MAP_HELP, add_signal_options, chosen_reading, input_files
 
 if TYPE_CHECKING:
     from ..firmware.settings_file import Assignments
@@ -179,6 +180,7 @@ def _conclude(
 ) -> int:
     """Prints and writes everything; the exit status."""
     from ..files import write_text
+    from ..provenance import provenance, with_provenance
     from ..tables import print_tables
     from ..tune import validation
 
@@ -187,20 +189,22 @@ def _conclude(
         tables = {"calibration": [_calibration_row(entry) for entry in calibration.entries], **tables}
     changed = sum(entry.after != entry.before for entry in tuned) + len(calibration.assignments)
     verdict = validation.verdict(fits, changed)
+    origin = provenance([*args.log, *input_files(args)])
     print_tables(tables, args.json)
-    print(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
+    say(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
     if args.page is not None:
         from ..tune.tune_page import build
 
-        write_text(args.page, build(_subtitle(args, likelihood), verdict, tables, calibration.text, tuned, fits))
+        page = build(_subtitle(args, likelihood), verdict, tables, calibration.text, tuned, fits)
+        write_text(args.page, with_provenance(page, origin))
     if validation.is_worse(fits):
         _note("the new settings do worse on the part held out, so the log changes on the way: no settings are written")
         return 1
     if args.output is not None:
-        write_text(args.output, _file(args, f"{verdict} {calibration.text}", before, after))
+        write_text(args.output, origin.comment() + _file(f"{verdict} {calibration.text}", before, after))
     written = [str(path) for path in (args.output, args.page) if path is not None]
     if written:
-        print(f"Written: {', '.join(written)}")
+        say(f"Written: {', '.join(written)}")
     return 0
 
 
@@ -268,11 +272,10 @@ def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
     return rows
 
 
-def _file(args: argparse.Namespace, text: str, before: Assignments, after: Assignments) -> str:
+def _file(text: str, before: Assignments, after: Assignments) -> str:
     """The settings file: what it was made of, and all that is not left to the firmware's defaults."""
     from ..firmware.settings_file import format_assignments, make_config
 
     was = make_config(before).settings
     notes = {name: f"was {was[name]:g}" for name in after if name in was and after[name] != was[name]}
-    lines = (line for part in (f"lever tune {' '.join(args.log)}", text) for line in textwrap.wrap(part, 110))
-    return "".join(f"# {line}\n" for line in lines) + format_assignments(after, notes)
+    return "".join(f"# {line}\n" for line in textwrap.wrap(text, 110)) + format_assignments(after, notes)

@@ -168,7 +168,8 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
             raise LeverError("a bus needs both --dbc FILE and --map KEY=MESSAGE.SIGNAL")
         online = Online(read_mapping(args.map), args.dbc, args.clock)
         check_others_can_be_heard(args.interface)
-        return MappedBusSource(args.interface, args.channel, online, config, chosen_options(args)), config
+        options = chosen_options(args, fd=online.fd)
+        return MappedBusSource(args.interface, args.channel, online, config, options), config
     if args.log is not None:
         return LogSource(args.log, args.channel, part=check_part(args)), config
     check_others_can_be_heard(args.interface)

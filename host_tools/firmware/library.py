@@ -5,19 +5,16 @@ Importing takes about 50 ms (cffi reads the header); a library that is not there
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import cffi
 
 from ..errors import LeverError
-from ..files import native_file
+from ..files import native_file, shared_library
 
 if TYPE_CHECKING:
     import numpy as np
-
-_SHARED = {"darwin": "lib{}.dylib", "win32": "{}.dll"}.get(sys.platform, "lib{}.so")
 
 ffi: Any = cffi.FFI()
 
@@ -26,7 +23,7 @@ ffi: Any = cffi.FFI()
 def load(library: str) -> Any:
     """The functions of a shared library; what installing has made of its header declares them. Raises LeverError."""
     ffi.cdef(native_file(f"{library}_cdef.h").read_text(encoding="utf-8"))
-    path = native_file(_SHARED.format(library))
+    path = native_file(shared_library(library))
     try:
         return ffi.dlopen(str(path))
     except OSError as error:

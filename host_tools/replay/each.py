@@ -15,18 +15,19 @@ from ..errors import LeverError
 from ..extras import missing, require
 from ..files import Outputs
 from ..firmware.quantities import Quantity, quantities
-from ..report.document import document
-from ..report.figure import Figure, axis, line
+from ..provenance import Provenance, provenance, with_provenance
+from ..report.figure import SERIES, Figure, axis, line, time_axis
 from ..report.page import Page
-from ..report.summary_html import table
+from ..report.series import spread_indices
+from ..report.summary_html import number, table
 from ..tables import Row
 from .engine import Options, Progress, replay
 from .summary import failure
 
 PAGE = "overlay.html"
 TABLE = "logs.parquet"
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c564b")
-_ROW_HEIGHT = 190  # [pixels]
+_ROW_HEIGHT = 150  # [pixels]
+_POINTS = 1500
 
 
 @dataclass
@@ -84,14 +85,17 @@ def rows_of(replays: Sequence[Replayed]) -> list[Row]:
     return [{name: row.get(name) for name in columns} for row in rows]
 
 
-def write(replays: Sequence[Replayed], out: Path) -> list[str]:
-    """Writes the page and the table, as far as their extras are installed; returns their names. Raises LeverError."""
+def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list[str]:
+    """Writes the page and the table, as far as their extras are installed; returns their names. `inputs` are files
+    beside the logs. Raises LeverError."""
+    logs = [each.log for each in replays]
+    origin = provenance([*logs, *inputs])
     names = [name for name, extra in ((PAGE, "report"), (TABLE, "files")) if not missing(extra)]
-    with Outputs(out, [each.log for each in replays], (PAGE, TABLE)) as outputs:
+    with Outputs(out, logs, (PAGE, TABLE)) as outputs:
         if PAGE in names:
-            outputs.path(PAGE).write_text(_page(replays), encoding="utf-8")
+            outputs.path(PAGE).write_text(with_provenance(_page(replays), origin), encoding="utf-8")
         if TABLE in names:
-            _write_table(rows_of(replays), outputs.path(TABLE))
+            _write_table(rows_of(replays), outputs.path(TABLE), origin)
         outputs.finish()
     return names
 
@@ -109,49 +113,61 @@ def _folders(logs: Sequence[str]) -> list[str]:
     return names
 
 
-def _write_table(rows: Sequence[Row], path: Path) -> None:
+def _write_table(rows: Sequence[Row], path: Path, origin: Provenance) -> None:
     require("files")
     import pyarrow
     from pyarrow import parquet
 
-    parquet.write_table(pyarrow.Table.from_pylist([dict(row) for row in rows]), path)
+    table = pyarrow.Table.from_pylist([dict(row) for row in rows])
+    parquet.write_table(table.replace_schema_metadata(origin.properties()), path)
 
 
 # --- the page ---------------------------------------------------------------------------------------------------------
 
 
 def _page(replays: Sequence[Replayed]) -> str:
-    title = f"Lever CDKF: {len(replays)} logs"
-    page = Page()
-    shown = [each for each in replays if each.summary is not None and len(each.rows.get("time_s", ()))]
+    page = Page(f"{len(replays)} logs", "The same firmware on each of them.", "lever replay --each")
     caption = "The estimates of all logs over the time since the start of each."
-    page.section("estimates", "Estimates", "Estimates", page.figure("overlay", _figure(shown), caption))
-    rows = rows_of(replays)
-    cells = ([_cell(cell) for cell in row.values()] for row in rows)
-    page.section("numbers", "At the end", "At the end of each", table([html.escape(name) for name in rows[0]], cells))
-    body = f"<header><h1>{html.escape(title)}</h1></header>{''.join(page.sections)}"
-    return document(title, body, {key: figure.spec() for key, figure in page.figures.items()})
+    page.section("estimates", "Estimates", "Estimates", page.figure("overlay", _figure(replays), caption))
+    rows = [_cells({**row, "log": name}) for row, name in zip(rows_of(replays), _labels(replays), strict=True)]
+    numbers = table([html.escape(name) for name in rows[0]], (list(row.values()) for row in rows))
+    page.section("numbers", "At the end", "At the end of each", numbers)
+    failed = sum(bool(each.problem) for each in replays)
+    return page.html(f'<p class="verdict bad">{failed} of {len(replays)} logs have a problem.</p>' if failed else "")
 
 
-def _cell(cell: Any) -> str:
-    if cell is None:
-        return ""
-    return f"{cell:.4g}" if isinstance(cell, float) else html.escape(str(cell))
+def _labels(replays: Sequence[Replayed]) -> list[str]:
+    """The names of the logs, with their folders where the names alone are the same."""
+    names = [Path(each.log).name for each in replays]
+    return [name if names.count(name) == 1 else each.log for name, each in zip(names, replays, strict=True)]
 
 
-def _figure(shown: Sequence[Replayed]) -> Figure | None:
+def _cells(row: Row) -> dict[str, str]:
+    """As HTML; an estimate and its standard deviation are one."""
+    cells: dict[str, str] = {}
+    for name, cell in row.items():
+        if " sigma" not in name:
+            cells[name] = "" if cell is None else html.escape(number(cell, 4))
+        elif cell is not None:
+            cells[name.replace(" sigma", "")] += f" ± {number(cell, 2)}"
+    return cells
+
+
+def _figure(replays: Sequence[Replayed]) -> Figure | None:
     """A row a quantity, a curve a log."""
+    shown = [each for each in replays if each.summary is not None and len(each.rows.get("time_s", ()))]
     if not shown:
         return None
     wanted: list[Quantity] = list(quantities(shown[0].summary["estimator"]["model"]))  # type: ignore[index]
     wanted = [each for each in wanted if any(each.column("estimate") in log.rows for log in shown)]
     wanted.sort(key=lambda each: each.key not in ("natural_frequency", "damping_ratio"))
-    rows = [axis(each.key if each.unit == "1" else f"{each.key} [{each.shown_unit}]") for each in wanted]
-    figure = Figure(rows, axis("time [s]"), 60 + _ROW_HEIGHT * len(rows))
-    for number, log in enumerate(shown):
-        colour = _COLOURS[number % len(_COLOURS)]
+    rows = [axis(f"{each.symbol} [{each.shown_unit}]") for each in wanted]
+    end = max(float(log.rows["time_s"][-1]) for log in shown)
+    figure = Figure(rows, time_axis(end), 60 + _ROW_HEIGHT * len(rows))
+    for index, (log, name) in enumerate(zip(shown, _labels(shown), strict=True)):
+        time = np.asarray(log.rows["time_s"])
+        chosen = spread_indices(len(time), _POINTS)
         for row, quantity in enumerate(wanted):
             if (values := log.rows.get(quantity.column("estimate"))) is not None:
-                time = np.asarray(log.rows["time_s"])
-                figure.add(line(time, values, Path(log.log).name, "estimate", row, line_color=colour))
+                figure.add(line(time[chosen], values[chosen], name, SERIES[index % len(SERIES)], row))
     return figure

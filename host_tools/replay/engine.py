@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
-from datetime import datetime, timezone
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,10 +16,13 @@ from ..can import codec
 from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.logs import Recording
 from ..can.traffic import Traffic
+from ..exports.signal_files import calendar
 from ..extras import missing
 from ..files import Outputs, write_text
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
+from ..provenance import printable, provenance
+from ..report import write_page
 from ..results.summary import SCHEMA, ReplaySummary, of
 from ..results.trace import Trace
 from ..signals.reading import Reading
@@ -28,8 +30,7 @@ from ..signals.traffic import MappedTraffic
 from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
-from .mf4 import Mf4
-from .outputs import FILES, SUMMARY, BusLog, TraceCsv
+from .outputs import FILES, SUMMARY, Folder
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
 from .summary import Figures, failure, verdict
@@ -38,7 +39,6 @@ from .timeline import Timeline
 Progress = Callable[[int, int], None]
 """Called now and then with the bytes done and the bytes in all."""
 
-_ABSOLUTE = 10**15  # [us]: recorded times from 2001 on are of a calendar
 _ROWS_AT_ONCE = 1 << 15
 
 
@@ -60,6 +60,10 @@ class Options:
     start: float = 0.0
     """[s] of recorded time; COMMAND frames before it count."""
     length: float = float("inf")
+    formats: Sequence[str] = ("csv",)
+    """Of the signals, of formats.FORMATS."""
+    inputs: Sequence[str | Path] = ()
+    """Files beside the logs that all this is from: settings, database, mapping."""
 
 
 def replay(
@@ -70,9 +74,8 @@ def replay(
     keep: Callable[[Mapping[str, FloatArray]], None] | None = None,
 ) -> dict[str, Any]:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
-    trace.csv, signals.mf4, report.html and summary.json there, all or none; signals.mf4 with the extra `mf4`,
-    report.html with `report`, and hands the trace, reduced, to `keep`. Raises LeverError, also rather than write over a
-    log."""
+    the signals, report.html (with the extra `report`) and summary.json there, all or none, and hands the trace,
+    reduced, to `keep`. Raises LeverError, also rather than write over a log."""
     logs = list(logs)
     traffic: Traffic | MappedTraffic
     if options.reading is None:
@@ -81,12 +84,16 @@ def replay(
         traffic = MappedTraffic(logs, options.reading, progress)
         options = replace(options, config=traffic.at_its_rate(options.config))
     with ExitStack() as stack:
-        outputs = None if out_dir is None else stack.enter_context(Outputs(out_dir, logs, FILES))
-        replayed = _Replay(traffic, options, outputs)
+        folder = None
+        if out_dir is not None:
+            inputs = [*logs, *options.inputs]
+            outputs = stack.enter_context(Outputs(out_dir, inputs, FILES))
+            folder = stack.enter_context(Folder(outputs, options.formats, provenance(inputs)))
+        replayed = _Replay(traffic, options, folder)
         replayed.run(progress)
         summary = replayed.summary()
-        if outputs is not None:
-            replayed.finish(outputs, summary)
+        if folder is not None:
+            summary = replayed.finish(folder, summary)
             if keep is not None:
                 keep(replayed.kept.stretches.rows())
         return summary
@@ -95,15 +102,12 @@ def replay(
 class _Replay:
     """The parts, joined."""
 
-    def __init__(self, traffic: Traffic | MappedTraffic, options: Options, outputs: Outputs | None) -> None:
-        self._traffic, self._options, self._outputs = traffic, options, outputs
+    def __init__(self, traffic: Traffic | MappedTraffic, options: Options, folder: Folder | None) -> None:
+        self._traffic, self._options, self._folder = traffic, options, folder
         self._feeder = Feeder(Estimator(options.config))
         self._commands = Commands(options.config.choices, options.chosen)
         self._repeats = Repeats()
         self._timeline = Timeline(options.config.settings["sample_period"])
-        self._bus_log: BusLog | None = None
-        self._csv: TraceCsv | None = None
-        self._mf4: Mf4 | None = None
         self._columns: Columns | None = None
         self._sinks: list[_Sink] = []
         self._waiting: list[Rows] = []
@@ -120,8 +124,8 @@ class _Replay:
             self._repeats.add(frames)
             self._identify(frames)
             for fed, rows in self._feeder.feed(self._commands.applied(frames)):
-                if self._outputs is not None:
-                    self._log(fed, self._outputs)
+                if self._folder is not None:
+                    self._folder.log(fed, self._traffic.channel or "")
                 self._take(rows)
             if progress is not None:
                 progress(recording.done, recording.size)
@@ -144,11 +148,6 @@ class _Replay:
             contracts = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
             self._recorded_contract = next((int(number) for number in contracts[np.isfinite(contracts)]), None)
 
-    def _log(self, fed: Frames, outputs: Outputs) -> None:
-        if self._bus_log is None:
-            self._bus_log = BusLog(outputs.path("bus.log"), self._traffic.channel or "")
-        self._bus_log.add(fed)
-
     def _take(self, rows: Rows, last: bool = False) -> None:
         """Gathers rows, so that what is done with columns pays."""
         self._waiting.append(rows)
@@ -168,10 +167,12 @@ class _Replay:
         trace = self._columns.of(rows)
         for sink in self._sinks:
             sink.add(trace)
-        if self._mf4 is not None:
+        if self._folder is not None:
             published = (rows["fresh"] >> SLOTS["PILOT_PARAMETERS"]) & 1 != 0
             recorded = (rows["fresh"] >> RECORDED["PILOT_PARAMETERS"]) & 1 != 0
-            self._mf4.add(trace, published, recorded)
+            if not self._folder.signals.started:
+                self._folder.signals.start(trace, int(rows["time_us"][0]), self._estimator())
+            self._folder.signals.add(trace, published, recorded)
 
     def _start(self, rows: Rows) -> Columns:
         """Everything that has to know the model."""
@@ -186,13 +187,8 @@ class _Replay:
         self._comparison = Comparison(self.model) if with_recorded else None
         if self._comparison is not None:
             self._sinks.append(self._comparison)
-        if self._outputs is not None:
+        if self._folder is not None:
             self._sinks.append(self.kept)
-            self._csv = TraceCsv(self._outputs.path("trace.csv"))
-            self._sinks.append(self._csv)
-            if not missing("mf4"):
-                start_us = int(rows["time_us"][0])
-                self._mf4 = Mf4(self._outputs.path("signals.mf4"), self.model, start_us, with_recorded)
         return Columns(self._timeline, self.model, with_recorded)
 
     # --- what comes of it ---------------------------------------------------------------------------------------------
@@ -200,11 +196,10 @@ class _Replay:
     def summary(self) -> dict[str, Any]:
         """The content of summary.json."""
         compared = None if self._comparison is None else self._comparison.summary()
-        choices = self._commands.choices | {"model": self.model}
         summary: dict[str, Any] = {
             "schema": SCHEMA,
             "recording": self._recording(),
-            "estimator": {**choices, "settings": self._options.config.settings},
+            "estimator": self._estimator(),
             "samples": self._timeline.clocks.samples,
             **self.figures.summary(self._feeder.estimator.health()),
             "comparison": compared,
@@ -213,14 +208,18 @@ class _Replay:
         summary["verdict"] = verdict(summary)
         return summary
 
+    def _estimator(self) -> dict[str, Any]:
+        choices = self._commands.choices | {"model": self.model}
+        return {**choices, "settings": self._options.config.settings}
+
     def _recording(self) -> dict[str, Any]:
         traffic, clocks = self._traffic, self._timeline.clocks
         recording = traffic.recording
         first, last = traffic.first_us, traffic.last_us
         return {
-            "logs": [Path(path).name for path in recording.paths],
+            "logs": [printable(Path(path).name) for path in recording.paths],
             "channel": traffic.channel,
-            "start": _calendar(first) if first >= _ABSOLUTE else None,
+            "start": _calendar(first),
             "duration_s": (last - first) * 1e-6,
             "frames": traffic.frames,
             "frames_left_out": {kind: count for kind, count in traffic.others.items() if count},
@@ -245,26 +244,24 @@ class _Replay:
             "mapping": traffic.loaded.summary() if isinstance(traffic, MappedTraffic) else None,
         }
 
-    def finish(self, outputs: Outputs, summary: dict[str, Any]) -> None:
-        """Completes the files and puts them into place."""
-        from ..report import write_page
-
-        for part in (self._bus_log, self._csv, self._mf4):
-            if part is not None:
-                part.close()
+    def finish(self, folder: Folder, summary: dict[str, Any]) -> dict[str, Any]:
+        """Completes the files and puts them into place; returns the summary with their provenance."""
+        summary = summary | {"provenance": asdict(folder.complete())}
         if not missing("report"):
-            write_page(RecordedRun(self.kept, of(ReplaySummary, summary)), outputs.path("report.html"))
+            run = RecordedRun(self.kept, of(ReplaySummary, summary))
+            write_page(run, folder.outputs.path("report.html"))
         text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
-        write_text(outputs.path(SUMMARY), text + "\n")
-        outputs.finish()
+        write_text(folder.outputs.path(SUMMARY), text + "\n")
+        folder.outputs.finish()
+        return summary
 
 
-def _calendar(time_us: int) -> str:
-    moment = datetime.fromtimestamp(time_us // 1_000_000, tz=timezone.utc)
-    return moment.strftime("%Y-%m-%d %H:%M:%S UTC")
+def _calendar(time_us: int) -> str | None:
+    moment = calendar(time_us // 1_000_000 * 1_000_000)
+    return None if moment is None else moment.strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 def _without_folder(reason: str) -> str:
     """A reason that begins with the path of a log: the same wherever that is."""
     path, colon, rest = reason.partition(": ")
-    return f"{Path(path).name}{colon}{rest}"
+    return printable(f"{Path(path).name}{colon}{rest}")

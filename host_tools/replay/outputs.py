@@ -2,19 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
+from types import TracebackType
 
 from ..can import bulk
 from ..can.bulk import Frames
-from ..files import writing
-from ..results.trace import Trace, write_csv_header, write_csv_rows
+from ..exports.signal_files import SignalFiles
+from ..files import Outputs, writing
+from ..formats import FORMATS
+from ..provenance import Provenance
 
-SUMMARY = "summary.json"
-"""The last file to be in its place: where it is, the others are of the same replay."""
-FILES = ("bus.log", "trace.csv", "signals.mf4", "report.html", SUMMARY)
+BUS_LOG, SUMMARY = "bus.log", "summary.json"
+"""The summary is the last file to be in its place: where it is, the others are of the same replay."""
+FILES = (BUS_LOG, *FORMATS.values(), "report.html", SUMMARY)
 
 
-class BusLog:
+class Folder:
+    """What grows with the recording. A context manager that lets go of files that are not complete."""
+
+    def __init__(self, outputs: Outputs, formats: Iterable[str], provenance: Provenance) -> None:
+        self.outputs = outputs
+        self.signals = SignalFiles(formats, outputs.path, provenance)
+        self._provenance = provenance
+        self._bus_log: _BusLog | None = None
+
+    def log(self, frames: Frames, channel: str) -> None:
+        """Further frames, in the order on the bus."""
+        if self._bus_log is None:
+            self._bus_log = _BusLog(self.outputs.path(BUS_LOG), channel)
+        self._bus_log.add(frames)
+
+    def complete(self) -> Provenance:
+        """Completes the files; returns their provenance. Raises LeverError."""
+        self.signals.close()
+        if self._bus_log is not None:
+            self._bus_log.close()
+        return self._provenance.with_outputs(self.outputs.written(BUS_LOG, FORMATS["csv"]))
+
+    def __enter__(self) -> Folder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.signals.__exit__(kind, error, traceback)
+        if self._bus_log is not None:
+            self._bus_log.abandon()
+
+
+class _BusLog:
     """bus.log: what the estimator got and what it answered, in candump's format."""
 
     def __init__(self, path: Path, channel: str) -> None:
@@ -23,7 +61,6 @@ class BusLog:
             self._file = path.open("wb")
 
     def add(self, frames: Frames) -> None:
-        """Further frames, in the order on the bus."""
         with writing(self._path):
             self._file.write(bulk.format_lines(frames, self._channel).data)
 
@@ -31,23 +68,6 @@ class BusLog:
         with writing(self._path):
             self._file.close()
 
-
-class TraceCsv:
-    """trace.csv, a row for each sample."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._started = path, False
-        with writing(path):
-            self._file = path.open("wb")
-
-    def add(self, trace: Trace) -> None:
-        """Further rows."""
-        with writing(self._path):
-            if not self._started:
-                write_csv_header(trace, self._file)
-            write_csv_rows(trace, self._file)
-        self._started = True
-
-    def close(self) -> None:
-        with writing(self._path):
+    def abandon(self) -> None:
+        with suppress(OSError):
             self._file.close()

@@ -1,7 +1,7 @@
 """The report of a run: one self-contained, interactive HTML page for somebody who has never seen the project.
 
 `write_report` is all that others need. Inside: `run` reads the trace, `charts` turn it into figures (plain plotly.js
-JSON, so plotly's Python classes are never loaded), `summary_html` makes verdict and tables, `models` says what is
+JSON, so plotly's Python classes are never loaded), `summary_html` makes answer and tables, `captions` says what is
 special in the estimator's model and in the truth, `page` puts it together with page.html, page.css, page.js and
 plotly.js from the plotly package.
 
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from ..files import write_text
+from ..provenance import with_provenance
 
 if TYPE_CHECKING:
     from ..results.summary import Summary
@@ -35,4 +36,4 @@ def write_page(run: Run, path: str | os.PathLike[str]) -> None:
     """write_report() of a run that may have kept less than a whole trace."""
     from .page import build
 
-    write_text(path, build(run))
+    write_text(path, with_provenance(build(run), run.summary.provenance if run.summary else None))

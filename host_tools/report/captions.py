@@ -96,16 +96,9 @@ def _has_scale(run: Run) -> bool:
 
 def whiteness_caption(run: Run) -> str:
     """What the chart of the autocorrelation shows."""
-    result = run.whiteness
-    verdict = ""
-    if result is not None:
-        verdict = (
-            f" Here the residual passes as white. {whiteness.CANNOT_SEE}"
-            if result.white
-            else " Here the residual is coloured: the arm, or a sensor, is not as assumed."
-        )
+    verdict = whiteness.verdict(run.whiteness)
     return (
-        "Is the residual white? Autocorrelation of measured minus estimated rate, averaged over 20 ms. White noise "
-        "stays about the band; bars beyond 0.2 mean that something moves the lever in a way that the model does not "
-        f"know.{verdict}"
+        "What is left of the rate: autocorrelation of measured minus estimated rate, averaged over 20 ms. Chance alone "
+        "keeps all bars in the band in 95 % of runs; beyond the dotted lines something moves the lever that the model "
+        f"does not know. {verdict}"
     )

@@ -1,5 +1,7 @@
 """A page that needs nothing else: HTML, its style, plotly.js, the figures, and the script that draws them."""
 
+import base64
+import gzip
 import html
 import json
 from collections.abc import Mapping
@@ -17,12 +19,16 @@ def document(title: str, body: str, figures: Mapping[str, Spec], style: str = ""
     import plotly.offline
 
     here = files(__package__)
-    drawn = json.dumps(figures, separators=(",", ":"), allow_nan=False)
     return Template((here / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
         css=(here / "page.css").read_text(encoding="utf-8") + style,
         body=body,
-        figures=drawn.replace("</", "<\\/"),
-        plotly=plotly.offline.get_plotlyjs(),
+        figures=_packed(json.dumps(figures, separators=(",", ":"), allow_nan=False)),
+        plotly=_packed(plotly.offline.get_plotlyjs()),
         script=(here / "page.js").read_text(encoding="utf-8"),
     )
+
+
+def _packed(text: str) -> str:
+    """gzip in base64, which page.js unpacks."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")

@@ -14,6 +14,8 @@ from ..arrays import Array
 from .series import packed
 
 Spec = dict[str, Any]
+SERIES = ("estimate", "joint", "fault", "torque", "good", "violet", "text", "quiet", "brown")
+"""Colours of many curves of one kind."""
 ROW_GAP = 22  # [pixels] between two rows
 TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 
@@ -22,19 +24,19 @@ def line(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) 
     """A curve. `more` are further properties of the trace; those of its line start with line_."""
     style = {"color": f"@{colour}", "width": 1.8}
     style |= {key[5:]: more.pop(key) for key in list(more) if key.startswith("line_")}
-    return _trace(x, y, name, row) | {"mode": "lines", "line": style, "legendgroup": name} | more
+    return _trace(x, y, name, row) | {"mode": "lines", "line": style} | more
 
 
 def dots(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) -> Spec:
     """Separate points."""
     marker = {"color": f"@{colour}", "size": 4}
-    return _trace(x, y, name, row) | {"mode": "markers", "marker": marker, "legendgroup": name} | more
+    return _trace(x, y, name, row) | {"mode": "markers", "marker": marker} | more
 
 
 def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0, **more: Any) -> list[Spec]:
     """The area between two curves."""
     finite = np.isfinite(low) & np.isfinite(high)
-    edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": name}
+    edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
     lower = _trace(x[finite], low[finite], name, row) | edge | {"showlegend": False}
     upper = _trace(x[finite], high[finite], name, row) | edge | {"fill": "tonexty", "fillcolor": f"@{colour}"}
     return [lower, upper | more]
@@ -42,7 +44,8 @@ def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0
 
 def _trace(x: Array, y: Array, name: str, row: int) -> Spec:
     axis = f"y{row + 1}" if row else "y"
-    return {"type": "scatter", "x": packed(x), "y": packed(y), "name": name, "yaxis": axis}
+    hover = {"legendrank": 1000 + row, "yhoverformat": ".4g"}  # in the order of the charts
+    return {"type": "scatter", "x": packed(x), "y": packed(y), "name": name, "yaxis": axis} | hover
 
 
 def axis_range(columns: list[Array], settled: slice, share: float = 0.08, zero: bool = False) -> list[float] | None:
@@ -73,6 +76,8 @@ class Figure:
     more: Spec = field(default_factory=dict)
     over_time: bool = True
     """Whether x is the time of the run, so that zooming here zooms the other figures over time."""
+    choices: Spec = field(default_factory=dict)
+    """What choices() has set."""
 
     def add(self, *traces: Spec) -> None:
         """Adds traces; a name that is there already is shown once in the legend."""
@@ -88,8 +93,20 @@ class Figure:
                 {"type": "line", "x0": moment, "x1": moment, "y0": 0, "y1": 1, "yref": "paper", "line": style}
             )
 
+    def level(self, *values: float) -> None:
+        """Dotted lines across the first row at values of its axis."""
+        style = {"color": "@mark", "width": 1, "dash": "dot"}
+        for value in values:
+            ends = {"x0": 0, "x1": 1, "xref": "paper", "y0": value, "y1": value}
+            self.shapes.append({"type": "line", "line": style} | ends)
+
+    def choose(self, of: list[Spec], first: int = 0, slider: str = "") -> None:
+        """Has the user choose by buttons, or by a slider with that name. Each of them is a "label", and "data" and
+        "layout" for Plotly.update of the "traces" (all); `first` is what the figure shows as it is."""
+        self.choices = {"of": of, "first": first, "slider": slider}
+
     def spec(self) -> Spec:
-        """The figure for plotly.js."""
+        """The figure for page.js."""
         layout: Spec = {
             "height": self.height,
             "shapes": self.shapes,
@@ -105,16 +122,19 @@ class Figure:
             axis_layout = {key: value for key, value in row.items() if key != "weight"}
             layout[f"yaxis{index + 1}" if index else "yaxis"] = {"domain": [bottom, top]} | axis_layout
             top = bottom - gap
-        return {"data": self.traces, "layout": layout | self.more, "over_time": self.over_time}
+        spec: Spec = {"data": self.traces, "layout": layout | self.more, "over_time": self.over_time}
+        return spec | ({"choices": self.choices} if self.choices else {})
 
 
 def time_axis(end: float) -> Spec:
-    return {"title": {"text": "time [s]"}, "range": [0.0, end]}
+    return axis("time [s]", range=[0.0, end], unifiedhovertitle={"text": "%{x:.2f} s"})
 
 
 def frequency_axis(low: float, high: float) -> Spec:
     """A logarithmic axis from `low` to `high` [Hz]."""
-    return axis("frequency [Hz]", type="log", range=[math.log10(low), math.log10(high)], tickvals=TICKS)
+    limits = [math.log10(low), math.log10(high)]
+    hover = {"text": "%{x:.3g} Hz"}
+    return axis("frequency [Hz]", type="log", range=limits, tickvals=TICKS, unifiedhovertitle=hover)
 
 
 def axis(title: str, **more: Any) -> Spec:

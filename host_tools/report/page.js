@@ -1,7 +1,7 @@
 // Draws the figures of the page with plotly.js in the colours of page.css, and keeps their time axes together.
 (function () {
   "use strict";
-  const figures = JSON.parse(document.getElementById("figures").textContent);
+  const root = document.documentElement;
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const touch = window.matchMedia("(pointer: coarse)").matches;
   const small = window.matchMedia("(max-width: 720px)").matches;
@@ -9,10 +9,20 @@
     responsive: true, displaylogo: false, showSendToCloud: false, displayModeBar: touch || small ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"]
   };
+  const FLATTER = 0.8; // charts on paper
   const charts = Array.from(document.querySelectorAll(".chart"));
+  const chosen = new Map(); // chart: which of its choices
+  let figures = {};
+  let opened = []; // for print only
+
+  // The text of an element, which is gzip in base64.
+  async function unpacked(id) {
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (letter) => letter.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
 
   function colour(name) {
-    return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+    return getComputedStyle(root).getPropertyValue("--" + name).trim();
   }
 
   // A copy of a figure in which every "@name" is the colour of that name.
@@ -29,25 +39,26 @@
     const common = {
       autosize: true, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: "inherit", size: small ? 11 : 12, color: "@text" },
-      margin: { l: small ? 52 : 64, r: 12, t: 44, b: 44 },
-      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", yref: "paper" },
+      margin: { l: small ? 52 : 64, r: 12, t: 36, b: 44 },
+      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", traceorder: "normal" },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: "@quiet", activecolor: "@text" },
       hovermode: "x unified", hoversubplots: "axis", hoverlabel: { bgcolor: "@card", bordercolor: "@edge" },
-      dragmode: touch ? false : "zoom"
+      dragmode: touch ? false : "zoom", uirevision: "kept"
     };
     const merged = Object.assign(common, own);
     for (const key of Object.keys(merged).filter((name) => /^[xy]axis/.test(name))) {
       merged[key] = Object.assign({}, axis, own[key], { title: Object.assign({}, axis.title, own[key].title) });
     }
-    if (own.updatemenus) { merged.margin = Object.assign({}, merged.margin, { t: 90 }); }
     return coloured(merged);
   }
 
-  function draw() {
-    return Promise.all(charts.map((chart) => {
-      const figure = figures[chart.id];
-      return Plotly.react(chart, coloured(figure.data), layout(figure), OPTIONS);
-    }));
+  function draw(chart) {
+    const figure = figures[chart.id];
+    const drawn = layout(figure);
+    drawn.height *= root.classList.contains("paper") ? FLATTER : 1;
+    chart.style.height = drawn.height + "px";
+    Plotly.react(chart, coloured(figure.data), drawn, OPTIONS);
+    if (chosen.has(chart)) { choose(chart, chosen.get(chart)); }
   }
 
   // Zooming one figure over time zooms them all.
@@ -64,7 +75,91 @@
     }));
   }
 
-  document.documentElement.classList.toggle("picture", window.location.hash === "#picture");
-  draw().then(link);
-  dark.addEventListener("change", draw);
+  // A click on the legend hides or shows all curves of that name: one in each row.
+  function listen(chart) {
+    chart.on("plotly_legendclick", ({ curveNumber }) => {
+      const { name, visible } = chart.data[curveNumber];
+      const all = [...chart.data.keys()].filter((index) => chart.data[index].name === name);
+      Plotly.restyle(chart, { visible: visible === "legendonly" || "legendonly" }, all);
+      return false;
+    });
+    chart.on("plotly_legenddoubleclick", () => false);
+  }
+
+  // --- a chart that shows one of several: buttons, or a slider ---
+
+  function choose(chart, index) {
+    const choice = figures[chart.id].choices.of[index];
+    chosen.set(chart, index);
+    return Plotly.update(chart, choice.data, choice.layout || {}, choice.traces);
+  }
+
+  function make(tag, properties, ...children) {
+    const element = Object.assign(document.createElement(tag), properties);
+    element.append(...children);
+    return element;
+  }
+
+  function addControls(chart) {
+    const choices = figures[chart.id].choices;
+    if (!choices) { return; }
+    chart.before(choices.slider ? slider(chart, choices) : buttons(chart, choices));
+  }
+
+  function slider(chart, choices) {
+    const place = make("output", { textContent: choices.of[choices.first].label });
+    const range = make("input", { type: "range", min: 0, max: choices.of.length - 1, value: choices.first });
+    range.addEventListener("input", () => {
+      place.textContent = choices.of[range.value].label;
+      choose(chart, Number(range.value));
+    });
+    return make("label", { className: "slider" }, choices.slider, range, place);
+  }
+
+  function buttons(chart, choices) {
+    const all = choices.of.map((choice, index) => {
+      const button = make("button", { type: "button", textContent: choice.label, ariaPressed: index === choices.first });
+      button.addEventListener("click", () => {
+        all.forEach((other) => { other.ariaPressed = other === button; });
+        choose(chart, index);
+      });
+      return button;
+    });
+    return make("div", { className: "buttons" }, ...all);
+  }
+
+  // --- on paper ---
+
+  function print(begins) {
+    root.classList.toggle("paper", begins);
+    if (begins) { opened = Array.from(document.querySelectorAll("details:not([open])")); }
+    opened.forEach((each) => { each.open = begins; });
+    charts.forEach(draw);
+  }
+
+  // --- the start ---
+
+  async function start() {
+    figures = JSON.parse(await unpacked("figures"));
+    charts.forEach(addControls);
+    document.body.append(make("script", { textContent: await unpacked("plotly") }));
+    for (const chart of charts) {
+      draw(chart);
+      if (chart === charts[0]) { await new Promise((seen) => setTimeout(seen)); }
+    }
+    charts.forEach(listen);
+    link();
+    dark.addEventListener("change", () => charts.forEach(draw));
+    window.addEventListener("beforeprint", () => print(true));
+    window.addEventListener("afterprint", () => print(false));
+  }
+
+  root.classList.toggle("picture", window.location.hash === "#picture");
+  // An open frame keeps the page loading, so that what prints or photographs it after it has loaded finds the charts.
+  const hold = document.body.appendChild(make("iframe", { hidden: true }));
+  hold.contentDocument.open();
+  start().finally(() => {
+    hold.contentDocument.close();
+    hold.remove();
+  });
 })();

@@ -1,4 +1,4 @@
-"""Puts the page together: sections of words and figures, the style, plotly.js and the script that draws."""
+"""Pages of sections with words and figures; and the report of a run as one."""
 
 import html
 from importlib.resources import files
@@ -6,17 +6,21 @@ from importlib.resources import files
 from . import captions, summary_html
 from .charts import comparison, health, signals, tracking, transfer
 from .document import document
-from .figure import Figure
+from .figure import Figure, Spec
 from .run import Run
 
 
 class Page:
-    """Sections in the order they are added."""
+    """Sections in the order they are added, under a bar of links to them."""
 
-    def __init__(self) -> None:
+    def __init__(self, title: str, subtitle: str, command: str) -> None:
+        """`title` is text, `subtitle` HTML; `command` is what makes the page."""
+        self.title = title
+        self.subtitle = subtitle
+        self.command = command
         self.sections: list[str] = []
         self.contents: list[tuple[str, str]] = []
-        self.figures: dict[str, Figure] = {}
+        self.figures: dict[str, Spec] = {}
 
     def section(self, key: str, short: str, title: str, *parts: str) -> None:
         """Adds a section of HTML parts, unless all are empty; `short` is its title in the table of contents."""
@@ -24,41 +28,47 @@ class Page:
             self.contents.append((key, short))
             self.sections.append(f'<section id="{key}"><h2>{title}</h2>{"".join(parts)}</section>')
 
-    def figure(self, key: str, figure: Figure | None, caption: str) -> str:
-        """The place of a figure with its caption; nothing without a figure."""
+    def figure(self, key: str, figure: Figure | Spec | None, caption: str) -> str:
+        """The place of a figure with its caption, as HTML; nothing without a figure."""
         if figure is None:
             return ""
-        self.figures[key] = figure
-        place = f'<div class="chart" id="{key}" style="height:{figure.height}px"></div>'
+        self.figures[key] = spec = figure.spec() if isinstance(figure, Figure) else figure
+        place = f'<div class="chart" id="{key}" style="height:{spec["layout"]["height"]}px"></div>'
         return f"<figure>{place}<figcaption>{caption}</figcaption></figure>"
+
+    def html(self, answer: str, style: str = "", *, beside: bool = False) -> str:
+        """The whole page. `answer` is HTML above the first section, or, where there is room, `beside` it."""
+        links = "".join(f'<a href="#{key}">{name}</a>' for key, name in self.contents)
+        first, rest = "".join(self.sections[:1]), "".join(self.sections[1:])
+        body = (
+            f"<nav><strong>Lever CDKF</strong>{links}</nav><header><h1>{html.escape(self.title)}</h1>"
+            f'<p class="subtitle">{self.subtitle}</p></header>'
+            f'<div{" class=first" if beside else ""}><div class="answer">{answer}</div>{first}</div>{rest}'
+            f"<footer>Made by <code>{self.command}</code>. Nothing on this page is loaded from elsewhere.</footer>"
+        )
+        return document(f"Lever CDKF: {self.title}", body, self.figures, style)
 
 
 def build(run: Run) -> str:
     """The whole page."""
-    page = Page()
-    _explained(page, run)
+    scenario = run.simulated.scenario if run.simulated else None
+    title = (
+        (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.get("logs", ())) or "recorded run"
+    )
+    page = Page(title, _subtitle(run), "lever sim" if run.simulated else "lever replay")
     _estimates(page, run)
+    _explained(page, run)
     _comparison(page, run)
     _transfer(page, run)
     _signals(page, run)
     _health(page, run)
     _numbers(page, run)
-    scenario = run.simulated.scenario if run.simulated else None
-    title = (
-        (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.get("logs", ())) or "recorded run"
-    )
-    links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
-    body = (
-        f'<header><h1>Lever CDKF: {html.escape(title)}</h1><p class="subtitle">{_subtitle(run)}</p></header>'
-        f"{summary_html.verdict(run)}{summary_html.cards(run)}<nav>{links}</nav>{''.join(page.sections)}"
-        "<footer>Made by <code>lever</code>. Nothing on this page is loaded from elsewhere.</footer>"
-    )
-    return document(f"Lever CDKF: {title}", body, {key: figure.spec() for key, figure in page.figures.items()})
+    return page.html(summary_html.answer(run), beside=True)
 
 
 def _subtitle(run: Run) -> str:
     description = html.escape((run.simulated and run.simulated.scenario.description) or summary_html.recorded(run))
-    length = f"{run.samples:,} samples in {run.end:.0f} s.".replace(",", "\u2009")
+    length = f"{run.samples:,} samples in {run.end:.0f}\u00a0s.".replace(",", "\u2009")
     return f"{description} {length}".strip()
 
 
@@ -125,7 +135,7 @@ def _comparison(page: Page, run: Run) -> None:
 def _transfer(page: Page, run: Run) -> None:
     maps = transfer.maps(run)
     meaning = (
-        "Brightness is how many degrees the lever moves for 1 m/s² of floor motion, over time and frequency. The white "
+        "Brightness is how many degrees the lever moves for 1 m/s² of floor motion, over time and frequency. The "
         "line is the natural frequency."
     )
     sentences = {"truth": f"<strong>Truth.</strong> {meaning}", "estimate": f"<strong>Estimate.</strong> {meaning}"}

@@ -20,7 +20,7 @@ OFFLINE = (
     *("--disable-quic", "--disable-background-networking", "--disable-component-update", "--disable-sync"),
     "--no-first-run",
 )
-SIZE = (1120, 1190)  # [pixels]
+SIZE = (1280, 700)  # [pixels]
 
 
 def browse(url: str, *options: str) -> subprocess.CompletedProcess[str]:

@@ -1,4 +1,4 @@
-"""The run in words and figures: the verdict, the cards below it, and the tables. All figures come from the summary."""
+"""The run in words and figures: the answer, and the tables. All figures come from the summary."""
 
 import html
 import re
@@ -6,12 +6,13 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..firmware import native
-from ..firmware.quantities import LEAST_COVERAGE, Quantity
+from ..firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from ..results.nis import Nis
 from ..results.summary import Quality
 from .run import Run
 
 NOTHING = "–"
+LARGEST_ERROR = 10.0  # [% rms] of a run that is called good
 
 
 def number(value: Any, digits: int = 3) -> str:
@@ -48,75 +49,83 @@ def figures_of(run: Run, quantity: Quantity) -> Quality | None:
     return run.simulated.parameters.get(quantity.key) if run.simulated else None
 
 
+def answer(run: Run) -> str:
+    """The headline, the figures behind it, and what the summary says."""
+    judged = [quantity for quantity in run.quantities if figures_of(run, quantity)]
+    figures, note = _accuracy(run, judged) if judged else (_last_estimates(run), "")
+    text = html.escape(run.summary.verdict if run.summary else "A recorded run, whose truth is not known.")
+    for quantity in run.parameters:
+        text = re.sub(rf"\b{quantity.key}\b", quantity.symbol, text)
+    text = text.replace(" %", "\u00a0%")
+    return f'{verdict(run)}{figures}<p class="said">{text}</p><p class="note">{note}</p>'
+
+
 def verdict(run: Run) -> str:
     """The headline."""
-    if run.summary is None:
-        text, mood = "A recorded run, whose truth is not known: the estimates from it.", ""
-    else:
-        text = run.summary.verdict
-        mood = "bad" if not run.summary.passed else "" if _in_doubt(run) else "good"
-    escaped = html.escape(text)
-    for quantity in run.parameters:
-        escaped = re.sub(rf"\b{quantity.key}\b", quantity.symbol, escaped)
-    return f'<p class="verdict {mood}">{escaped}</p>'
+    return f'<p class="verdict {_mood(run)}"><strong>{_headline(run)}</strong></p>'
 
 
-def _in_doubt(run: Run) -> bool:
-    """Whether the stated sigma, or the model, is not right by this run, whatever its limits allow."""
-    covered = [entry.coverage_2sigma for entry in run.simulated.parameters.values()] if run.simulated else []
-    too_small = any(share is not None and share < LEAST_COVERAGE for share in covered)
-    return too_small or (run.whiteness is not None and not run.whiteness.white)
+def _headline(run: Run) -> str:
+    """Of the natural frequency: how well it was estimated, or, where its truth is not known, what it was at the end."""
+    quantity = DYNAMICS[0]
+    figures = figures_of(run, quantity)
+    if figures and figures.rms_percent is not None:
+        missed = "Limits missed. " if run.simulated and run.simulated.missed else ""
+        covered = percent(figures.coverage_2sigma)
+        return f"{missed}Natural frequency: {figures.rms_percent:.1f} % rms error; within ±2σ {covered} of the time"
+    value = _last(run, quantity)
+    return f"Natural frequency at the end: {value}" if value else "No estimate"
 
 
-def cards(run: Run) -> str:
-    """The figures behind the verdict."""
-    judged = [quantity for quantity in run.quantities if figures_of(run, quantity)]
-    shown = _accuracy_cards(run, judged) if judged else [_last_estimates(run)]
-    return f'<div class="cards">{"".join(shown)}</div>'
+def _mood(run: Run) -> str:
+    """Good only where sigma and model are right by this run, and errors small, whatever its limits allow."""
+    if run.simulated is None:
+        return "" if run.summary is None or run.summary.passed else "bad"
+    if not run.simulated.passed:
+        return "bad"
+    figures = run.simulated.parameters.values()
+    sure = all((each.coverage_2sigma or 0.0) >= LEAST_COVERAGE for each in figures)
+    small = all((each.rms_percent or 0.0) <= LARGEST_ERROR for each in figures)
+    white = run.whiteness is None or run.whiteness.white
+    return "good" if sure and small and white and figures else "watch"
 
 
-def _card(title: str, rows: Iterable[tuple[str, str]], note: str) -> str:
-    lines = "<br>".join(f"{value} <small>{label}</small>" for label, value in rows)
-    return f'<div class="card"><h3>{title}</h3><div class="figures">{lines}</div><p>{note}</p></div>'
-
-
-def _accuracy_cards(run: Run, judged: list[Quantity]) -> list[str]:
-    def rows(key: str, show: Any) -> list[tuple[str, str]]:
-        return [
-            (f"{quantity.symbol} {quantity.name}", show(getattr(figures_of(run, quantity), key))) for quantity in judged
-        ]
-
+def _accuracy(run: Run, judged: list[Quantity]) -> tuple[str, str]:
+    """A table, and what its columns mean."""
+    rows = []
+    for quantity in judged:
+        figures = figures_of(run, quantity)
+        assert figures is not None
+        rows.append(
+            (
+                f"{quantity.symbol} {quantity.name}",
+                f"{fixed(figures.rms_percent, 1)} %",
+                percent(figures.coverage_2sigma),
+                seconds(figures.time_to_10_percent_s),
+            )
+        )
     after = run.simulated.scenario.converged_after_s if run.simulated else None
     since = f", from {number(after)} s after the start and each sudden change on" if after is not None else ""
-    return [
-        _card(
-            "How well tracked",
-            rows("rms_percent", lambda value: f"{fixed(value, 1)} %"),
-            f"Root mean square of the error, in % of the truth{since}.",
-        ),
-        _card(
-            "Coverage of ±2σ",
-            rows("coverage_2sigma", percent),
-            "Of the time the truth lay within ±2σ: 95 % of Gaussian errors do. Errors last for seconds, so a single "
-            "run is partly luck; lever sim --seeds shows many.",
-        ),
-        _card(
-            "How fast",
-            rows("time_to_10_percent_s", seconds),
-            "From the start / from each sudden change of the pilot, until within 10 % of the truth to stay.",
-        ),
-    ]
+    note = (
+        f"rms error: in % of the truth{since}. In ±2σ: part of that time with the truth within ±2σ; 95 % of Gaussian "
+        "errors are, but errors last for seconds, so a single run is partly luck (<code>lever sim --seeds</code> shows "
+        "many). To 10 %: from the start / from each sudden change, until the error stays below 10 %."
+    )
+    return table(("", "rms error", "in ±2σ", "to 10 %"), rows), note
 
 
 def _last_estimates(run: Run) -> str:
-    rows = []
-    for quantity in run.quantities:
-        estimate, sigma = run.estimate(quantity), run.sigma(quantity)
-        if estimate is not None and sigma is not None:
-            value = f"{number(float(estimate[-1]))} ± {number(float(sigma[-1]), 2)}"
-            value += "" if quantity.unit == "1" else f" {quantity.shown_unit}"
-            rows.append((f"{quantity.symbol} {quantity.name}", value))
-    return _card("Estimates at the end", rows, "With their standard deviation.")
+    rows = [(f"{each.symbol} {each.name}", value) for each in run.quantities if (value := _last(run, each))]
+    return table(("", "at the end, ± one σ"), rows)
+
+
+def _last(run: Run, quantity: Quantity) -> str:
+    """The last estimate with its standard deviation; empty without one."""
+    estimate, sigma = run.estimate(quantity), run.sigma(quantity)
+    if estimate is None or sigma is None:
+        return ""
+    unit = "" if quantity.unit == "1" else f" {quantity.shown_unit}"
+    return f"{number(float(estimate[-1]))} ± {number(float(sigma[-1]), 2)}{unit}"
 
 
 # --- tables ----------------------------------------------------------------------------------------------------------
@@ -228,7 +237,7 @@ def run_table(run: Run) -> str:
         ("mean normalised innovation squared", number(nis.mean), "1"),
         ("the same if σ is right", number(nis.expected), "1"),
         ("innovations inside their 95 % bound", number(None if inside is None else 100.0 * inside), "%"),
-        ("largest correlation of residuals (white noise: 0)", number(run.whiteness and run.whiteness.largest), "1"),
+        ("largest correlation of residuals", number(run.whiteness and run.whiteness.largest), "1"),
     ]
     rows += [(label, number(getattr(run.summary, key, None)), unit) for key, label, unit in RUN_FIGURES]
     shares: dict[str, float | None] = {}

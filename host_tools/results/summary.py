@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import LeverError
+from ..provenance import Provenance
 from .nis import Nis
 from .whiteness import Whiteness
 
@@ -50,6 +51,8 @@ class Summary:
     passed: bool
     verdict: str
     """In a few sentences."""
+    provenance: Provenance | None = None
+    """Of the files of the run; None where there are none."""
 
 
 # --- of a simulation -------------------------------------------------------------------------------------------------

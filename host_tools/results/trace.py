@@ -9,8 +9,7 @@ The columns of the parameters are those of the estimator's model; their truth is
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 from typing import BinaryIO
 
 import numpy as np
@@ -63,20 +62,13 @@ def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:
         yield quantity.column("sigma"), sigmas, f"{quantity.key}_sigma"
 
 
-def write_csv(trace: Trace, path: Path) -> None:
-    """trace.csv with six decimals; NaN stands as `NaN`, a whole number that is not known yet as nothing."""
-    with path.open("wb") as file:
-        write_csv_header(trace, file)
-        write_csv_rows(trace, file)
-
-
-def write_csv_header(trace: Trace, file: BinaryIO) -> None:
-    """The names of the columns."""
-    file.write((",".join(trace) + "\n").encode("ascii"))
+def write_csv_header(columns: Iterable[str], file: BinaryIO) -> None:
+    """The names of the columns of trace.csv."""
+    file.write((",".join(columns) + "\n").encode("ascii"))
 
 
 def write_csv_rows(trace: Trace, file: BinaryIO) -> None:
-    """A line for each sample."""
+    """A line for each sample, with six decimals; NaN stands as `NaN`, a whole number that is not known as nothing."""
     for first in range(0, len(trace["time_s"]), _ROWS_AT_ONCE):
         file.write(csv_lines({name: values[first : first + _ROWS_AT_ONCE] for name, values in trace.items()}).data)
 

@@ -28,7 +28,7 @@ COLOURED = 0.2
 """A correlation that is not put down to chance or tuning. Seen: models that are right leave 0.05 to 0.11 in 40 s, those
 that are asked for the pilots of two_dof and hand 0.5."""
 CANNOT_SEE = "That test does not see friction in the lever, nor gain and delay of a sensor: these bias the parameters."
-"""For every verdict that says that residuals are white."""
+"""For every verdict that finds no colour."""
 
 _ALL_95 = normal_quantile(0.5 + 0.5 * 0.95 ** (1.0 / LAGS))
 """LAGS normal deviates are all within plus and minus this with a probability of 95 %."""
@@ -48,6 +48,12 @@ class Whiteness:
     largest_after_s: float
     """Its lag."""
     white: bool
+    """Whether no correlation is beyond what chance, or tuning (COLOURED), explains."""
+
+    @property
+    def band_of_all(self) -> float:
+        """White noise stays within plus and minus this at all lags, with a probability of 95 %."""
+        return self.band_95 * _ALL_95 / NORMAL_95
 
 
 def residual(trace: Mapping[str, FloatArray]) -> FloatArray | None:
@@ -108,13 +114,16 @@ def verdict(measured: Whiteness | None) -> str:
     if measured is None:
         return ""
     size = f"{measured.largest:.2f} after {1000.0 * measured.largest_after_s:.0f} ms"
-    if measured.white:
-        last = measured.average_s * len(measured.autocorrelation)
+    chance = f"chance alone: within ±{measured.band_of_all:.2f}"
+    if not measured.white:
         return (
-            f"Residuals of the rate pass the test for whiteness up to a lag of {last:g} s (largest correlation {size})."
-            f" {CANNOT_SEE}"
+            f"Residuals of the rate are coloured (correlation {size}; {chance}): the arm, or a sensor, is not what the "
+            "model assumes."
         )
+    if abs(measured.largest) <= measured.band_of_all:
+        last = measured.average_s * len(measured.autocorrelation)
+        return f"Residuals of the rate are white up to a lag of {last:g} s ({chance}). {CANNOT_SEE}"
     return (
-        f"Residuals of the rate are coloured (correlation {size}; white noise stays within ±{measured.band_95:.2f}): "
-        "the arm, or a sensor, is not what the model assumes."
+        f"Residuals of the rate are slightly correlated ({size}; {chance}), below the {COLOURED:g} from which on the "
+        f"model counts as wrong. {CANNOT_SEE}"
     )

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..can import codec
-from .bus_signals import find, load_database, number
+from .bus_signals import find, load_database, number, of_fd
 from .inputs import Input, samples_of, understood
 from .mapping import Mapping, Source
 from .recorded import Signal
@@ -34,11 +34,14 @@ class Online:
         """What was decided in the beginning."""
         self.period: float | None = None
         """Of the samples [s], once it is known."""
+        self.fd = False
+        """Whether any of the messages is CAN FD."""
         self._mapping, self._clock = mapping, clock
         self._wanted = defaultdict(list)
         for key, source in mapping.sources.items():
             message, signal = find(loaded, source.signal, database)
             self._wanted[message.frame_id, message.is_extended_frame].append((key, message, signal))
+            self.fd = self.fd or of_fd(message)
         self._seen: dict[str, list[tuple[float, float]]] = {key: [] for key in mapping.sources}
         self._scale: dict[str, tuple[float, float]] = {}
         self._offset: dict[str, float] = {}  # [s] of the inputs that come with every sample, to its clock

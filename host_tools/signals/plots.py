@@ -6,13 +6,15 @@ import html
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..arrays import FloatArray
-from ..errors import LeverError
+from ..exports import pictures
 from ..extras import require
 from ..files import whole, write_text
+from ..provenance import Provenance, with_provenance
 from .recorded import Signal
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
@@ -30,15 +32,17 @@ def sparkline(signal: Signal, width: int) -> str:
     return "".join(_BLOCKS[min(int(8.0 * (each - low) / span), 7)] if math.isfinite(each) else " " for each in values)
 
 
-def write(path: Path, signals: Sequence[tuple[str, Signal]], title: str) -> None:
-    """A page (.html) or picture (.png) with each signal under its heading. Raises LeverError."""
-    suffix = path.suffix.lower()
-    if suffix == ".html":
-        write_text(path, _page(signals, title))
-    elif suffix == ".png":
-        _picture(path, signals, title)
-    else:
-        raise LeverError(f"cannot write {path}: plots are .html or .png")
+KINDS = (".html", *(f".{kind}" for kind in pictures.KINDS))
+
+
+def write(path: Path, signals: Sequence[tuple[str, Signal]], title: str, origin: Provenance) -> None:
+    """A page (.html) or picture with each signal under its heading. Raises LeverError."""
+    if path.suffix.lower() == ".html":
+        write_text(path, with_provenance(_page(signals, title), origin))
+        return
+    content = pictures.render(_picture(signals, title), path.suffix.lower().removeprefix("."), title, origin)
+    with whole(path) as target:
+        target.write_bytes(content)
 
 
 def _parts(signal: Signal, count: int) -> tuple[FloatArray, FloatArray]:
@@ -72,15 +76,16 @@ def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
         caption = f"<b>{html.escape(heading)}</b> {html.escape(signal.name)}: {html.escape(_extremes(signal))}"
         figures.append(f"<figure><figcaption>{caption}</figcaption>{_svg(signal)}</figure>")
     style = (
-        ":root{color-scheme:light dark}body{font:15px/1.4 system-ui,sans-serif;max-width:60rem;margin:1rem auto;"
-        "padding:0 1rem}figure{margin:1rem 0}svg{width:100%;height:auto;border:1px solid #8886}"
+        ":root{color-scheme:light dark}body{font:15px/1.4 system-ui,sans-serif;max-width:84rem;margin:1rem auto;"
+        "padding:0 1rem}main{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,28rem),1fr));"
+        "gap:1rem 2rem}figure{margin:0;break-inside:avoid}figcaption{overflow-wrap:anywhere}svg{width:100%;height:auto;border:1px solid #8886}"
         "path{fill:none;stroke:#2a6fdb;stroke-width:1.2;vector-effect:non-scaling-stroke}"
     )
     seconds = max((float(np.ptp(each.time)) for _, each in signals if len(each.time)), default=0.0)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width"><style>{style}</style>'
-        f"<h1>{html.escape(title)}</h1><p>{seconds:.4g} s</p>{''.join(figures)}</html>\n"
+        f"<h1>{html.escape(title)}</h1><p>{seconds:.4g} s</p><main>{''.join(figures)}</main></html>\n"
     )
 
 
@@ -98,11 +103,17 @@ def _svg(signal: Signal) -> str:
     return f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img"><path d="{"".join(path)}"/></svg>'
 
 
-def _picture(path: Path, signals: Sequence[tuple[str, Signal]], title: str) -> None:
+def _picture(signals: Sequence[tuple[str, Signal]], title: str) -> Any:
+    """As a Figure of matplotlib."""
     require("study")
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.0, 1.2 + 1.4 * len(signals)), layout="constrained")
+    with pictures.style():
+        return _drawn(Figure(layout="constrained"), signals, title)
+
+
+def _drawn(figure: Any, signals: Sequence[tuple[str, Signal]], title: str) -> Any:
+    figure.set_size_inches(pictures.WIDTHS["double"], 0.6 + 1.2 * len(signals))
     figure.suptitle(title)
     axes = figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (heading, signal) in zip(axes, signals, strict=True):
@@ -111,5 +122,4 @@ def _picture(path: Path, signals: Sequence[tuple[str, Signal]], title: str) -> N
         axis.set_ylabel(signal.unit or "no unit")
         axis.set_title(f"{heading}: {signal.name}", fontsize="small", loc="left")
     axes[-1].set_xlabel("time [s]")
-    with whole(path) as target:
-        figure.savefig(target, format="png", dpi=150)
+    return figure

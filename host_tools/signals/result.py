@@ -13,14 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray, IntArray
+from ..errors import LeverError
 from ..extras import require
-from ..files import whole
+from ..files import whole, write_text
 from ..firmware.config import Config
 from ..firmware.estimator import fault_names
 from ..firmware.library import enum_names
 from ..firmware.quantities import DYNAMICS, parameters
+from ..provenance import provenance
 
 Text = NDArray[np.str_]
+
+_STATES = ("theta", "theta_dot")
+_MOST_POINTS = 5000  # of a curve
 
 
 @dataclass(frozen=True)
@@ -113,7 +118,8 @@ class Result(Mapping[str, Estimated]):
         return table | {"nis": (self._raw["nis"], "1"), "mode": (self.mode, ""), "flags": (self.flags, "")}
 
     def to_parquet(self, path: str | Path) -> None:
-        """Writes columns() with the units as metadata of the fields. Raises LeverError."""
+        """Writes columns() with the units as metadata of the fields, and provenance as metadata of the file. Raises
+        LeverError."""
         require("files")
         import pyarrow
         from pyarrow import parquet
@@ -123,34 +129,45 @@ class Result(Mapping[str, Estimated]):
             array = pyarrow.array(values.tolist() if values.dtype.kind == "U" else values)
             arrays.append(array)
             fields.append(pyarrow.field(name, array.type, metadata={"unit": unit} if unit else None))
+        schema = pyarrow.schema(fields, metadata=provenance().properties(estimator=self._estimator()))
         with whole(path) as target:
-            parquet.write_table(pyarrow.table(arrays, schema=pyarrow.schema(fields)), target)
+            parquet.write_table(pyarrow.table(arrays, schema=schema), target)
 
-    def plot(self) -> Any:
+    def _estimator(self) -> dict[str, Any]:
+        return {**self.config.choices, "settings": self.config.settings}
+
+    def plot(self, path: str | Path | None = None, *, width: str = "double") -> Any:
         """The parameters, natural frequency and damping ratio over time with their bands of ±2 sigma, as a Figure of
-        matplotlib. Raises LeverError."""
-        require("study")
-        from matplotlib.figure import Figure
+        matplotlib, as wide as one ("single", 88 mm) or two ("double", 180 mm) columns of a journal.
 
-        shown = [each for name, each in self._estimated.items() if name not in ("theta", "theta_dot")]
-        figure = Figure(figsize=(8.0, 1.6 * len(shown)), layout="constrained")
-        axes = figure.subplots(len(shown), 1, sharex=True)
-        thin = max(1, len(self.time) // 5000)
-        for axis, each in zip(axes, shown, strict=True):
-            time, values, sigma = self.time[::thin], each.values[::thin], each.sigma[::thin]
-            axis.fill_between(time, values - 2.0 * sigma, values + 2.0 * sigma, alpha=0.25, linewidth=0)
-            axis.plot(time, values)
-            axis.set_ylabel(each.name if each.unit == "1" else f"{each.name}\n[{each.unit}]")
-            finite = values[np.isfinite(values)]
-            if len(finite):
-                low, high = np.percentile(finite, [1.0, 99.0])
-                room = max(0.5 * float(high - low), 4.0 * each.last_sigma, 1e-9)
-                axis.set_ylim(float(low) - room, float(high) + room)
-        axes[-1].set_xlabel("time [s]")
+        path: where to keep it (.pdf, .svg or .png), with what it shows beside it as CSV. Raises LeverError.
+        """
+        require("study")
+        from ..exports import pictures
+        from . import result_plot
+
+        kind = None if path is None else Path(path).suffix.lower().removeprefix(".")
+        if width not in pictures.WIDTHS or (kind is not None and kind not in pictures.KINDS):
+            raise LeverError(
+                f"cannot plot {width} {path}: it may be single or double, and .{', .'.join(pictures.KINDS)}"
+            )
+        at = slice(None, None, max(1, len(self.time) // _MOST_POINTS))
+        shown = {
+            name: Estimated(name, each.unit, each.values[at], each.sigma[at])
+            for name, each in self._estimated.items()
+            if name not in _STATES
+        }
+        with pictures.style():
+            figure = result_plot.figure(self.time[at], list(shown.values()), pictures.WIDTHS[width])
+        if path is not None and kind is not None:
+            content = pictures.render(figure, kind, self._heading(), provenance(), estimator=self._estimator())
+            with whole(path) as target:
+                target.write_bytes(content)
+            write_text(Path(path).with_suffix(".csv"), result_plot.table(self.time[at], list(shown.values())))
         return figure
 
     def __repr__(self) -> str:
-        lines = [str(each) for name, each in self._estimated.items() if name not in ("theta", "theta_dot")]
+        lines = [str(each) for name, each in self._estimated.items() if name not in _STATES]
         return f"{self._heading()}\n" + "\n".join(f"  {line}" for line in lines)
 
     def _heading(self) -> str:
@@ -166,7 +183,7 @@ class Result(Mapping[str, Estimated]):
             f"<tr><td>{html.escape(each.name)}</td><td>{each.last:.4g}</td><td>± {each.last_sigma:.2g}</td>"
             f"<td>{html.escape('' if each.unit == '1' else each.unit)}</td></tr>"
             for name, each in self._estimated.items()
-            if name not in ("theta", "theta_dot")
+            if name not in _STATES
         )
         notes = "".join(f"<li>{html.escape(note)}</li>" for note in self.notes)
         return (

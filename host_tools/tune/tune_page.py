@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..report.document import document
 from ..report.figure import Figure, Spec, axis, band, dots, line
 from ..report.page import Page
 from ..report.summary_html import number, table
@@ -16,7 +15,7 @@ from ..tables import Row
 from .search import Tuned
 from .validation import Fit
 
-_TITLE = "Lever CDKF: settings from a log"
+_TITLE = "Settings from a log"
 _COLOURS = {"before": "base", "after": "estimate"}
 _OUTPUTS = ("θ", "θ̇")
 _WINDOW = 1.0  # [s] over which innovations are averaged
@@ -32,7 +31,7 @@ def build(
     fits: Sequence[Fit],
 ) -> str:
     """The whole page. `tables` are as they are printed; `calibration` says in words what is known of that."""
-    page = Page()
+    page = Page(_TITLE, html.escape(subtitle), "lever tune")
     calibrated, settings, numbers = (
         _table(title, tables.get(title, ())) for title in ("calibration", "settings", "before and after")
     )
@@ -46,13 +45,7 @@ def build(
     page.section("calibration", "Calibration", "Accelerometer and friction", paragraph, calibrated)
     page.section("settings", "Settings", "What the log says of the settings", chart, settings)
     page.section("fits", "Before and after", "Before and after", numbers, *_innovations(page, fits))
-    links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
-    body = (
-        f'<header><h1>{_TITLE}</h1><p class="subtitle">{html.escape(subtitle)}</p></header>'
-        f'<p class="verdict">{html.escape(verdict)}</p><nav>{links}</nav>{"".join(page.sections)}'
-        "<footer>Made by <code>lever tune</code>. Nothing on this page is loaded from elsewhere.</footer>"
-    )
-    return document(_TITLE, body, {key: figure.spec() for key, figure in page.figures.items()})
+    return page.html(f'<p class="verdict">{html.escape(verdict)}</p>')
 
 
 def _table(title: str, rows: Sequence[Row]) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, add_json_option
 
@@ -23,8 +24,9 @@ pilot's grip, wrong settings of the noise, and the scenarios of `lever sim`. A d
 paired bootstrap over runs, at 5 % for all comparisons together (Holm); below 8 runs there is no verdict. With --out
 also writes into DIR
 
-  compare.csv   every figure of every estimator in every case
-  compare.html  verdicts, figures and tables as one page for a browser
+  compare.csv      every figure of every estimator in every case
+  compare.html     verdicts, figures and tables as one page for a browser
+  provenance.json  version, revision, date and command that made them
 
 With --envelope instead: the firmware beside joint EKF and UKF in the conditions of `lever envelope` (8 pilots each),
 these told the true process noise and the trim, with and without the firmware's fourth-order high-pass (_hp) in front.
@@ -106,18 +108,22 @@ def run(args: argparse.Namespace) -> int:
     tables = table.tables(rows, claims)
     print_tables(tables, args.json)
     for case, verdict in by_case.items():
-        print(f"{case}: {verdict}")
+        say(f"{case}: {verdict}")
     if args.out is not None:
         from lever_cdkf.host_tools.files import Outputs, write_text
+        from lever_cdkf.host_tools.provenance import provenance, with_provenance
 
         from ..study.compare import compare_page
 
         with Outputs(args.out) as outputs:
             write_text(outputs.path("compare.csv"), table.csv_text(rows))
+            origin = provenance()
             page = compare_page.build(results, rows, by_case, claims, tables)
-            write_text(outputs.path("compare.html"), page)
+            write_text(outputs.path("compare.html"), with_provenance(page, origin))
+            written = outputs.written("compare.csv", "compare.html")
+            write_text(outputs.path("provenance.json"), origin.with_outputs(written).text())
             outputs.finish()
-        print(f"Written to {args.out}: compare.html, compare.csv")
+        say(f"Written to {args.out}: compare.html, compare.csv, provenance.json")
     return 0
 
 

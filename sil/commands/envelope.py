@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder, write_text
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 
 from .names import check_names
@@ -60,7 +61,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         help="folder for the page, envelope.html (default: %(default)s)",
     )
     parser.add_argument(
-        "--json", metavar="FILE", help='also write the rows to FILE: {"rows": [{"name", "measured", …}]}'
+        "--json", metavar="FILE", help='also write the rows to FILE: {"rows": [{"name", "measured", …}], …}'
     )
     parser.set_defaults(run=run)
 
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     print_tables({f"{seeds} random pilots a condition": table.lines(results)})
     missed = [result.condition.name for result in results if not result.ok]
     judged = sum(bool(result.condition.limits) for result in results)
-    print(f"{judged - len(missed)} of {judged} conditions hold." + (f" Missed: {', '.join(missed)}." if missed else ""))
+    say(f"{judged - len(missed)} of {judged} conditions hold." + (f" Missed: {', '.join(missed)}." if missed else ""))
     _write(args, results, seeds)
     return 1 if missed else 0
 
@@ -101,14 +102,18 @@ def _run(chosen: Sequence[Condition], seeds: int) -> list[Result]:
 def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
     """The files that were asked for."""
     import json
+    from dataclasses import asdict
+
+    from lever_cdkf.host_tools.provenance import provenance, with_provenance
 
     from ..envelope import envelope_page, table
 
+    origin = provenance()
     if args.json is not None:
-        text = json.dumps({"rows": table.rows(results)}, indent=2, ensure_ascii=False, allow_nan=False)
-        write_text(args.json, text + "\n")
-    write_text(args.out / "envelope.html", envelope_page.build(results, seeds))
-    print(f"Written to {args.out}: envelope.html")
+        content = {"rows": table.rows(results), "provenance": asdict(origin)}
+        write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(args.out / "envelope.html", with_provenance(envelope_page.build(results, seeds), origin))
+    say(f"Written to {args.out}: envelope.html")
 
 
 def _listed(condition: Condition) -> dict[str, str | bool]:

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.extras import require
+from lever_cdkf.host_tools.layout import say
 
-_PAGE, _CAPTIONS = "figures.html", "captions.md"
+_PAGE, _CAPTIONS, _PROVENANCE = "figures.html", "captions.md", "provenance.json"
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,9 +19,12 @@ if TYPE_CHECKING:
 _DESCRIPTION = """\
 Computes the paper's figures for this system from simulated runs of the firmware, and writes into DIR
 
-  NAME.png       each figure for print: one column wide, 200 dots per inch
-  figures.html   all of them as one page for a browser, to be turned and zoomed; figures.html#NAME is one of them
-  captions.md    what each figure shows; its numbers are measured in these runs
+  NAME.pdf .svg .png  each figure for print; fonts are embedded in the PDF, text in the SVG is text, PNG has 300 dots
+                      per inch
+  NAME.csv            what it shows, as numbers
+  figures.html        all of them as one page for a browser, to be turned and zoomed; figures.html#NAME is one of them
+  captions.md         what each figure shows; its numbers are measured in these runs
+  provenance.json     version, revision, date and command that made them
 
 The same seed gives the same figures and the same numbers.
 """
@@ -47,6 +51,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--only", metavar="NAME", nargs="+", action="extend", default=[], help="these figures, and a page of them"
     )
+    parser.add_argument(
+        "--width",
+        choices=("single", "double"),
+        default="single",
+        help="one column of a journal (88 mm) or two (180 mm); default: %(default)s",
+    )
     parser.add_argument("--list", action="store_true", help="print the names of all figures")
 
 
@@ -65,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.list:
         return _list()
-    written = _make(chosen(args.only), args.seed, args.out)
-    print(f"Written to {args.out}: {', '.join(written)}")
+    written = _make(chosen(args.only), args.seed, args.width, args.out)
+    say(f"Written to {args.out}: {', '.join(written)}")
     return 0
 
 
@@ -79,27 +89,40 @@ def _list() -> int:
     return 0
 
 
-def _make(names: Sequence[str], seed: int, folder: Path) -> list[str]:
+def _make(names: Sequence[str], seed: int, width: str, folder: Path) -> list[str]:
     """Makes the figures and writes the files, all or none; returns their names. Raises LeverError."""
-    from lever_cdkf.host_tools.files import Outputs, write_text, writing
+    from lever_cdkf.host_tools.exports import pictures
+    from lever_cdkf.host_tools.files import Outputs, writing
     from lever_cdkf.host_tools.progress import Progress
+    from lever_cdkf.host_tools.provenance import provenance, with_provenance
 
-    from ..study.figures import figures_page, png
+    from ..study.figures import data, figures_page, printed
     from ..study.figures.catalogue import FIGURES
     from ..study.figures.runs import Extent
 
     figures: list[Figure] = []
+    files: list[str] = []
+    origin = provenance()
+
+    def keep(name: str, content: bytes) -> None:
+        files.append(name)
+        path = outputs.path(name)
+        with writing(path):
+            path.write_bytes(content)
+
     with Outputs(folder) as outputs, Progress("figures") as progress:
         for done, name in enumerate(names):
             progress.show(done, len(names))
-            figures.append(FIGURES[name](seed, Extent()))
-            print_file = outputs.path(f"{name}.png")
-            with writing(print_file):
-                print_file.write_bytes(png.render(figures[-1]))
-        write_text(outputs.path(_PAGE), figures_page.build(figures))
-        write_text(outputs.path(_CAPTIONS), _captions(figures))
+            figure = FIGURES[name](seed, Extent())
+            figures.append(figure)
+            for kind in pictures.KINDS:
+                keep(f"{name}.{kind}", printed.render(figure, kind, width, origin))
+            keep(f"{name}.csv", data.table(figure).encode())
+        keep(_PAGE, with_provenance(figures_page.build(figures), origin).encode())
+        keep(_CAPTIONS, _captions(figures).encode())
+        keep(_PROVENANCE, origin.with_outputs(outputs.written(*files)).text().encode())
         outputs.finish()
-    return [*(f"{name}.png" for name in names), _PAGE, _CAPTIONS]
+    return files
 
 
 def _captions(figures: Sequence[Figure]) -> str:

@@ -6,13 +6,16 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.can import buses
 from lever_cdkf.host_tools.can.buses import add_bus_options, chosen_options
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.extras import require, warn_of_left_out
+from lever_cdkf.host_tools.extras import require
+from lever_cdkf.host_tools.formats import FORMATS, add_format_option, chosen_formats
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -25,10 +28,13 @@ _DESCRIPTION = """\
 Simulates a pilot's arm on the lever and lets the firmware estimate it over CAN, in lock-step: every sample is answered
 before the next one is sent. Prints how good the estimates were; with --out also writes into DIR
 
-  bus.log       every frame both ways, in the format of candump, with simulated time
-  trace.csv     truth, measured, estimated, standard deviations and health, a row for each sample
-  summary.json  errors, coverage, times to converge, innovations, counts, and a verdict
-  report.html   all of it as one page for a browser
+  bus.log        every frame both ways, in the format of candump, with simulated time
+  trace.csv      truth, measured, estimated, standard deviations and health, a row for each sample
+  signals.mf4    with --format mf4: the same with units and comments, for asammdf, PlotJuggler and the like
+  signals.mcap   with --format mcap: the same as messages, for Foxglove
+  trace.parquet  with --format parquet: trace.csv with units, for pandas, polars and the like
+  summary.json   errors, coverage, times to converge, innovations, counts, a verdict, and where the files come from
+  report.html    all of it as one page for a browser
 
 With --seeds N it runs the scenario N times, each time with other random numbers, in as many processes as there are
 cores, and prints median and worst over the runs: a single run is one draw of noise and vibration. Its only file is
@@ -51,14 +57,20 @@ _EPILOG = """\
 examples:
   lever sim --list
   lever sim steady --out out/steady
-  lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
+  lever sim steady --seed 7 --set duration="30 s" \\
+      --set theta_noise="2 mrad" --set base.0.rms="0.05 g"
   lever sim my_own.toml
-  lever sim steady --seeds 20 --json steady.json           median and worst of 20 runs, a minute on two cores
-  lever sim steady --seed 7 --out out/seed7                one of these runs, with its report
-  lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
-  lever sim steady --settings > steady.settings; lever_can --can vcan0 --lock-step --settings steady.settings &
+  lever sim steady --seeds 20 --json steady.json
+      median and worst of 20 runs, a minute on two cores
+  lever sim steady --seed 7 --out out/seed7
+      one of these runs, with its report
+  lever sim steady --settings my.settings
+      from `lever tune` or `lever settings`
+  lever sim steady --settings > steady.settings
+  lever_can --can vcan0 --lock-step --settings steady.settings &
   lever sim steady --interface socketcan --channel vcan0
-  lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
+  lever sim steady --interface slcan --channel /dev/ttyUSB0 \\
+      --bus-option tty_baudrate=921600
 
 Exit status: 0 when every sample was answered, the estimator never was in fault, and the limits of the scenario were
 kept; 1 when not, with one line on standard error. With --seeds the first two are asked of every run, and the limits of
@@ -66,7 +78,7 @@ the median rms error and of the coverage of all runs together.
 """
 _CHANNELS = {"lever": "lever", "socketcan": "vcan0"}
 _DEMO = "demo"
-_FILES = ("report.html", "summary.json", "trace.csv", "bus.log")
+_FILES = ("report.html", "summary.json", *FORMATS.values(), "bus.log")
 _PRINT = ""  # --settings without a file
 
 
@@ -93,6 +105,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         const=_PRINT,
         help="use the estimator settings in FILE; without FILE: print a settings file with those of the run, and stop",
     )
+    add_format_option(sim, ("csv",))
     add_json_option(sim)
     sim.set_defaults(run=run, interface="lever")
     demo = subparsers.add_parser(
@@ -101,8 +114,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled.",
     )
     demo.add_argument("--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
+    add_format_option(demo, ("csv",))
     add_json_option(demo)
-    demo.set_defaults(run=run_demo)
+    demo.set_defaults(run=run_demo, realtime=False, settings=None)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -127,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
     channel = args.channel or _CHANNELS.get(args.interface)
     if channel is None:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
-    return _simulate(scenario, args.interface, channel, chosen_options(args), args.out, args.json, args.realtime)
+    return _simulate(scenario, args.interface, channel, chosen_options(args), args)
 
 
 def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
@@ -145,7 +159,7 @@ def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
     with Progress("sim") as progress:
         summaries = seeds.run(tasks, args.jobs or os.cpu_count() or 1, progress.show)
     print_tables(seeds.tables(summaries), args.json)
-    print(seeds.verdict(summaries))
+    say(seeds.verdict(summaries))
     reasons = seeds.troubles(summaries) + seeds.missed(summaries)
     if reasons:
         print(f"lever: {args.scenario}: {'; '.join(reasons)}", file=sys.stderr)
@@ -159,6 +173,7 @@ def _check_seeds(args: argparse.Namespace) -> None:
             raise LeverError(f"{option} {number}: must be at least 1")
     for option, given in (
         ("--out", args.out is not None),
+        ("--format", args.format is not None),
         ("--realtime", args.realtime),
         ("--settings without a file", args.settings == _PRINT),
         (f"--interface {args.interface}", args.interface != "lever"),
@@ -172,13 +187,9 @@ def _check_seeds(args: argparse.Namespace) -> None:
 
 def _from_file(path: str) -> list[str]:
     """A settings file as overrides of a scenario. Raises LeverError."""
-    from lever_cdkf.host_tools.firmware.config import CHOICES, setting
     from lever_cdkf.host_tools.firmware.settings_file import read_assignments
 
-    return [
-        f"estimator.{name}={value}" if name in CHOICES else f"settings.{name}={value} {setting(name).unit}"
-        for name, value in read_assignments(path).items()
-    ]
+    return [f"{name}={value}" for name, value in read_assignments(path).items()]
 
 
 def run_demo(args: argparse.Namespace) -> int:
@@ -187,7 +198,7 @@ def run_demo(args: argparse.Namespace) -> int:
 
     from ..scenarios.scenario import load
 
-    return _simulate(load(_DEMO), "lever", "lever", {}, args.out, args.json, realtime=False)
+    return _simulate(load(_DEMO), "lever", "lever", {}, args)
 
 
 def _list(json_file: str | None) -> int:
@@ -208,23 +219,33 @@ def _simulate(
     interface: str,
     channel: str,
     bus_options: Mapping[str, Any],
-    out: Path | None,
-    json_file: str | None,
-    realtime: bool,
+    args: argparse.Namespace,
 ) -> int:
     from lever_cdkf.host_tools.progress import Progress
     from lever_cdkf.host_tools.tables import print_tables
 
     from ..run.runner import simulate
 
-    if out is not None:
-        warn_of_left_out(_FILES)
-    with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
-        result = simulate(scenario, bus, out, channel=channel, realtime=realtime, progress=progress.show)
-    print_tables(_tables(result), json_file)
-    print(result.summary.verdict)
-    if out is not None:
-        print(f"Written to {out}: {', '.join(name for name in _FILES if (out / name).exists())}")
+    formats, inputs = (
+        chosen_formats(args),
+        [path for path in (scenario.file, args.settings) if Path(path or "").is_file()],
+    )
+    with ExitStack() as stack:
+        progress, bus = stack.enter_context(Progress(scenario.name)), None
+        if interface != "lever" or bus_options:
+            bus = stack.enter_context(open_bus(scenario, interface, channel, bus_options))
+        result = simulate(
+            *(scenario, bus, args.out),
+            channel=channel,
+            realtime=args.realtime,
+            progress=progress.show,
+            formats=formats,
+            inputs=inputs,
+        )
+    print_tables(_tables(result), args.json)
+    say(result.summary.verdict)
+    if args.out is not None:
+        say(f"Written to {args.out}: {', '.join(name for name in _FILES if (args.out / name).exists())}")
     if result.summary.passed:
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)

@@ -6,7 +6,6 @@ import html
 from collections.abc import Sequence
 
 import numpy as np
-from lever_cdkf.host_tools.report.document import document
 from lever_cdkf.host_tools.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.summary_html import table
@@ -16,26 +15,31 @@ from .campaign import Result
 from .measure import FIGURES, FLAGS, Excerpt
 from .table import MISSED, figures, lines, state
 
-_TITLE = "Lever CDKF: the conditions that a collective meets"
-_STYLE = ".missed { color: var(--bad); } #table :is(td, th):nth-child(3) { text-align: left; white-space: normal; }"
+_STYLE = """
+.missed { color: var(--bad); }
+#table :is(td, th):nth-child(3) { text-align: left; white-space: normal; }
+@media (min-width: 1100px) {
+  :root:not(.paper) .condition { display: grid; grid-template-columns: minmax(0, 1fr) auto; gap: 2rem; }
+}
+"""
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
     """The whole page."""
-    page = Page()
+    page = Page(
+        "The conditions that a collective meets",
+        f"Levers and pilots by a plant that shares nothing with the filter's model, {seeds} random pilots a condition, "
+        "the firmware as shipped. Charts: the natural frequency with its ±2σ, of each condition in the run in which it "
+        "was worst.",
+        "lever envelope",
+    )
     page.section("table", "Table", "Measured values against their limits", _table(lines(results)), _legend(results))
     for result in results:
         name, chart = result.condition.name, None if result.excerpt is None else _chart(result.excerpt, result)
         title = f"{html.escape(result.condition.title)}: {state(result)}"
-        page.section(name, name, title, page.figure(f"chart-{name}", chart, ""), _table(figures(result)))
-    body = (
-        f'<header><h1>{_TITLE}</h1><p class="subtitle">Levers and pilots by a plant that shares nothing with the '
-        f"filter's model, {seeds} random pilots a condition, the firmware as shipped. Charts: the natural frequency "
-        f"with its ±2σ, of each condition in the run in which it was worst.</p></header>{_verdict(results)}"
-        f"{''.join(page.sections)}"
-        "<footer>Made by <code>lever envelope</code>. Nothing on this page is loaded from elsewhere.</footer>"
-    )
-    return document(_TITLE, body, {key: figure.spec() for key, figure in page.figures.items()}, _STYLE)
+        parts = page.figure(f"chart-{name}", chart, ""), _table(figures(result))
+        page.section(name, name, title, f'<div class="condition">{"".join(parts)}</div>')
+    return page.html(_verdict(results), _STYLE)
 
 
 def _verdict(results: Sequence[Result]) -> str:
@@ -79,7 +83,7 @@ def _chart(shown: Excerpt, result: Result) -> Figure:
     figure = Figure([axis("natural frequency [Hz]", range=[floor, ceiling])], time_axis(shown.time[-1]), height=260)
     figure.add(*band(shown.time, low, high, "estimate ±2σ", "estimate-band"))
     if shown.truth.size:
-        figure.add(line(shown.time, shown.truth, "truth", "truth"))
+        figure.add(line(shown.time, shown.truth, "truth", "truth", line_dash="dash", zorder=1))
     figure.add(line(shown.time, shown.value, "estimate", "estimate"))
     if shown.flagged.any():
         at = shown.time[shown.flagged]

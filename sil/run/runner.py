@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import can
+import numpy as np
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.exports.signal_files import SignalFiles
 from lever_cdkf.host_tools.extras import missing
 from lever_cdkf.host_tools.files import Outputs, make_folder, write_text, writing
-from lever_cdkf.host_tools.results import trace
+from lever_cdkf.host_tools.formats import FORMATS
+from lever_cdkf.host_tools.provenance import provenance
 from lever_cdkf.host_tools.results.summary import SimulationSummary, text
 from lever_cdkf.host_tools.results.trace import Trace
+from numpy.typing import NDArray
 
 from ..scenarios.scenario import Scenario
-from . import buslog, loop, summary
+from . import buslog, in_process, loop, summary
 from .buslog import Frames
-from .columns import columns_of
+from .columns import columns_of, published
 from .loop import Progress
 
 
@@ -39,10 +44,13 @@ def simulate(
     channel: str = "lever",
     realtime: bool = False,
     progress: Progress | None = None,
+    formats: Sequence[str] = ("csv",),
+    inputs: Sequence[str | Path] = (),
 ) -> Result:
     """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
-    it; with `out_dir` also writes bus.log, trace.csv, report.html (with the extra `report`) and summary.json there,
-    all or none. `channel` is the bus's name in bus.log.
+    it; with `out_dir` also writes bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra
+    `report`) and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the
+    scenario is from.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
     files but for the wall times are the same either way. Raises LeverError.
@@ -50,32 +58,49 @@ def simulate(
     start = clock.perf_counter()
     if out_dir is not None:
         make_folder(out_dir)  # before a run that could then not be kept
-    with ExitStack() as stack:
-        estimator = bus or stack.enter_context(LeverBus(channel, config=scenario.config))
-        recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
+    if bus is None and not realtime:
+        recording = in_process.run(scenario, channel, progress)
+    else:
+        with ExitStack() as stack:
+            estimator = bus or stack.enter_context(LeverBus(channel, config=scenario.config))
+            recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
     frames = recording.frames()
     columns = columns_of(recording, frames)
     untimed = summary.build(recording, columns)
     if out_dir is not None:
-        _write(Result(columns, untimed, frames), out_dir, channel, start)
+        files = _Files(out_dir, channel, formats, inputs)
+        files.write(Result(columns, untimed, frames), published(recording, frames), start)
     return Result(columns, untimed.timed(clock.perf_counter() - start), frames)
 
 
-def _write(result: Result, folder: Path, channel: str, start: float) -> None:
-    """Writes the files; summary.json comes last, so that its wall time is of everything."""
-    from lever_cdkf.host_tools.report import write_report
+@dataclass(frozen=True)
+class _Files:
+    """What is to be written."""
 
-    def elapsed() -> SimulationSummary:
-        return result.summary.timed(clock.perf_counter() - start)
+    folder: Path
+    channel: str
+    formats: Sequence[str]
+    inputs: Sequence[str | Path]
 
-    with Outputs(folder, names=("report.html",)) as outputs:
-        bus_log = outputs.path("bus.log")
-        with writing(bus_log), bus_log.open("wb") as file:
-            file.writelines(buslog.lines(result.frames, channel))
-        trace_csv = outputs.path("trace.csv")
-        with writing(trace_csv):
-            trace.write_csv(result.trace, trace_csv)
-        if not missing("report"):
-            write_report(result.trace, elapsed(), outputs.path("report.html"))
-        write_text(outputs.path("summary.json"), text(elapsed()))
-        outputs.finish()
+    def write(self, result: Result, published: NDArray[np.bool_], start: float) -> None:
+        """Writes the files; summary.json comes last, so that its wall time is of everything."""
+        from lever_cdkf.host_tools.report import write_report
+
+        def elapsed() -> SimulationSummary:
+            return result.summary.timed(clock.perf_counter() - start)
+
+        origin = provenance(self.inputs)
+        with Outputs(self.folder, self.inputs, ("report.html", *FORMATS.values())) as outputs:
+            bus_log = outputs.path("bus.log")
+            with writing(bus_log), bus_log.open("wb") as file:
+                file.writelines(buslog.lines(result.frames, self.channel))
+            with SignalFiles(self.formats, outputs.path, origin) as signals:
+                signals.start(result.trace, 0, asdict(result.summary.estimator))
+                signals.add(result.trace, published, np.zeros_like(published))
+                signals.close()
+            origin = origin.with_outputs(outputs.written("bus.log", FORMATS["csv"]))
+            summary = replace(elapsed(), provenance=origin)
+            if not missing("report"):
+                write_report(result.trace, summary, outputs.path("report.html"))
+            write_text(outputs.path("summary.json"), text(replace(elapsed(), provenance=origin)))
+            outputs.finish()

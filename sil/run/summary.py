@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
-from lever_cdkf.host_tools.can.fields import COUNTS
 from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from lever_cdkf.host_tools.results import nis, summary, whiteness
@@ -46,7 +45,10 @@ def build(recording: Recording, trace: Trace) -> SimulationSummary:
     summary = SimulationSummary(
         estimator=Estimator(**scenario.config.choices, settings=dict(scenario.config.settings)),
         samples=count,
-        **{name: _last(trace[name]) for name in COUNTS},
+        lost=_last(trace["lost"]),
+        corrupt=_last(trace["corrupt"]),
+        late=_last(trace["late"]),
+        restarts=_last(trace["restarts"]),
         nis=_nis(scenario, trace),
         whiteness=_whiteness(scenario, trace),
         modes_s=modes,
@@ -191,12 +193,18 @@ def missed_limits(
     for name, rms in rms_percent.items():
         limit = limits.get(name)
         if limit is not None and rms is not None and rms > 100.0 * limit:
-            missed.append(f"rms error of {name} {rms:.1f} % (limit {100.0 * limit:g} %)")
+            missed.append(f"rms error of {name} {_above(rms, 100.0 * limit)} % (limit {100.0 * limit:g} %)")
     least = limits.get("coverage")
     for name, share in coverage.items():
         if least is not None and share is not None and share < least:
             missed.append(f"coverage of {name} {_whole_percent(share)} % (limit {100.0 * least:g} %)")
     return missed
+
+
+def _above(value: float, limit: float) -> str:
+    """With as many decimals as it takes to differ from the limit."""
+    texts = (f"{value:.{decimals}f}" for decimals in range(1, 12))
+    return next((text for text in texts if float(text) > limit), f"{value!r}")
 
 
 def _whole_percent(share: float) -> int:

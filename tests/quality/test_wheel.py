@@ -9,6 +9,7 @@ import tarfile
 from pathlib import Path
 
 import pytest
+from conftest import Built
 from quality import tools
 
 if sys.version_info >= (3, 11):
@@ -16,29 +17,17 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations")
-_SDIST = "import sys; from scikit_build_core.build import build_sdist; build_sdist(sys.argv[1])"
+NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations", "lever_loop")
 
 
 @pytest.fixture(scope="module")
-def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sdist")
-    tools.assert_silent([sys.executable, "-c", _SDIST, folder])
-    (archive,) = folder.iterdir()
-    return archive
+def installed(built: Built) -> Path:
+    """A folder with the package and nothing else, made by package/wheel.py."""
+    return built("wheel_test/installed", "build.wheel")
 
 
-@pytest.fixture(scope="module")
-def installed(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the package and nothing else."""
-    folder = tmp_path_factory.mktemp("wheel")
-    pip = [sys.executable, "-m", "pip", "install", "--no-index", "--no-deps", "--no-build-isolation"]
-    pip += ["--config-settings=cmake.build-type=Debug"]  # is built faster
-    tools.assert_silent([*pip, "--target", folder, sdist])
-    return folder
-
-
-def test_the_source_distribution_has_what_builds_the_package(sdist: Path) -> None:
+def test_the_source_distribution_has_what_builds_the_package(installed: Path) -> None:
+    (sdist,) = installed.parent.glob("*.tar.gz")
     with tarfile.open(sdist) as archive:
         names = {Path(name).relative_to(Path(name).parts[0]) for name in archive.getnames()}
     assert {Path(name) for name in ("CMakeLists.txt", "pyproject.toml", "LICENSE", "README.md")} <= names

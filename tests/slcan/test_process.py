@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import select
 import signal
-import stat
 import subprocess
 import time
 import tty
@@ -166,14 +165,6 @@ def test_noise_is_answered_and_does_not_disturb(start: Start, link: Path) -> Non
     assert answers == rig.in_process(120)
     there.bus.shutdown()
     assert process.stop()["lines refused"] == 2 + 5
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_well(start: Start, link: Path, number: signal.Signals) -> None:
-    process = start("pty", link)
-    assert stat.S_ISCHR(link.stat().st_mode)
-    assert process.stop(number)["samples"] == 0
-    assert not link.is_symlink()
 
 
 def test_a_link_that_was_left_behind_is_replaced_and_a_file_is_not(start: Start, link: Path, build_dir: Path) -> None:

@@ -120,6 +120,14 @@ def interface() -> Iterator[str]:
 
 
 @pytest.fixture
+def host(interface: str) -> Iterator[rig.Host]:
+    """Somebody on that interface."""
+    there = rig.Host.on(interface)
+    yield there
+    there.bus.shutdown()
+
+
+@pytest.fixture
 def start(build_dir: Path, tmp_path: Path, interface: str) -> Iterator[rig.Starter]:
     """Starts lever_can on the interface with further options, and ends what is left of it after the test."""
     with ExitStack() as stack:

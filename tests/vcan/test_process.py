@@ -45,9 +45,8 @@ def test_an_interface_that_is_not_can(build_dir: Path) -> None:
     assert refusal(build_dir / "lever_can", "lo") == "not a CAN interface\n"
 
 
-def test_its_answers_are_those_of_the_firmware_in_this_process(start: rig.Starter, interface: str) -> None:
+def test_its_answers_are_those_of_the_firmware_in_this_process(start: rig.Starter, host: rig.Host) -> None:
     process = start()
-    host = rig.Host.on(interface)
     began = time.perf_counter()
     answers = host.run(4 * SAMPLES)
     rate = 4 * SAMPLES / (time.perf_counter() - began)
@@ -58,24 +57,14 @@ def test_its_answers_are_those_of_the_firmware_in_this_process(start: rig.Starte
     assert totals["frames in"] == 8 * SAMPLES
     assert totals["frames out"] == len(answers)
     assert {name for name, count in totals.items() if count} == {"samples", "frames in", "frames out"}
-    host.bus.shutdown()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_well(start: rig.Starter, interface: str, number: signal.Signals) -> None:
+def test_a_signal_ends_it_well(start: rig.Starter, number: signal.Signals, host: rig.Host) -> None:
     process = start()
-    host = rig.Host.on(interface)
     host.run(10)
     assert process.stop(number)["samples"] == 10
     assert process.stderr == ""
-    host.bus.shutdown()
-
-
-def test_a_signal_ends_it_while_the_interface_is_down(start: rig.Starter, interface: str) -> None:
-    process = start()
-    rig.ip("link", "set", interface, "down")
-    process.wait_for("link lost")
-    assert process.stop()["outages"] == 1
 
 
 def test_a_signal_ends_it_under_full_load(start: rig.Starter, interface: str) -> None:
@@ -90,9 +79,8 @@ def test_a_signal_ends_it_under_full_load(start: rig.Starter, interface: str) ->
         flood.wait()
 
 
-def test_it_goes_on_after_the_interface_was_down(start: rig.Starter, interface: str) -> None:
+def test_it_goes_on_after_the_interface_was_down(start: rig.Starter, interface: str, host: rig.Host) -> None:
     process = start()
-    host = rig.Host.on(interface)
     answers = host.run(SAMPLES)
     rig.ip("link", "set", interface, "down")
     process.wait_for("link lost (Network is down); waiting for it with the estimate kept")
@@ -103,12 +91,12 @@ def test_it_goes_on_after_the_interface_was_down(start: rig.Starter, interface: 
     assert answers == rig.in_process(2 * SAMPLES)
     assert process.stderr.count("\n") == 2
     assert process.stop()["outages"] == 1
-    host.bus.shutdown()
 
 
-def test_it_goes_on_after_the_interface_was_deleted_and_made_again(start: rig.Starter, interface: str) -> None:
+def test_it_goes_on_after_the_interface_was_deleted_and_made_again(
+    start: rig.Starter, interface: str, host: rig.Host
+) -> None:
     process = start()
-    host = rig.Host.on(interface)
     answers = host.run(SAMPLES)
     rig.ip("link", "delete", interface)
     process.wait_for("link lost")
@@ -123,31 +111,14 @@ def test_it_goes_on_after_the_interface_was_deleted_and_made_again(start: rig.St
     assert answers == rig.in_process(2 * SAMPLES)
     assert process.stderr.count("\n") == 2
     process.stop()
-    host.bus.shutdown()
-
-
-def test_many_outages_in_a_row(start: rig.Starter, interface: str) -> None:
-    process = start()
-    host = rig.Host.on(interface)
-    answers = []
-    for outage in range(1, 4):
-        answers += host.run(20)
-        rig.ip("link", "set", interface, "down")
-        rig.ip("link", "set", interface, "up")
-        process.wait_for("link restored", times=outage)
-        host.reopen(interface)
-    assert answers == rig.in_process(60)
-    assert process.stop()["outages"] == 3
-    host.bus.shutdown()
 
 
 @pytest.mark.requires("tc")
-def test_no_frame_is_dropped_when_the_interface_has_no_room(start: rig.Starter, interface: str) -> None:
+def test_no_frame_is_dropped_when_the_interface_has_no_room(start: rig.Starter, interface: str, host: rig.Host) -> None:
     """A queue of two frames, emptied at about 500 frames a second: ENOBUFS all the time."""
     slow = ["tc", "qdisc", "add", "dev", interface, "root", "tbf", "rate", "64kbit", "burst", "80", "limit", "40"]
     subprocess.run(slow, check=True)
     process = start("--set", "publish_period=0.002")
-    host = rig.Host.on(interface)
     answers = host.run(SAMPLES)
     assert host.nothing_more()
     totals = process.stop()
@@ -155,10 +126,9 @@ def test_no_frame_is_dropped_when_the_interface_has_no_room(start: rig.Starter, 
     assert totals["frames out"] == len(answers)
     assert totals["unsent"] == 0
     assert answers == rig.in_process(SAMPLES, publish_period=0.002)
-    host.bus.shutdown()
 
 
-def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, interface: str) -> None:
+def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, host: rig.Host) -> None:
     foreign = [
         can.Message(arbitration_id=0x7FF, is_extended_id=False, data=bytes(range(8))),
         can.Message(arbitration_id=0x110, is_extended_id=True, data=bytes(range(8))),
@@ -178,7 +148,6 @@ def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, interface:
         ]
     ]
     process = start()
-    host = rig.Host.on(interface)
     answers = []
     for frame in (*foreign, *broken):
         answers += host.run(20)
@@ -192,13 +161,11 @@ def test_foreign_and_broken_frames_do_not_disturb(start: rig.Starter, interface:
     assert totals["samples"] == samples
     assert totals["corrupt"] == len(broken)
     assert totals["frames in"] == 2 * samples + len(broken)
-    host.bus.shutdown()
 
 
-def test_a_motor_command_does_not_wait_for_the_interface(start: rig.Starter, interface: str) -> None:
+def test_a_motor_command_does_not_wait_for_the_interface(start: rig.Starter, interface: str, host: rig.Host) -> None:
     """Stopped, the process has a sample to answer when the interface goes down. Once this was sent 3 s later."""
     process = start(supervised=True)
-    host = rig.Host.on(interface)
     host.run_with_torque()
     process.process.send_signal(signal.SIGSTOP)
     for frame in next(rig.samples(host.samples_sent, 1)):
@@ -212,35 +179,30 @@ def test_a_motor_command_does_not_wait_for_the_interface(start: rig.Starter, int
     process.wait_for("link restored")
     assert not any(rig.torques(host.rest()))
     process.stop()
-    host.bus.shutdown()
 
 
-def test_another_estimator_on_the_bus_is_noticed(start: rig.Starter, interface: str) -> None:
+def test_another_estimator_on_the_bus_is_noticed(start: rig.Starter, host: rig.Host) -> None:
     """Its IDENTITY passes the receive filter."""
     process = start()
-    host = rig.Host.on(interface)
     answers = host.run(20)
     host.send(next(frame for frame in answers if frame[0] == IDENTITY))
     health = [codec.decode(*frame)[1] for frame in host.run(200) if frame[0] == HEALTH]
     assert any(each["fault_duplicate"] for each in health)
     assert process.stop()["frames in"] == 2 * 220 + 1
-    host.bus.shutdown()
 
 
 @pytest.mark.requires("cangen")
-def test_a_full_receive_buffer_is_counted(start: rig.Starter, interface: str) -> None:
+def test_a_full_receive_buffer_is_counted(start: rig.Starter, interface: str, host: rig.Host) -> None:
     """While the process is stopped more frames come than the kernel keeps for it."""
     process = start()
     process.process.send_signal(signal.SIGSTOP)
     flood = 20000
     subprocess.run(["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "8", "-n", str(flood)], check=True)
     process.process.send_signal(signal.SIGCONT)
-    host = rig.Host.on(interface)
     host.reach()  # what was sent before is taken or lost by then
     totals = process.stop()
     assert totals["overflowed"] > 0
     assert totals["frames in"] + totals["overflowed"] == flood + 2 * host.samples_sent
-    host.bus.shutdown()
 
 
 def test_a_change_of_the_bus_condition_is_told_once(start: rig.Starter, interface: str) -> None:

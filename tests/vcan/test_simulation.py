@@ -79,10 +79,6 @@ def test_the_frames_are_those_of_a_run_in_one_process(runs: Runs) -> None:
     assert log.replace(f" {rig.INTERFACE} ", " lever ") == (runs.in_process / "bus.log").read_text()
 
 
-def test_the_estimates_are_those_of_a_run_in_one_process(runs: Runs) -> None:
-    assert (runs.over_can / "trace.csv").read_bytes() == (runs.in_process / "trace.csv").read_bytes()
-
-
 def test_a_process_that_has_run_before_serves_the_next_run(start: rig.Starter, interface: str, tmp_path: Path) -> None:
     process = start("--settings", settings_file("fixed_preload", tmp_path))
     for out in ("one", "two"):

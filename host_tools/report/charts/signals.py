@@ -6,6 +6,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...firmware.quantities import DYNAMICS
+from ...results.whiteness import COLOURED
 from ...statistics import chi_square_band
 from ..figure import Figure, Spec, axis, axis_range, band, dots, frequency_axis, line, time_axis
 from ..run import Run
@@ -32,7 +33,7 @@ def motion(run: Run) -> Figure | None:
 def detail(run: Run, seconds: float = 2.0, points: int = 1000) -> Figure | None:
     """The same, close up: every sample of a few short stretches, chosen by button."""
     rows = [axis(title) for _, _, title in STATES]
-    figure = Figure(rows, time_axis(seconds), 460, over_time=False)
+    figure = Figure(rows, time_axis(seconds), 420, over_time=False)
     owners: list[int] = []
     starts = _stretches(run, seconds)
     for number, start in enumerate(starts.values()):
@@ -50,18 +51,16 @@ def detail(run: Run, seconds: float = 2.0, points: int = 1000) -> Figure | None:
                     owners.append(number)
     if not figure.traces:
         return None
-    buttons: list[Spec] = [
-        {
-            "label": label,
-            "method": "update",
-            "args": [{"visible": [owner == number for owner in owners]}, {"xaxis.range": [start, start + seconds]}],
-        }
-        for number, (label, start) in enumerate(starts.items())
-    ]
-    # Plotly paints the active button nearly white in any theme, so the text on the buttons is dark in any theme.
-    figure.x_axis["range"] = buttons[0]["args"][1]["xaxis.range"]
-    place = {"type": "buttons", "direction": "left", "x": 0, "xanchor": "left", "y": 1.22, "yanchor": "top"}
-    figure.more["updatemenus"] = [place | {"buttons": buttons, "bgcolor": "#d5dde5", "font": {"color": "#1b232b"}}]
+    figure.choose(
+        [
+            {
+                "label": label,
+                "data": {"visible": [owner == number for owner in owners]},
+                "layout": {"xaxis.range": [start, start + seconds]},
+            }
+            for number, (label, start) in enumerate(starts.items())
+        ]
+    )
     return figure
 
 
@@ -76,10 +75,10 @@ def _look(kind: str) -> tuple[str, dict[str, Any]]:
 def _stretches(run: Run, seconds: float) -> dict[str, float]:
     """Label and start [s] of the stretches worth a close look."""
     last = max(0.0, run.end - seconds)
-    starts = {"at the start": 0.0}
+    starts = {"start": 0.0}
     if run.changes:
-        starts["at the first change"] = min(max(0.0, run.changes[0] - 0.25 * seconds), last)
-    starts["at the end"] = last
+        starts["first change"] = min(max(0.0, run.changes[0] - 0.25 * seconds), last)
+    starts["end"] = last
     return starts
 
 
@@ -104,7 +103,7 @@ def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
 
 
 def whiteness(run: Run) -> Figure | None:
-    """Autocorrelation of the residual of the rate, and the band in which white noise stays."""
+    """Autocorrelation of the residual of the rate with the band of chance and the limits of a right model."""
     result = run.whiteness
     if result is None:
         return None
@@ -113,8 +112,9 @@ def whiteness(run: Run) -> Figure | None:
     end = float(lag[-1] + lag[0])
     limits = axis_range([np.append(correlation, (-0.25, 0.25))], slice(None))
     figure = Figure([axis("correlation [1]", range=limits)], axis("lag [ms]", range=[0.0, end]), 260, over_time=False)
-    edges = np.full(2, result.band_95)
-    figure.add(*band(np.array([0.0, end]), -edges, edges, "95 % of white noise", "chance-band"))
+    edges = np.full(2, result.band_of_all)
+    figure.add(*band(np.array([0.0, end]), -edges, edges, "chance alone", "chance-band"))
+    figure.level(-COLOURED, COLOURED)
     bar: Spec = {
         "type": "bar",
         "x": packed(lag),
@@ -154,7 +154,7 @@ def spectra(run: Run) -> Figure | None:
     if base is None or torque is None or run.samples < 16:
         return None
     titles = ("z̈ [m/s² per √Hz]", "τ<sub>m</sub> [N m per √Hz]")
-    rows = [axis(title, type="log", dtick=1, exponentformat="power") for title in titles]
+    rows = [axis(title, type="log", dtick=1, exponentformat="none") for title in titles]
     figure = Figure(rows, frequency_axis(0.25, 50.0), 420, over_time=False)
     for row, (column, name, colour) in enumerate(
         ((base, "base acceleration z̈", "base"), (torque, "motor torque τ<sub>m</sub>", "torque"))
@@ -186,5 +186,5 @@ def _mark_natural_frequency(run: Run, figure: Figure) -> None:
     low, high = limits
     box = {"type": "rect", "x0": low, "x1": max(high, 1.01 * low), "y0": 0, "y1": 1, "yref": "paper"}
     figure.shapes.append(box | {"fillcolor": "@chance-band", "line": {"width": 0}, "layer": "below"})
-    where = {"x": float(np.log10(low * max(high, 1.01 * low)) / 2.0), "y": 1, "yref": "paper", "yanchor": "top"}
+    where = {"x": float(np.log10(low * max(high, 1.01 * low)) / 2.0), "y": 0, "yref": "paper", "yanchor": "bottom"}
     figure.annotations.append(where | {"text": DYNAMICS[0].name, "showarrow": False})

@@ -12,12 +12,12 @@ POINTS = 1500
 
 def parameters(run: Run) -> Figure | None:
     """Those of the estimator's model over time."""
-    return _tracked(run, run.parameters, height=620)
+    return _tracked(run, run.parameters, height=580)
 
 
 def dynamics(run: Run) -> Figure | None:
     """Natural frequency and damping ratio over time."""
-    return _tracked(run, DYNAMICS, height=440)
+    return _tracked(run, DYNAMICS, height=420)
 
 
 def _tracked(run: Run, quantities: tuple[Quantity, ...], height: int) -> Figure | None:
@@ -54,7 +54,7 @@ def _traces(run: Run, quantity: Quantity, row: int, chosen: np.ndarray) -> list[
         traces += band(time, bounds[0][chosen], bounds[1][chosen], "estimate ± 2σ", "estimate-band", row)
     if (truth := run.truth(quantity)) is not None:
         hover = f"true {quantity.name} %{{y:.4g}}{unit}<extra></extra>"
-        traces.append(line(time, truth[chosen], "truth", "truth", row, line_dash="dash", hovertemplate=hover))
+        traces.append(line(time, truth[chosen], "truth", "truth", row, line_dash="dash", zorder=1, hovertemplate=hover))
     if (estimate := run.estimate(quantity)) is not None:
         hover = f"estimated {quantity.name} %{{y:.4g}}{unit}<extra></extra>"
         traces.append(line(time, estimate[chosen], "estimate", "estimate", row, hovertemplate=hover))

@@ -97,12 +97,12 @@ def slices(run: Run) -> Figure | None:
         axis("θ/z̈ [deg per m/s²]", type="log", range=[float(decade) for decade in decades], tickvals=TICKS),
         axis("phase [deg]", range=axis_range(phases, slice(None)), dtick=45),
     ]
-    figure = Figure(rows, frequency_axis(FREQUENCIES[0], FREQUENCIES[-1]), 520, over_time=False)
+    figure = Figure(rows, frequency_axis(FREQUENCIES[0], FREQUENCIES[-1]), 430, over_time=False)
     bands = _bands(run, time, responses["estimate"]) if "estimate" in responses else []
     shown = _shown(bands, len(time) * 4 // 5)
     for row, edges in enumerate(bands):
         figure.add(*band(BAND, *edges[shown], "estimate ± 2σ", "estimate-band", row))
-    looks: dict[str, Spec] = {"truth": {"line_dash": "dash"}, "estimate": {}}
+    looks: dict[str, Spec] = {"truth": {"line_dash": "dash", "zorder": 1}, "estimate": {}}
     for name, values in responses.items():
         for row, curve in enumerate(magnitude_and_phase(values[shown])):
             figure.add(line(FREQUENCIES, curve, name, name, row, **looks[name]))
@@ -110,10 +110,7 @@ def slices(run: Run) -> Figure | None:
         _step(moment, [edge for edges in bands for edge in edges[index]], [each[index] for each in responses.values()])
         for index, moment in enumerate(time)
     ]
-    look = {"bgcolor": "@button", "bordercolor": "@quiet", "activebgcolor": "@estimate", "tickcolor": "@edge"}
-    figure.more["sliders"] = [
-        {"active": shown, "steps": steps, "currentvalue": {"prefix": "time ", "suffix": " s"}, "pad": {"t": 50}, **look}
-    ]
+    figure.choose(steps, shown, slider="time")
     _add_coherence(run, figure)
     return figure
 
@@ -163,9 +160,9 @@ def _short(number: float) -> float | None:
 def _step(moment: float, edges: list[Array], values: list[np.ndarray]) -> dict[str, Any]:
     curves = [*edges, *(curve for value in values for curve in magnitude_and_phase(value))]
     return {
-        "label": f"{moment:.3g}" if moment < 1000.0 else f"{moment:.0f}",
-        "method": "restyle",
-        "args": [{"y": [[_short(number) for number in curve] for curve in curves]}, list(range(len(curves)))],
+        "label": f"{moment:.3g} s" if moment < 1000.0 else f"{moment:.0f} s",
+        "data": {"y": [[_short(number) for number in curve] for curve in curves]},
+        "traces": list(range(len(curves))),
     }
 
 

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from itertools import groupby
+from itertools import cycle, groupby
 from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.report.figure import Figure, Spec, axis, band, dots, line
+from lever_cdkf.host_tools.report.figure import SERIES, Figure, Spec, axis, band, dots, line
 
+from ..baselines import BASELINES
 from ..scores import settling_times
 from .campaign import Results
 from .cases import cases
-from .entrants import entrants
+from .entrants import OURS, entrants
 from .evaluation import FREQUENCY, Row, quantities
 
-COLOURS = ("estimate", "base", "torque", "good", "quiet", "text")
+COLOURS = dict(zip((*OURS, *BASELINES), cycle(SERIES)))
+"""Of an estimator, on all charts; that of the firmware has the same in all its settings."""
+SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross", "star")
+"""Of the series of a chart."""
 _LANE = 22  # [pixels] of one estimator in a figure, for one series; further ones take a third of it
 _SHOWN_AFTER = 15.0  # [s] after a step
 
@@ -67,7 +71,7 @@ def _average(values: Sequence[float]) -> float:
 def _lanes(
     rows: Sequence[Row], title: str, value: Callable[[Row], float], error: Callable[[Row], float], mark: float
 ) -> Figure | None:
-    """A lane for each estimator, a colour for each case, over a logarithmic axis with a line at `mark`."""
+    """A lane for each estimator, a symbol for each case, over a logarithmic axis with a line at `mark`."""
     if not rows:
         return None
     names = list(dict.fromkeys(row.estimator for row in rows))
@@ -76,18 +80,31 @@ def _lanes(
     for index, (case, members) in enumerate(series):
         at = np.array([names.index(row.estimator) + _offset(index, len(series)) for row in members], dtype=float)
         values, errors = (np.array([of(row) for row in members]) for of in (value, error))
-        figure.add(_marks(values, at, case, index, errors))
+        figure.add(*_marks(values, at, [row.estimator for row in members], case, index, errors))
     figure.shapes.append(_vertical(mark))
     return figure
 
 
-def _marks(values: Array, at: Array, name: str, index: int, errors: Array | None = None) -> Spec:
-    colour = COLOURS[index % len(COLOURS)]
-    more: Spec = {"marker": {"color": f"@{colour}", "size": 8}, "hovertemplate": f"%{{x:.3g}}<extra>{name}</extra>"}
+def _colour(estimator: str) -> str:
+    """dual_shipped is a dual."""
+    return COLOURS.get(estimator) or next(COLOURS[name] for name in OURS if estimator.startswith(f"{name}_"))
+
+
+def _marks(
+    values: Array, at: Array, estimators: Sequence[str], name: str, index: int, errors: Array | None = None
+) -> list[Spec]:
+    """One for each estimator; and for the legend one without a place, as they have no common colour."""
+    look: Spec = {"size": 8, "symbol": SYMBOLS[index % len(SYMBOLS)]}
+    colours = [f"@{_colour(estimator)}" for estimator in estimators]
+    more: Spec = {"marker": look | {"color": colours}, "hovertemplate": f"%{{x:.3g}}<extra>{name}</extra>"}
     if errors is not None:
         widths = [float(width) if math.isfinite(width) else 0.0 for width in errors]
-        more["error_x"] = {"type": "data", "array": widths, "thickness": 1.2, "width": 0, "color": f"@{colour}"}
-    return dots(values, at, name, colour, **more)
+        more["error_x"] = {"type": "data", "array": widths, "thickness": 1.2, "width": 0, "color": "@mark"}
+    nowhere, plain = np.array([math.nan]), look | {"color": "@text"}
+    return [
+        dots(values, at, name, "text", showlegend=False, **more),
+        dots(nowhere, nowhere, name, "text", marker=plain),
+    ]
 
 
 def _offset(index: int, count: int) -> float:
@@ -96,10 +113,17 @@ def _offset(index: int, count: int) -> float:
 
 def _figure(names: Sequence[str], title: str, series: int, **x_axis: Any) -> Figure:
     """An empty figure with a lane for each name, the first on top."""
-    lanes: Spec = {"tickvals": list(range(len(names))), "ticktext": list(names), "range": [len(names) - 0.5, -0.5]}
+    lanes: Spec = {
+        "tickvals": list(range(len(names))),
+        "ticktext": list(names),
+        "automargin": True,
+        "range": [len(names) - 0.5, -0.5],
+        "zeroline": False,
+    }
     height = round(_LANE * len(names) * (1.0 + 0.3 * (series - 1))) + 70 + 20 * series
-    more = {"margin": {"l": 130, "r": 12, "t": 30 + 20 * series, "b": 44}, "hovermode": "closest"}
-    return Figure([lanes | {"zeroline": False}], axis(title, **x_axis), height, more=more, over_time=False)
+    more: Spec = {"margin": {"l": 20, "r": 12, "t": 30 + 20 * series, "b": 44}, "hovermode": "closest"}
+    more["showlegend"] = series > 1
+    return Figure([lanes], axis(title, **x_axis), height, more=more, over_time=False)
 
 
 def _vertical(at: float, colour: str = "mark") -> Spec:
@@ -119,38 +143,31 @@ def settling(results: Results, case: str) -> Figure | None:
         times = settling_times(outcome.errors[..., FREQUENCY], elapsed)
         lane = index + np.linspace(-0.25, 0.25, len(times))
         never = np.isnan(times)
-        colour = "estimate" if _is_ours(case, name) else "base"
         for chosen, symbol in ((~never, "circle"), (never, "circle-open")):
-            marker = {"color": f"@{colour}", "size": 6, "symbol": symbol}
+            marker = {"color": f"@{_colour(name)}", "size": 6, "symbol": symbol}
             shown = np.where(never, elapsed[-1], times)[chosen]
-            figure.add(dots(shown, lane[chosen], name, colour, marker=marker, showlegend=False))
+            figure.add(dots(shown, lane[chosen], name, "text", marker=marker, showlegend=False))
     return figure
 
 
 def following(results: Results, case: str) -> Figure | None:
-    """The error of the natural frequency about the step: median over runs, and of ours the middle half.
-
-    Of ours the first, and as many others as there are colours.
-    """
+    """The error of the natural frequency about the step: median over runs, and of the first of ours the middle half."""
     change, names = cases()[case].change(results.plan), _present(results, case)
     if change is None or not names:
         return None
     ours, others = ([name for name in names if _is_ours(case, name) is own] for own in (True, False))
-    shown = (ours[:1] + others)[: len(COLOURS)]
+    shown = ours[:1] + others
     figure = Figure([axis("error of f_n [%]", range=[-25, 35])], axis("time after the step [s]"), 380, over_time=False)
-    for index, name in enumerate(shown):
+    for name in shown:
         outcome = results.outcomes[case, name]
         elapsed = outcome.time - change
         near = (elapsed > -2.0) & (elapsed < _SHOWN_AFTER)
         errors = 100.0 * outcome.errors[:, near, FREQUENCY]
         low, middle, high = np.quantile(np.where(np.isfinite(errors), errors, 1e6), (0.25, 0.5, 0.75), axis=0)
-        colour = COLOURS[index % len(COLOURS)]
         if _is_ours(case, name):
             figure.add(*band(elapsed[near], low, high, f"{name}, middle half of runs", "estimate-band"))
-        figure.add(line(elapsed[near], middle, name, colour))
-    for level in (-5.0, 5.0):
-        ends = {"x0": 0, "x1": 1, "xref": "paper", "y0": level, "y1": level}
-        figure.shapes.append({"type": "line", "line": {"color": "@mark", "width": 1, "dash": "dot"}} | ends)
+        figure.add(line(elapsed[near], middle, name, _colour(name)))
+    figure.level(-5.0, 5.0)
     return figure
 
 
@@ -163,7 +180,7 @@ def _is_ours(case: str, name: str) -> bool:
 
 
 def wrong_noise(rows: Sequence[Row], case: str) -> Figure | None:
-    """rms error ÷ that of the tuned filter for each wrong noise, a colour for each quantity."""
+    """rms error ÷ that of the tuned filter for each wrong noise, a symbol for each quantity."""
     chosen = [row for row in rows if row.case == case and math.isfinite(row.against[FREQUENCY])]
     if not chosen:
         return None
@@ -171,6 +188,6 @@ def wrong_noise(rows: Sequence[Row], case: str) -> Figure | None:
     figure = _figure(names, "rms error ÷ that of the filter told the truth", len(parts))
     for index, part in enumerate(parts):
         at = np.arange(len(names), dtype=float) + _offset(index, len(parts))
-        figure.add(_marks(np.array([row.against[index] for row in chosen]), at, part, index))
+        figure.add(*_marks(np.array([row.against[index] for row in chosen]), at, names, part, index))
     figure.shapes += [_vertical(1.0), _vertical(1.5, "fault")]
     return figure

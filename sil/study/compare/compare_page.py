@@ -6,7 +6,6 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 
-from lever_cdkf.host_tools.report.document import document
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.summary_html import number, table
 from lever_cdkf.host_tools.tables import Row as TableRow
@@ -17,8 +16,6 @@ from .cases import PRIOR, cases
 from .evaluation import Row
 from .verdicts import Claim
 
-_TITLE = "Lever CDKF: every estimator on the same data"
-
 
 def build(
     results: Results,
@@ -28,7 +25,14 @@ def build(
     tables: Mapping[str, Sequence[TableRow]],
 ) -> str:
     """The whole page."""
-    page = Page()
+    plan = results.plan
+    length = "" if plan.duration is None else f" of {plan.duration:g} s"
+    page = Page(
+        "Every estimator on the same data",
+        f"{plan.seeds} runs{length} of each case, seed {plan.seed}. Differences are called significant by paired "
+        "bootstrap over runs, at 5 % for all comparisons of this page together (Holm).",
+        "lever compare",
+    )
     page.section("claims", "What it has to show", "What the firmware has to show", _claims(claims) if claims else "")
     page.section("winners", "Who wins", "Who wins where", _winners(verdicts))
     _references(page, rows)
@@ -38,11 +42,12 @@ def build(
         f"<details><summary>{html.escape(title)}</summary>{_table(lines)}</details>" for title, lines in tables.items()
     )
     page.section("numbers", "Numbers", "All numbers", *details)
-    return _assembled(page, results, claims)
+    return page.html(_verdict(claims))
 
 
 def _winners(verdicts: Mapping[str, str]) -> str:
-    return "".join(f"<h3>{html.escape(case)}</h3><p>{html.escape(text)}</p>" for case, text in verdicts.items())
+    rows = ((html.escape(case), f'<span class="words">{html.escape(text)}</span>') for case, text in verdicts.items())
+    return table(("case", ""), rows) if verdicts else ""
 
 
 def _claims(claims: Sequence[Claim]) -> str:
@@ -106,8 +111,8 @@ def _steps(page: Page, results: Results) -> None:
             page.figure(
                 f"settling-{case.name}",
                 charts.settling(results, case.name),
-                "Time until the natural frequency is within 5 % of the truth for good, a dot for each run (blue: the "
-                "firmware). Hollow, at the end of the run: never.",
+                "Time until the natural frequency is within 5 % of the truth for good, a dot for each run. Hollow, at "
+                "the end of the run: never.",
             ),
             page.figure(
                 f"following-{case.name}",
@@ -137,23 +142,9 @@ def _table(lines: Sequence[TableRow]) -> str:
     return table(header, ([html.escape(number(cell)) for cell in line.values()] for line in lines))
 
 
-def _assembled(page: Page, results: Results, claims: Sequence[Claim]) -> str:
-    kept, decided = (sum(claim.kept is value for claim in claims) for value in (True, False))
-    decided += kept
-    mood = "good" if kept == decided else "bad"
-    verdict = (
-        f"{kept} of {decided} claims about the firmware hold."
-        if decided
-        else "A preview: the claims about the firmware take 20 whole runs of each case."
-    )
-    plan = results.plan
-    length = "" if plan.duration is None else f" of {plan.duration:g} s"
-    links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
-    body = (
-        f'<header><h1>{_TITLE}</h1><p class="subtitle">{plan.seeds} runs{length} of each case, seed {plan.seed}. '
-        "Differences are called significant by paired bootstrap over runs, at 5 % for all comparisons of this page "
-        "together (Holm).</p></header>"
-        f'<p class="verdict {mood}">{verdict}</p><nav>{links}</nav>{"".join(page.sections)}'
-        "<footer>Made by <code>lever compare</code>. Nothing on this page is loaded from elsewhere.</footer>"
-    )
-    return document(_TITLE, body, {key: figure.spec() for key, figure in page.figures.items()})
+def _verdict(claims: Sequence[Claim]) -> str:
+    kept, missed = (sum(claim.kept is value for claim in claims) for value in (True, False))
+    if not kept + missed:
+        return '<p class="verdict">A preview: the claims about the firmware take 20 whole runs of each case.</p>'
+    mood = "bad" if missed else "good"
+    return f'<p class="verdict {mood}">{kept} of {kept + missed} claims about the firmware hold.</p>'

@@ -1,10 +1,10 @@
 """The paper's figures for this system, from one command: `lever figures`.
 
-Each figure is computed from runs of the firmware and described once (`description`), its caption included; `png` and
-`figures_page` draw what is described, for print and for a browser. `catalogue` lists the figures, `runs` is what they
-share.
+Each figure is computed from runs of the firmware and described once (`description`), its caption included; `printed`
+and `figures_page` draw what is described, for print and for a browser, `data` writes it as a table. `catalogue` lists
+the figures, `runs` is what they share.
 
-    {catalogue → one module for each group of figures → {runs, description}, png, figures_page → description}
+    {catalogue → one module for each group of figures → {runs, description}, printed, figures_page, data → description}
 
 A new figure: a function like those, and a line in `catalogue.FIGURES`.
 """

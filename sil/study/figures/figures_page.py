@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from lever_cdkf.host_tools.report import figure as chart
-from lever_cdkf.host_tools.report.document import document
+from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.series import packed
 
 from .description import LOOKS, Band, Column, Figure, Points, Surface, Trace
@@ -19,38 +19,29 @@ _MARGIN = {"l": 60, "r": 36, "t": 44, "b": 44}  # [pixels], with room for the bu
 _SURFACE = 430  # [pixels]
 _SCENE_FONT = {"family": "sans-serif", "size": 12}  # in three dimensions no font is inherited
 _LIFT = 1.01  # of a curve over the surface that it follows
-_TITLE = "Lever CDKF: figures"
 
 
 def build(figures: Sequence[Figure]) -> str:
     """The page; each figure can be linked to by its name, as in figures.html#bode."""
-    specs: dict[str, chart.Spec] = {}
-    sections = [_section(number, figure, specs) for number, figure in enumerate(figures, 1)]
-    links = "".join(f'<a href="#{figure.name}">{figure.name.capitalize()}</a>' for figure in figures)
-    body = (
-        f'<header><h1>{_TITLE}</h1><p class="subtitle">Simulated runs of the firmware. Errors, times and shares in '
-        "the captions are measured in these runs.</p>"
-        f"</header><nav>{links}</nav>{''.join(sections)}"
-        "<footer>Made by <code>lever figures</code>. Nothing on this page is loaded from elsewhere.</footer>"
+    page = Page(
+        "Figures",
+        "Simulated runs of the firmware. Errors, times and shares in the captions are measured in these runs.",
+        "lever figures",
     )
-    return document(_TITLE, body, specs, own_css())
+    for number, figure in enumerate(figures, 1):
+        heading = f'<span class="number">{number}.</span> {in_html(figure.title)}'
+        caption = f'<p class="caption">{in_html(figure.caption)}</p>'
+        page.section(figure.name, figure.name.capitalize(), heading, _charts(page, figure), caption)
+    return page.html("", own_css())
 
 
-def _section(number: int, figure: Figure, specs: dict[str, chart.Spec]) -> str:
-    """Charts side by side where there is room for them, with one caption; their specifications go into `specs`."""
-    parts = []
-    for index, column in enumerate(figure.columns):
-        key = f"{figure.name}-{index}"
-        spec = specs[key] = _spec(figure, column)
-        title = f"<figcaption>{in_html(column.title)}</figcaption>" if column.title else ""
-        parts.append(
-            f'<figure>{title}<div class="chart" id="{key}" style="height:{spec["layout"]["height"]}px"></div></figure>'
-        )
-    charts = "".join(parts)
-    if len(parts) > 1:
-        charts = f'<div class="pair">{charts}</div>'
-    heading = f'<h2><span class="number">{number}.</span> {in_html(figure.title)}</h2>'
-    return f'<section id="{figure.name}">{heading}{charts}<p class="caption">{in_html(figure.caption)}</p></section>'
+def _charts(page: Page, figure: Figure) -> str:
+    """Side by side where there is room for them."""
+    charts = [
+        page.figure(f"{figure.name}-{index}", _spec(figure, column), in_html(column.title))
+        for index, column in enumerate(figure.columns)
+    ]
+    return f'<div class="pair">{"".join(charts)}</div>' if len(charts) > 1 else charts[0]
 
 
 def _spec(figure: Figure, column: Column) -> chart.Spec:

@@ -42,7 +42,7 @@ def css() -> str:
 @cache
 def colours() -> Mapping[str, Colour]:
     """The colours of the light theme by name."""
-    light = re.sub(r"@media[^{]*dark[^{]*\{\s*:root\s*\{[^}]*\}\s*\}", "", css())
+    light = re.sub(r"@media[^{]*dark[^{]*\{\s*:root[^{]*\{[^}]*\}\s*\}", "", css())
     return {name: _colour(value) for name, value in _COLOUR.findall(light) if value.startswith(("#", "rgba"))}
 
 

@@ -6,7 +6,6 @@ import subprocess
 import sys
 
 import lever_cdkf
-import numpy as np
 import pytest
 
 PUBLIC = ["Config", "Estimator", "Result", "estimate", "load_scenario", "run_samples", "simulate"]
@@ -24,20 +23,6 @@ def test_importing_loads_nothing_of_it() -> None:
     listed = "import sys, lever_cdkf; print(*(name for name in sys.modules if name.startswith('lever_cdkf.')))"
     done = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
-
-
-def test_samples_and_instance_agree() -> None:
-    from lever_cdkf import Config, Estimator, run_samples
-
-    time_us = 1000 * np.arange(300)
-    theta = 0.35 + 0.01 * np.sin(20e-6 * time_us)
-    still = np.zeros(len(time_us))
-    config = Config(settings={"m_p": 3.0})
-    whole = run_samples(config, {"time_us": time_us, "theta": theta, "tau_m": still, "z_ddot": still})
-    one = Estimator(config)
-    for time, angle in zip(time_us.tolist(), theta.tolist(), strict=True):
-        one.update(time, theta=angle, theta_dot=None, tau_m=0.0, z_ddot=0.0)
-    assert whole["natural_frequency"][-1] == one.estimate().natural_frequency > 0.0
 
 
 def test_a_scenario_runs_without_a_bus() -> None:

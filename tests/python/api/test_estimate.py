@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 import xarray as xr
 from lever_cdkf import Config, Result, estimate, run_samples
 from lever_cdkf.host_tools.errors import LeverError
+from PIL import Image
 from pyarrow import parquet
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight, fly
 
@@ -160,6 +162,9 @@ def test_everything_has_its_name(result: Result, tmp_path: Path) -> None:
     table = parquet.read_table(tmp_path / "estimates.parquet")
     assert table.schema.field("k_p_sigma").metadata == {b"unit": b"N/m"}
     assert table["flags"][-1].as_py() == result.flags[-1]
+    metadata = table.schema.metadata
+    assert metadata[b"library"].startswith(b"sha256:")
+    assert json.loads(metadata[b"estimator"])["settings"]["sample_period"] == pytest.approx(0.002)
     np.testing.assert_array_equal(table["damping_ratio"].to_numpy(), result["damping_ratio"].values)
     with pytest.raises(LeverError, match="cannot write"):
         result.to_parquet(tmp_path / "nowhere/estimates.parquet")
@@ -173,3 +178,24 @@ def test_the_plot_shows_the_last_estimates(result: Result) -> None:
     assert labels == ["m_p\n[kg]", "c_p\n[N s/m]", "k_p\n[N/m]", "natural_frequency\n[Hz]", "damping_ratio"]
     low, high = figure.axes[3].get_ylim()
     assert low < NATURAL_FREQUENCY < high
+
+
+@pytest.mark.parametrize("kind", ["pdf", "svg", "png"])
+def test_the_plot_is_kept_with_its_numbers(kind: str, result: Result, tmp_path: Path) -> None:
+    path = tmp_path / f"Schätzung 推定.{kind}"
+    result.plot(path, width="single")
+    assert path.read_bytes().startswith({"pdf": b"%PDF", "svg": b"<?xml", "png": b"\x89PNG"}[kind])
+    if kind == "png":
+        with Image.open(path) as image:
+            assert image.width == int(88 / 25.4 * 300)
+    table = pd.read_csv(path.with_suffix(".csv"))
+    assert table["natural_frequency [Hz]"].iloc[-1] == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+    assert len(table.columns) == 1 + 2 * 5
+
+
+def test_a_plot_that_cannot_be_kept_is_an_error(result: Result, tmp_path: Path) -> None:
+    with pytest.raises(LeverError, match=r"it may be single or double, and \.png, \.svg, \.pdf"):
+        result.plot(tmp_path / "estimates.gif")
+    with pytest.raises(LeverError, match="cannot write"):
+        result.plot(tmp_path / "nowhere/estimates.pdf")
+    assert list(tmp_path.iterdir()) == []

@@ -13,7 +13,6 @@ from typing import Any
 
 import can
 import pytest
-from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus, LeverBusError
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.native import Config, Estimator
@@ -50,34 +49,6 @@ def test_each_sample_is_answered_as_by_the_firmware(make_bus: MakeBus, samples: 
     assert bus.estimator.health() == estimator.health()
 
 
-def test_form_of_an_answer(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
-    answer = exchange(make_bus("bench"), samples(0, 1)[0])[-1]
-    assert (answer.channel, answer.dlc, answer.is_rx) == ("bench", 8, True)
-    assert not any((answer.is_extended_id, answer.is_remote_frame, answer.is_error_frame, answer.is_fd))
-    assert codec.decode(answer.arbitration_id, answer.data)[0] == "STATE_ESTIMATE"
-
-
-def test_nothing_without_a_good_base_sample(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
-    bus = make_bus("x")
-    (lever, base), *_ = samples(0, 1)
-    bus.send(message(lever))
-    assert bus.recv(10.0) is None
-    bus.send(message((base[0], bytes([base[1][0] ^ 1]) + base[1][1:])))
-    bus.send(message((base[0], base[1][:7])))
-    bus.send(message((0x123, b"")))
-    assert bus.recv(10.0) is None
-    assert bus.estimator.health().corrupt == 2
-
-
-def test_buses_of_one_channel_share_nothing(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
-    one, other = make_bus("x"), make_bus("x")
-    for sample in samples(0, 10):
-        assert exchange(one, sample)
-    assert one.estimator.health().samples == 10
-    assert other.estimator.health().samples == 0
-    assert other.recv(0.0) is None
-
-
 # --- receiving -------------------------------------------------------------------------------------------------------
 
 
@@ -106,47 +77,6 @@ def test_a_loop_over_the_bus_gets_every_answer_and_ends(
     assert list(bus) == []
 
 
-def test_another_thread_waits_for_the_answer(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
-    bus = make_bus("x")
-    received: list[can.Message | None] = []
-    receiver = threading.Thread(target=lambda: received.append(bus.recv(PATIENCE)))
-    receiver.start()
-    for frame in samples(0, 1)[0]:
-        bus.send(message(frame))
-    receiver.join(PATIENCE)
-    assert received[0] is not None
-    assert received[0].channel == "x"
-
-
-def test_with_two_senders_both_wait(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
-    bus = make_bus("x")
-    other = threading.Thread(target=bus.send, args=(message((0x7FF, b"")),))
-    other.start()
-    bus.send(message((0x7FF, b"")))
-    other.join()
-    bus.send(message((0x7FF, b"")))
-
-    def later() -> None:
-        for frame in samples(0, 1)[0]:
-            bus.send(message(frame))
-
-    timer = threading.Timer(0.05, later)
-    timer.start()
-    assert bus.recv(PATIENCE) is not None
-    timer.join()
-
-
-def test_filters(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
-    bus = make_bus("x", can_filters=[{"can_id": 0x210, "can_mask": 0x7FF, "extended": False}])
-    answers = [answer for sample in samples(0, 100) for answer in exchange(bus, sample)]
-    assert [answer.arbitration_id for answer in answers] == [0x210] * 100
-    bus.set_filters([{"can_id": 0x211, "can_mask": 0x7FF}, {"can_id": 0x214, "can_mask": 0x7FF}])
-    answers = [answer for sample in samples(100, 100) for answer in exchange(bus, sample)]
-    assert {answer.arbitration_id for answer in answers} == {0x211, 0x214}
-    bus.set_filters(None)
-    assert exchange(bus, samples(200, 1)[0])[-1].arbitration_id == 0x210
-
-
 def test_own_messages(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
     bus = make_bus("x", receive_own_messages=True)
     (lever, base), *_ = samples(1, 1)
@@ -156,18 +86,6 @@ def test_own_messages(make_bus: MakeBus, samples: Samples, exchange: Exchange) -
     assert all(m.is_rx for m in received[2:])
     assert [m.timestamp for m in received] == [0.0] + [pytest.approx(1e-3)] * (len(received) - 1)
     assert all(m.channel == "x" for m in received)
-
-
-def test_what_is_sent_may_be_reused(make_bus: MakeBus, samples: Samples) -> None:
-    bus = make_bus("x", receive_own_messages=True)
-    (lever, _), *_ = samples(0, 1)
-    message = can.Message(arbitration_id=0x110, is_extended_id=False, data=lever[1], timestamp=12.5)
-    bus.send(message)
-    message.data[0] ^= 255
-    received = bus.recv()
-    assert received is not None
-    assert bytes(received.data) == lever[1]
-    assert message.timestamp == 12.5
 
 
 def test_queue_is_bounded(
@@ -183,42 +101,6 @@ def test_queue_is_bounded(
     assert [record.getMessage() for record in caplog.records] == [
         "lever firmware in this process, channel 'x': nobody receives; of 5 frames the oldest are dropped"
     ]
-
-
-# --- time ------------------------------------------------------------------------------------------------------------
-
-
-def test_time_is_that_of_the_samples(make_bus: MakeBus, samples: Samples, exchange: Exchange) -> None:
-    runs = []
-    for pause in (0.0, 0.002):
-        bus, messages = make_bus("x"), []
-        for sample in samples(0, 50):
-            messages += exchange(bus, sample)
-            time.sleep(pause)
-        runs.append(seen(messages))
-    assert runs[0] == runs[1]
-    assert runs[0][-1][0] == 49 * 1000 * 1e-6
-
-
-def test_time_goes_on_where_the_frames_wrap(make_bus: MakeBus, exchange: Exchange) -> None:
-    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    bus, start, step = make_bus("x"), 2**32 - 3_000_000, 10_000
-    times = []
-    for k in range(600):  # through the end of the 32 bits
-        sample = ((0x110, lever(k, 0.35, 0.0, 0.0)), (0x111, base(k, 0.0, start + step * k)))
-        times.append(exchange(bus, sample)[-1].timestamp)
-    assert times == pytest.approx([(start + step * k) * 1e-6 for k in range(600)], abs=1e-6)
-
-
-def test_time_never_goes_back(make_bus: MakeBus, exchange: Exchange) -> None:
-    lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    bus = make_bus("x")
-    times = []
-    for k, time_us in enumerate((5000, 6000, 4000, 7000)):
-        sample = ((0x110, lever(k, 0.35, 0.0, 0.0)), (0x111, base(k, 0.0, time_us)))
-        times.append(exchange(bus, sample)[-1].timestamp)
-    assert times == pytest.approx([5e-3, 6e-3, 6e-3, 7e-3])
-    assert bus.estimator.health().late == 1
 
 
 # --- other frames ----------------------------------------------------------------------------------------------------
@@ -314,13 +196,6 @@ def test_bad_arguments(arguments: dict[str, Any], text: str) -> None:
     assert isinstance(caught.value, can.CanInitializationError)
 
 
-def test_options_of_python_can_itself_are_no_error(make_bus: MakeBus) -> None:
-    bus = make_bus(7, single_handle=True, bitrate=500_000, fd=False)
-    assert str(bus) == "lever firmware in this process, channel '7'"
-    bus.flush_tx_buffer()
-    assert bus.state == can.BusState.ACTIVE
-
-
 def test_senders_do_not_mix_their_frames(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
     bus, ended = make_bus("x"), threading.Event()
     noise = message((0x7FF, b"noise..."))
@@ -341,34 +216,3 @@ def test_senders_do_not_mix_their_frames(make_bus: MakeBus, samples: Samples, me
     sys.setswitchinterval(interval)
     health = bus.estimator.health()
     assert (health.samples, health.corrupt, health.lost) == (2000, 0, 0)
-
-
-# --- other parts of python-can ---------------------------------------------------------------------------------------
-
-
-def test_notifier_and_redirection(make_bus: MakeBus, samples: Samples, message: ToMessage) -> None:
-    """What can_bridge does: another bus gets the answers, and its frames get into the firmware."""
-    lever = make_bus("x")
-    near, far = can.Bus(interface="virtual", channel="joined"), can.Bus(interface="virtual", channel="joined")
-    out = can.Notifier(lever, [can.RedirectReader(near)], 0.05)
-    back = can.Notifier(near, [can.RedirectReader(lever)], 0.05)
-    for sample in samples(0, 30):
-        for frame in sample:
-            far.send(message(frame))
-        while True:
-            answer = far.recv(PATIENCE)
-            assert answer is not None
-            if answer.arbitration_id == 0x210:
-                break
-    for notifier, bus in ((out, near), (back, far)):
-        notifier.stop()
-        bus.shutdown()
-    assert lever.estimator.health().samples == 30
-
-
-def test_thread_safe_wrapper(samples: Samples, installed: str) -> None:
-    assert installed
-    with can.ThreadSafeBus(interface="lever", channel="x") as bus:
-        for identifier, data in samples(0, 1)[0]:
-            bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
-        assert 0x210 in [answer.arbitration_id for answer in iter(lambda: bus.recv(1.0), None)]

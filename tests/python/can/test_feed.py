@@ -117,19 +117,6 @@ def test_samples_are_those_that_were_sent(session: Session, spoilt_log: Path) ->
     assert np.isnan(some["theta"]).sum() > 20
 
 
-def test_a_recorded_estimator_is_no_second_one(session: Session) -> None:
-    """Its answers, IDENTITY among them, are not fed to the estimator of the replay."""
-    feeder = Feeder(Estimator(session.config), 4096)
-    identifiers = set()
-    for frames in Traffic(Recording([session.log])).chunks():
-        identifiers.update(frames["id"].tolist())
-        for out, _ in feeder.feed(frames):
-            assert set(out["id"][out["flags"] == 0].tolist()) <= {0x110, 0x111, 0x120}
-    assert 0x217 in identifiers
-    assert "duplicate" not in feeder.estimator.health().faults
-    assert feeder.refused == 0
-
-
 def test_which_bus_has_the_samples_must_be_clear(session: Session, tmp_path: Path) -> None:
     both = tmp_path / "both.log"
     text = session.log.read_text()

@@ -131,24 +131,6 @@ def test_limits_and_beyond(codec: Codec, message: Message, signal: Signal) -> No
         assert got == (None if refused else expected), value
 
 
-@pytest.mark.parametrize(("message", "signal"), QUANTITIES)
-def test_counts_decode_to_the_nearest_float(codec: Codec, message: Message, signal: Signal) -> None:
-    """The C gives the float nearest to what cantools gives, and sends that as the same count."""
-    least, greatest = limits(signal)
-    step = 1 if greatest < 1024 else 37
-    around = context(message, signal)
-    for raw in [*range(least, greatest, step), greatest]:
-        if raw == not_available(signal):
-            continue
-        value = float(np.float32(scaled(signal, raw)))
-        data = codec.encode(message.name, as_members(message, around | {signal.name: value}))
-        blank = {other.name: 0 for other in signals_of(message, around.get(multiplexer(message) or "", 0))}
-        assert data == message.encode(blank | around | {signal.name: raw}, scaling=False, strict=False)
-        decoded = codec.decode(message.name, data or b"")
-        assert decoded is not None
-        assert as_signals(message, decoded)[signal.name] == value
-
-
 @pytest.mark.parametrize(("message", "signal"), CODES)
 def test_codes(codec: Codec, message: Message, signal: Signal) -> None:
     _, greatest = limits(signal)
@@ -255,12 +237,3 @@ def test_another_length_or_identifier_is_refused(codec: Codec, message: Message)
         assert codec.decode(message.name, bytes(length)) is None
     for other in {0, 1, message.frame_id ^ 1, 0x7FF, *(each.frame_id for each in DBC.messages)} - {message.frame_id}:
         assert codec.decode(message.name, bytes(8), other) is None
-
-
-def test_just_below_half_a_count_is_zero(codec: Codec) -> None:
-    """Adding one half in single precision and cutting off would give one."""
-    theta = float(np.nextafter(np.float32(0.5 * 1e-4), np.float32(0.0)))
-    for value in (theta, -theta):
-        data = codec.encode("LEVER_SAMPLE", {"theta": value, "theta_valid": True})
-        assert data is not None
-        assert data[2:4] == bytes(2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -83,19 +82,3 @@ def test_wireshark_shows_names_of_values_and_units(tmp_path: Path, wireshark: di
     assert re.search(r"excitation \[rad/s\]: .* not_available\]", shown)
     assert "theta_dot [rad/s]: 0.5" in shown
     assert re.search(r"theta \[rad\]: 3.0268 .* add -3.2768\]", shown)
-
-
-def test_cantools_decodes_a_log_on_its_command_line(log: Path) -> None:
-    """What `candump -L | cantools decode` shows."""
-    command = [str(Path(sys.executable).with_name("cantools")), "decode", "--single-line", "--no-decode-choices", DBC]
-    with log.open() as frames:
-        lines = subprocess.run(command, stdin=frames, capture_output=True, text=True, check=True).stdout.splitlines()
-    assert len(lines) == len(NAMES) * FRAMES
-    for index, name in enumerate(NAMES):
-        columns = codec.decode_columns(name, random_frames(name))
-        for row, line in enumerate(lines[index * FRAMES : (index + 1) * FRAMES]):
-            assert f":: {name}(" in line
-            shown = dict(part.split(": ") for part in line.partition(f"{name}(")[2].removesuffix(")").split(", "))
-            for signal, column in columns.items():
-                if np.isfinite(column[row]):
-                    assert float(shown[signal].split()[0]) == pytest.approx(column[row], abs=1e-9), line

@@ -83,9 +83,11 @@ def packages(extras: dict[str, list[str]], extra: str) -> list[str]:
     [
         ("files", "replay flight.parquet"),
         ("files", "replay flight.mat"),
+        ("files", "sim steady --out sim --format mcap"),
         ("live", "live --scenario demo"),
         ("live", "monitor --scenario demo"),
         ("mf4", "replay session.mf4"),
+        ("mf4", "sim steady --out sim --format mf4"),
         ("report", "demo"),
         ("report", "envelope --quick"),
         ("report", "tune session.log --page page.html"),

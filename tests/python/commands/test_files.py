@@ -23,14 +23,6 @@ TABLES: Tables = {
 }
 
 
-def test_write_replaces(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    for text in ("old", "θ̇ new\n"):
-        files.write_text(path, text)
-        assert path.read_text(encoding="utf-8") == text
-    assert os.listdir(tmp_path) == ["a.txt"]
-
-
 def test_failed_write_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")
@@ -43,14 +35,6 @@ def test_failed_write_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.
         files.write_text(path, "new")
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
-
-
-def test_places_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(LeverError, match=r"cannot write .*: Is a directory"):
-        files.write_text(tmp_path, "new")
-    with pytest.raises(LeverError, match=r"cannot write .*: No such file or directory"):
-        files.write_text(tmp_path / "none" / "a.txt", "new")
-    assert os.listdir(tmp_path) == []
 
 
 def test_links_and_devices_stay(tmp_path: Path) -> None:

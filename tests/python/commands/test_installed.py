@@ -19,7 +19,6 @@ from processes import PATIENCE
 pytestmark = pytest.mark.usefixtures("installed")
 
 Samples = Callable[[int, int], list[tuple[tuple[int, bytes], tuple[int, bytes]]]]
-BIN = Path(sys.executable).parent
 
 
 def test_python_can_knows_the_interface(samples: Samples) -> None:
@@ -31,19 +30,6 @@ def test_python_can_knows_the_interface(samples: Samples) -> None:
             for identifier, data in samples(0, 1)[0]:
                 bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
             assert 0x210 in [answer.arbitration_id for answer in iter(bus.recv, None)]
-
-
-def test_can_player_plays_a_recording(samples: Samples, tmp_path: Path) -> None:
-    log = tmp_path / "session.log"
-    with can.CanutilsLogWriter(log, channel="vcan0") as writer:
-        for k, sample in enumerate(samples(0, 50)):
-            for identifier, data in sample:
-                frame = can.Message(1.0 + k * 1e-3, identifier, is_extended_id=False, data=data)
-                writer.on_message_received(frame)
-    player = [sys.executable, "-m", "can.player", "-v", "-v", "-i", "lever", "-c", "bench", str(log)]
-    done = subprocess.run(player, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert len(re.findall(r"ID: {6}11[01] ", done.stdout)) == 100
 
 
 def test_can_logger_opens_and_waits(tmp_path: Path) -> None:

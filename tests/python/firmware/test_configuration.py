@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
-from lever_cdkf.host_tools.firmware.native import Config, Setting, model_parameters, settings_table
+from lever_cdkf.host_tools.firmware.native import Config, Setting, settings_table
 
 ROWS = settings_table()
 
@@ -90,13 +90,6 @@ def test_an_unknown_choice_is_refused_by_name(choice: str, config: Any) -> None:
     for value in (len(enum_names(f"lever_{choice}")), lib.LEVER_KEEP):
         setattr(config, choice, value)
         assert refused(config) == choice
-
-
-def test_first_guesses_have_the_units_of_the_parameters() -> None:
-    units = {row.name: row.unit for row in ROWS}
-    for model in enum_names("lever_model").values():
-        for parameter in model_parameters(model):
-            assert units[parameter.name] == parameter.unit
 
 
 def test_there_is_no_parameter_beyond() -> None:

@@ -19,7 +19,7 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from lever_cdkf.host_tools.files import LIBRARY_DIR, native_file
 from lever_cdkf.host_tools.firmware import native
-from lever_cdkf.host_tools.firmware.native import Config, Estimate, Estimator, Health, ffi, lib
+from lever_cdkf.host_tools.firmware.native import Config, Estimator, lib
 
 QUICK = Config(settings={"align_time": 0.05})
 DEFAULTS = {"model": "lever", "preload": "trim", "estimator": "dual", "adaptation": "robbins_monro"}
@@ -64,13 +64,6 @@ def test_settings_table_is_the_definition(root: Path) -> None:
     np.testing.assert_array_equal(numbers, np.array([row[2:5] for row in expected], np.float32))
 
 
-def test_enum_names() -> None:
-    assert native.enum_names("lever_preload") == {0: "fixed", 1: "trim"}
-    assert native.enum_names("lever_mode")[lib.LEVER_MODE_COAST] == "coast"
-    assert native.fault_names(lib.LEVER_FAULT_THETA | lib.LEVER_FAULT_RECOVERED) == ("theta", "recovered")
-    assert native.fault_names(0) == ()
-
-
 def test_parameters_of_every_model_are_those_on_the_bus() -> None:
     """Against lever.dbc; names and units are the firmware's."""
     message = codec.message("PILOT_PARAMETERS")
@@ -81,19 +74,7 @@ def test_parameters_of_every_model_are_those_on_the_bus() -> None:
         native.model_parameters("arm")
 
 
-@pytest.mark.parametrize(("python", "c"), [(Estimate, "lever_estimate_t"), (Health, "lever_health_t")])
-def test_results_have_the_fields_of_the_structs(python: type[Estimate] | type[Health], c: str) -> None:
-    assert [name for name, _ in ffi.typeof(c).fields] == list(python._fields)
-
-
 # --- configuration ---------------------------------------------------------------------------------------------------
-
-
-def test_defaults() -> None:
-    config = Config()
-    assert config.choices == DEFAULTS
-    assert config.settings == {row.name: row.default for row in native.settings_table()}
-    assert lib.lever_config_check(config.pointer) == ffi.NULL
 
 
 def test_choices_and_settings_reach_the_firmware() -> None:
@@ -120,23 +101,6 @@ def test_range_of_every_setting(row: native.Setting) -> None:
         assert "\n" not in line
 
 
-@pytest.mark.parametrize("value", ["2", True, None, [2.0]])
-def test_a_setting_is_a_number(value: Any) -> None:
-    with pytest.raises(SettingsError, match=r"m_p = .* must be a number from 0\.3 to 10 kg"):
-        Config(settings={"m_p": value})
-
-
-def test_unknown_names() -> None:
-    with pytest.raises(SettingsError, match="unknown setting 'theta_nose'; did you mean theta_noise"):
-        Config(settings={"theta_nose": 1e-3})
-    with pytest.raises(SettingsError, match="unknown setting 'x'; `lever settings` lists them all"):
-        Config(settings={"x": 1.0})
-    with pytest.raises(SettingsError, match="preload = 'none' is not known; allowed: fixed, trim"):
-        Config(preload="none")
-    with pytest.raises(SettingsError, match="model = 'count' is not known; allowed: lever"):
-        Config(model="count")
-
-
 def test_configuration_changed_behind_its_back() -> None:
     config = Config()
     config.pointer.settings.m_p = -1.0
@@ -145,37 +109,6 @@ def test_configuration_changed_behind_its_back() -> None:
 
 
 # --- one instance ----------------------------------------------------------------------------------------------------
-
-
-def test_life_of_an_instance() -> None:
-    estimator = Estimator(QUICK)
-    assert estimator.health() == Health("init", (), 0, 0, 0, 0, 0, 0.0, 0.0, gate_open=False)
-    modes = {estimator.update(1000 * k, 0.35, 0.0, 0.0, 0.0) for k in range(300)}
-    assert modes == {"align", "run"}
-    estimate = estimator.estimate()
-    assert estimate.time_us == 299_000
-    assert estimate.theta == pytest.approx(0.35, abs=1e-3)
-    assert estimate.nis_size == 2
-    assert all(sigma > 0.0 for sigma in (*estimate.parameter_sigma, estimate.theta_sigma))
-    health = estimator.health()
-    assert (health.mode, health.samples, health.late) == ("run", 300, 0)
-
-
-def test_missing_values_and_wrapped_time() -> None:
-    estimator = Estimator(QUICK)
-    start = 2**32 - 100_000
-    for k in range(200):
-        estimator.update(start + 1000 * k, 0.35, 0.0, 0.0, 0.0)
-    estimator.update(start + 200_000, theta_dot=0.0)
-    assert {"theta", "torque", "base"} <= set(estimator.health().faults)
-    assert "theta_dot" not in estimator.health().faults
-    assert estimator.estimate().nis_size == 1
-    assert estimator.estimate().time_us == 100_000
-    assert estimator.update(start + 201_000) == "coast"
-    assert estimator.update(start + 100_000, 0.35) == "coast"
-    assert estimator.health().late == 1
-    estimator.update(start + 202_000, math.nan, 0.0, 0.0, 0.0)
-    assert estimator.health().corrupt == 1
 
 
 def test_commands() -> None:

@@ -44,19 +44,6 @@ def test_step_is_of_second_order(case: Case) -> None:
 
 
 @both
-def test_step_takes_many_at_once(case: Case) -> None:
-    model, p, _, _ = case
-    rng = np.random.default_rng(2)
-    x, pilots = rng.standard_normal((2, 4, 5)), p[:, None, None] * rng.uniform(0.5, 1.5, (3, 4, 5))
-    base, torque, trim = rng.standard_normal((3, 4, 1))
-    moved = model.step(x, pilots, (base, torque), trim, 1e-3)
-    assert moved.shape == (2, 4, 5)
-    for i, j in ((0, 0), (3, 1), (2, 4)):
-        alone = model.step(x[:, i, j], pilots[:, i, j], (base[i, 0], torque[i, 0]), float(trim[i, 0]), 1e-3)
-        np.testing.assert_allclose(moved[:, i, j], alone, rtol=1e-14)
-
-
-@both
 def test_step_is_stable_for_any_damping(case: Case) -> None:
     model, p, _, _ = case
     x = np.array([0.1, 5.0])

@@ -42,11 +42,6 @@ def test_roots_are_those_of_numpy_row_by_row() -> None:
         np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.roots(polynomial)), atol=1e-9)
 
 
-def test_a_single_mode_is_dominant() -> None:
-    frequency, ratio = parallel((2.0, 3.7, 0.3)).dominant_mode()
-    assert (frequency[0], ratio[0]) == pytest.approx((3.7, 0.3))
-
-
 @pytest.mark.parametrize(("gains", "expected"), [((1.0, 0.2), (3.0, 0.3)), ((0.1, 2.0), (5.0, 0.4))])
 def test_the_mode_that_answers_most_between_2_and_8_hz_is_dominant(
     gains: tuple[float, float], expected: tuple[float, float]
@@ -76,9 +71,3 @@ def test_shares_are_those_of_the_partial_fractions() -> None:
     frequency, ratio = Transfer(numerator[None], denominator[None]).dominant_mode()
     assert frequency[0] == pytest.approx(size / (2.0 * math.pi), rel=1e-5)
     assert ratio[0] == pytest.approx(-real / size, rel=1e-5)
-
-
-def test_each_time_has_its_own_mode() -> None:
-    rows = [parallel((2.0, frequency, 0.3)) for frequency in (3.0, 4.0, 5.0)]
-    together = Transfer(np.vstack([row.numerator for row in rows]), np.vstack([row.denominator for row in rows]))
-    assert together.dominant_mode()[0] == pytest.approx([3.0, 4.0, 5.0])

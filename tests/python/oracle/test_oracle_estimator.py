@@ -100,33 +100,6 @@ def test_it_is_the_joint_filter(form: str, share: float) -> None:
     assert (np.abs(estimator.belief.joint_factor - factor) < share * cdkf.deviations(factor)[:, None]).all()
 
 
-def test_coasting_moves_with_the_model_and_grows_uncertain() -> None:
-    samples = recorded(1200)
-    estimator = Estimator(EACH_SAMPLE, start_of(samples), "fixed")
-    feed(estimator, samples, 1, 1000)
-    before = np.concatenate((cdkf.deviations(estimator.belief.w_factor), estimator.state_deviations()))
-    w, x = estimator.belief.w.copy(), estimator.belief.x[:, None]
-    for k in range(1000, 1200):
-        middle = tuple(0.5 * float(samples[name][k] + samples[name][k - 1]) for name in ("z_ddot", "tau_m"))
-        x = estimator.model.step(x, PILOT[:, None] * np.exp(w[:, None]), (middle[0], middle[1]), estimator.trim, 1e-3)
-        feed(estimator, samples, k, k + 1, ~BOTH)
-        assert estimator.nis == 0.0
-    np.testing.assert_array_equal(estimator.belief.w, w)
-    assert (np.abs(estimator.belief.x - x[:, 0]) < 0.05 * estimator.state_deviations()).all()
-    assert (np.concatenate((cdkf.deviations(estimator.belief.w_factor), estimator.state_deviations())) > before).all()
-
-
-def test_a_gap_is_predicted_through_in_steps_of_a_sample_period() -> None:
-    samples = recorded(12)
-    samples |= {name: np.full(12, samples[name][0]) for name in ("z_ddot", "tau_m")}
-    once = SETTINGS | {"learn_period": 0.01}  # both walk at its end
-    bridged, stepped = (Estimator(once, start_of(samples), "fixed") for _ in range(2))
-    feed(bridged, samples, 10, 11, ~BOTH)
-    feed(stepped, samples, 1, 11, ~BOTH)
-    np.testing.assert_allclose(bridged.belief.x, stepped.belief.x, atol=1e-9)
-    np.testing.assert_allclose(bridged.belief.joint_factor, stepped.belief.joint_factor, atol=1e-9)
-
-
 # --- the adaptations -------------------------------------------------------------------------------------------------
 
 
@@ -163,28 +136,7 @@ def test_without_motion_the_walk_is_at_its_floor_and_the_uncertainty_limited() -
     assert (cdkf.deviations(estimator.belief.w_factor) <= estimator.learning.greatest_sigma * (1.0 + 1e-9)).all()
 
 
-def test_parameters_stay_in_their_bounds() -> None:
-    samples = recorded(2000, PILOT * [1.0, 1.0, 1.8])
-    bounds = np.array([[1.0, 5.0], [10.0, 100.0], [1000.0, 1600.0]])
-    estimator = Estimator(SETTINGS, start_of(samples), bounds=bounds)
-    seen = []
-    for k in range(1, 2000):
-        feed(estimator, samples, k, k + 1)
-        seen.append(estimator.parameters()[0])
-    assert (np.min(seen, axis=0) >= bounds[:, 0] * (1 - 1e-12)).all()
-    assert (np.max(seen, axis=0) <= bounds[:, 1] * (1 + 1e-12)).all()
-    assert np.max(seen, axis=0)[2] == pytest.approx(1600.0)
-
-
 # --- noise, and sudden changes ---------------------------------------------------------------------------------------
-
-
-def test_noise_that_is_set_too_small_is_found() -> None:
-    samples = recorded(2500)
-    settings = SETTINGS | {"noise_window": 0.5, "theta_noise": SETTINGS["theta_noise"] / 3.0}
-    estimator = Estimator(settings, start_of(samples), "fixed")
-    feed(estimator, samples, 1, 2500)
-    np.testing.assert_allclose(estimator.learning.noise.output_noise, OUTPUT_NOISE.diagonal(), rtol=0.1)
 
 
 def test_white_corrections_are_no_change_and_a_drift_is() -> None:
@@ -232,10 +184,3 @@ def test_the_parameters_do_not_follow_a_new_trim() -> None:
     feed(carried, moved, 1, 7000)
     assert (np.abs(still.belief.w - carried.belief.w) < 2.0 * cdkf.deviations(still.belief.w_factor)).all()
     assert carried.trim - still.trim == pytest.approx(0.05, abs=1e-3)
-
-
-@pytest.mark.parametrize("what", ["adaptation", "estimator", "model"])
-def test_unknown_choices_are_refused(what: str) -> None:
-    choice: dict[str, Any] = {what: "magic"}
-    with pytest.raises(ValueError, match=f'{what}: "magic" is none of'):
-        Estimator(SETTINGS, START, **choice)

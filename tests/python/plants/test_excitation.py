@@ -110,24 +110,6 @@ def test_pulses_have_their_amplitude_width_and_period_and_alternate() -> None:
     assert np.all(values[11_000:11_050] == -2.0)
 
 
-def test_a_seed_gives_the_same_signal_and_another_seed_another() -> None:
-    table = {"kind": "noise", **BAND}
-    assert np.array_equal(made(table, 3), made(table, 3))
-    assert abs(np.corrcoef(made(table, 3), made(table, 4))[0, 1]) < 0.1
-
-
-def test_several_excitations_add_up() -> None:
-    tables = NORMALISED[:2]
-    place = Place("x.toml", "base", "m/s^2")
-    both = [excitation.read_excitation(table, place) for table in tables]
-    total = excitation.total(both, TIME, [np.random.default_rng(0), np.random.default_rng(0)])
-    assert total == pytest.approx(made(tables[0]) + made(tables[1]), abs=1e-12)
-
-
-def test_torque_takes_units_of_torque() -> None:
-    assert rms(made({"kind": "sine", "rms": "300 mN m", "frequency": "2 Hz"}, unit="N m")) == pytest.approx(0.3)
-
-
 @pytest.mark.parametrize(
     ("table", "message"),
     [

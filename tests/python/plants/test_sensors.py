@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.files import native_file
-from lever_cdkf.sil.plants.sensors import Dropout, Fault, Scale, Sensor, Sensors, Spikes, Stuck, missing
+from lever_cdkf.sil.plants.sensors import Dropout, Fault, Scale, Sensor, Spikes, Stuck, missing
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -40,10 +40,6 @@ def test_delay_shifts_the_signal_by_any_part_of_a_sample(delay: float) -> None:
     np.testing.assert_allclose(delayed[10:], expected[10:], rtol=0.0, atol=limit)
     assert np.abs(delayed[:10]).max() < 0.2
     assert delayed[0] == 0.0
-
-
-def test_the_default_sensors_are_the_standard_ones() -> None:
-    assert (Sensors().theta.noise, Sensors().theta_dot.noise) == (1e-3, 1e-2)
 
 
 @pytest.mark.parametrize(("share", "burst"), [(0.02, 1e-3), (0.1, 20e-3), (0.5, 5e-3), (0.9, 2e-3)])

@@ -114,45 +114,6 @@ def test_the_substeps_suffice_with_friction(make: Make) -> None:
     assert np.ptp(fine[600:, 0]) < 0.9 * np.ptp(free[600:, 0])
 
 
-SPRING = Lever(0.45, 1.2, 0.5, 0.020, 0.0, 400.0, 0.0, 0.0, lever_friction=0.3)
-WEIGHT = (3.2, 0.0, 0.0)
-"""A hand that only has mass, on a lever with a straight spring and friction: Coulomb's textbook case."""
-
-
-def test_free_decay_under_friction_is_linear_in_time() -> None:
-    """By 2 T_f / k each half period, whatever the amplitude; v_f rounds the corners."""
-    truth = lever_truth(3000, SPRING, WEIGHT)
-    lever = body(truth)
-    lever.theta += 0.02
-    path = moved(lever, 3000)[:, 0]
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(path))) != 0) + 1
-    swings = np.abs(path[turns])[:10]
-    assert np.diff(swings) == pytest.approx(np.full(9, -2 * 0.3 / 400.0), rel=0.02)
-    period = 2 * math.pi * math.sqrt(lever_plant.inertia(SPRING, truth.pilot)[0] / 400.0)
-    assert np.diff(turns)[:9] * PERIOD == pytest.approx(np.full(9, period / 2), abs=2 * PERIOD)
-
-
-def test_in_a_limit_cycle_friction_takes_four_times_its_torque_times_the_amplitude_each_cycle() -> None:
-    """Energy that the base puts in, over the last 15 of 30 cycles at 3 Hz."""
-    count = 10_001
-    base = 1.2 * np.sin(2 * math.pi * 3.0 * np.arange(count) * PERIOD)
-    lever = dataclasses.replace(SPRING, lever_damping=0.5)
-    truth = lever_truth(count, lever, WEIGHT)
-    theta, rate = moved(body(truth, base), count)[-5001:].T
-    power = -lever_plant.moment(lever, truth.pilot)[0] * np.cos(theta + TRIM) * base[-5001:] * rate
-    lost = integrate.trapezoid(power - 0.5 * rate**2, dx=PERIOD) / 15.0
-    assert lost == pytest.approx(4 * 0.3 * 0.5 * np.ptp(theta), rel=0.01)
-
-
-def test_at_rest_friction_is_a_damper() -> None:
-    """Of T_f / v_f: under little noise the rate has the variance of an Ornstein-Uhlenbeck process."""
-    count, noise = 20_000, 0.004
-    truth = lever_truth(count, dataclasses.replace(SPRING, lever_stiffness=0.0), WEIGHT)
-    mass = lever_plant.inertia(SPRING, truth.pilot)[0]
-    rate = moved(body(truth, noise=noise), count)[1000:, 1]
-    assert np.std(rate) == pytest.approx(noise * math.sqrt(0.5 * mass * STOP_RATE / 0.3), rel=0.05)
-
-
 def test_motion_with_friction_is_that_of_a_stiff_solver() -> None:
     """The lever alone, hands off, where friction is steepest: Radau."""
     count = 1500

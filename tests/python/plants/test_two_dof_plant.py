@@ -80,17 +80,3 @@ def test_transfer_function_and_dynamics_are_those_of_the_linearised_lagrangian(a
     strongest = max(strengths, key=lambda pole: strengths[pole])
     assert truth.dynamics.natural_frequency == pytest.approx(abs(strongest) / (2 * math.pi), rel=1e-9)
     assert truth.dynamics.damping_ratio == pytest.approx(-strongest.real / abs(strongest), rel=1e-9)
-
-
-def test_dynamics_follow_the_parameters() -> None:
-    truth = held(count=6)
-    truth.k_p[2:4] = 3000.0
-    soft, stiff = (held((3.2, 60.0, k_p)).dynamics.natural_frequency[0] for k_p in (2100.0, 3000.0))
-    assert truth.dynamics.natural_frequency == pytest.approx([soft, soft, stiff, stiff, soft, soft])
-    assert stiff > soft
-
-
-def test_the_default_trunk_is_at_four_and_a_half_hertz() -> None:
-    omega = math.sqrt(TRUNK_STIFFNESS / TRUNK_MASS)
-    assert omega / (2 * math.pi) == pytest.approx(4.5, abs=0.01)
-    assert TRUNK_DAMPING / (2 * TRUNK_MASS * omega) == pytest.approx(0.39, abs=0.005)

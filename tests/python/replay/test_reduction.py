@@ -67,13 +67,6 @@ def test_a_stretch_keeps_what_was_in_it(count: int) -> None:
     assert (np.diff(rows["time_s"]) >= 0.0).all()
 
 
-def test_few_samples_stay_as_they_are() -> None:
-    whole = trace(50)
-    rows = reduced([whole]).rows()
-    for name, values in whole.items():
-        np.testing.assert_array_equal(rows[name], values)
-
-
 def test_groups_are_of_equal_size_wherever_the_cuts_are() -> None:
     values = np.arange(103.0)
     groups = Groups(10, lambda column: (column.reshape(-1, 10).sum(axis=1),))

@@ -96,8 +96,3 @@ def test_missing_and_late_samples_are_counted() -> None:
     assert (np.diff(time) >= 0.0).all()
     assert timeline.clocks.longest_gap_s == pytest.approx(0.006)
     assert timeline.clocks.late == 1
-
-
-def test_nothing_takes_no_time() -> None:
-    timeline = Timeline(1e-3)
-    assert len(timeline.seconds(np.zeros(0, np.int64), np.zeros(0))) == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 import re
 from html.parser import HTMLParser
@@ -70,7 +71,7 @@ def read(path: Path) -> Reader:
 
 def figures(page: Reader) -> dict[str, dict[str, Any]]:
     """The figures' specifications by id. Every curve has its axis; the first is plotly's own."""
-    found: dict[str, dict[str, Any]] = json.loads(page.scripts[0])
+    found: dict[str, dict[str, Any]] = json.loads(gzip.decompress(base64.b64decode(page.scripts[0])))
     for key, figure in found.items():
         drawn = {f"yaxis{trace.get('yaxis', 'y')[1:]}" for trace in figure["data"]}
         assert drawn <= figure["layout"].keys() | {"yaxis"}, key

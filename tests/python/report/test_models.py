@@ -39,7 +39,7 @@ def curves(page: Reader, figure: str, name: str) -> list[np.ndarray]:
 
 def test_signed_parameters_are_shown_with_their_symbols_and_not_cut_at_zero(black_box: tuple[Result, Reader]) -> None:
     result, page = black_box
-    rows = [row[0] for row in page.tables[0][1:]]
+    rows = [row[0] for row in page.tables[1][1:]]
     assert rows[:3] == ["a21 minus stiffness", "a22 minus damping", "b21 answer to the floor"]
     titles = [figures(page)["figure-parameters"]["layout"][axis]["title"]["text"] for axis in ("yaxis", "yaxis2")]
     assert titles == ["a<sub>21</sub> [1/s²]", "a<sub>22</sub> [1/s]"]
@@ -62,8 +62,8 @@ def test_the_answer_of_the_black_box_is_that_of_scipy(black_box: tuple[Result, R
 
 def test_a_linear_system_that_moves_along_with_the_floor_starts_at_phase_zero(tmp_path: Path) -> None:
     page = page_of(run("linear_physical", "duration=4 s", "converged_after=1 s", "limits={}"), tmp_path)
-    steps = figures(page)["figure-slices"]["layout"]["sliders"][0]["steps"]
-    phase = steps[-1]["args"][0]["y"][5]  # after the band
+    steps = figures(page)["figure-slices"]["choices"]["of"]
+    phase = steps[-1]["data"]["y"][5]  # after the band
     assert -30.0 < phase[0] < 0.0
     assert -180.0 < phase[-1] < -120.0
 
@@ -72,7 +72,7 @@ def test_another_kind_of_truth_is_said_to_be_one_and_compared_where_it_can_be(mi
     text = "".join(mismatch.text)
     assert "The truth of this run is of another kind: a rigid lever with the arm as mass" in text
     assert "They have no true values" in text
-    assert [row[0] for row in mismatch.tables[0][1:]] == ["fn natural frequency", "ζ damping ratio"]
+    assert [row[0] for row in mismatch.tables[1][1:]] == ["fn natural frequency", "ζ damping ratio"]
     assert curves(mismatch, "figure-parameters", "truth") == []
     assert len(curves(mismatch, "figure-dynamics", "truth")) == 2
     heat = figures(mismatch)["figure-map-truth"]["data"][0]
@@ -90,7 +90,7 @@ def test_every_model_of_the_truth_has_words(tmp_path: Path) -> None:
     text = "".join(page.text)
     assert "a hand that follows the cabin as Mayo (1989) measured it" in text
     assert "poles of the hand's transfer function" in text
-    assert "Here the residual is coloured: the arm, or a sensor, is not as assumed." in text
+    assert "Residuals of the rate are coloured" in text
 
 
 def test_without_a_summary_the_model_is_that_of_the_columns(black_box: tuple[Result, Reader], tmp_path: Path) -> None:

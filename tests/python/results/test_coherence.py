@@ -23,14 +23,6 @@ def test_in_pieces_it_is_that_of_scipy() -> None:
     assert made.windows == 19
 
 
-def test_unrelated_signals_stay_below_what_chance_gives() -> None:
-    rng = np.random.default_rng(2)
-    made = Coherence(1e-3, 0.5)
-    made.add(rng.standard_normal(30_000), rng.standard_normal(30_000))
-    _, coherence = made.spectrum()
-    assert np.mean(coherence[1:] < made.chance()) == pytest.approx(0.95, abs=0.04)
-
-
 def test_gaps_lower_it_and_nothing_is_made_up() -> None:
     rng = np.random.default_rng(3)
     x = rng.standard_normal(10_000)

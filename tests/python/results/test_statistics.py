@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from lever_cdkf.host_tools.statistics import NORMAL_95, chi_square_band, chi_square_quantile, normal_quantile
+from lever_cdkf.host_tools.statistics import chi_square_band, chi_square_quantile
 from scipy import stats
 
 PROBABILITIES = (0.001, 0.025, 0.5, 0.95, 0.975, 0.999)
-
-
-@pytest.mark.parametrize("probability", PROBABILITIES)
-def test_normal(probability: float) -> None:
-    assert normal_quantile(probability) == pytest.approx(stats.norm.ppf(probability), rel=1e-12, abs=1e-12)
-    assert stats.norm.cdf(NORMAL_95) - stats.norm.cdf(-NORMAL_95) == pytest.approx(0.95, rel=1e-12)
 
 
 @pytest.mark.parametrize("freedom", [1, 2, 3, 4, 7, 30, 251, 500, 5001])

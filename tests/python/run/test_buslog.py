@@ -34,17 +34,3 @@ def test_bytes_are_those_of_python_can(last_us: int) -> None:
             )
         )
     assert b"".join(lines(frames, "vcan0")).decode() == text.getvalue()
-
-
-def test_python_can_reads_back_what_was_written() -> None:
-    frames = some_frames(500, 20_000_000)
-    read = list(can.CanutilsLogReader(io.StringIO(b"".join(lines(frames, "lever")).decode())))
-    assert [message.arbitration_id for message in read] == frames.identifier.tolist()
-    assert [bytes(message.data) for message in read] == [row.tobytes() for row in frames.data]
-    assert [message.is_rx for message in read] == frames.received.tolist()
-    assert [round(message.timestamp * 1e6) for message in read] == frames.time_us.tolist()
-    assert {message.channel for message in read} == {"lever"}
-
-
-def test_no_frames_no_lines() -> None:
-    assert list(lines(some_frames(0, 1), "lever")) == []

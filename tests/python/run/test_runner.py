@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import pty
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,9 +14,8 @@ import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
-from lever_cdkf.sil.commands import sim as commands
-from lever_cdkf.sil.run import buslog, loop, runner
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.sil.run import loop, runner
+from lever_cdkf.sil.scenarios import inputs, scenario
 from lever_cdkf.sil.scenarios.scenario import Scenario
 from python.conftest import PuppetBus, estimate
 
@@ -103,18 +99,18 @@ def test_dither_is_kept_alive_by_a_command_each_quarter_of_a_second() -> None:
 
 def test_lost_frames_are_not_sent_and_invalid_values_are_marked() -> None:
     lost = scenario.load("sensor_dropout", ["duration=4 s", "sensors.dropout.2.start=1 s", "sensors.dropout.2.end=2 s"])
-    inputs, bus = loop.prepare(lost), PuppetBus(always)
+    known, bus = inputs.prepare(lost), PuppetBus(always)
     loop.run(lost, bus)
     levers, bases = bus.decoded("LEVER_SAMPLE"), bus.decoded("BASE_SAMPLE")
-    assert 0 < inputs.missing["lever_frame"].sum() == 4000 - len(levers)
-    assert 0 < inputs.missing["base_frame"].sum() == 4000 - len(bases)
-    assert [sample["counter"] for sample in levers] == (np.flatnonzero(~inputs.missing["lever_frame"]) % 16).tolist()
-    there = ~inputs.missing["lever_frame"]
-    assert [sample["theta_valid"] == 0 for sample in levers] == inputs.missing["theta"][there].tolist()
-    assert inputs.missing["theta"][1000:2000].all()
+    assert 0 < known.missing["lever_frame"].sum() == 4000 - len(levers)
+    assert 0 < known.missing["base_frame"].sum() == 4000 - len(bases)
+    assert [sample["counter"] for sample in levers] == (np.flatnonzero(~known.missing["lever_frame"]) % 16).tolist()
+    there = ~known.missing["lever_frame"]
+    assert [sample["theta_valid"] == 0 for sample in levers] == known.missing["theta"][there].tolist()
+    assert known.missing["theta"][1000:2000].all()
     assert all(sample["theta_dot_valid"] == 1 for sample in levers)
-    there = ~inputs.missing["base_frame"]
-    assert [sample["z_ddot_valid"] == 0 for sample in bases] == inputs.missing["z_ddot"][there].tolist()
+    there = ~known.missing["base_frame"]
+    assert [sample["z_ddot_valid"] == 0 for sample in bases] == known.missing["z_ddot"][there].tolist()
 
 
 def test_a_delayed_sensor_lags_and_a_wrong_gain_scales(short: Scenario) -> None:
@@ -196,15 +192,6 @@ def test_nothing_is_sent_before_a_run_on_a_fresh_estimator_and_its_rest_is_no_pa
     assert again.identity.settings_crc == short.config.settings_crc
 
 
-def test_an_estimator_of_another_contract_is_an_error_in_one_line(short: Scenario) -> None:
-    def other(_: int) -> list[tuple[str, dict[str, Any]]]:
-        version = {"firmware_major": 1, "firmware_minor": 0, "firmware_patch": 0, "contract": 7}
-        return [("IDENTITY", {"page": 0, **version}), estimate()]
-
-    with pytest.raises(LeverError, match=r"the estimator on puppet speaks contract 7 of lever.dbc, this program 2: "):
-        loop.run(short, PuppetBus(other))
-
-
 def test_an_estimator_with_other_settings_than_the_scenario_is_refused_and_nothing_written(tmp_path: Path) -> None:
     """As on a bus, where the firmware is another process, which has its settings from elsewhere."""
     wanted = scenario.load("steady", ["duration=2 s", "settings.k_p=1300 N/m"])
@@ -231,75 +218,6 @@ def test_two_runs_give_the_same_bytes(lever_bus: MakeBus, tmp_path: Path) -> Non
     for file in ("bus.log", "trace.csv"):
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
     assert (tmp_path / "one" / "bus.log").read_bytes().count(b"\n") > 2 * 3000
-
-
-def test_another_seed_gives_other_bytes(lever_bus: MakeBus) -> None:
-    runs = [scenario.load("steady", ["duration=0.2 s", f"seed={seed}"]) for seed in (1, 2)]
-    one, two = (runner.simulate(wanted, lever_bus(wanted)).frames for wanted in runs)
-    assert not np.array_equal(one.data, two.data)
-
-
-def test_a_firmware_in_another_thread_on_another_bus_gives_the_same_frames(lever_bus: MakeBus, short: Scenario) -> None:
-    """python-can's virtual bus between runner and firmware, as a real bus would be: waiting, and not in step."""
-    there = can.Bus(interface="virtual", channel="sil")
-    here = can.Bus(interface="virtual", channel="sil")
-    stop = threading.Event()
-
-    def firmware() -> None:
-        inner = lever_bus(short)
-        while not stop.is_set():
-            message = there.recv(0.05)
-            if message is not None:
-                inner.send(message)
-                while (answer := inner.recv(0.0)) is not None:
-                    there.send(answer)
-
-    thread = threading.Thread(target=firmware)
-    thread.start()
-    try:
-        remote = runner.simulate(short, here)
-    finally:
-        stop.set()
-        thread.join()
-        there.shutdown()
-        here.shutdown()
-    inside = runner.simulate(short, lever_bus(short))
-    assert remote.summary.unanswered == 0
-    assert b"".join(buslog.lines(remote.frames, "x")) == b"".join(buslog.lines(inside.frames, "x"))
-
-
-def test_a_firmware_behind_a_serial_line_gives_the_same_frames(lever_bus: MakeBus, short: Scenario) -> None:
-    """python-can's slcan on one side of a pseudo-terminal, the ASCII protocol spoken by hand on the other."""
-    device, line = pty.openpty()
-    inner = lever_bus(short)
-
-    def adapter() -> None:
-        pending = b""
-        while True:
-            try:
-                pending += os.read(device, 4096)
-            except OSError:  # the line was closed
-                return
-            *complete, pending = pending.split(b"\r")
-            for command in complete:
-                if command[:1] != b"t":
-                    continue
-                identifier, data = int(command[1:4], 16), bytes.fromhex(command[5:].decode())
-                inner.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
-                while (answer := inner.recv(0.0)) is not None:
-                    os.write(device, f"t{answer.arbitration_id:03X}8{answer.data.hex().upper()}\r".encode())
-
-    thread = threading.Thread(target=adapter, daemon=True)
-    thread.start()
-    with commands.open_bus(short, "slcan", os.ttyname(line)) as bus:
-        assert bus.channel_info == f"slcan channel {os.ttyname(line)}"  # for errors
-        os.close(line)
-        remote = runner.simulate(short, bus)
-    thread.join()
-    os.close(device)
-    inside = runner.simulate(short, lever_bus(short))
-    assert remote.summary.unanswered == 0
-    assert b"".join(buslog.lines(remote.frames, "x")) == b"".join(buslog.lines(inside.frames, "x"))
 
 
 @pytest.mark.parametrize(("before", "rms"), [("sensor_dropout", "0.3 N m"), ("poor_excitation", "2 N m")])
@@ -337,7 +255,7 @@ def test_files_are_complete_or_not_there(short: Scenario, tmp_path: Path, monkey
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("lever_cdkf.host_tools.results.trace.write_csv", broken)
+    monkeypatch.setattr("lever_cdkf.host_tools.exports.csv.write_csv_rows", broken)
     with pytest.raises(LeverError, match=r"cannot write .*trace.csv: No space left on device"):
         runner.simulate(short, PuppetBus(always), tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []

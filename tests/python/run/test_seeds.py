@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from lever_cdkf.host_tools.results.nis import Nis
 from lever_cdkf.host_tools.results.summary import Estimator, Firmware, Quality, Scenario, SimulationSummary, Truth
 from lever_cdkf.host_tools.results.whiteness import Whiteness
 from lever_cdkf.sil.run import seeds
+from python.conftest import Refused, Run
 
 SHORT = ("duration=1 s", "converged_after=0.2 s")
 
@@ -80,7 +80,7 @@ def test_the_verdict_says_what_was_tested_and_what_that_cannot_see() -> None:
     assert said.startswith(
         "All limits kept. Over all runs ±2σ covers every truth for at least 70 % of the time (least: m_p)."
     )
-    assert "Residuals of 1 of 3 runs pass the test for whiteness. That test does not see friction" in said
+    assert "Residuals of 2 of 3 runs are coloured. That test does not see friction" in said
     assert seeds.verdict([summary(1, None, None, [None])]).startswith("Too short to judge")
 
 
@@ -104,24 +104,14 @@ def test_a_run_in_a_process_is_the_single_run(tmp_path: Path, capsys: pytest.Cap
     capsys.readouterr()
 
 
-@pytest.fixture
-def lever(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """lever("sim", …) with a second of steady."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        status = cli.main(["sim", "steady", *(f"--set={override}" for override in SHORT), *arguments])
-        return status, *capsys.readouterr()
-
-    return run
+STEADY = ("sim", "steady", *(f"--set={override}" for override in SHORT))
 
 
-def test_seeds_on_the_command_line(
-    lever: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_seeds_on_the_command_line(lever: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(interrupts, "worker_pool", None)  # not called for one process, or one seed
     file = tmp_path / "seeds.json"
     arguments = ("--seeds", "2", "--seed", "7", "--jobs", "1", "--json", str(file))
-    status, out, err = lever(*arguments, "--set", "limits={ m_p = '0.001 %' }")
+    status, out, err = lever(*STEADY, *arguments, "--set", "limits={ m_p = '0.001 %' }")
     assert status == 1
     assert err.startswith("lever: steady: rms error of m_p")
     assert "Limits missed: rms error of m_p" in out
@@ -130,7 +120,7 @@ def test_seeds_on_the_command_line(
     assert others == ["share of the judged time with each fault", "runs"]
     assert all(column in out for column in ("rms median [%]", "coverage [%]", "to 5 % median [s]"))
     alone = ("--seeds", "1", "--jobs", "2", "--set", "limits={}")
-    assert lever(*alone)[0] == 0
+    assert lever(*STEADY, *alone)[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -145,10 +135,5 @@ def test_seeds_on_the_command_line(
         (("--jobs", "2"), "--jobs is for --seeds"),
     ],
 )
-def test_what_does_not_go_together_is_one_line(
-    lever: Callable[..., tuple[int, str, str]], arguments: tuple[str, ...], message: str
-) -> None:
-    status, out, err = lever(*arguments)
-    assert (status, out) == (2, "")
-    assert message in err
-    assert err.count("\n") == 1
+def test_what_does_not_go_together_is_one_line(arguments: tuple[str, ...], message: str, refused: Refused) -> None:
+    assert message in refused(*STEADY, *arguments)

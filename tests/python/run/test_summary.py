@@ -19,6 +19,7 @@ from lever_cdkf.host_tools.results.summary import Firmware, SimulationSummary, o
 from lever_cdkf.host_tools.results.trace import Trace
 from lever_cdkf.host_tools.results.whiteness import Whiteness
 from lever_cdkf.sil.run import loop, summary
+from lever_cdkf.sil.scenarios import inputs
 from lever_cdkf.sil.scenarios.scenario import Scenario
 from scipy import stats
 
@@ -43,7 +44,7 @@ coverage = "90 %"
 @pytest.fixture
 def recording(load: Callable[..., Scenario]) -> loop.Recording:
     scenario = load(TEXT)
-    return loop.Recording(scenario, loop.prepare(scenario))
+    return loop.Recording(scenario, inputs.prepare(scenario))
 
 
 def perfect(recording: loop.Recording) -> Trace:
@@ -86,13 +87,6 @@ def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.R
     assert made.missed == ["rms error of m_p 5.4 % (limit 5 %)", "coverage of m_p 0 % (limit 90 %)"]
     assert "Limits missed: rms error of m_p 5.4 % (limit 5 %)" in made.verdict
     assert "In this run the stated σ of m_p is too small" in made.verdict
-
-
-def test_coverage_of_a_gaussian_error_is_that_of_two_sigma(recording: loop.Recording) -> None:
-    trace = perfect(recording)
-    trace["k_p_estimate_N_m"] += 0.01 * 2000 * np.random.default_rng(1).standard_normal(COUNT)
-    coverage = summary.build(recording, trace).parameters["k_p"].coverage_2sigma
-    assert coverage == pytest.approx(stats.norm.cdf(2) - stats.norm.cdf(-2), abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -210,7 +204,7 @@ def test_whether_the_estimator_has_the_settings_of_the_scenario_is_told(recordin
 
 def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., Scenario]) -> None:
     scenario = load(TEXT, "converged_after=20 s")
-    recording = loop.Recording(scenario, loop.prepare(scenario))
+    recording = loop.Recording(scenario, inputs.prepare(scenario))
     trace = perfect(recording)
     trace["m_p_estimate_kg"][:] = math.nan
     made = summary.build(recording, trace)
@@ -224,7 +218,7 @@ def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., 
 
 def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable[..., Scenario]) -> None:
     scenario = load(TEXT, "estimator.model=linear_physical", "limits={natural_frequency='2 %', coverage='90 %'}")
-    recording = loop.Recording(scenario, loop.prepare(scenario))
+    recording = loop.Recording(scenario, inputs.prepare(scenario))
     trace = perfect(recording)
     trace["damping_ratio_sigma"][:] = 0.0
     trace["damping_ratio_estimate"] *= 1.01
@@ -237,7 +231,7 @@ def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable
 def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(load: Callable[..., Scenario]) -> None:
     """The pilot tightens his c_p at 4 s; against M, D, K and the forcing of firmware/THEORY.md worked out here."""
     scenario = load(TEXT, "estimator.model=linear_physical", "limits={}")
-    recording = loop.Recording(scenario, loop.prepare(scenario))
+    recording = loop.Recording(scenario, inputs.prepare(scenario))
     told = summary.build(recording, perfect(recording)).truth
     assert told.model == "lever"
     assert told.transfer is not None
@@ -251,32 +245,15 @@ def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(
         assert denominator == pytest.approx(expected)
 
 
-def test_white_residuals_are_a_test_passed_and_no_proof_of_the_model() -> None:
-    white = Whiteness(0.02, [0.0] * 25, band_95=0.04, largest=0.08, largest_after_s=0.06, white=True)
+def test_white_residuals_are_no_proof_of_the_model() -> None:
+    white = Whiteness(0.02, [0.0] * 25, band_95=0.04, largest=0.05, largest_after_s=0.06, white=True)
     said = whiteness.verdict(white)
-    assert said.startswith(
-        "Residuals of the rate pass the test for whiteness up to a lag of 0.5 s (largest correlation 0.08"
-    )
-    assert all(unseen in said for unseen in ("friction", "gain", "delay"))
-    assert "coloured (correlation 0.08 after 60 ms; white" in whiteness.verdict(replace(white, white=False))
+    assert said.startswith("Residuals of the rate are white up to a lag of 0.5 s (chance alone: within ±0.06)")
+    beyond = whiteness.verdict(replace(white, largest=0.08))
+    assert beyond.startswith("Residuals of the rate are slightly correlated (0.08 after 60 ms; chance alone")
+    assert all(unseen in text for unseen in ("friction", "gain", "delay") for text in (said, beyond))
+    assert "coloured (correlation 0.05 after 60 ms; chance" in whiteness.verdict(replace(white, white=False))
     assert whiteness.verdict(None) == ""
-
-
-def test_a_file_is_read_back_as_it_was(recording: loop.Recording, tmp_path: Path) -> None:
-    made = summary.build(recording, perfect(recording)).timed(1.0)
-    file = tmp_path / "summary.json"
-    file.write_text(text(made))
-    assert read(file) == made
-    content = json.loads(file.read_text())
-    assert set(content) >= {
-        "schema", "scenario", "estimator", "parameters", "nis", "samples", "lost", "corrupt", "late", "restarts",
-        "unanswered", "misplaced", "firmware", "fault_shares", "flagged_share", "wall_time_s",
-        "simulated_time_s", "wall_time_per_simulated_time", "verdict",
-    }  # fmt: skip
-    assert set(content["parameters"]) == {"m_p", "c_p", "k_p", "natural_frequency", "damping_ratio"}
-    assert set(content["parameters"]["m_p"]) == {
-        "rms_percent", "bias_percent", "coverage_2sigma", "time_to_10_percent_s", "time_to_5_percent_s",
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -293,3 +270,10 @@ def test_what_is_no_summary_is_refused_in_a_line(wrong: str, tmp_path: Path) -> 
 def test_that_of_any_run_is_read_back(name: str) -> None:
     made = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
     assert of(SimulationSummary, json.loads(text(made))) == made
+
+
+@pytest.mark.parametrize(("rms", "shown"), [(5.4, "5.4"), (5.01, "5.01"), (5.0004, "5.0004"), (12.345, "12.3")])
+def test_a_limit_that_is_missed_does_not_look_kept(rms: float, shown: str) -> None:
+    (text,) = summary.missed_limits({"m_p": 0.05}, {"m_p": rms}, {})
+    assert text == f"rms error of m_p {shown} % (limit 5 %)"
+    assert summary.missed_limits({"m_p": 0.05}, {"m_p": 5.0}, {}) == []

@@ -141,6 +141,7 @@ def test_every_kind_of_csv(kind: str, packed: bool, columns: Columns, tmp_path: 
         ("empty.csv", b"", "no table of numbers"),
         ("bare.csv", b"0.0,1.0\n0.1,2.0\n0.2,3.0\n", "its columns have no names"),
         ("prose.csv", b"once upon\na time\n", "no table of numbers"),
+        ("prose.txt", b"once upon\na time\n", "add --dbc FILE"),
         ("timeless.csv", b"a,b\n" + b"1.5,2\n" * 9, "say which by --map time=COLUMN"),
         ("short.csv", b"time,b\n" + b"0,2\n" * 9 + b"0,1,2\n" + b"0,3\n" * 9, "line 11 has 3 fields, those above it 2"),
         ("broken.parquet", b"PAR1 no", "it cannot be read"),

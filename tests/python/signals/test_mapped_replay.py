@@ -171,8 +171,9 @@ def test_an_acceleration_that_points_down_is_turned(flight: Flight, tmp_path: Pa
 
 
 def test_what_is_written_is_read_back(folder: Path, tmp_path: Path) -> None:
-    first = replayed(tmp_path / "first", folder / "columns.csv", "--map", *COLUMNS)
-    for name in ("trace.csv", "signals.mf4"):
+    every = ("--format", "csv,mf4,parquet")
+    first = replayed(tmp_path / "first", folder / "columns.csv", "--map", *COLUMNS, *every)
+    for name in ("trace.csv", "signals.mf4", "trace.parquet"):
         again = replayed(tmp_path / name, tmp_path / "first" / name)
         assert frequency(again) == pytest.approx(frequency(first), rel=1e-3)
         assert again["samples"] == first["samples"]

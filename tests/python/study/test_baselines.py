@@ -84,12 +84,3 @@ def test_a_run_that_breaks_down_is_nan_and_the_others_do_not_notice(baseline: Ba
     if estimates.covariance is not None:
         broken = np.isnan(estimates.w[1]).any(axis=1)
         np.testing.assert_array_equal(np.isnan(estimates.covariance[1]).all(axis=(1, 2)), broken)
-
-
-def test_names_are_keys_and_linear_regressions_know_their_models() -> None:
-    class Unknown:
-        preload = "trim"
-
-    assert {name: baseline.name for name, baseline in BASELINES.items()} == {name: name for name in BASELINES}
-    unknown: Any = Unknown()
-    assert [name for name, baseline in BASELINES.items() if not baseline.handles(unknown)] == ["rls", "lms"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.sil.study.baselines.algorithm1 import Algorithm1, ParameterFilter, differences
+from lever_cdkf.sil.study.baselines.algorithm1 import ParameterFilter
 from lever_cdkf.sil.study.baselines.dual_ekf import DualEkf
 from lever_cdkf.sil.study.baselines.joint_ekf import JointEkf
 from lever_cdkf.sil.study.baselines.joint_ukf import JointUkf, UnscentedTransform
@@ -29,19 +29,6 @@ class Driven:
     def step(self, x: Array, p: Array, u: tuple[Array, Array], trim: Array, dt: float) -> Array:
         drive = p[0] * u[0] + p[1] * u[1] + p[2]
         return np.array((x[0] + dt * x[1], x[1] + dt * (drive - STIFFNESS * x[0] - SETTLE * x[1])))
-
-    def dynamics(self, p: Array, trim: Array) -> Array:
-        return np.zeros((2, *p.shape[1:]))
-
-
-@dataclass(frozen=True)
-class Explicit:
-    """The black box by Euler's rule: linear in the parameters for a given state."""
-
-    preload: str = "fixed"
-
-    def step(self, x: Array, p: Array, u: tuple[Array, Array], trim: Array, dt: float) -> Array:
-        return np.array((x[0] + dt * x[1], x[1] + dt * (p[0] * x[0] + p[1] * x[1] + p[2] * u[0])))
 
     def dynamics(self, p: Array, trim: Array) -> Array:
         return np.zeros((2, *p.shape[1:]))
@@ -145,30 +132,6 @@ def test_joint_ekf_is_the_extended_filter_of_filterpy(preload: str) -> None:
     assert np.abs(ours.w).max() > 0.05
 
 
-def test_algorithm1_is_the_kalman_filter_of_a_model_linear_in_the_parameters() -> None:
-    """The output's slope is what stands beside the parameters; its noise comes from two samples and from between."""
-    box: dict[str, Any] = {"guess": (-500.0, -12.0, 1.0), "sigma": (100.0, 4.0, 0.2), "walk": (10.0, 0.5, 0.02)}
-    batch = simulate(Plan(Explicit(), 1, 1.0, positive=False, **box))
-    known, ours = batch.knowledge, ParameterFilter(batch, 1)
-    noise = np.diag(known.output_noise**2)
-    kf = KalmanFilter(3, 2)
-    kf.x, kf.Q = np.zeros(3), np.diag((known.walk / known.sigma) ** 2) * PERIOD
-    for k in range(1, batch.samples):
-        ours.step(k)
-        theta, rate = batch.y[0, k - 1]
-        beside = np.array((theta, rate, inputs(batch, 0, k - 1)[0]))
-        p = known.guess + known.sigma * kf.x
-        motion = np.array([[1.0, PERIOD], [PERIOD * p[0], 1.0 + PERIOD * p[1]]])
-        kf.H = np.stack((np.zeros(3), PERIOD * beside * known.sigma))
-        kf.R = noise + motion @ noise @ motion.T + known.process_covariance(PERIOD)
-        kf.predict()
-        kf.update(batch.y[0, k] - (theta + PERIOD * rate, rate + PERIOD * (beside @ known.guess)))
-        np.testing.assert_allclose(ours.w[0], kf.x, atol=1e-10)
-        np.testing.assert_allclose(ours.innovation_covariance[0], kf.S, rtol=1e-10)
-    np.testing.assert_allclose(ours.w_covariance[0], kf.P, atol=1e-12)
-    assert np.abs(ours.w).max() > 0.1
-
-
 def test_algorithm1_ahead_is_the_kalman_filter_of_every_nth_sample() -> None:
     """Of a linear system, whose states and slopes over n samples are products of those over one."""
     batch, n = driven(runs=1), 7
@@ -202,30 +165,6 @@ def test_algorithm1_sees_how_the_model_bends() -> None:
     bent = PERIOD**2 * (4.0 * p**2 * variance + 2.0 * variance**2)
     assert ours.innovation_covariance[0, 1, 1] - noise == pytest.approx(bent, rel=1e-6)
     assert ours.innovation[0, 1] == pytest.approx(batch.y[0, 1, 1] - batch.y[0, 0, 1] - PERIOD * (p**2 + variance))
-
-
-def test_algorithm1_ahead_waits_and_then_compares_with_the_model_run_from_the_sample_before() -> None:
-    batch = simulate(Plan(lever("trim"), runs=2, duration=0.1, sigma=(1e-6, 1e-6, 1e-6)))
-    ahead = ParameterFilter(batch, 30)
-    x = batch.y[:, 0]
-    for k in range(1, 31):
-        x = batch.move(k - 1, x, np.zeros((2, 3)))
-        assert not ahead.w.any()
-        ahead.step(k)
-    np.testing.assert_allclose(ahead.innovation, batch.y[:, 30] - x, atol=2e-5)  # the model bends over the noise of y
-    assert (ahead.w != 0.0).all()
-    estimates = Algorithm1(ahead=0.03)(batch, np.array([29, 30, 59]))
-    np.testing.assert_array_equal(estimates.w[:, 1:], np.stack((ahead.w, ahead.w), axis=1))
-
-
-def test_differences_have_the_moments_of_a_quadratic() -> None:
-    """Of f = a + bᵀ n + nᵀ C n with diagonal C and n standard normal: mean a + tr C, variance bᵀ b + 2 tr C²."""
-    slopes, curvatures = np.array([0.3, -1.2, 0.5]), np.array([0.7, 0.0, -0.4])
-    spread = np.sqrt(3.0) * np.eye(3)
-    points = np.concatenate((np.zeros((1, 3)), spread, -spread))
-    mean, first, second = differences((2.0 + points @ slopes + points**2 @ curvatures)[np.newaxis, :, np.newaxis])
-    assert mean[0, 0] == pytest.approx(2.0 + curvatures.sum())
-    assert (first**2).sum() + (second**2).sum() == pytest.approx(slopes @ slopes + 2.0 * curvatures @ curvatures)
 
 
 def test_a_covariance_without_a_factor_is_one_runs_affair() -> None:

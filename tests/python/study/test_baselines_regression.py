@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
 from lever_cdkf.sil.study.baselines.balance import Ratios, Same
 from lever_cdkf.sil.study.baselines.lms import Nlms
@@ -165,16 +164,6 @@ def test_parameters_that_mean_no_pilot_are_not_reported() -> None:
     np.testing.assert_allclose(estimates.w[0, 3], 0.0, atol=1e-12)
 
 
-def test_rls_winds_up_without_excitation_until_it_breaks_down() -> None:
-    batch = simulate(replace(on_lever("trim"), runs=1))
-    still = replace(batch, y=np.zeros_like(batch.y), u=np.zeros_like(batch.u))
-    estimates = Rls(0.02, forgetting=2e-3)(still, np.array([1000, 3999]))
-    assert estimates.covariance is not None
-    np.testing.assert_array_equal(estimates.w[0, 0], 0.0)
-    assert (np.diagonal(estimates.covariance[0, 0]) > 1e6).all()
-    assert np.isnan(estimates.w[0, 1]).all()
-
-
 # --- LMS -------------------------------------------------------------------------------------------------------------
 
 
@@ -191,25 +180,3 @@ def test_lms_converges_to_the_wiener_solution() -> None:
         wiener = np.linalg.lstsq(weight[:, np.newaxis] * phi, weight * target)[0]
         np.testing.assert_allclose(w[run].mean(axis=0), batch.knowledge.scaled(wiener), atol=0.1)
     assert np.abs(w[:, -1]).max() > 0.5
-
-
-def test_lms_with_too_large_a_step_diverges_and_says_so() -> None:
-    batch = simulate(replace(black_box(), runs=1))
-    assert np.isnan(Nlms(0.001, 1e4, 0.0)(batch, np.array([3999])).w).all()
-
-
-def test_another_model_is_refused() -> None:
-    class Other:
-        preload = "trim"
-
-        def step(
-            self, x: Array, p: Array, u: tuple[float | Array, float | Array], trim: float | Array, dt: float
-        ) -> Array:
-            return x
-
-        def dynamics(self, p: Array, trim: float | Array) -> Array:
-            return p[:2]
-
-    batch = simulate(replace(black_box(), runs=1, duration=0.01))
-    with pytest.raises(LeverError, match="Other cannot be written as a linear regression"):
-        Rls()(replace(batch, model=Other()), np.array([5]))

@@ -3,7 +3,6 @@ the lever's equation written out, scipy's integration, roots and chi-square."""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 import re
@@ -97,15 +96,6 @@ def test_charts_hold_all_that_is_drawn_once_the_start_is_over(name: str) -> None
                 assert all(low <= series[after].min() <= series[after].max() <= high for series in values(entry))
 
 
-@pytest.mark.parametrize("name", ["parameters", "identification"])
-def test_a_wild_start_does_not_squeeze_the_rest(name: str) -> None:
-    assert made(name).scaled_from == pytest.approx(0.05 * SHORT.duration)
-    whole, late = (dataclasses.replace(made(name), scaled_from=at).limits() for at in (0.0, 0.5 * SHORT.duration))
-    for (low, high), (lower, upper) in zip(late, whole, strict=True):
-        assert lower <= low < high <= upper
-        assert high - low < 0.8 * (upper - lower)
-
-
 def test_series_that_share_a_chart_do_not_rely_on_hue() -> None:
     for name in catalogue.FIGURES:
         for column in made(name).columns:
@@ -179,19 +169,6 @@ def test_the_surfaces_are_the_answer_of_the_linearised_lever() -> None:
             # The firmware linearises about the angle it measures, not about the one that its parameters would hold.
             assert surface.ridge[index] == pytest.approx(natural, rel=1e-5 if surface is truth else 3e-3)
         assert estimate.ridge[index] == found[k].natural_frequency
-
-
-def test_the_bode_caption() -> None:
-    truth, estimate = (column.content for column in made("bode").columns)
-    assert isinstance(truth, Surface)
-    assert isinstance(estimate, Surface)
-    half = truth.time >= truth.time[-1] / 2.0
-    peaks = [surface.magnitude.max(axis=0) for surface in (truth, estimate)]
-    errors = [np.sqrt(np.mean((b / a - 1.0)[half] ** 2)) for a, b in ((truth.ridge, estimate.ridge), peaks)]
-    caption = made("bode").caption
-    assert f"between {two(truth.ridge.min(), 3)} and {two(truth.ridge.max(), 3)} Hz" in caption
-    assert f"between {two(peaks[0].min())} and {two(peaks[0].max())} deg per m/s²" in caption
-    assert f"off by {two(100 * errors[0])} % rms in natural frequency and {two(100 * errors[1])} % rms" in caption
 
 
 # --- linear models ---------------------------------------------------------------------------------------------------
@@ -303,27 +280,6 @@ def test_identification_shows_the_firmware_and_a_reference_that_starts_at_the_pr
         assert relative[-1] < 0.7 * prior
 
 
-def test_both_sides_of_the_identification_are_the_same_pilot() -> None:
-    for label, row in rows("identification", 0).items():
-        np.testing.assert_array_equal(trace(row, "truth").y, trace(rows("identification", 1)[label], "truth").y)
-
-
-def test_the_identification_caption() -> None:
-    caption, sides = made("identification").caption, [rows("identification", column) for column in (0, 1)]
-    apart = 0.0
-    for label in sides[0]:
-        claims, bounds = [], []
-        for side in sides:
-            dual, band, joint = (trace(side[label], name) for name in ("dual", "dual ± 2σ", "joint"))
-            sigma = (band.high - band.low) / 4.0
-            apart = max(apart, float(np.max(np.abs(dual.y - joint.y) / sigma)))
-            claims.append(two(100.0 * sigma[-1] / dual.y[-1]))
-            bound, truth = trace(side[label], "linearised at the truth: ± 2σ"), trace(side[label], "truth")
-            bounds.append(two(100.0 * (bound.high - bound.low)[-1] / (4.0 * truth.y[-1])))
-        assert f"{label.split()[0]} {claims[0]} → {claims[1]} % ({bounds[0]} → {bounds[1]} %)" in caption
-    assert f"nowhere more than {two(apart)} σ apart" in caption
-
-
 # --- change of grip --------------------------------------------------------------------------------------------------
 
 
@@ -395,27 +351,6 @@ def test_the_grip_caption_tells_how_fast_the_runs_followed(column: int, title: s
     )
     many = rows("grip", column)["k_p error [%]"]
     np.testing.assert_allclose(trace(many, "median of the runs").y, np.median(errors, axis=0), rtol=1e-6)
-
-
-def test_alarms_are_those_of_the_firmware(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a threshold that is too low, so that there are false ones."""
-    _, batch, moment = grips()
-    monkeypatch.setattr(grip, "_CASES", {"with detection": 8.0, "without": 0.0})
-    caption = catalogue.FIGURES["grip"](SEED, SHORT).caption
-    settings = {**PRIOR, "noise_window": 0.0, "change_threshold": 8.0}
-    shown, noticed, false = set(runs.shown(batch).tolist()), 0, 0
-    for y, u in zip(batch.raw_y, batch.raw_u, strict=True):
-        estimator, before, soon = Estimator(Config("lever", "trim", "dual", "fixed", settings=settings)), False, False
-        for k, ((theta, rate), (z_ddot, tau_m)) in enumerate(zip(y, u, strict=True)):
-            estimator.update(k * 1000, theta=theta, theta_dot=rate, tau_m=tau_m, z_ddot=z_ddot)
-            if k in shown:
-                alarm = "change" in estimator.health().faults
-                false += alarm and not before and k < moment
-                soon |= alarm and moment <= k < moment + 2000
-                before = alarm
-        noticed += soon
-    assert false > 0
-    assert f"noticed within 2 s in {noticed} of {batch.runs} runs; false alarms before it: {false} in 8 s" in caption
 
 
 # --- consistency -----------------------------------------------------------------------------------------------------

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import hashlib
+import html
 import importlib.metadata
 import io
 import itertools
@@ -13,15 +15,19 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
 from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.provenance import provenance
 from lever_cdkf.host_tools.report import screenshot
-from lever_cdkf.sil.study.figures import catalogue, figures_page, png, runs
+from lever_cdkf.sil.study.figures import catalogue, figures_page, printed, runs
 from lever_cdkf.sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
 from lever_cdkf.sil.study.figures.typesetting import colours, css, in_html, in_mathtext
 from PIL import Image
+from PIL.PngImagePlugin import PngImageFile
 from python.report.reading import figures, read, unpack
 from python.study.shown import ONCE, SEED, SHORT, made
 from quality.tools import ROOT
@@ -38,12 +44,12 @@ every = pytest.mark.parametrize("name", NAMES)
 
 
 @functools.cache
-def sheet(name: str) -> Any:
+def sheet(name: str, width: str = "single") -> Any:
     """A figure in print, with a time axis as long as that of the real one."""
     figure = made(name)
     if figure.x_range[0] == 0.0:
         figure = dataclasses.replace(figure, x_range=(0.0, figure.x_range[1] * LONG.duration / SHORT.duration))
-    return png.sheet(figure)
+    return printed.sheet(figure, width)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -55,6 +61,7 @@ def commands() -> Iterator[None]:
         patch.setattr(importlib.metadata, "entry_points", lambda group: found)
         patch.setattr(runs, "Extent", lambda: SHORT)
         patch.setattr(catalogue, "FIGURES", ONCE)
+        patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
         yield
 
 
@@ -81,8 +88,9 @@ def lever(capsys: pytest.CaptureFixture[str]) -> Run:
 # --- pictures --------------------------------------------------------------------------------------------------------
 
 
-def test_every_figure_is_there_in_both_forms_and_nothing_else(folder: Path) -> None:
-    wanted = {*(f"{name}.png" for name in NAMES), "figures.html", "captions.md"}
+def test_every_figure_is_there_in_every_form_and_nothing_else(folder: Path) -> None:
+    wanted = {f"{name}.{kind}" for name in NAMES for kind in ("png", "svg", "pdf", "csv")}
+    wanted |= {"figures.html", "captions.md", "provenance.json"}
     assert {path.name for path in folder.iterdir()} == wanted
     assert read(folder / "figures.html").ids("section") == NAMES
 
@@ -90,19 +98,20 @@ def test_every_figure_is_there_in_both_forms_and_nothing_else(folder: Path) -> N
 @every
 def test_a_picture_is_a_column_wide_on_white_with_nothing_cut_off(folder: Path, name: str) -> None:
     with Image.open(folder / f"{name}.png") as image:
-        assert image.width == round(3.5 * 200)
-        assert image.info["dpi"] == pytest.approx((200, 200), abs=0.1)
+        assert image.width == int(88 / 25.4 * 300)
+        assert image.info["dpi"] == pytest.approx((300, 300), abs=0.1)
         pixels = np.asarray(image.convert("L"))
     border = np.concatenate((pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
     assert (border == 255).all()
     assert 0.02 < np.mean(pixels < 250) < 0.9
 
 
+@pytest.mark.parametrize("width", ["single", "double"])
 @every
-def test_no_legend_lies_on_a_chart_and_no_label_on_another(name: str) -> None:
-    (legend,) = sheet(name).legends
+def test_no_legend_lies_on_a_chart_and_no_label_on_another(name: str, width: str) -> None:
+    (legend,) = sheet(name, width).legends
     boxes = []
-    for axes in sheet(name).axes:
+    for axes in sheet(name, width).axes:
         assert not legend.get_window_extent().overlaps(axes.get_window_extent())
         boxes += [axis.label.get_window_extent() for axis in (axes.xaxis, axes.yaxis) if axis.label.get_text()]
         for axis in (axes.xaxis, axes.yaxis):
@@ -128,17 +137,77 @@ def test_text_is_legible_in_print(name: str) -> None:
 
 def test_the_same_seed_gives_the_same_picture(folder: Path) -> None:
     anew, other = (ONCE["states"].__wrapped__(seed, SHORT) for seed in (SEED, SEED + 1))
-    assert png.render(anew) == (folder / "states.png").read_bytes()
-    assert png.render(other) != (folder / "states.png").read_bytes()
+    for kind in ("png", "svg", "pdf"):
+        before = (folder / f"states.{kind}").read_bytes()
+        assert printed.render(anew, kind, provenance=provenance()) == before
+        assert printed.render(other, kind, provenance=provenance()) != before
     assert other.caption != anew.caption
+
+
+def test_text_in_svg_is_text_and_fonts_are_in_the_pdf(folder: Path) -> None:
+    for name in NAMES:
+        svg = ElementTree.parse(folder / f"{name}.svg").getroot()
+        assert float(svg.attrib["width"].removesuffix("pt")) == pytest.approx(88 / 25.4 * 72, abs=0.01)
+        words = "".join(text for element in svg.iter("{http://www.w3.org/2000/svg}text") for text in element.itertext())
+        assert "time [s]" in words
+        pdf = (folder / f"{name}.pdf").read_bytes()
+        assert pdf.startswith(b"%PDF-")
+        assert pdf.count(b"/FontFile2") >= 1  # TrueType
+        assert b"/Type3" not in pdf
+        (box,) = set(re.findall(rb"/MediaBox \[ 0 0 ([\d.]+)", pdf))
+        assert float(box) == pytest.approx(88 / 25.4 * 72, abs=0.01)
+
+
+def test_a_double_width_is_two_columns_wide(lever: Run, tmp_path: Path) -> None:
+    assert lever("figures", "--only", "states", "--width", "double", "--out", str(tmp_path))[0] == 0
+    with Image.open(tmp_path / "states.png") as image:
+        assert image.width == int(180 / 25.4 * 300)
+
+
+def test_the_table_holds_what_is_drawn(folder: Path) -> None:
+    for name in NAMES:
+        table = pd.read_csv(folder / f"{name}.csv", keep_default_na=False, na_values={"value": "", "low": ""})
+        for column in made(name).columns:
+            rows = table[table["column"] == column.title]
+            if isinstance(column.content, Surface):
+                surface = rows[rows["series"] == ""].astype({"frequency_Hz": float, "time_s": float})
+                grid = surface.pivot(index="frequency_Hz", columns="time_s", values="value")
+                np.testing.assert_allclose(grid.to_numpy(), column.content.magnitude, rtol=1e-6)
+                continue
+            for chart in column.content:
+                for trace in chart.traces:
+                    points = rows[(rows["chart"] == chart.label) & (rows["series"] == trace.name)]
+                    values = points["low" if isinstance(trace, Band) else "value"].dropna()
+                    shown = trace.low if isinstance(trace, Band) else trace.y
+                    np.testing.assert_allclose(values, shown[np.isfinite(shown)], rtol=1e-6)
+
+
+def test_every_picture_says_where_it_is_from(folder: Path) -> None:
+    told = json.loads((folder / "provenance.json").read_text())
+    assert told["created"] == "2023-11-14T22:13:20Z"
+    for name, digest in told["outputs"].items():
+        assert digest == f"sha256:{hashlib.sha256((folder / name).read_bytes()).hexdigest()}"
+    assert set(told["outputs"]) | {"provenance.json"} == {path.name for path in folder.iterdir()}
+    with Image.open(folder / "grip.png") as image:
+        assert isinstance(image, PngImageFile)
+        in_png = json.loads(image.text["Description"])
+    svg = (folder / "grip.svg").read_text(encoding="utf-8")
+    in_svg = json.loads(html.unescape(re.findall("<dc:description>(.*?)</dc:description>", svg)[0]))
+    page = (folder / "figures.html").read_text(encoding="utf-8")
+    in_page = json.loads(re.findall('<script type="application/json" id="provenance">(.*?)</script>', page)[0])
+    for properties in (in_png, in_svg, in_page):
+        assert {key: properties[key] for key in ("version", "library", "created", "command")} == {
+            key: told[key] for key in ("version", "library", "created", "command")
+        }
+    assert b"D:20231114221320Z" in (folder / "grip.pdf").read_bytes()
 
 
 def test_a_picture_does_not_depend_on_how_matplotlib_is_configured() -> None:
     import matplotlib as mpl
 
-    plain = png.render(made("excitation"))
+    plain = printed.render(made("excitation"))
     with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "black", "savefig.bbox": "tight"}):
-        assert png.render(made("excitation")) == plain
+        assert printed.render(made("excitation")) == plain
 
 
 def test_what_is_drawn_is_where_it_belongs() -> None:
@@ -150,8 +219,8 @@ def test_what_is_drawn_is_where_it_belongs() -> None:
         Points(x, np.full(101, 2.0), "dots", "measured"),
     )
     figure = Figure("x", "x", "x", (Column("", (Row("y [1]", traces, (0.0, 10.0)),)),), (0.0, 1.0))
-    pixels = np.asarray(Image.open(io.BytesIO(png.render(figure))).convert("RGB")).astype(int)
-    (axes,) = png.sheet(figure).axes
+    pixels = np.asarray(Image.open(io.BytesIO(printed.render(figure))).convert("RGB")).astype(int)
+    (axes,) = printed.sheet(figure).axes
     assert (axes.get_xlim(), axes.get_ylim()) == ((0.0, 1.0), (0.0, 10.0))
     height = len(pixels)
     for name, level in (("chance-band", 7.0), ("estimate", 4.0), ("measured", 2.0)):
@@ -268,10 +337,10 @@ def test_list_names_every_figure_and_writes_nothing(
 def test_only_makes_what_is_asked_for(lever: Run, tmp_path: Path) -> None:
     status, out, err = lever("figures", "--only", "states", "excitation", "--seed", "3", "--out", str(tmp_path))
     assert (status, err) == (0, "")
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "captions.md", "excitation.png", "figures.html", "states.png"
-    ]  # fmt: skip
-    assert out == f"Written to {tmp_path}: excitation.png, states.png, figures.html, captions.md\n"
+    pictures = [f"{name}.{kind}" for name in ("excitation", "states") for kind in ("png", "svg", "pdf", "csv")]
+    names = [*pictures, "figures.html", "captions.md", "provenance.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    assert out == f"Written to {tmp_path}: {', '.join(names)}\n"
     assert read(tmp_path / "figures.html").ids("section") == ["excitation", "states"]
     assert catalogue.FIGURES["states"](3, SHORT).caption in (tmp_path / "captions.md").read_text(encoding="utf-8")
 

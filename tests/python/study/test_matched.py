@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.host_tools.models.linear import LinearBlackBox
 from lever_cdkf.sil.plants import lever_plant
-from lever_cdkf.sil.study.data import Batch, rest_angle
+from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
 from scipy import signal
@@ -73,40 +72,6 @@ def test_the_seed_makes_the_batch_to_the_bit(name: str) -> None:
     assert all(value.dtype == np.float64 for value in arrays(again).values())
 
 
-def test_purposes_have_random_numbers_of_their_own() -> None:
-    """No two of base, dither, walk, process and output noise go together: in all 8 runs."""
-    batch = drawn("linear_black_box trim")
-    assert batch.truth.p is not None
-    w = batch.knowledge.scaled(batch.truth.p)
-    pushed = batch.truth.x[:, 1:, 1] - np.stack([_moved(batch, k, w) for k in range(batch.samples - 1)], axis=1)
-    walk = np.diff(w[..., 0], axis=1)
-    noise = (batch.raw_y - batch.truth.x)[:, 1:, 0]
-    white = np.corrcoef(np.stack([part.ravel() for part in (pushed, walk, noise)]))
-    assert np.abs(white - np.eye(3)).max() < 4.0 / math.sqrt(pushed.size)
-    base, dither = batch.u[..., 0], batch.u[..., 1]
-    alike = np.mean(base * dither, axis=1) / np.sqrt(np.mean(base**2, axis=1) * np.mean(dither**2, axis=1))
-    assert np.abs(alike).max() < 4.0 / math.sqrt(2.0 * 9.0 * 3.0)  # as many free numbers as 9 Hz have in 3 s
-
-
-def _moved(batch: Batch, k: int, w: Array) -> Array:
-    """(B,) rate at sample k + 1 without noise."""
-    x = batch.truth.x[:, k] - np.stack((batch.trim[:, k], np.zeros(batch.runs)), axis=-1)
-    return batch.move(k, x, w[:, k])[:, 1]
-
-
-def test_one_purpose_does_not_shift_another() -> None:
-    base = Condition(dither_rms=0.3)
-    plain = matched(base, 2, 1.0, 3)
-    still = matched(dataclasses.replace(base, dither_rms=0.0), 2, 1.0, 3)
-    np.testing.assert_array_equal(still.u[..., 0], plain.u[..., 0])
-    np.testing.assert_array_equal(still.u[..., 1], 0.0)
-    np.testing.assert_array_equal(still.truth.p, plain.truth.p)
-    np.testing.assert_allclose(still.raw_y - still.truth.x, plain.raw_y - plain.truth.x, atol=1e-15)
-    silent = matched(dataclasses.replace(base, settings={"theta_dot_process_noise": 0.0}), 2, 1.0, 3)
-    np.testing.assert_array_equal(silent.truth.p, plain.truth.p)
-    np.testing.assert_array_equal(silent.u, plain.u)
-
-
 # --- the right statistics --------------------------------------------------------------------------------------------
 
 
@@ -147,15 +112,6 @@ def test_process_noise_is_an_integrated_random_walk(name: str) -> None:
 
 
 @every
-def test_outputs_are_the_state_and_white_noise(name: str) -> None:
-    batch = drawn(name)
-    noise = batch.raw_y - batch.truth.x
-    for index, sigma in enumerate((DEFAULTS["theta_noise"], DEFAULTS["theta_dot_noise"])):
-        assert same_variance(noise[..., index], sigma)
-    assert abs(np.corrcoef(noise[..., 0].ravel(), noise[..., 1].ravel())[0, 1]) < 4.0 / math.sqrt(8 * 6000)
-
-
-@every
 def test_inputs_have_their_rms_and_band(name: str) -> None:
     batch, condition = drawn(name), CONDITIONS[name]
     for index, rms in enumerate((condition.base_rms, condition.dither_rms)):
@@ -167,15 +123,6 @@ def test_inputs_have_their_rms_and_band(name: str) -> None:
 
 
 # --- the right motion ------------------------------------------------------------------------------------------------
-
-
-@every
-def test_deviations_count_from_the_trim(name: str) -> None:
-    batch = drawn(name)
-    trim = math.radians(20.0) if name.endswith("trim") else 0.0
-    np.testing.assert_array_equal(batch.trim, trim)
-    np.testing.assert_allclose(batch.raw_y[..., 0] - batch.y[..., 0], trim, atol=1e-15)
-    np.testing.assert_array_equal(batch.raw_y[..., 1], batch.y[..., 1])
 
 
 @pytest.mark.parametrize("preload", ["fixed", "trim"])
@@ -208,13 +155,6 @@ def test_without_noise_the_black_box_is_a_linear_system() -> None:
         assert np.abs(moved - exact).max(axis=0) == pytest.approx(0.0, abs=1e-3 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize(("stiffness", "rest"), [(465.0, 0.2), (0.0, np.nan)])
-def test_what_nothing_holds_rests_nowhere(stiffness: float, rest: float) -> None:
-    p = np.array([-stiffness, -13.7, -2.2])[:, None]
-    found = rest_angle(LinearBlackBox(0.2, "fixed"), p, np.zeros(1), 1e-3)
-    np.testing.assert_allclose(found, rest, rtol=1e-9)
-
-
 def test_where_an_unknown_truth_rests_is_not_made_up() -> None:
     at = np.array([0, 7])
     unknown = {
@@ -239,14 +179,6 @@ def test_parameters_stay_within_the_bounds_of_the_model() -> None:
         p = batch.truth.p[..., index]
         assert least <= p.min()
         assert 0.5 * greatest < p.max() <= greatest  # three standard deviations would be beyond
-
-
-def test_no_truth_falls_or_drives_itself() -> None:
-    wild = {"a21_sigma": 600.0, "a22_sigma": 20.0}
-    batch = matched(Condition("linear_black_box", settings=BLACK_BOX | wild), 30, 1.0, 3)
-    assert batch.truth.p is not None
-    assert (batch.truth.p[..., :2] < 0.0).all()
-    assert (batch.truth.dynamics > 0.0).all()
 
 
 def test_conditions_that_cannot_be_are_refused() -> None:

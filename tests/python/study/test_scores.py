@@ -11,15 +11,8 @@ from lever_cdkf.sil.study import scores
 from lever_cdkf.sil.study.data import Estimates
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
-from scipy import stats
 
 Array = NDArray[Any]  # of floats
-
-
-def random_covariance(rng: np.random.Generator) -> Array:
-    root = np.tril(rng.standard_normal((3, 3))) + 2.0 * np.eye(3)
-    covariance: Array = 1e-3 * root @ root.T
-    return covariance
 
 
 def correlated(rng: np.random.Generator, runs: int, times: int, memory: float) -> Array:
@@ -45,15 +38,6 @@ def test_errors_are_those_of_w_and_relative_ones_of_the_dynamics() -> None:
     np.testing.assert_allclose(found[..., :3], np.broadcast_to(wrong, (3, 2, 3)), atol=1e-12)
     np.testing.assert_allclose(found[..., 3], np.sqrt(1.1) - 1.0, rtol=1e-9)
     np.testing.assert_allclose(found[..., 4], np.exp(0.2) / np.sqrt(1.1) - 1.0, rtol=1e-9)
-
-
-@pytest.mark.parametrize("preload", ["fixed", "trim"])
-def test_the_truth_has_no_errors(preload: str) -> None:
-    batch = matched(Condition(preload=preload), 2, 0.5, 1)
-    assert batch.truth.p is not None
-    at = np.arange(0, 500, 50)
-    w = batch.knowledge.scaled(batch.truth.p[:, at])
-    np.testing.assert_allclose(scores.errors(batch, Estimates(at, w, None)), 0.0, atol=1e-12)
 
 
 def test_of_a_truth_outside_the_model_only_the_dynamics_are_judged() -> None:
@@ -106,15 +90,6 @@ def test_spread_of_the_ratio_is_that_of_many_experiments() -> None:
 # --- consistency -----------------------------------------------------------------------------------------------------
 
 
-def test_normalised_squares_of_honest_errors_are_chi_square() -> None:
-    rng = np.random.default_rng(5)
-    covariance = np.stack([[random_covariance(rng) for _ in range(50)] for _ in range(40)])
-    deviations = np.einsum("btij,btj->bti", np.linalg.cholesky(covariance), rng.standard_normal((40, 50, 3)))
-    squares = scores.normalised_squares(deviations, covariance)
-    assert squares.shape == (40, 50)
-    assert stats.kstest(squares.ravel(), stats.chi2(3).cdf).pvalue > 1e-3
-
-
 @pytest.mark.parametrize(("freedom", "memory"), [(2, 1.0), (3, 0.95)])
 def test_a_consistent_filter_is_found_so_in_95_of_100_batches_or_more(freedom: int, memory: float) -> None:
     """Exact chi-square, correlated over a tenth of the run or all of it: 600 batches of 20 runs."""
@@ -130,12 +105,6 @@ def test_a_consistent_filter_is_found_so_in_95_of_100_batches_or_more(freedom: i
     inside = [one.inside for one in found]
     assert np.mean(inside) == pytest.approx(0.95, abs=3.3 * np.std(inside) / np.sqrt(600))
     assert np.mean([one.mean for one in found]) == pytest.approx(freedom, rel=0.02)
-
-
-def test_the_band_of_the_mean_is_chi_squares() -> None:
-    squares = np.random.default_rng(4).chisquare(3, (20, 10))
-    expected = stats.chi2.ppf((0.025, 0.975), 60) / 20
-    np.testing.assert_allclose(scores.consistency(squares, 3).mean_band, expected)
 
 
 @pytest.mark.parametrize("claim", [0.8, 1.25])
@@ -171,12 +140,6 @@ ELAPSED = np.arange(-2.0, 8.0)  # the change is at index 2
 def test_settling_time(relative: list[float], settled: float) -> None:
     both = np.array([relative, np.full(10, 0.5)])
     np.testing.assert_array_equal(scores.settling_times(both, ELAPSED), [settled, np.nan])
-
-
-def test_settling_time_within_another_limit() -> None:
-    decay = np.exp(-np.arange(0.0, 5.0, 1e-3))[None]
-    found = scores.settling_times(decay, np.arange(0.0, 5.0, 1e-3), within=0.1)
-    assert found[0] == pytest.approx(np.log(10.0), abs=1e-3)
 
 
 def test_median_and_worst() -> None:

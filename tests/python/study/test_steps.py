@@ -69,12 +69,6 @@ def test_process_noise_is_that_of_the_step() -> None:
         assert low < np.sum(np.square(x[:, -1, 1])) / (q**2 * (samples - 1) * PERIOD) < high
 
 
-def test_parameters_step_once(batch: Batch) -> None:
-    p, at = truth_of(batch), round(SHORT.at / PERIOD)
-    np.testing.assert_array_equal(np.flatnonzero(np.diff(p[..., 2], axis=1).any(axis=0)), [at - 1])
-    np.testing.assert_allclose(p[:, -1] / p[:, 0], np.tile((1.0, 1.3, 1.3), (3, 1)), rtol=1e-12)
-
-
 def test_start_is_uniform_about_the_first_guess() -> None:
     short = stepped(Step(duration=2e-3, at=1e-3), 400, 3)
     assert short.samples == 2
@@ -82,12 +76,6 @@ def test_start_is_uniform_about_the_first_guess() -> None:
     guess = [DEFAULTS[name] for name in ("m_p", "c_p", "k_p")]
     for index in range(3):
         assert kstest((drawn[:, index] / guess[index] - 0.75) / 0.5, "uniform").pvalue > 1e-3
-
-
-def test_the_seed_makes_the_batch(batch: Batch) -> None:
-    fewer, other = stepped(SHORT, 2, 5), stepped(SHORT, 2, 6)
-    np.testing.assert_array_equal(fewer.raw_y, batch.raw_y[:2])
-    assert not np.array_equal(other.raw_u, fewer.raw_u)
 
 
 def test_signals_are_detrended_as_the_oracle_does(batch: Batch) -> None:

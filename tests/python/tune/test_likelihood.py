@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.firmware.innovations import innovations
 from lever_cdkf.host_tools.firmware.native import run_samples
@@ -73,13 +72,6 @@ def test_the_filter_that_is_watched_is_the_firmware() -> None:
     assert used.sum() >= 2990
     assert (told["size"][used] == said["nis_size"][used]).all()
     np.testing.assert_allclose(told["nis"][used], said["nis"][used], rtol=2e-3, atol=1e-4)
-
-
-def test_a_configuration_changed_behind_its_back_is_refused() -> None:
-    changed = config(sigma=0.3)
-    changed.pointer.settings.theta_noise = -1.0
-    with pytest.raises(LeverError, match="refused its configuration"):
-        innovations(changed, textbook.simulate(GUESS, 10, seed=5))
 
 
 def test_an_output_that_is_missing_says_nothing() -> None:

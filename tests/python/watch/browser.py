@@ -53,7 +53,8 @@ class Browser:
     async def _detach(self) -> None:
         if self._socket is not None:
             self._socket.close()
-            await self._socket.read_message()
+            while await asyncio.wait_for(self._socket.read_message(), PATIENCE) is not None:
+                pass  # what the page had still to say
 
     def _attach(self) -> None:
         endpoint = Path(self._profile) / "DevToolsActivePort"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import random
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -223,14 +222,6 @@ def test_what_was_taken_away_is_counted_as_lost(flight: Flight) -> None:
     assert (entry.lost, entry.corrupt, entry.repeated, entry.frames) == (0, 0, 0, 0)
 
 
-def test_commands_of_several_senders_are_no_losses() -> None:
-    picture = Picture()
-    values: dict[str, codec.Value] = {"request": "none", **KEEP}
-    picture.take([(0x120, codec.encode("COMMAND", counter, values)) for counter in (3, 11, 4, 4)], 0.0)
-    entry = picture.traffic["COMMAND"]
-    assert (entry.frames, entry.lost, entry.repeated) == (4, 0, 0)
-
-
 def test_counts_of_the_estimator_go_on_beyond_their_bits() -> None:
     picture = Picture()
     faults: dict[str, codec.Value] = {f"fault_{name}": 0 for name in enum_names("lever_fault").values()}
@@ -307,23 +298,6 @@ def test_history_has_a_row_a_step_and_is_bounded(flight: Flight) -> None:
     times = list(picture.history["time"])
     steps = [after - before for before, after in itertools.pairwise(times)]
     assert steps == pytest.approx([STEP] * len(steps))
-
-
-def test_memory_does_not_grow(flight: Flight) -> None:
-    picture, frames = Picture(), flight.frames(100)
-
-    def held() -> int:
-        columns = sum(sys.getsizeof(column) for column in picture.history.values())
-        marks = sum(sys.getsizeof(entry._marks) for entry in picture.traffic.values())
-        return columns + marks + sum(len(window._batches) for window in picture._windows.values())
-
-    sizes = []
-    for k in range(200):
-        picture.take(frames, k * 10.0)
-        sizes.append(held())
-    assert len(picture.traffic["STATE_ESTIMATE"]._marks) <= 21
-    assert max(sizes[100:]) <= 2 * max(sizes[:50])
-    assert all(len(window._batches) <= 1 for window in picture._windows.values())
 
 
 def test_another_model_starts_another_history(make_flight: Callable[..., Flight]) -> None:

@@ -121,17 +121,6 @@ def test_an_interface_that_lacks_a_package_says_which(monkeypatch: pytest.Monkey
     assert str(caught.value) == f"interface udp_multicast needs the Python package msgpack: {install}"
 
 
-def test_an_interface_that_breaks_down_is_an_error_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As kvaser does without its driver."""
-
-    def broken(**_: object) -> can.BusABC:
-        raise NameError("name 'canGetNumberOfChannels' is not defined")
-
-    monkeypatch.setattr(can, "Bus", broken)
-    with pytest.raises(LeverError, match="cannot open kvaser channel 0: name 'canGetNumberOfChannels' is not defined"):
-        BusSource("kvaser", "0")
-
-
 def test_a_command_goes_out_protected_and_is_shown(other_end: can.BusABC, on_bus: BusSource) -> None:
     on_bus.command({"request": "freeze"})
     on_bus.command({"dither_rms": 0.3})

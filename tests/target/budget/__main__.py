@@ -9,7 +9,7 @@ from pathlib import Path
 sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from lever_cdkf.host_tools.errors import LeverError  # noqa: E402
-from target.budget import hot_spots, image, quick, report  # noqa: E402
+from target.budget import hot_spots, image, images, quick, report  # noqa: E402
 from target.budget.recording import MODELS  # noqa: E402
 
 _BUILD = Path(__file__).resolve().parents[3] / "build/target"
@@ -70,6 +70,8 @@ def _parser() -> argparse.ArgumentParser:
     profile.add_argument("--worst", action="store_true", help="only the most expensive step of the window")
     profile.add_argument("--lines", type=int, default=40, metavar="N", help="source lines shown (default: %(default)s)")
     profile.set_defaults(run=hot_spots.run)
+    tested = what.add_parser("images", parents=[common], help="only builds what the tests run, in and beside --build")
+    tested.set_defaults(run=images.run)
     return parser
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import Built
 from target.budget import image, measure
 
 
 @pytest.fixture(scope="session")
-def elf(build_dir: Path) -> Path:
-    return image.build(build_dir / "target/image")
+def elf(built: Built) -> Path:
+    return built("target/image/budget.elf", "build.budget")
 
 
 @pytest.fixture(scope="session")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import Built
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
@@ -55,9 +55,9 @@ def test_the_image_computes_what_the_host_computes(runs: Runs, estimator: str, m
             assert values[0] == values[1], (form, name)
 
 
-def test_a_processor_without_fpu_computes_the_same(runs: Runs, tmp_path: Path) -> None:
+def test_a_processor_without_fpu_computes_the_same(runs: Runs, built: Built) -> None:
     """And takes about twenty times the instructions: PORTING.md."""
-    elf = image.build(tmp_path, processor="-mcpu=cortex-m4 -mthumb -mfloat-abi=soft")
+    elf = built("target/soft_float/budget.elf", "build.budget")
     soft, hard = image.run(elf, record("lever"), "lever", "dual", "update"), runs["dual", "lever", "update"]
     assert soft.estimate == hard.estimate
     assert 15.0 < soft.instructions.mean() / hard.instructions.mean() < 25.0
@@ -167,16 +167,9 @@ def test_what_cannot_be_bounded_is_refused(tmp_path: Path, source: str, message:
 # --- a dearer firmware is noticed ---
 
 
-def test_a_dearer_firmware_is_noticed(elf: Path, runs: Runs, tmp_path: Path) -> None:
-    """A buffer of 1600 bytes that is filled in each step, in a copy of the firmware."""
-    firmware = tmp_path / "firmware"
-    shutil.copytree(image.FIRMWARE, firmware)
-    source = firmware / "app/estimator.c"
-    text = source.read_text(encoding="utf-8")
-    before, brace, _ = text.partition("enum lever_mode estimator_update(")[2].partition("{")
-    waste = "volatile float waste[400]; for (uint32_t i = 0u; i < 400u; i++) { waste[i] = 1.0f; }"
-    source.write_text(text.replace(f"{before}{brace}", f"{before}{brace}{waste}", 1), encoding="utf-8")
-    dearer = image.build(tmp_path / "build", firmware)
+def test_a_dearer_firmware_is_noticed(elf: Path, runs: Runs, built: Built) -> None:
+    """A buffer of 1600 bytes that is filled in each step."""
+    dearer = built("target/dearer/budget.elf", "build.budget")
     run, was = image.run(dearer, record("lever"), "lever", "dual", "update"), runs["dual", "lever", "update"]
     assert run.instructions[-1] >= was.instructions[-1] + 600
     assert run.stack.max() >= was.stack.max() + 1000

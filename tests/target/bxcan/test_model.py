@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from target.bxcan.bus import BIT_NS
-from target.bxcan.bxcan import ABOM, BTR, ESR, IER, INRQ, MCR, MSR, NART, RF0R, RFLM, SLAK, SLEEP, TSR, TXFP
+from target.bxcan.bxcan import ABOM, BTR, ESR, IER, INRQ, MCR, MSR, RF0R, RFLM, TSR, TXFP
 from target.bxcan.fifo import FOVR, FULL, RFOM
 from target.bxcan.filters import FA1R, FMR, FMR_RESET
 from target.bxcan.frame import Frame
@@ -32,22 +32,6 @@ def test_way_to_normal_mode(desk: Desk) -> None:
     assert desk.misuses == []
     assert desk.can.bit_time_ns() == pytest.approx(1000)
     assert desk.can.sample_point() == pytest.approx(12 / 14)
-
-
-def test_normal_mode_waits_for_the_end_of_a_frame(desk: Desk) -> None:
-    desk.start()
-    desk.initialise()
-    other = Frame(0x7FF, b"\xff")
-    second = type(desk.peer)(desk.bus)
-    desk.peer.send(other)
-    desk.wait(5)
-    desk.write(MCR, ABOM)
-    desk.wait(len(other.wire) - 5)
-    assert desk.read(MSR) & 1
-    desk.wait(5)
-    assert desk.read(MSR) & 1 == 0
-    assert second.frames() == [other]
-    assert desk.read(RF0R) == 0
 
 
 def test_initialisation_waits_for_the_end_of_transmission(desk: Desk) -> None:
@@ -94,19 +78,6 @@ def test_frames_go_out_and_come_in_as_they_are(desk: Desk, frame: Frame) -> None
     desk.wait(1)
     assert desk.read(RF0R) == 0
     assert desk.misuses == []
-
-
-def test_identifiers_decide_who_is_first(desk: Desk) -> None:
-    desk.start()
-    for mailbox, identifier in enumerate((0x300, 0x100, 0x200)):
-        desk.load(mailbox, Frame(identifier))
-    assert desk.read(TSR) >> 24 == 1 << 5 | 0, "no mailbox free, of which 0 has the lowest priority"
-    desk.peer.send(Frame(0x150))
-    desk.wait(400)
-    assert [frame.identifier for frame in desk.peer.frames()] == [0x100, 0x200, 0x300]
-    assert [message.frame.identifier for message in desk.can.fifos[0].messages] == [0x150]
-    order = sorted((time, "out") for time, _ in desk.peer.heard)
-    assert len(order) == 3
 
 
 def test_order_of_requests_decides_with_txfp(desk: Desk) -> None:
@@ -157,15 +128,6 @@ def test_nobody_acknowledges(desk: Desk) -> None:
     assert desk.read(ESR) >> 16 == 127
 
 
-def test_without_retransmission_an_error_is_final(desk: Desk) -> None:
-    desk.start(NART)
-    desk.bus.disturb = 1
-    desk.load(2, SAMPLE)
-    desk.wait(300)
-    assert desk.read(TSR) >> 16 & 0xF == 1 | 8
-    assert desk.peer.frames() == []
-
-
 def test_bus_off_and_recovery(desk: Desk) -> None:
     desk.start()
     desk.write(IER, 1 << 15 | 1 << 10)
@@ -186,37 +148,6 @@ def test_bus_off_and_recovery(desk: Desk) -> None:
     desk.wait(20 + 200)
     assert desk.read(ESR) == 0
     assert desk.peer.frames() == [SAMPLE]
-
-
-def test_recovery_on_a_busy_bus_counts_the_gaps_between_frames(desk: Desk) -> None:
-    desk.start()
-    desk.bus.is_shorted = True
-    desk.load(0, SAMPLE)
-    desk.wait(1000)
-    assert desk.read(ESR) & 4
-    desk.bus.is_shorted = False
-    type(desk.peer)(desk.bus)
-    count = 110
-    desk.peer.send(*[Frame(0x50, b"\0" * 8)] * count)
-    desk.wait(count * 100)
-    assert desk.read(ESR) & 4, "each frame gives one sequence of 11 recessive bits"
-    desk.wait(count * 60 + 128 * 11)
-    assert desk.read(ESR) & 4 == 0
-
-
-def test_without_abom_recovery_is_asked_for(desk: Desk) -> None:
-    desk.start(0)
-    desk.bus.is_shorted = True
-    desk.load(0, SAMPLE)
-    desk.wait(1000)
-    desk.bus.is_shorted = False
-    desk.wait(3000)
-    assert desk.read(ESR) & 4
-    desk.write(MCR, INRQ)
-    desk.wait(2)
-    desk.write(MCR, 0)
-    desk.wait(12 + 128 * 11)
-    assert desk.read(ESR) & 4 == 0
 
 
 def test_receive_errors(desk: Desk) -> None:
@@ -246,13 +177,3 @@ def test_interrupts(desk: Desk) -> None:
     assert desk.can.interrupts() == {19}
     desk.write(TSR, 1)
     assert desk.can.interrupts() == set()
-
-
-def test_sleep(desk: Desk) -> None:
-    desk.start()
-    desk.write(MCR, SLEEP)
-    desk.wait(2)
-    assert desk.read(MSR) & 3 == SLAK
-    desk.peer.send(SAMPLE)
-    desk.wait(300)
-    assert desk.read(RF0R) == 0

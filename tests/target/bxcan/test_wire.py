@@ -31,11 +31,6 @@ def test_length_is_within_the_bounds_of_tindell_and_davis(frame: Frame, least: i
     assert least <= len(frame.wire) <= most
 
 
-def test_worst_case_of_stuffing_is_reached_where_it_begins() -> None:
-    """An identifier of zeros, a remote frame of length 0: 0 0000 0|1 0000 0|1 ... by hand from ISO 11898-1."""
-    assert Frame(0).wire[:14] == [0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0]
-
-
 def test_arbitration_is_that_of_the_standard() -> None:
     ranked = [
         Frame(0x110),
@@ -75,26 +70,6 @@ def test_list_of_four_16_bit_identifiers() -> None:
     assert made.match(Frame(0x112)) is None
     assert made.match(Frame(0x110, remote=True)) is None
     assert made.match(Frame(0x110 << 18, extended=True)) is None
-
-
-def test_mask_of_32_bits_for_extended_identifiers() -> None:
-    made = filters(FS1R=1, FA1R=1, FFA1R=1, bank_0=(0x12345 << 3 | 4) << 32 | (0x1FFFFFF0 << 3 | 4))
-    assert made.match(Frame(0x1234F, extended=True)) == (1, 0)
-    assert made.match(Frame(0x12355, extended=True)) is None
-    assert made.match(Frame(0x12345 >> 18)) is None
-
-
-def test_numbers_count_inactive_banks_of_the_same_fifo() -> None:
-    """32.7.4, filter match index: the numbering does not ask whether a bank is active; here bank 0 holds four."""
-    made = filters(FM1R=1, FS1R=6, FA1R=6, FFA1R=4, bank_1=0x110 << 53 | 0xFFE00000, bank_2=0)
-    assert made.match(Frame(0x110)) == (0, 4)
-    assert made.match(Frame(0x111)) == (1, 0)
-
-
-def test_32_bits_go_before_16_and_list_before_mask() -> None:
-    banks = {"bank_0": 0, "bank_1": 0, "bank_2": 0x110 << 53}
-    assert filters(FS1R=0b010, FA1R=0b011, bank_0=0, bank_1=0).match(Frame(0x110)) == (0, 2)
-    assert filters(FS1R=0b110, FM1R=0b100, FA1R=0b111, **banks).match(Frame(0x110)) == (0, 3)
 
 
 def test_nothing_passes_while_filters_are_initialised() -> None:

@@ -9,13 +9,10 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import can
 import pytest
 import serial
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.board import qemu
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.protocol_ahead import read_ahead
 from vcan import rig
 
 QEMU = pytest.mark.requires(qemu.PROGRAM)
@@ -62,15 +59,6 @@ def test_it_answers_commands_and_refuses_what_is_malformed(channel: str) -> None
                 more = line.read(1)
                 assert more, f"{command!r}: {got!r}"
                 got += more
-
-
-@QEMU
-def test_hosts_come_and_go(channel: str) -> None:
-    for _ in range(3):
-        with can.Bus(interface="slcan", channel=read_ahead(channel), sleep_after_open=0.0, bitrate=1_000_000) as bus:
-            host = rig.Host(bus)
-            host.send((0x120, codec.encode("COMMAND", 0, RESET)))
-            host.run(50)
 
 
 # --- the command --------------------------------------------------------------------------------------------------

@@ -1,10 +1,11 @@
-"""A figure for print: one column of a paper wide, on white, as a PNG."""
+"""A figure for print, on white, as wide as one or two columns of a paper."""
 
 from __future__ import annotations
 
-import io
-from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
+
+from lever_cdkf.host_tools.exports import pictures
+from lever_cdkf.host_tools.provenance import Provenance
 
 from .description import LOOKS, Band, Column, Figure, Points, Surface, Trace
 from .typesetting import colours, in_mathtext
@@ -13,56 +14,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Sheet
 
-RESOLUTION = 200  # [dots per inch]
-WIDTH = 3.5  # [inches], a column of IEEE's and of most two-column journals
 _HEADROOM = 0.55  # [inches] for legend, column titles and the label of the x axis
 _POINTS_A_PIXEL = 0.6  # line widths are told in pixels of the page
 _DASHES = {"solid": "-", "dash": (0, (4, 1.8)), "dot": ":", "dashdot": "-."}
 _LEVELS = 18  # of a contour, at most
-_STYLE: dict[str, Any] = {
-    "font.size": 7.5,
-    "axes.labelsize": 7.5,
-    "axes.titlesize": 7.5,
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
-    "legend.fontsize": 7.0,
-    "axes.linewidth": 0.6,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.linewidth": 0.5,
-    "grid.color": "#dfe4e8",
-    "mathtext.default": "regular",
-    "legend.frameon": False,
-    "legend.handlelength": 1.9,
-    "legend.columnspacing": 1.2,
-    "legend.borderaxespad": 0.0,
-    "legend.borderpad": 0.2,
-    "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5,
-    "figure.constrained_layout.h_pad": 0.02,
-    "figure.constrained_layout.w_pad": 0.03,
-    "figure.constrained_layout.wspace": 0.06,
-}
 
 
-def render(figure: Figure) -> bytes:
-    """The PNG; the same figure gives the same bytes."""
-    file = io.BytesIO()
-    with _style():
-        sheet(figure).savefig(file, format="png", metadata={"Software": None, "Title": figure.title})
-    return file.getvalue()
+def render(figure: Figure, kind: str = "png", width: str = "single", provenance: Provenance | None = None) -> bytes:
+    """The file, of pictures.KINDS, in one of pictures.WIDTHS; the same figure gives the same bytes."""
+    return pictures.render(sheet(figure, width), kind, figure.title, provenance)
 
 
-def sheet(figure: Figure) -> Sheet:
+def sheet(figure: Figure, width: str = "single") -> Sheet:
     """The figure laid out by matplotlib."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Sheet
 
-    with _style():
-        drawn = Sheet(dpi=RESOLUTION, layout="constrained")
+    with pictures.style():
+        drawn = Sheet(dpi=pictures.RESOLUTION, layout="constrained")
         FigureCanvasAgg(drawn)
+        drawn.set_figwidth(pictures.WIDTHS[width])
         surfaces = [(column.title, column.content) for column in figure.columns if isinstance(column.content, Surface)]
         if surfaces:
             _draw_surfaces(drawn, figure, surfaces)
@@ -72,18 +43,11 @@ def sheet(figure: Figure) -> Sheet:
     return drawn
 
 
-def _style() -> AbstractContextManager[None]:
-    """matplotlib's own defaults, whatever its user has configured, and the style of these figures."""
-    import matplotlib.style
-
-    return matplotlib.style.context(["default", _STYLE])
-
-
 def _draw_surfaces(sheet: Sheet, figure: Figure, surfaces: list[tuple[str, Surface]]) -> None:
     """Filled contours of one scale, side by side."""
     from matplotlib.ticker import MaxNLocator
 
-    sheet.set_size_inches(WIDTH, figure.row_height + _HEADROOM)
+    sheet.set_figheight(figure.row_height + _HEADROOM)
     charts = sheet.subplots(1, len(surfaces), sharex=True, sharey=True, squeeze=False)[0]
     levels = MaxNLocator(_LEVELS).tick_values(0.0, figure.brightest())
     for chart, (title, surface) in zip(charts, surfaces, strict=True):
@@ -100,7 +64,7 @@ def _draw_surfaces(sheet: Sheet, figure: Figure, surfaces: list[tuple[str, Surfa
 def _draw_rows(sheet: Sheet, figure: Figure) -> None:
     """Charts above each other, in each column."""
     limits = figure.limits()
-    sheet.set_size_inches(WIDTH, len(limits) * figure.row_height + _HEADROOM)
+    sheet.set_figheight(len(limits) * figure.row_height + _HEADROOM)
     charts = sheet.subplots(len(limits), len(figure.columns), sharex=True, sharey="row", squeeze=False)
     for index, column in enumerate(figure.columns):
         _draw_column(charts[:, index], column, figure)
@@ -146,4 +110,10 @@ def _legend(sheet: Sheet, *charts: Axes) -> None:
     for chart in charts:
         handles, labels = chart.get_legend_handles_labels()
         named |= dict(zip(labels, handles, strict=True))
-    sheet.legend(list(named.values()), list(named), loc="outside upper center", ncols=min(len(named), 3), markerscale=4)
+    sheet.legend(
+        list(named.values()),
+        list(named),
+        loc="outside upper center",
+        ncols=min(len(named), round(sheet.get_figwidth())),
+        markerscale=4,
+    )

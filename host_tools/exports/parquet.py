@@ -1,0 +1,79 @@
+"""trace.parquet: the columns of trace.csv, for pandas, polars, DuckDB and the like.
+
+Unit and meaning of each are metadata of its field, provenance is metadata of the file. What is not known is null; mode
+and faults are words.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray
+from ..extras import require
+from ..files import writing
+from ..results.trace import WHOLE, Trace
+from .columns import TEXT, as_words
+from .head import Head
+
+
+class Parquet:
+    """Written a piece at a time; complete after close()."""
+
+    def __init__(self, path: Path, head: Head) -> None:
+        require("files")
+        import pyarrow
+        from pyarrow import parquet
+
+        self._path = path
+        described = [("time_s", "s", "Since the first sample.")]
+        described += [(column.source, column.unit, column.comment) for column in head.columns]
+        fields = [
+            pyarrow.field(name, _kind(name), metadata={"unit": unit, "comment": comment})
+            for name, unit, comment in described
+        ]
+        self._schema = pyarrow.schema(fields, metadata=dict(head.properties))
+        with writing(path):
+            self._file = path.open("wb")
+            self._writer: Any = parquet.ParquetWriter(self._file, self._schema)
+
+    def add(self, trace: Trace, _published: NDArray[np.bool_], _recorded: NDArray[np.bool_]) -> None:
+        """Further samples."""
+        import pyarrow
+
+        arrays = [_array(name, values, self._schema.field(name).type) for name, values in trace.items()]
+        with writing(self._path):
+            self._writer.write_table(pyarrow.table(arrays, schema=self._schema))
+
+    def close(self) -> None:
+        """Writes the index."""
+        with writing(self._path):
+            self._writer.close()
+            self._file.close()
+
+    def abandon(self) -> None:
+        """Lets go of the file."""
+        for part in (self._file, self._writer):
+            with suppress(Exception):
+                part.close()
+
+
+def _kind(column: str) -> Any:
+    import pyarrow
+
+    if column in TEXT:
+        return pyarrow.string()
+    return pyarrow.int64() if column in WHOLE else pyarrow.float64()
+
+
+def _array(column: str, values: FloatArray, kind: Any) -> Any:
+    """NaN becomes null."""
+    import pyarrow
+
+    if column in TEXT:
+        return pyarrow.array(as_words(column, values), kind)
+    return pyarrow.array(values, pyarrow.float64(), from_pandas=True).cast(kind)

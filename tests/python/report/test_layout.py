@@ -1,0 +1,100 @@
+"""The report in a browser: what is seen at once, and that nothing is cut: on a desk, on a phone, on paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools.report import screenshot
+from python.watch.browser import Browser
+
+pytestmark = pytest.mark.requires("|".join(screenshot.BROWSERS))
+
+BOXES = "Array.from(document.querySelectorAll('%s'), each => each.getBoundingClientRect().toJSON())"
+A4 = (210 - 2 * 12) * 96 / 25.4
+"""Width of the print area [pixels]."""
+
+
+@pytest.fixture(scope="module")
+def desk(report: Path) -> Iterator[Browser]:
+    with Browser(1400, 900) as browser:
+        browser.open(report.as_uri())
+        yield browser
+
+
+def test_answer_and_first_chart_are_on_the_first_screen(desk: Browser) -> None:
+    for selector in (".verdict", ".answer table", "#figure-parameters .main-svg"):
+        assert desk.run(BOXES % selector)[0]["bottom"] <= 900, selector
+
+
+def test_charts_are_drawn_before_the_page_counts_as_loaded(report: Path) -> None:
+    """Or who prints it by a program prints nothing."""
+    with Browser(1400, 900) as browser:
+        browser.ask("Page.enable")
+        script = (
+            "addEventListener('load', () => { window.drawn = document.querySelectorAll('.js-plotly-plot').length })"
+        )
+        browser.ask("Page.addScriptToEvaluateOnNewDocument", source=script)
+        browser.open(report.as_uri())
+        assert browser.run("drawn == document.querySelectorAll('.chart').length && drawn > 0")
+
+
+def test_the_last_column_of_every_table_is_seen(desk: Browser) -> None:
+    desk.run("document.querySelectorAll('details').forEach(each => { each.open = true; })")
+    boxes = desk.run(BOXES % "tr > :last-child")
+    assert len(boxes) > 80
+    assert max(box["right"] for box in boxes) <= 1400
+
+
+def test_the_bar_does_not_hide_where_its_links_lead(desk: Browser) -> None:
+    desk.run("document.documentElement.style.scrollBehavior = 'auto'")
+    bar = desk.run(BOXES % "nav")[0]["bottom"]
+    for key in desk.run("Array.from(document.querySelectorAll('nav a'), each => each.hash)"):
+        desk.run(f"location.hash = '{key}'")
+        assert desk.run(BOXES % f"{key} h2")[0]["top"] >= bar, key
+
+
+def test_the_hover_label_is_in_the_order_of_the_charts(desk: Browser) -> None:
+    desk.run("scrollTo({top: 0, behavior: 'instant'})")
+    box = desk.run(BOXES % "#figure-parameters .main-svg")[0]
+    labels = "Array.from(document.querySelectorAll('#figure-parameters .hoverlayer .legendtext'), e => e.textContent)"
+    for step in range(2):
+        where = {"x": box["x"] + 0.6 * box["width"] + step, "y": box["y"] + 0.5 * box["height"]}
+        desk.ask("Input.dispatchMouseEvent", type="mouseMoved", **where)
+    desk.wait(f"{labels}.length == 6")
+    words = [label.split()[:2] for label in desk.run(labels)]
+    assert words == [[kind, what] for what in ("mass", "damping", "stiffness") for kind in ("true", "estimated")]
+
+
+def test_the_slider_moves_through_the_run(desk: Browser) -> None:
+    drawn = "document.querySelector('#figure-slices .js-line').getAttribute('d')"
+    before, place = desk.run(drawn), desk.run("document.querySelector('.slider output').value")
+    desk.run("document.querySelector('.slider input').value = 0")
+    desk.run("document.querySelector('.slider input').dispatchEvent(new Event('input'))")
+    desk.wait(f"{drawn} != '{before}'")
+    assert desk.run("document.querySelector('.slider output').value") != place
+
+
+def test_nothing_is_scrolled_sideways_on_a_phone(report: Path) -> None:
+    with Browser(390, 844, phone=True) as phone:
+        phone.open(report.as_uri())
+        assert phone.run("document.documentElement.scrollWidth") == 390
+        assert phone.run(BOXES % ".verdict")[0]["bottom"] <= 844
+        assert max(box["right"] for box in phone.run(BOXES % ".answer td")) <= 390
+        assert phone.complaints == []
+
+
+def test_on_paper_charts_are_whole_and_light(report: Path) -> None:
+    with Browser(1400, 900) as browser:
+        browser.darken()
+        browser.open(report.as_uri())
+        dark = browser.run("getComputedStyle(document.body).backgroundColor")
+        browser.run("dispatchEvent(new Event('beforeprint'))")
+        charts = browser.run(BOXES % ".chart .main-svg")
+        assert max(box["right"] - box["left"] for box in charts) <= A4
+        assert browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)" != dark
+        assert browser.run("document.querySelectorAll('details:not([open])').length") == 0
+        browser.run("dispatchEvent(new Event('afterprint'))")
+        assert browser.run("getComputedStyle(document.body).backgroundColor") == dark
+        assert max(box["right"] - box["left"] for box in browser.run(BOXES % ".chart .main-svg")) > A4
