@@ -83,13 +83,20 @@ class Mayo(LinearTruth):
         numerator = relative.numerator * (1.0, self.hand.outside)
         return Transfer(numerator, np.pad(relative.denominator, ((0, 0), (0, 1))))
 
+    def felt(self, conditions: Conditions) -> Conditions:
+        """With z_ddot + (a - b) z_dot in place of z_ddot."""
+        z_ddot = conditions.z_ddot
+        z_dot = np.zeros_like(z_ddot)
+        np.cumsum(0.5 * conditions.period * (z_ddot[1:] + z_ddot[:-1]), out=z_dot[1:])
+        return dataclasses.replace(conditions, z_ddot=z_ddot + self.hand.outside * z_dot)
+
     def body(self, conditions: Conditions) -> Plant:
-        return super().body(_InSpace(**vars(conditions), outside=self.hand.outside))
+        return Plant(self.system, _InSpace(**vars(conditions), outside=self.hand.outside))
 
 
 @dataclass(frozen=True, kw_only=True)
 class _InSpace(Conditions):
-    """The base shakes with z_ddot + outside * z_dot."""
+    """As felt(), but no sooner than z_ddot is known."""
 
     outside: float
 
