@@ -270,3 +270,10 @@ def test_what_is_no_summary_is_refused_in_a_line(wrong: str, tmp_path: Path) -> 
 def test_that_of_any_run_is_read_back(name: str) -> None:
     made = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
     assert of(SimulationSummary, json.loads(text(made))) == made
+
+
+@pytest.mark.parametrize(("rms", "shown"), [(5.4, "5.4"), (5.01, "5.01"), (5.0004, "5.0004"), (12.345, "12.3")])
+def test_a_limit_that_is_missed_does_not_look_kept(rms: float, shown: str) -> None:
+    (text,) = summary.missed_limits({"m_p": 0.05}, {"m_p": rms}, {})
+    assert text == f"rms error of m_p {shown} % (limit 5 %)"
+    assert summary.missed_limits({"m_p": 0.05}, {"m_p": 5.0}, {}) == []
