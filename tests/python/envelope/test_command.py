@@ -88,6 +88,14 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert table.MISSED in printed
 
 
+def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
+    limits = (Limit("f_n largest", most=1.0), Limit("f_n largest", most=2.0, over="worst"))
+    condition = Condition("steady", "", limits=limits)
+    result = campaign.Result(condition, dict.fromkeys(condition.figures, np.array([0.5, 1.0004])))
+    (line,) = table.lines([result])
+    assert (line["all runs"], line["median"], line["worst"]) == ("1.0004", "0.75", "1")
+
+
 def test_estimates_that_are_not_finite_keep_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     limits = (Limit("f_n rms", most=1e9), Limit("f_n covered", least=0.1))
     row = Condition("steady", "", Motion(duration=3.0), limits, start=1.0)
