@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -229,7 +230,10 @@ def _simulate(
         chosen_formats(args),
         [path for path in (scenario.file, args.settings) if Path(path or "").is_file()],
     )
-    with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
+    with ExitStack() as stack:
+        progress, bus = stack.enter_context(Progress(scenario.name)), None
+        if interface != "lever" or bus_options:
+            bus = stack.enter_context(open_bus(scenario, interface, channel, bus_options))
         result = simulate(
             *(scenario, bus, args.out),
             channel=channel,

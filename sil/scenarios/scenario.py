@@ -167,12 +167,12 @@ class Scenario:
         except SettingsError as error:
             raise ScenarioError(f"{self.file}: settings: {error}") from None
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Sample period [s], in whole microseconds as the time in the frames."""
         return round(self.config.settings["sample_period"] * 1e6) * 1e-6
 
-    @property
+    @cached_property
     def true_lever(self) -> lever_plant.Lever:
         return lever_plant.Lever.from_settings(self.config.settings | dict(self.lever or {}))
 
@@ -245,17 +245,26 @@ def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
 
     Raises ScenarioError.
     """
+    return from_toml(content_of(name_or_path), name_or_path, overrides)
+
+
+def content_of(name_or_path: str, folder: Path | None = None) -> bytes:
+    """What the file of a scenario holds; a path is relative to `folder`. Raises ScenarioError."""
     if name_or_path.endswith(".toml"):
-        path, file = Path(name_or_path), name_or_path
+        path = (folder or Path()) / name_or_path
         if not path.is_file():
-            raise ScenarioError(f"{file}: no such file")
-        content, name = path.read_bytes(), path.stem
-    elif name_or_path in names():
-        name, file = name_or_path, f"{name_or_path}.toml"
-        content = (files(__package__) / file).read_bytes()
-    else:
-        hint = did_you_mean(name_or_path, names(), f"there are {', '.join(names())}, or give a path to a .toml file")
-        raise ScenarioError(f"no scenario {name_or_path!r}; {hint}")
+            raise ScenarioError(f"{path}: no such file")
+        return path.read_bytes()
+    if name_or_path in names():
+        return (files(__package__) / f"{name_or_path}.toml").read_bytes()
+    hint = did_you_mean(name_or_path, names(), f"there are {', '.join(names())}, or give a path to a .toml file")
+    raise ScenarioError(f"no scenario {name_or_path!r}; {hint}")
+
+
+def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
+    """As load(), of what the file holds."""
+    is_path = name_or_path.endswith(".toml")
+    name, file = (Path(name_or_path).stem, name_or_path) if is_path else (name_or_path, f"{name_or_path}.toml")
     try:
         scenario = dataclasses.replace(_read(content, file, overrides), name=name, file=file)
     except RecursionError:
