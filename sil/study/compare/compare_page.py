@@ -6,6 +6,7 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 
+from lever_cdkf.host_tools.report.figure import Spec
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.summary_html import number, table
 from lever_cdkf.host_tools.tables import Row as TableRow
@@ -26,8 +27,8 @@ def build(
     verdicts: Mapping[str, str],
     claims: Sequence[Claim],
     tables: Mapping[str, Sequence[TableRow]],
-) -> str:
-    """The whole page."""
+) -> tuple[str, dict[str, Spec]]:
+    """The whole page, and its figures by name."""
     plan = results.plan
     length = "" if plan.duration is None else f" of {plan.duration:g} s"
     page = Page(
@@ -45,7 +46,7 @@ def build(
         f"<details><summary>{html.escape(title)}</summary>{_table(lines)}</details>" for title, lines in tables.items()
     )
     page.section("numbers", "Numbers", "All numbers", *details)
-    return page.html(_verdict(claims))
+    return page.html(_verdict(claims)), page.figures
 
 
 def _winners(verdicts: Mapping[str, str]) -> str:
