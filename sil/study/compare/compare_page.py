@@ -17,7 +17,6 @@ from .cases import PRIOR, cases
 from .evaluation import Row
 from .verdicts import Claim
 
-
 _ESTIMATORS = 6  # in a table
 
 
