@@ -330,7 +330,7 @@ def test_list_names_every_figure_and_writes_nothing(
     monkeypatch.chdir(tmp_path)
     status, out, err = lever("figures", "--list")
     assert (status, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()[4:] if line.strip()] == NAMES
+    assert [line.split()[0] for line in out.splitlines()[3:] if line.strip()] == NAMES
     assert list(tmp_path.iterdir()) == []
 
 
