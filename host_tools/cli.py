@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import codecs
 import importlib.metadata
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +15,7 @@ from . import interrupts
 from .errors import LeverError
 from .exit_status import INTERRUPTED
 from .extras import hide_mf4, reveal_mf4
+from .help_text import HelpFormatter
 from .provenance import version
 
 COMMANDS = "lever_cdkf.commands"
@@ -31,25 +34,28 @@ on line, from samples on a CAN bus. The estimator is C firmware; this command ru
 """
 _EPILOG = """\
 a first session:
-  lever demo                              simulate a pilot, estimate, and write a report to open in a browser
-  lever sim --list                        all scenarios; `lever sim NAME` runs one
-  lever live --scenario demo              watch it in a browser while it runs; `lever monitor` does so in the terminal
-  lever replay session.log                the same estimator on a recorded log; `lever record` makes one
-  lever map flight.blf --dbc some.dbc     which signals of a log with other messages are the estimator's inputs
-  lever settings                          every tunable number of the estimator with unit, default and range
-  lever dbc                               the CAN messages
+  lever demo                          simulate a pilot; write a report
+  lever sim --list                    the scenarios; lever sim NAME runs one
+  lever live --scenario demo          watch it in a browser
+  lever monitor --scenario demo       watch it in the terminal
+  lever replay session.log            estimate from a recorded log
+  lever map flight.blf --dbc it.dbc   inputs in a log with other messages
+  lever settings                      settings with units and ranges
+  lever dbc                           the CAN messages
 
-`lever COMMAND --help` explains a command. Exit status: 0 when all went well; 1 when the command ran, but what it checks
-does not hold (limits of a scenario, no estimate from a log, …); 2 with one line on standard error when the command line
-or an input is wrong; 130 after Ctrl-C.
+`lever` alone prints this; `lever COMMAND --help` explains a command. Exit status: 0 when all went well; 1 when the
+command ran, but what it checks does not hold (limits of a scenario, no estimate from a log, …); 2 with one line on
+standard error when the command line or an input is wrong; 130 after Ctrl-C.
+
+Tables fold at the width of the terminal. In a pipe or file each row is one line, unless COLUMNS says how wide.
 """
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse, but an error is one line that says where to read on, and help keeps its line breaks."""
+    """argparse, but an error is one line that says where to read on."""
 
     def __init__(self, **kwargs: Any) -> None:
-        kwargs.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        kwargs.setdefault("formatter_class", HelpFormatter)
         super().__init__(allow_abbrev=False, **kwargs)
 
     def error(self, message: str) -> NoReturn:
@@ -65,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             args = _parser().parse_args(argv)
             with interrupts.heard():
-                status: int = args.run(args)
+                status: int = args.run(args) or 0
         except SystemExit as stop:  # --help and --version
             status = int(stop.code or 0)
         sys.stdout.flush()
@@ -91,7 +97,11 @@ def _has_streams() -> bool:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  for the life of the process
     if sys.stdout is None:
         print("lever: error: standard output is closed: send it to a file or to /dev/null", file=sys.stderr)
-    return sys.stdout is not None
+        return False
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it has not is no reason to end
+        is_utf8 = codecs.lookup(sys.stdout.encoding).name == "utf-8"
+        sys.stdout.reconfigure(errors="surrogateescape" if is_utf8 else "replace")
+    return True
 
 
 def _expected() -> tuple[type[Exception], ...]:
@@ -103,7 +113,8 @@ def _expected() -> tuple[type[Exception], ...]:
 def _parser() -> Parser:
     parser = Parser(prog="lever", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("--version", action="version", version=f"lever {version()}")
-    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    parser.set_defaults(run=lambda _: parser.print_help())
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND")
     for entry in sorted(importlib.metadata.entry_points(group=COMMANDS)):
         try:
             module = entry.load()

@@ -5,17 +5,16 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 
 from .files import write_text
+from .layout import UNLIMITED, terminal_width, wrapped
+from .table_layout import Column, table_lines, upright_lines
 
 Cell = str | float | bool | None
 Row = Mapping[str, Cell]
 Tables = Mapping[str, Sequence[Row]]
 """Rows by the title of their table; the keys of its first row are the columns. Titles and columns say the units."""
-
-_PIPE_WIDTH = 100_000  # not a terminal: no line is folded
 
 
 def add_json_option(parser: argparse._ActionsContainer) -> None:
@@ -23,26 +22,34 @@ def add_json_option(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--json", metavar="FILE", help="also write what is printed to FILE, as JSON: {title: [row, …]}")
 
 
-def print_tables(tables: Tables, json_file: str | None = None) -> None:
-    """Prints the tables, and with `json_file` also writes them there. Raises LeverError."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+def print_tables(tables: Tables, json_file: str | None = None, digits: int = 4) -> None:
+    """Prints the tables, numbers with so many `digits`; with `json_file` also writes them there. Raises LeverError.
 
+    On a terminal they fit its width, and a table of one row stands upright; elsewhere a row is a line.
+    """
     if json_file is not None:
         write_json(json_file, tables)
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
+    width = terminal_width()
     for title, rows in tables.items():
-        if not rows:
-            console.print(_literal(f"{title}: none"))
-            continue
-        table = Table(title=_literal(title), title_justify="left", box=box.SIMPLE_HEAD)
-        for column in rows[0]:
-            is_number = all(_is_number(row[column]) or row[column] is None for row in rows)
-            table.add_column(_literal(column), justify="right" if is_number else "left")
-        for row in rows:
-            table.add_row(*(_text(cell) for cell in row.values()))
-        console.print(table)
+        if rows:
+            columns = _columns(rows, digits)
+            print(*wrapped(title, width), sep="\n")
+            stands = len(rows) == 1 and width < UNLIMITED
+            lines = upright_lines(columns, 0, width) if stands else table_lines(columns, width)
+            print(*lines, "", sep="\n")
+        else:
+            print(*wrapped(f"{title}: none", width), "", sep="\n")
+
+
+def _columns(rows: Sequence[Row], digits: int) -> list[Column]:
+    return [
+        Column(
+            name,
+            [_text(row[name], digits) for row in rows],
+            all(_is_number(row[name]) or row[name] is None for row in rows),
+        )
+        for name in rows[0]
+    ]
 
 
 def write_json(path: str, tables: Tables) -> None:
@@ -55,15 +62,13 @@ def _is_number(cell: Cell) -> bool:
     return isinstance(cell, (int, float)) and not isinstance(cell, bool)
 
 
-def _text(cell: Cell) -> str:
+def _text(cell: Cell, digits: int) -> str:
     if cell is None:
         return ""
-    return f"{cell:.6g}" if isinstance(cell, float) else _literal(str(cell))
-
-
-def _literal(text: str) -> str:
-    """Text that rich prints as it is: a unit in brackets is not one of its styles."""
-    return text.replace("[", "\\[")
+    if not isinstance(cell, float):
+        return " ".join(str(cell).split("\n"))
+    text = f"{cell:.{digits}g}"
+    return f"{cell:.0f}" if "e+" in text and abs(cell) < 1e9 else text
 
 
 def _json_row(row: Row) -> Row:

@@ -1,8 +1,9 @@
-"""The fenced blocks of README files, for the tests that run them."""
+"""Commands as README files and --help have them, for the tests that run them."""
 
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 
@@ -11,3 +12,16 @@ def blocks(readme: Path, language: str) -> dict[int, str]:
     text = readme.read_text(encoding="utf-8")
     fenced = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
     return {text.count("\n", 0, match.start()) + 1: match[1] for match in fenced.finditer(text)}
+
+
+def lever_commands(script: str) -> list[list[str]]:
+    """The arguments of each call of `lever` in lines of a shell."""
+    words = shlex.shlex(script.replace("\\\n", " "), posix=True, punctuation_chars="|&;<>\n")
+    words.whitespace, words.whitespace_split = " \t", True
+    commands: list[list[str]] = [[]]
+    for word in words:
+        if set(word) <= set("|&;<>\n"):
+            commands.append([])
+        else:
+            commands[-1].append(word)
+    return [command[1:] for command in commands if command[:1] == ["lever"]]

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..layout import say
 from ..tables import Row, add_json_option
 
 if TYPE_CHECKING:
@@ -55,14 +56,14 @@ def run(args: argparse.Namespace) -> int:
         from ..can.wireshark import write_profile
 
         write_profile(args.wireshark)
-        print(f"Written to {args.wireshark}: for wireshark -C {args.wireshark.name} if that is where its profiles are")
+        say(f"Written to {args.wireshark}: for wireshark -C {args.wireshark.name} if that is where its profiles are")
         return 0
 
     from ..can.codec import database
 
     messages = database().messages
     signals = [_signal_row(message, signal) for message in messages for signal in message.signals]
-    print_tables({"messages": [_message_row(message) for message in messages], "signals": signals}, args.json)
+    print_tables({"messages": [_message_row(message) for message in messages], "signals": signals}, args.json, digits=6)
     return 0
 
 

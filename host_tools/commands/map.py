@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import layout
 from ..errors import LeverError
 from ..files import check_not_input
 from ..tables import Row, add_json_option
@@ -76,8 +77,8 @@ def run(args: argparse.Namespace) -> int:
     rows = [_row("", signal) for signal in changing]
     print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json)
     if len(changing) < len(others):
-        print(f"{len(others) - len(changing)} other signals never change, and are not shown.")
-    print(_command(args, mapping, proposed))
+        layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
+    print(*layout.command_lines(_command(args, mapping, proposed), layout.terminal_width()), sep="\n")
     origin = provenance([args.log, *([args.dbc] if args.dbc else [])])
     if args.toml is not None:
         write_text(args.toml, origin.comment() + as_toml(mapping))
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         shown = [(each.key, each.signal) for each in proposed]
         write(args.out, shown + [("other", each) for each in changing], Path(args.log).name, origin)
     if written := [str(path) for path in (args.toml, args.out) if path is not None]:
-        print(f"Written: {', '.join(written)}")
+        layout.say(f"Written: {', '.join(written)}")
     return 0
 
 

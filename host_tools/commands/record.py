@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options, open_bus
 from ..errors import LeverError
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
 from .signal_options import add_signal_options
 
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         finally:
             line.end()
     print_tables({"recorded": _rows(recorder), **_mapped(out, reading)}, args.json)
-    print(f"{out}: {_summary(recorder)}")
+    say(f"{out}: {_summary(recorder)}")
     return 0
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..files import check_not_input
 from ..formats import add_format_option, chosen_formats
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
 from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading, input_files
 
@@ -45,7 +46,7 @@ examples:
   lever replay session.log
   lever replay session.log -o out/session
   lever replay session.log --model linear_physical --set theta_noise=0.002 -o out/other
-  lever replay monday.log.gz monday.log.1.gz --channel can1 -o out/monday
+  lever replay monday_1.log.gz monday_2.log.gz --channel can1 -o out/monday
   candump -L can0 | lever replay - -o out/live
   lever replay monday/*.blf --each --dbc aircraft.dbc --map aircraft.toml -o out/monday --json monday.json
   lever replay flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o out/flight
@@ -97,9 +98,9 @@ def run(args: argparse.Namespace) -> int:
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
     print_tables(_tables(summary), args.json)
-    print(summary["verdict"])
+    say(summary["verdict"])
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
+        say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
     if not summary["passed"]:
         print(f"lever: replay: {failure(summary)}", file=sys.stderr)
     return 0 if summary["passed"] else 1
@@ -122,7 +123,7 @@ def _run_each(args: argparse.Namespace) -> int:
     print_tables({"logs": rows_of(replays)}, args.json)
     if args.out is not None:
         written = write(replays, args.out, input_files(args))
-        print(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
+        say(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
     for each in replays:
         if each.problem:
             print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)

@@ -13,12 +13,13 @@ _DESCRIPTION = """\
 Without --set and --settings: prints every setting of the estimator with unit, default, range and meaning, after the
 four choices that are made by name.
 With them: prints a settings file with all values, for `lever_can --settings FILE` and can.Bus(interface="lever",
-settings="FILE"). Values are in the units of the table, without the unit.
+settings="FILE"). A number is in the unit of the table, or in the unit that follows it, here and wherever settings are
+given: in files, with --set of `lever sim`, `lever replay` and `lever tune`, and with lever_can --set.
 """
 _EPILOG = """\
 examples:
   lever settings
-  lever settings --set theta_noise=0.002 --set preload=fixed > my.settings
+  lever settings --set theta_noise="2 mrad" --set preload=fixed > my.settings
   lever settings --settings my.settings --set m_p=3 --json my.json
 """
 
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     assignments |= dict(parse_assignment(text) for text in args.set)
     config = make_config(assignments)
     if args.settings is None and not args.set:
-        print_tables({"settings": _rows()}, args.json)
+        print_tables({"settings": _rows()}, args.json, digits=6)
         return 0
     if args.json is not None:
         values = config.choices | config.settings

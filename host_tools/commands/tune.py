@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import LeverError
 from ..extras import require
 from ..files import check_not_input
+from ..layout import say
 from ..tables import Row, Tables, add_json_option
 from .signal_options import MAP_HELP, add_signal_options, chosen_reading, input_files
 
@@ -190,7 +191,7 @@ def _conclude(
     verdict = validation.verdict(fits, changed)
     origin = provenance([*args.log, *input_files(args)])
     print_tables(tables, args.json)
-    print(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
+    say(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
     if args.page is not None:
         from ..tune.tune_page import build
 
@@ -203,7 +204,7 @@ def _conclude(
         write_text(args.output, origin.comment() + _file(f"{verdict} {calibration.text}", before, after))
     written = [str(path) for path in (args.output, args.page) if path is not None]
     if written:
-        print(f"Written: {', '.join(written)}")
+        say(f"Written: {', '.join(written)}")
     return 0
 
 

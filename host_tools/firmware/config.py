@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
 
 from ..errors import SettingsError
+from ..near_names import did_you_mean
 from .library import enum_names, ffi, lib
 
 CHOICES = ("model", "preload", "estimator", "adaptation")
@@ -42,6 +42,7 @@ class Setting:
             )
 
 
+@lru_cache(maxsize=4096)
 def shortest(value: float) -> float:
     """The number with the fewest digits that is `value` in single precision: 0.1 for 0.100000001."""
     candidates = (float(f"{value:.{digits}g}") for digits in range(1, 10))
@@ -69,9 +70,7 @@ def setting(name: str) -> Setting:
     """The row of a setting. Raises SettingsError, with the nearest name there is."""
     rows = {row.name: row for row in settings_table()}
     if name not in rows:
-        near = difflib.get_close_matches(name, rows, n=1)
-        hint = f"did you mean {near[0]}?" if near else "`lever settings` lists them all"
-        raise SettingsError(f"unknown setting {name!r}; {hint}")
+        raise SettingsError(f"unknown setting {name!r}; {did_you_mean(name, rows, '`lever settings` lists them all')}")
     return rows[name]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
 from .config import CHOICES, Config, choice_value
-from .library import enum_names, ffi, lib, struct_dtype
+from .library import enum_names, ffi, lib, load, struct_dtype
 
 if TYPE_CHECKING:
     import numpy as np
@@ -98,6 +98,16 @@ def health_of(pointer: Any) -> Health:
     return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
 
 
+def make_command(request: str = "none", dither_rms: float | None = None, **choices: str | None) -> Any:
+    """A lever_command_t *; None keeps a choice (model, preload, estimator, adaptation) or the dither as it is."""
+    command = ffi.new("lever_command_t *", {"dither_rms": lib.LEVER_KEEP if dither_rms is None else dither_rms})
+    command.request = choice_value("lever_request", "request", request)
+    for what in CHOICES:
+        name = choices.get(what)
+        setattr(command, what, lib.LEVER_KEEP if name is None else choice_value(f"lever_{what}", what, name))
+    return command
+
+
 class Estimator:
     """An instance of the firmware. Any number may exist; each belongs to one thread at a time."""
 
@@ -153,10 +163,9 @@ class Estimator:
         dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque fades out a second
         of sample time after the last command: repeat one. Raises LeverError.
         """
-        command = ffi.new("lever_command_t *", {"dither_rms": lib.LEVER_KEEP if dither_rms is None else dither_rms})
-        command.request = choice_value("lever_request", "request", request)
-        for what, name in zip(CHOICES, (model, preload, estimator, adaptation), strict=True):
-            setattr(command, what, lib.LEVER_KEEP if name is None else choice_value(f"lever_{what}", what, name))
+        command = make_command(
+            request, dither_rms, model=model, preload=preload, estimator=estimator, adaptation=adaptation
+        )
         if not lib.lever_command(self.pointer, command):
             raise LeverError(f"the firmware refused the command {request!r}, dither_rms = {dither_rms} N m")
 
@@ -208,6 +217,25 @@ class Estimator:
         return answer.id, self._answer_data[0 : answer.length]
 
 
+def feed(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Has the estimator take samples (lever_sample_t), up to the last with an index in `at`, which rise. Returns
+    lever_estimate_t and lever_health_t after each of these."""
+    import numpy as np
+
+    asked = np.ascontiguousarray(at, np.int64)
+    estimates = np.zeros(len(asked), struct_dtype("lever_estimate_t"))
+    healths = np.zeros(len(asked), struct_dtype("lever_health_t"))
+    load("lever_bulk").bulk_estimates(
+        estimator.pointer,
+        ffi.from_buffer("lever_sample_t[]", samples),
+        ffi.from_buffer("int64_t[]", asked),
+        len(asked),
+        ffi.from_buffer("lever_estimate_t[]", estimates),
+        ffi.from_buffer("lever_health_t[]", healths),
+    )
+    return estimates, healths
+
+
 def run_samples(
     config: Config | None, samples: Mapping[str, Any], at: NDArray[np.int64] | None = None
 ) -> dict[str, NDArray[Any]]:
@@ -233,18 +261,6 @@ def run_samples(
     asked = np.arange(count) if at is None else np.asarray(at)
     if (len(asked) and not 0 <= asked[0] <= asked[-1] < count) or (np.diff(asked) <= 0).any():
         raise LeverError(f"at: the indices must rise from 0 to at most {count - 1}")
-    estimates = np.zeros(len(asked), struct_dtype("lever_estimate_t"))
-    healths = np.zeros(len(asked), struct_dtype("lever_health_t"))
-    lever = estimator.pointer
-    sample = ffi.from_buffer("lever_sample_t[]", taken)
-    estimate = ffi.from_buffer("lever_estimate_t[]", estimates)
-    health = ffi.from_buffer("lever_health_t[]", healths)
-    index = 0
-    for row, last in enumerate(asked.tolist()):
-        while index <= last:
-            lib.lever_update(lever, sample + index)
-            index += 1
-        lib.lever_estimate(lever, estimate + row)
-        lib.lever_health(lever, health + row)
+    estimates, healths = feed(estimator, taken, asked)
     columns = {name: estimates[name].copy() for name in estimates.dtype.names or ()}
     return columns | {name: healths[name].copy() for name in ("mode", "faults", "recoveries")}

@@ -1,23 +1,24 @@
 """Settings files, which `lever settings` prints and `lever_can --settings` reads: a configuration as text.
 
 One `name = value` a line, `#` starts a comment, the last of two equal names counts; firmware/port/linux/settings.h has
-the grammar, to the byte. Names are those of settings_table(), in its units, and the four choices:
+the grammar, to the byte. Names are those of settings_table(), in its units unless another follows, and four choices:
 
     preload = trim           # one of fixed, trim
-    theta_noise = 0.002      # [rad] standard deviation of a theta sample
+    theta_noise = 2 mrad     # 0.002: [rad] standard deviation of a theta sample
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import SettingsError
-from .config import CHOICES, Config, choice_value, setting, settings_table
+from . import units
+from .config import CHOICES, Config, Setting, choice_value, setting, settings_table
 from .library import enum_names
+from .units import UnitError
 
 Assignments = Mapping[str, str | float]
 """Values by name, of settings (float) and choices (str)."""
@@ -25,7 +26,6 @@ Assignments = Mapping[str, str | float]
 _BOM = b"\xef\xbb\xbf"
 _BLANK = " \t"
 _LINE_BYTES = 510
-_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 def parse_assignment(text: str) -> tuple[str, str | float]:
@@ -37,11 +37,22 @@ def parse_assignment(text: str) -> tuple[str, str | float]:
         choice_value(f"lever_{name}", name, value)
         return name, value
     row = setting(name)
-    if _NUMBER.fullmatch(value) is None:
-        raise SettingsError(f"{name} = {value!r} is not a number (give it in {row.unit}, without the unit)")
-    number = float(value)
+    try:
+        number = setting_value(row, value)
+    except UnitError as error:
+        raise SettingsError(f"{name} = {error}") from None
     row.check(number)
     return name, number
+
+
+def setting_value(row: Setting, text: str) -> float:
+    """What is written for a setting, in its unit or with one of its units. Raises UnitError."""
+    quantity = units.split(text)
+    if quantity is None:
+        allowed = ", ".join(units.spellings(row.unit))
+        raise UnitError(f"{text!r} is not a number (give it in {row.unit}, or with a unit: {allowed})")
+    number, unit = quantity
+    return units.parse(text, row.unit) if unit else float(number)
 
 
 def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:

@@ -21,6 +21,7 @@ from e2e.p05 import e2e_p05_check
 from ..can.bulk import ERROR, EXTENDED, FD, REMOTE, Frames
 from ..can.logs import LogError, Recording
 from ..errors import LeverError
+from ..near_names import near_names
 from .mapping import Protection
 from .recorded import Signal
 
@@ -69,11 +70,8 @@ def of_fd(message: Message) -> bool:
 
 
 def _near(name: str, names: Iterable[str]) -> str:
-    import difflib
-
-    lower = {each.lower(): each for each in names}
-    near = difflib.get_close_matches(name.lower(), lower, n=3, cutoff=0.5)
-    return f"; near to it: {', '.join(lower[each] for each in near)}" if near else ""
+    near = near_names(name, names)
+    return f"; near to it: {', '.join(near)}" if near else ""
 
 
 @dataclass

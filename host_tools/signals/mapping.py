@@ -18,7 +18,6 @@ or the same as TOML, a table for each input, and one for each message with E2E p
 
 from __future__ import annotations
 
-import difflib
 import math
 import sys
 from collections.abc import Iterable
@@ -27,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LeverError
+from ..near_names import did_you_mean
 from .units import INPUTS, KINDS, factor
 
 if sys.version_info >= (3, 11):
@@ -149,9 +149,10 @@ def _time(table: Any) -> str | None:
 def _key(key: str) -> str:
     key = key.strip()
     if key not in INPUTS:
-        near = difflib.get_close_matches(key, INPUTS, n=1)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise LeverError(f"--map {key}: {hint}the inputs are {', '.join(INPUTS)}, and time for a file's column of time")
+        hint = did_you_mean(key, INPUTS, "no such input;")
+        raise LeverError(
+            f"--map {key}: {hint} the inputs are {', '.join(INPUTS)}, and time for a file's column of time"
+        )
     return key
 
 

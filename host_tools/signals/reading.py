@@ -9,6 +9,7 @@ from typing import Any
 
 from ..can.logs import Recording
 from ..errors import LeverError
+from ..near_names import near_names
 from .bus_signals import BusSignals, Counts, find, load_database
 from .inputs import Input, samples_of, understood
 from .mapping import Mapping, Source
@@ -194,8 +195,6 @@ def column(columns: Sequence[Signal], name: str, where: str) -> Signal:
     ):
         if len(matches) == 1:
             return matches[0]
-    import difflib
-
     names = [each.name for each in columns]
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.3) or names[:8]
+    near = near_names(name, names) or names[:8]
     raise LeverError(f"{where}: no column {name}; there are {', '.join(near)}{' …' if len(names) > len(near) else ''}")

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 import time
 
 from rich.console import Console, Group, RenderableType
 from rich.rule import Rule
 
+from ..layout import UNLIMITED, terminal_width
 from . import panels
 from .picture import STEP, Picture
 from .sources import LogSource, Source
 
 _SPAN = 30.0
 """[s] that trends are shown over."""
-_PIPE_WIDTH = 100
+_LEAST_WIDTH, _PIPE_WIDTH = 80, 100
 
 
 def print_once(source: Source, listen: float) -> Picture:
@@ -24,7 +24,8 @@ def print_once(source: Source, listen: float) -> Picture:
         source.read_into(picture)
     else:
         _listen(source, picture, listen)
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else _PIPE_WIDTH)
+    width = terminal_width()
+    console = Console(highlight=False, width=_PIPE_WIDTH if width == UNLIMITED else max(width, _LEAST_WIDTH))
     parts: list[RenderableType] = [
         panels.headline(picture, source),
         panels.condition(picture, source),

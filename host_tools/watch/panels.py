@@ -17,7 +17,7 @@ from .picture import STEP, Estimated, Picture
 from .sources import Source
 
 NOTHING = "–"
-_BLOCKS = "▁▂▃▄▅▆▇█"
+_BLOCKS = " ▁▂▃▄▅▆▇█"
 _TREND_MEAN = 1.0  # [s] of the means that a trend is the difference of
 _COLOURS = {"good": "green", "watch": "yellow", "bad": "bold red"}
 _EXPECTED = ("LEVER_SAMPLE", "BASE_SAMPLE", "STATE_ESTIMATE", "HEALTH")  # messages
@@ -26,6 +26,7 @@ _COLUMNS: tuple[tuple[JustifyMethod, int], ...] = (
     *(("left", 17), ("right", 8), ("right", 8)),
     *(("left", 6), ("right", 6), ("right", 9)),
 )
+_SCALE_WIDTH = 7
 _FEEDTHROUGH_WIDTH = 15
 ESTIMATES_WIDTH = sum(width + 1 for _, width in _COLUMNS)
 """Of estimates() without its sparkline."""
@@ -38,31 +39,35 @@ def headline(picture: Picture, source: Source) -> Text:
     version = picture.identity.version
     firmware = f" · firmware {version}" if version else ""
     text = f"{source.title}{model} · watching for {minutes}:{seconds:02d} min{firmware}"
-    return Text(text, style="bold", no_wrap=True)
+    return Text(text, style="bold")
 
 
 def condition(picture: Picture, source: Source) -> Text:
-    """One line on how it stands."""
+    """How it stands, in a sentence."""
     if source.error is not None:
-        return Text(f"● {source.error}", style=_COLOURS["bad"], no_wrap=True, overflow="ellipsis")
+        return Text(f"● {source.error}", style=_COLOURS["bad"])
     if source.ended:
-        return Text("● the end: nothing more will come", style=_COLOURS["watch"], no_wrap=True)
+        return Text("● the end: nothing more will come", style=_COLOURS["watch"])
     level, text = status.condition(picture)
-    return Text(f"● {text}", style=_COLOURS[level], no_wrap=True, overflow="ellipsis")
+    return Text(f"● {text}", style=_COLOURS[level])
 
 
-def estimates(picture: Picture, span: float, width: int, height: int = 1) -> Table:
-    """Parameters and dynamics with sigma, and how they went in the last `span` seconds; `width` [characters], and
-    `height` [lines] of each."""
+def estimates(picture: Picture, span: float, width: int, lines: int = 1) -> Table:
+    """Parameters and dynamics with sigma, and how they went in the last `span` seconds; `width` [characters].
+
+    With more than one of the `lines` each, the range of a chart stands beside it.
+    """
     table = Table.grid(padding=(0, 1), pad_edge=False)
+    chart_width = max(0, width - ESTIMATES_WIDTH - (_SCALE_WIDTH + 1 if lines > 1 else 0))
     for justify, column_width in _COLUMNS:
         table.add_column(justify=justify, width=column_width, no_wrap=True)
-    sparkline_width, apart = max(0, width - ESTIMATES_WIDTH), "\n" if height > 1 else ""
-    table.add_column(width=sparkline_width, no_wrap=True)
-    titles = ("", "estimate", "± σ", "unit", "σ [%]", f"{span:.0f} s [%]", "trend" if sparkline_width > 5 else "")
+    for column_width in (chart_width, _SCALE_WIDTH)[: 1 if lines == 1 else 2]:
+        table.add_column(width=column_width, no_wrap=True)
+    titles = ("", "estimate", "± σ", "unit", "σ [%]", f"{span:.0f} s [%]", "trend" if chart_width > 5 else "")
     table.add_row(*(Text(title, style="dim") for title in titles))
     for entry in (*picture.parameters(), *picture.dynamics()):
         recent = _recent(picture, entry.key, span)
+        bottom, top = map(_number, _scale(recent, entry.sigma))
         table.add_row(
             Text(entry.key, style="bold"),
             Text(_number(entry.value), style="bold"),
@@ -70,7 +75,8 @@ def estimates(picture: Picture, span: float, width: int, height: int = 1) -> Tab
             _UNIT.get(entry.unit, entry.unit),
             _number(100.0 * entry.sigma / abs(entry.value) if entry.value else math.nan, 2),
             _change(entry, recent),
-            Text(sparkline(recent, entry.sigma, sparkline_width, max(height - 1, 1)) + apart, style="cyan"),
+            Text(sparkline(recent, entry.sigma, chart_width, lines), style="cyan"),
+            *([Text(top + "\n" * (lines - 1) + bottom, style="dim")] if lines > 1 else []),
         )
     if not picture.parameters():
         table.add_row(Text("parameters", style="bold"), Text("none yet", style="dim"))
@@ -107,22 +113,28 @@ def _at(measured: Measured | None, frequency: float) -> float:
     return math.nan if measured is None else float(np.interp(frequency, measured.frequency, measured.coherence))
 
 
-def sparkline(values: Sequence[float], least_range: float, width: int, height: int = 1) -> str:
-    """The values as blocks, oldest left, in `height` lines; a range smaller than `least_range` does not fill them."""
-    if width < 1 or not values:
+def sparkline(values: Sequence[float], least_range: float, width: int, lines: int = 1) -> str:
+    """The values as bars of so many lines, oldest left, from the bottom to the top of _scale()."""
+    chosen = [values[min(len(values) - 1, int((k + 0.5) * len(values) / width))] for k in range(width) if values]
+    bottom, top = _scale(chosen, least_range)
+    if math.isnan(bottom):
         return ""
-    chosen = [values[min(len(values) - 1, int((k + 0.5) * len(values) / width))] for k in range(width)]
-    finite = [value for value in chosen if math.isfinite(value)]
+    blocks = len(_BLOCKS) - 1
+    steps = (lines * blocks - 1) / (top - bottom)
+    levels = [1 + round((value - bottom) * steps) if math.isfinite(value) else 0 for value in chosen]
+    below = range((lines - 1) * blocks, -1, -blocks)
+    return "\n".join("".join(_BLOCKS[min(max(level - drawn, 0), blocks)] for level in levels) for drawn in below)
+
+
+def _scale(values: Sequence[float], least_range: float) -> tuple[float, float]:
+    """From the least to the greatest of the values, but no less than `least_range`; NaN where there are none."""
+    finite = [value for value in values if math.isfinite(value)]
     if not finite:
-        return ""
+        return math.nan, math.nan
     low, high = min(finite), max(finite)
     least = least_range if math.isfinite(least_range) else 0.0
     half = max(high - low, least, 1e-12 * max(abs(low), abs(high)), 1e-30) / 2.0
-    bottom = (low + high) / 2.0 - half
-    eighths = height * len(_BLOCKS)
-    levels = [1 + round((v - bottom) / (2.0 * half) * (eighths - 1)) if math.isfinite(v) else 0 for v in chosen]
-    lines = range(eighths - len(_BLOCKS), -1, -len(_BLOCKS))  # by the level of their foot, from the top
-    return "\n".join("".join((" " + _BLOCKS)[min(max(level - foot, 0), 8)] for level in levels) for foot in lines)
+    return (low + high) / 2.0 - half, (low + high) / 2.0 + half
 
 
 def health(picture: Picture, source: Source) -> Table:

@@ -18,9 +18,10 @@ SPANS = (30.0, 120.0, 300.0, 10.0)
 """[s] that trends are shown over, in the order of the key."""
 TALL = 32
 """[lines] from which on the feedthrough is shown unasked."""
-
-_FEEDTHROUGH_LINES = 8
-_OTHER_LINES = 25  # headline, condition, frame and titles of the estimates, health and messages, keys
+_AROUND, _FEEDTHROUGH = 7, 8
+"""[lines] of all that is neither a row of a table, nor the condition, nor the panel of the feedthrough; and of that."""
+_TALLEST = 8
+"""[lines] of a chart."""
 
 
 class Monitor(App[None]):
@@ -30,7 +31,8 @@ class Monitor(App[None]):
     TITLE = "lever monitor"
     CSS = """
     Screen { layout: vertical; overflow: hidden; }
-    #headline, #condition { height: 1; padding: 0 1; }
+    #headline { height: 1; padding: 0 1; }
+    #condition { height: auto; padding: 0 1; }
     #estimates, #feedthrough { height: auto; }
     .panel { border: round $primary; padding: 0 1; }
     #lower { height: 1fr; }
@@ -73,8 +75,10 @@ class Monitor(App[None]):
             self.set_timer(self._duration, self.exit)
 
     def on_resize(self, event: Resize) -> None:
+        is_tall = event.size.height >= TALL
+        self._lines["condition"].styles.max_height = 2 if is_tall else 1  # the panel health has it all
         if not self._feedthrough_chosen:
-            self._panels["feedthrough"].display = event.size.height >= TALL
+            self._panels["feedthrough"].display = is_tall
 
     def on_unmount(self) -> None:
         self.source.stop()
@@ -89,18 +93,15 @@ class Monitor(App[None]):
         picture, source, tables = self.picture, self.source, self._tables
         self._lines["headline"].update(panels.headline(picture, source))
         self._lines["condition"].update(panels.condition(picture, source))
-        tables["estimates"].update(
-            panels.estimates(picture, self.span, tables["estimates"].size.width, self._trend_height())
-        )
+        health, messages = panels.health(picture, source), panels.messages(picture)
+        estimates, width = len(picture.parameters()) + len(picture.dynamics()), tables["estimates"].size.width
+        spare = self.size.height - _AROUND - estimates - max(health.row_count, messages.row_count)
+        spare -= self._lines["condition"].size.height + (_FEEDTHROUGH if self._panels["feedthrough"].display else 0)
+        lines = min(max(1 + spare // estimates, 1), _TALLEST)
+        tables["estimates"].update(panels.estimates(picture, self.span, width, lines))
         tables["feedthrough"].update(panels.feedthrough(picture))
-        tables["health"].update(panels.health(picture, source))
-        tables["messages"].update(panels.messages(picture))
-
-    def _trend_height(self) -> int:
-        """[lines] of each trend: what the other panels leave."""
-        taken = _OTHER_LINES + (_FEEDTHROUGH_LINES if self._panels["feedthrough"].display else 0)
-        entries = len(self.picture.parameters()) + len(self.picture.dynamics())
-        return max(1, (self.size.height - taken) // entries)
+        tables["health"].update(health)
+        tables["messages"].update(messages)
 
     def action_hold(self) -> None:
         """Stops or goes on redrawing; frames are counted meanwhile."""

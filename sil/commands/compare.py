@@ -10,6 +10,7 @@ from typing import Any
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, add_json_option
 
@@ -108,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
     tables = table.tables(rows, claims)
     print_tables(tables, args.json)
     for case, verdict in by_case.items():
-        print(f"{case}: {verdict}")
+        say(f"{case}: {verdict}")
     if args.out is not None:
         from lever_cdkf.host_tools.files import Outputs, write_text, writing
         from lever_cdkf.host_tools.provenance import provenance, with_provenance
@@ -128,7 +129,7 @@ def run(args: argparse.Namespace) -> int:
                     path.write_bytes(content)
             write_text(outputs.path("provenance.json"), origin.with_outputs(outputs.written(*names)).text())
             outputs.finish()
-        print(f"Written to {args.out}: compare.html, compare.csv, figures as .pdf, .svg and .csv, provenance.json")
+        say(f"Written to {args.out}: compare.html, compare.csv, figures as .pdf, .svg and .csv, provenance.json")
     return 0
 
 

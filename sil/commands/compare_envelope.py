@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 from lever_cdkf.host_tools.tables import Row, print_tables, write_json
 
@@ -38,10 +39,10 @@ def run(args: argparse.Namespace) -> int:
         results = campaign.run(todo, args.jobs, progress.show)
     print_tables(tables.tables(results, seeds))
     for sentence in tables.verdicts(results):
-        print(sentence)
+        say(sentence)
     if args.json is not None:
         write_json(args.json, {"peers": tables.rows(results)})
-        print(f"Written: {args.json}")
+        say(f"Written: {args.json}")
     return 0
 
 

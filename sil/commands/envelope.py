@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import make_folder, write_text
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 
 from .names import check_names
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     print_tables({f"{seeds} random pilots a condition": table.lines(results)})
     missed = [result.condition.name for result in results if not result.ok]
     judged = sum(bool(result.condition.limits) for result in results)
-    print(f"{judged - len(missed)} of {judged} conditions hold." + (f" Missed: {', '.join(missed)}." if missed else ""))
+    say(f"{judged - len(missed)} of {judged} conditions hold." + (f" Missed: {', '.join(missed)}." if missed else ""))
     _write(args, results, seeds)
     return 1 if missed else 0
 
@@ -112,7 +113,7 @@ def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> N
         content = {"rows": table.rows(results), "provenance": asdict(origin)}
         write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     write_text(args.out / "envelope.html", with_provenance(envelope_page.build(results, seeds), origin))
-    print(f"Written to {args.out}: envelope.html")
+    say(f"Written to {args.out}: envelope.html")
 
 
 def _listed(condition: Condition) -> dict[str, str | bool]:

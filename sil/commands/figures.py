@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.extras import require
+from lever_cdkf.host_tools.layout import say
 
 _PAGE, _CAPTIONS, _PROVENANCE = "figures.html", "captions.md", "provenance.json"
 
@@ -74,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         return _list()
     written = _make(chosen(args.only), args.seed, args.width, args.out)
-    print(f"Written to {args.out}: {', '.join(written)}")
+    say(f"Written to {args.out}: {', '.join(written)}")
     return 0
 
 

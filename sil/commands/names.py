@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Sequence
 
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.near_names import did_you_mean
 
 
 def check_names(what: str, names: Iterable[str], among: Iterable[str], listed_by: str) -> None:
@@ -13,6 +13,4 @@ def check_names(what: str, names: Iterable[str], among: Iterable[str], listed_by
     there: Sequence[str] = list(among)
     for name in names:
         if name not in there:
-            near = difflib.get_close_matches(name, there, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"`{listed_by}` lists them all"
-            raise LeverError(f"no {what} {name!r}; {hint}")
+            raise LeverError(f"no {what} {name!r}; {did_you_mean(name, there, f'`{listed_by}` lists them all')}")

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from lever_cdkf.host_tools.can.buses import add_bus_options, chosen_options
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.formats import FORMATS, add_format_option, chosen_formats
+from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
@@ -55,14 +57,20 @@ _EPILOG = """\
 examples:
   lever sim --list
   lever sim steady --out out/steady
-  lever sim steady --seed 7 --set duration="30 s" --set settings.theta_noise="2 mrad" --set base.0.rms="0.05 g"
+  lever sim steady --seed 7 --set duration="30 s" \\
+      --set theta_noise="2 mrad" --set base.0.rms="0.05 g"
   lever sim my_own.toml
-  lever sim steady --seeds 20 --json steady.json           median and worst of 20 runs, a minute on two cores
-  lever sim steady --seed 7 --out out/seed7                one of these runs, with its report
-  lever sim steady --settings my.settings                  from `lever tune` or `lever settings`
-  lever sim steady --settings > steady.settings; lever_can --can vcan0 --lock-step --settings steady.settings &
+  lever sim steady --seeds 20 --json steady.json
+      median and worst of 20 runs, a minute on two cores
+  lever sim steady --seed 7 --out out/seed7
+      one of these runs, with its report
+  lever sim steady --settings my.settings
+      from `lever tune` or `lever settings`
+  lever sim steady --settings > steady.settings
+  lever_can --can vcan0 --lock-step --settings steady.settings &
   lever sim steady --interface socketcan --channel vcan0
-  lever sim steady --interface slcan --channel /dev/ttyUSB0 --bus-option tty_baudrate=921600
+  lever sim steady --interface slcan --channel /dev/ttyUSB0 \\
+      --bus-option tty_baudrate=921600
 
 Exit status: 0 when every sample was answered, the estimator never was in fault, and the limits of the scenario were
 kept; 1 when not, with one line on standard error. With --seeds the first two are asked of every run, and the limits of
@@ -151,7 +159,7 @@ def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
     with Progress("sim") as progress:
         summaries = seeds.run(tasks, args.jobs or os.cpu_count() or 1, progress.show)
     print_tables(seeds.tables(summaries), args.json)
-    print(seeds.verdict(summaries))
+    say(seeds.verdict(summaries))
     reasons = seeds.troubles(summaries) + seeds.missed(summaries)
     if reasons:
         print(f"lever: {args.scenario}: {'; '.join(reasons)}", file=sys.stderr)
@@ -179,13 +187,9 @@ def _check_seeds(args: argparse.Namespace) -> None:
 
 def _from_file(path: str) -> list[str]:
     """A settings file as overrides of a scenario. Raises LeverError."""
-    from lever_cdkf.host_tools.firmware.config import CHOICES, setting
     from lever_cdkf.host_tools.firmware.settings_file import read_assignments
 
-    return [
-        f"estimator.{name}={value}" if name in CHOICES else f"settings.{name}={value} {setting(name).unit}"
-        for name, value in read_assignments(path).items()
-    ]
+    return [f"{name}={value}" for name, value in read_assignments(path).items()]
 
 
 def run_demo(args: argparse.Namespace) -> int:
@@ -226,7 +230,10 @@ def _simulate(
         chosen_formats(args),
         [path for path in (scenario.file, args.settings) if Path(path or "").is_file()],
     )
-    with open_bus(scenario, interface, channel, bus_options) as bus, Progress(scenario.name) as progress:
+    with ExitStack() as stack:
+        progress, bus = stack.enter_context(Progress(scenario.name)), None
+        if interface != "lever" or bus_options:
+            bus = stack.enter_context(open_bus(scenario, interface, channel, bus_options))
         result = simulate(
             *(scenario, bus, args.out),
             channel=channel,
@@ -236,9 +243,9 @@ def _simulate(
             inputs=inputs,
         )
     print_tables(_tables(result), args.json)
-    print(result.summary.verdict)
+    say(result.summary.verdict)
     if args.out is not None:
-        print(f"Written to {args.out}: {', '.join(name for name in _FILES if (args.out / name).exists())}")
+        say(f"Written to {args.out}: {', '.join(name for name in _FILES if (args.out / name).exists())}")
     if result.summary.passed:
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)

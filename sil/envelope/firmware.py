@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.estimator import Estimator
-from lever_cdkf.host_tools.firmware.library import ffi, lib, struct_dtype
+from lever_cdkf.host_tools.firmware.estimator import Estimator, feed, make_command
+from lever_cdkf.host_tools.firmware.library import ffi, struct_dtype
+from lever_cdkf.host_tools.firmware.library import lib as firmware_lib
 from numpy.typing import NDArray
 
+from ..fast.library import Struct, lib
 from .condition import ClosedLoop
 from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, stream, truth
-from .plant import Plant
+from .plant import TICK, Plant
 from .sensors import NOISE
 
 PARAMETERS = ("m_p", "c_p", "k_p")
@@ -62,36 +65,33 @@ def estimates(config: Config, signals: Mapping[str, FloatArray], response: bool 
     count, width = signals["theta"].shape
     samples = np.zeros(count, struct_dtype("lever_sample_t"))
     samples["time_us"] = np.arange(count) * round(PERIOD * 1e6)
-    runs = []
+    notes = _Notes(count, width, response)
     for run in range(width):
         for what, column in signals.items():
             samples[what], samples[f"{what}_valid"] = column[:, run], ~np.isnan(column[:, run])
-        runs.append(_Live(config, count, response))
-        runs[-1].feed(samples)
-    return _track(runs)
+        notes.feed(run, Estimator(config), samples)
+    return _track(notes)
 
 
-def _track(runs: Sequence[_Live]) -> Track:
-    def beside(array: str, name: str) -> NDArray[Any]:
-        return np.stack([getattr(run, array)[name] for run in runs], axis=1)
-
+def _track(notes: _Notes) -> Track:
     def single(name: str) -> FloatArray:
-        return beside("estimates", name).astype(np.float64)
+        column: FloatArray = notes.estimates[name].swapaxes(0, 1).astype(np.float64)
+        return column
 
     value = {"f_n": single("natural_frequency"), "zeta": single("damping_ratio")}
     sigma = {"f_n": single("natural_frequency_sigma"), "zeta": single("damping_ratio_sigma")}
     for i, name in enumerate(PARAMETERS):
         value[name], sigma[name] = single("parameter")[..., i], single("parameter_sigma")[..., i]
     feedthrough = None
-    if runs[0].responses.size:
-        of = {name: beside("responses", name) for name in ("real", "imaginary", "gain_sigma", "phase_sigma")}
+    if notes.responses.size:
+        of = {name: notes.responses[name].swapaxes(0, 1) for name in ("real", "imaginary", "gain_sigma", "phase_sigma")}
         feedthrough = Feedthrough(of["real"] + 1j * of["imaginary"], of["gain_sigma"], of["phase_sigma"])
     return Track(
         time=np.arange(len(value["f_n"]), dtype=np.float64) * STRIDE * PERIOD,
         value=value,
         sigma=sigma,
-        faults=beside("healths", "faults"),
-        mode=beside("healths", "mode"),
+        faults=notes.healths["faults"].T,
+        mode=notes.healths["mode"].T,
         feedthrough=feedthrough,
     )
 
@@ -106,74 +106,52 @@ def closed_loop(
     """
     given = lanes(motion, seeds)
     plant, (count, width) = Plant(given), given.z_ddot.shape
-    noise = {what: sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()}
+    noise = [sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()]
     gone = np.stack([stream("lost", seed).random(count) < loop.lost for seed in seeds], axis=1)
-    theta, theta_dot, tau_m = (np.empty((count, width)) for _ in range(3))
-    decay, torque = math.exp(-PERIOD / MOTOR_LAG), np.zeros(width)
-    runs = [_Live(config, count) for _ in seeds]
-    for i in range(count):
-        theta[i], theta_dot[i], tau_m[i] = plant.theta, plant.theta_dot, torque
-        values = np.stack((theta[i], theta_dot[i], torque, given.z_ddot[i]))
-        values += np.stack([noise[what][i] for what in ("theta", "theta_dot", "tau_m", "z_ddot")])
-        if i % _KEEP_ALIVE == 0:
-            tick()
-            for run in runs:
-                run.estimator.command(dither_rms=loop.dither)
-        for run, column, missing in zip(runs, values.T.tolist(), gone[i].tolist(), strict=True):
-            if not (missing and loop.whole):
-                run.take(i, column, missing)
-            if i % STRIDE == 0:
-                run.note(i // STRIDE)
-        if i + 1 < count:
-            asked = np.array([run.torque for run in runs])
-            after = asked + (torque - asked) * decay
-            plant.advance(i, torque, after)
-            torque = after
-    recording = Recording(motion.time, theta, theta_dot, tau_m, given.z_ddot, truth(given))
-    return recording, _track(runs)
+    tau_m, notes = np.zeros((count, width)), _Notes(count, width)
+    estimators = [Estimator(config) for _ in seeds]
+    struct = Struct("lanes_loop_t")
+    closed = struct.pointer
+    closed.lever = struct.keep(ffi.new("struct lever *[]", [each.pointer for each in estimators]))
+    closed.period_us, closed.keep_alive = round(PERIOD * 1e6), _KEEP_ALIVE
+    closed.command = struct.keep(make_command(dither_rms=loop.dither))
+    closed.decay, closed.loses_whole = math.exp(-PERIOD / MOTOR_LAG), loop.whole
+    closed.lost = struct.array("uint8_t", gone, np.uint8)
+    closed.z_ddot, closed.noise = plant.column(given.z_ddot), [plant.column(each) for each in noise]
+    closed.tau_m, closed.asked = struct.doubles(tau_m), struct.doubles(np.zeros(width))
+    closed.stride, closed.rows = STRIDE, notes.estimates.shape[1]
+    closed.estimate = struct.array("lever_estimate_t", notes.estimates, notes.estimates.dtype)
+    closed.health = struct.array("lever_health_t", notes.healths, notes.healths.dtype)
+    for first in range(0, count, TICK):
+        lib.lanes_close(plant.struct.pointer, closed, first, min(first + TICK, count))
+        tick()
+    recording = Recording(motion.time, plant.theta, plant.theta_dot, tau_m, given.z_ddot, truth(given))
+    return recording, _track(notes)
 
 
-class _Live:
-    """One estimator, and what it says at every STRIDE-th of `count` samples."""
+class _Notes:
+    """What the estimators of `width` runs say at every STRIDE-th of `count` samples, and with `response` at every
+    RESPONSE_STRIDE-th of these their feedthrough: run first."""
 
-    def __init__(self, config: Config, count: int, response: bool = False) -> None:
-        self.estimator = Estimator(config)
-        self.torque = 0.0
+    def __init__(self, count: int, width: int, response: bool = False) -> None:
         rows = (count - 1) // STRIDE + 1
-        self.estimates = np.zeros(rows, struct_dtype("lever_estimate_t"))
-        self.healths = np.zeros(rows, struct_dtype("lever_health_t"))
-        size = ((rows - 1) // RESPONSE_STRIDE + 1 if response else 0, len(FREQUENCIES))
-        self.responses = np.zeros(size, struct_dtype("lever_feedthrough_t"))
-        self._estimate = ffi.from_buffer("lever_estimate_t[]", self.estimates)
-        self._health = ffi.from_buffer("lever_health_t[]", self.healths)
-        self._response = ffi.from_buffer("lever_feedthrough_t[]", self.responses)
-        self._now = ffi.new("lever_health_t *")
+        self.estimates = np.zeros((width, rows), struct_dtype("lever_estimate_t"))
+        self.healths = np.zeros((width, rows), struct_dtype("lever_health_t"))
+        shape = (width, (rows - 1) // RESPONSE_STRIDE + 1 if response else 0, len(FREQUENCIES))
+        self.responses = np.zeros(shape, struct_dtype("lever_feedthrough_t"))
 
-    def feed(self, samples: NDArray[Any]) -> None:
-        """All samples, in bulk."""
-        lever, sample = self.estimator.pointer, ffi.from_buffer("lever_sample_t[]", samples)
-        for i in range(len(samples)):
-            lib.lever_update(lever, sample + i)
-            if i % STRIDE == 0:
-                self.note(i // STRIDE)
+    def feed(self, run: int, estimator: Estimator, samples: NDArray[Any]) -> None:
+        """All samples of a run, in bulk: as many at a time as there are between two responses."""
+        at, fed = np.arange(0, len(samples), STRIDE), 0
+        stops = [*range(1, len(at), RESPONSE_STRIDE), len(at)] if self.responses.size else [len(at)]
+        for index, (first, last) in enumerate(pairwise([0, *stops])):
+            notes = feed(estimator, samples[fed:], at[first:last] - fed)
+            self.estimates[run, first:last], self.healths[run, first:last] = notes
+            fed = int(at[last - 1]) + 1
+            if index < self.responses.shape[1]:
+                self._note_response(run, index, estimator)
 
-    def take(self, i: int, values: Sequence[float], missing: bool) -> None:
-        """Takes theta, theta_dot, tau_m and z_ddot of sample i; `missing`: z_ddot alone."""
-        lever = () if missing else values[:3]
-        self.estimator.update(
-            i * round(PERIOD * 1e6),
-            **dict(zip(("theta", "theta_dot", "tau_m"), lever, strict=False)),
-            z_ddot=values[3],
-        )
-        lib.lever_health(self.estimator.pointer, self._now)
-        self.torque = self._now.torque
-
-    def note(self, row: int) -> None:
-        """Keeps what the estimator says now."""
-        lever = self.estimator.pointer
-        lib.lever_estimate(lever, self._estimate + row)
-        lib.lever_health(lever, self._health + row)
-        if self.responses.size and row % RESPONSE_STRIDE == 0:
-            first = row // RESPONSE_STRIDE * len(FREQUENCIES)
-            for i, frequency in enumerate(FREQUENCIES.tolist()):
-                lib.lever_feedthrough(lever, frequency, self._response + (first + i))
+    def _note_response(self, run: int, index: int, estimator: Estimator) -> None:
+        kept = ffi.from_buffer("lever_feedthrough_t[]", self.responses[run, index])
+        for i, frequency in enumerate(FREQUENCIES.tolist()):
+            firmware_lib.lever_feedthrough(estimator.pointer, frequency, kept + i)

@@ -17,6 +17,7 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.firmware.config import settings_table
 
+from ..fast import plants as fast_plants
 from ..plants import lever_plant, mayo_plant, two_dof_plant
 from ..plants.truth import Conditions, Truth
 from .motions import FREQUENCIES, PERIOD, Motion, Recording, arms, excitation, stream
@@ -84,12 +85,8 @@ def _of_sil(motion: Motion, seeds: Sequence[int], tick: Callable[[], None]) -> R
         tick()
         pilot = _pilot_of_sil(motion.pilot, np.full(len(z_ddot), trim[run]), stream("pilot", seed))
         rng = stream("process", seed)
-        body = pilot.body(Conditions(z_ddot[:, run], PERIOD, motion.process_noise, MOTOR_LAG, rng))
-        torque = command[:, run].tolist()
-        for i in range(len(z_ddot)):
-            theta[i, run], theta_dot[i, run], tau_m[i, run] = body.theta, body.theta_dot, body.tau_m
-            if i + 1 < len(z_ddot):
-                body.advance(torque[i])
+        given = Conditions(z_ddot[:, run], PERIOD, motion.process_noise, MOTOR_LAG, rng)
+        theta[:, run], theta_dot[:, run], tau_m[:, run] = fast_plants.move(pilot, given, command[:, run])
         responses.append(pilot.transfer(np.zeros(1, np.intp)).response(FREQUENCIES)[0])
     return Recording(motion.time, theta, theta_dot, tau_m, z_ddot, {}, np.stack(responses))
 

@@ -14,13 +14,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from numpy.typing import NDArray
 
+from ..fast.library import Struct, lib
+
 STOP_RATE = 2e-3
 """v_f: theta_dot at which friction reaches 71 % of its limit [rad/s]."""
+TICK = 10_000
+"""Samples between two signs of life."""
 
 
 @dataclass(frozen=True)
@@ -94,50 +99,43 @@ def natural_frequency_and_damping(
 
 
 class Plant:
-    """Levers in motion: `theta` [rad] and `theta_dot` [rad/s] of every lane, at the start at rest at the trim."""
+    """Levers in motion, by fast/c/lanes.h: `theta` [rad] and `theta_dot` [rad/s] of each lane at the samples so far, at
+    the first at rest at the trim."""
 
     def __init__(self, lanes: Lanes) -> None:
-        h = lanes.hardware
-        count, width = lanes.z_ddot.shape
-        wide = {name: np.broadcast_to(getattr(lanes, name), (count, width)) for name in ("m_p", "c_p", "k_p", "trim")}
-        m_p, k_p, trim = wide["m_p"], wide["k_p"], wide["trim"]
-        self.theta, self.theta_dot = trim[0].copy(), np.zeros(width)
-        self._hardware, self._period = h, lanes.period
-        self._spring, self._damper = k_p * h.length, wide["c_p"] * h.length
-        rest = self._spring * np.sin(trim) + h.stiffness * (trim - trim[0]) / (h.length * np.cos(trim))
-        self._drive = h.forcing_mass(m_p) * lanes.z_ddot
-        self._rest = np.where(k_p > 0.0, rest, 0.0)
-        self._inverse = np.broadcast_to(1.0 / h.moving_inertia(m_p), (count, width))
-        self._torque = np.broadcast_to(lanes.tau_m + lanes.disturbance + h.stiffness * trim[0], (count, width))
-        self._friction = np.broadcast_to(lanes.friction, (count, width))
-        self._rubs = bool(lanes.friction.any())
-        self._kick = np.broadcast_to(lanes.kick, (count, width))
+        h, trim = lanes.hardware, lanes.trim
+        self.count, self.width = lanes.z_ddot.shape
+        self.theta, self.theta_dot = np.zeros(lanes.z_ddot.shape), np.zeros(lanes.z_ddot.shape)
+        self.theta[0] = trim[0]
+        self.struct = Struct("lanes_t")
+        spring = lanes.k_p * h.length
+        rest = spring * np.sin(lanes.trim) + h.stiffness * (lanes.trim - lanes.trim[0]) / (
+            h.length * np.cos(lanes.trim)
+        )
+        given = self.struct.pointer
+        given.count, given.width, given.period = self.count, self.width, lanes.period
+        given.length, given.damping, given.stiffness, given.stop_rate = h.length, h.damping, h.stiffness, STOP_RATE
+        for name, values in {
+            "drive": h.forcing_mass(lanes.m_p) * lanes.z_ddot,
+            "torque": lanes.tau_m + lanes.disturbance + h.stiffness * trim[0],
+            "rest": np.where(lanes.k_p > 0.0, rest, 0.0),
+            "spring": spring,
+            "damper": lanes.c_p * h.length,
+            "inverse": 1.0 / h.moving_inertia(lanes.m_p),
+            "friction": lanes.friction,
+            "kick": lanes.kick,
+        }.items():
+            setattr(given, name, self.column(values))
+        given.theta, given.theta_dot = self.struct.doubles(self.theta), self.struct.doubles(self.theta_dot)
 
-    def advance(self, i: int, begin: FloatArray | float = 0.0, end: FloatArray | float = 0.0) -> None:
-        """From sample i to sample i + 1, with further torque [N m] at its begin and end."""
-        drives, torques = self._drive[i : i + 2], self._torque[i : i + 2]
-        torque0, torque1 = torques[0] + begin, torques[1] + end
-        drive, torque = 0.5 * (drives[0] + drives[1]), 0.5 * (torque0 + torque1)
-        x, v, period = self.theta, self.theta_dot, self._period
-        half = 0.5 * period
-        a1 = self._acceleration(i, drives[0], torque0, x, v)
-        v2 = v + half * a1
-        a2 = self._acceleration(i, drive, torque, x + half * v, v2)
-        v3 = v + half * a2
-        a3 = self._acceleration(i, drive, torque, x + half * v2, v3)
-        v4 = v + period * a3
-        a4 = self._acceleration(i, drives[1], torque1, x + period * v3, v4)
-        self.theta = x + period / 6.0 * (v + 2.0 * (v2 + v3) + v4)
-        self.theta_dot = v + period / 6.0 * (a1 + 2.0 * (a2 + a3) + a4) + self._kick[i]
+    def column(self, values: FloatArray) -> dict[str, Any]:
+        """Values (samples, lanes), or (1, lanes), for C."""
+        wide = np.broadcast_to(values, (len(values), self.width))
+        return {"value": self.struct.doubles(wide), "step": self.width if len(values) > 1 else 0}
 
-    def _acceleration(self, i: int, drive: FloatArray, torque: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-        cosine = np.cos(x)
-        arm = drive - self._rest[i] + self._spring[i] * np.sin(x) + self._damper[i] * cosine * v
-        other = torque - self._hardware.damping * v - self._hardware.stiffness * x
-        if self._rubs:
-            other -= self._friction[i] * v / np.sqrt(v * v + STOP_RATE**2)
-        acceleration: FloatArray = (other - self._hardware.length * cosine * arm) * self._inverse[i]
-        return acceleration
+    def move(self, first: int, last: int) -> None:
+        """From sample `first` to sample `last`."""
+        lib.lanes_move(self.struct.pointer, first, last)
 
 
 def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatArray:
@@ -162,11 +160,7 @@ def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatA
 def run(lanes: Lanes, tick: Callable[[], None] = lambda: None) -> tuple[FloatArray, FloatArray]:
     """theta [rad] and theta_dot [rad/s] of every lane at every sample; `tick` is called now and then."""
     plant = Plant(lanes)
-    theta, theta_dot = np.empty_like(lanes.z_ddot), np.empty_like(lanes.z_ddot)
-    for i in range(len(theta)):
-        theta[i], theta_dot[i] = plant.theta, plant.theta_dot
-        if i + 1 < len(theta):
-            plant.advance(i)
-        if i % 1000 == 0:
-            tick()
-    return theta, theta_dot
+    for first in range(0, plant.count - 1, TICK):
+        plant.move(first, min(first + TICK, plant.count - 1))
+        tick()
+    return plant.theta, plant.theta_dot

@@ -44,9 +44,19 @@ def _line(result: Result, name: str) -> Row:
     return {
         "figure": name,
         "unit": figure.unit,
-        **{column: "never" if math.isinf(value) else f"{value:.3g}" for column, value in shown.items()},
+        **{column: _shown(result, name, column, value) for column, value in shown.items()},
         "limit": limit_text(result, name),
     }
+
+
+def _shown(result: Result, name: str, column: str, value: float) -> str:
+    """With as many digits as it takes to show on which side of a limit it is."""
+    over = column.removesuffix(" runs")
+    both = (*result.condition.limits, *result.condition.unless)
+    limits = [limit for limit in both if (limit.figure, limit.over) == (name, over)]
+    texts = (f"{value:.{digits}g}" for digits in range(3, 18))
+    shown = (text for text in texts if all(limit.holds(float(text)) == limit.holds(value) for limit in limits))
+    return "never" if math.isinf(value) else next(shown)
 
 
 def _problem(result: Result) -> Row:

@@ -37,10 +37,10 @@ class Excitation(ABC):
 
     def samples(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
         """The signal at the evenly spaced times `time` [s]."""
-        inside = (time >= self.start) & (time < self.end)
+        first, last = np.searchsorted(time, (self.start, self.end))
         signal = np.zeros_like(time)
-        if inside.any():
-            signal[inside] = self.scaled(time[inside] - self.start, rng)
+        if first < last:
+            signal[first:last] = self.scaled(time[first:last] - self.start, rng)
         return signal
 
     @abstractmethod
@@ -127,8 +127,10 @@ class Noise(Band):
         if len(time) < 2:
             return np.zeros_like(time)
         frequency = np.fft.rfftfreq(len(time), float(time[1] - time[0]))
-        spectrum = rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency))
-        spectrum[(frequency < self.low) | (frequency > self.high)] = 0.0
+        band = slice(*np.searchsorted(frequency, (self.low, np.nextafter(self.high, math.inf))))
+        real, imaginary = rng.standard_normal((2, len(frequency)))
+        spectrum = np.zeros(len(frequency), np.complex128)
+        spectrum[band] = real[band] + 1j * imaginary[band]
         return np.fft.irfft(spectrum, len(time))
 
 

@@ -106,17 +106,42 @@ class Hysteretic(Truth):
         return Plant(self, conditions)
 
 
-# One sample period, prepared: M, l mu, k_p, sin theta_0, theta_0, [(z_ddot, impulse), ...] of its substeps
+def coefficients(truth: Hysteretic) -> tuple[FloatArray, ...]:
+    """At every sample: M, l mu, k_p, sin theta_0, theta_0."""
+    mass, moment = lever_plant.inertia(truth.lever, truth.arm), lever_plant.moment(truth.lever, truth.arm)
+    return mass, moment, truth.k_p, np.sin(truth.trim), truth.trim
+
+
+@dataclass(frozen=True)
+class Elements:
+    """The Maxwell elements over a substep."""
+
+    until_middle: FloatArray
+    """What is left of their forces until its middle."""
+    decay: FloatArray
+    """And until its end."""
+    stretched: FloatArray
+    """Force that a rate of 1 m/s brings until then [s]."""
+    damper: float
+    """Of the arm and of them, until its middle [s]."""
+
+    @classmethod
+    def of(cls, power: Power, step: float) -> Elements:
+        """For a substep of that length [s]."""
+        until_middle, decay = np.exp(-0.5 * step * _RATES), np.exp(-step * _RATES)
+        damper = power.damper + float(np.sum(power.springs * (1.0 - until_middle) / _RATES))
+        return cls(until_middle, decay, power.springs * (1.0 - decay) / _RATES, damper)
+
+
+# One sample period, prepared: coefficients(), [(z_ddot, impulse), ...] of its substeps
 _Row = tuple[float, float, float, float, float, list[list[float]]]
 
 
-def _rows(truth: Hysteretic, conditions: Conditions) -> Iterator[_Row]:
+def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
     """The sample periods between the samples, in order."""
-    mass, moment = lever_plant.inertia(truth.lever, truth.arm), lever_plant.moment(truth.lever, truth.arm)
-    columns = (mass, moment, truth.k_p, np.sin(truth.trim), truth.trim)
     for block in conditions.blocks():
         at = block.periods
-        drive = np.stack((block.z_ddot, mass[at, None] * block.kick + block.push), axis=2).tolist()
+        drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick + block.push), axis=2).tolist()
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
@@ -133,7 +158,8 @@ class Plant:
         self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
         self._forces = np.zeros(len(_RATES))  # of the elements, for a stiffness of 1 [m]
         self._rest_sine = math.sin(self.theta)
-        self._rows = _rows(truth, conditions)
+        self._elements = Elements.of(self._power, self._step)
+        self._rows = _rows(coefficients(truth), conditions)
 
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""
@@ -142,19 +168,17 @@ class Plant:
         lever, step, power = self._lever, self._step, self._power
         length, half = lever.lever_length, 0.5 * step
         forces = self._forces - power.springs * (length * (rest_sine - self._rest_sine))
-        until_middle, decay = np.exp(-half * _RATES), np.exp(-step * _RATES)
-        stretched = power.springs * (1.0 - decay) / _RATES
-        damper = power.damper + float(np.sum(power.springs * (1.0 - until_middle) / _RATES))
+        elements = self._elements
         for acceleration, impulse in drive:
             middle = theta + half * theta_dot
             rise = length * math.cos(middle)
             resisting, slope = lever_plant.resistance(lever, theta_dot)
-            arm = power.spring * length * (math.sin(middle) - rest_sine) + float(until_middle @ forces)
-            arm += damper * rise * theta_dot
+            arm = power.spring * length * (math.sin(middle) - rest_sine) + float(elements.until_middle @ forces)
+            arm += elements.damper * rise * theta_dot
             force = command + torque * self._lag_middle - rise / length * moment * acceleration - rise * k_p * arm
             force -= lever.lever_stiffness * (middle - rest) + resisting
-            change = (step * force + impulse) / (mass + half * (k_p * damper * rise * rise + slope))
-            forces = decay * forces + stretched * (rise * (theta_dot + 0.5 * change))
+            change = (step * force + impulse) / (mass + half * (k_p * elements.damper * rise * rise + slope))
+            forces = elements.decay * forces + elements.stretched * (rise * (theta_dot + 0.5 * change))
             theta += step * (theta_dot + 0.5 * change)
             theta_dot += change
             torque *= self._lag

@@ -59,6 +59,11 @@ class Lever:
         return cls(**{name: settings[name] for name in cls.__dataclass_fields__ if name in settings})
 
     @property
+    def own_moment(self) -> float:
+        """First moment of mass about the pivot without the arm, l eta m_l [kg m]."""
+        return self.lever_length * self.lever_mass_position * self.lever_mass
+
+    @property
     def own_inertia(self) -> float:
         """Inertia about the pivot without the arm, l^2 eta^2 m_l + J_l [kg m^2]."""
         return (self.lever_length * self.lever_mass_position) ** 2 * self.lever_mass + self.lever_inertia
@@ -93,6 +98,11 @@ def preload(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray, Floa
         return arm * np.sin(truth.trim), truth.trim
     hold = arm * math.sin(lever.arm_preload_angle) - GRAVITY * moment(lever, truth)
     return hold, np.full_like(hold, lever.lever_preload_angle)
+
+
+def weight(kind: Preload) -> float:
+    """What gravity [m/s^2] the lever's own mass feels: in preload trim a balance carries it."""
+    return GRAVITY if kind == "fixed" else 0.0
 
 
 def stiffness(lever: Lever, truth: Truth, kind: Preload, angle: FloatArray) -> FloatArray:
@@ -136,9 +146,9 @@ def resistance(lever: Lever, rate: float) -> tuple[float, float]:
     torque, slope = lever.lever_damping * rate, lever.lever_damping
     if lever.lever_friction > 0.0:
         speed = math.sqrt(rate * rate + STOP_RATE * STOP_RATE)
-        friction = lever.lever_friction / speed
+        friction, ratio = lever.lever_friction / speed, STOP_RATE / speed
         torque += friction * rate
-        slope += friction * (STOP_RATE / speed) ** 2
+        slope += friction * (ratio * ratio)
     return torque, slope
 
 
@@ -187,18 +197,22 @@ class LeverTruth(truths.Truth):
         return Plant(self.lever, self.pilot, self.preload, conditions)
 
 
-# One sample period, prepared: M, l mu, l^2 c_p, l^2 k_p, preload's torque, theta_l, [(z_ddot, kick, push), ...]
+def coefficients(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray, ...]:
+    """At every sample: M, l mu, l^2 c_p, l^2 k_p, preload's torque, theta_l."""
+    arm = lever.lever_length**2
+    hold, lever_angle = preload(lever, truth, kind)
+    return inertia(lever, truth), moment(lever, truth), arm * truth.c_p, arm * truth.k_p, hold, lever_angle
+
+
+# One sample period, prepared: coefficients(), [(z_ddot, kick, push), ...]
 _Row = tuple[float, float, float, float, float, float, list[list[float]]]
 
 
-def _rows(lever: Lever, truth: Truth, kind: Preload, conditions: Conditions) -> Iterator[_Row]:
+def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
     """The sample periods between the samples, in order."""
-    mass, arm = inertia(lever, truth), lever.lever_length**2
-    hold, lever_angle = preload(lever, truth, kind)
-    columns = (mass, moment(lever, truth), arm * truth.c_p, arm * truth.k_p, hold, lever_angle)
     for block in conditions.blocks():
         at = block.periods
-        drive = np.stack((block.z_ddot, mass[at, None] * block.kick, block.push), axis=2).tolist()
+        drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick, block.push), axis=2).tolist()
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
@@ -214,11 +228,11 @@ class Plant:
         self.theta_dot = 0.0
         self.tau_m = 0.0
         self.grip_force = 0.0
-        self._weight = GRAVITY if kind == "fixed" else 0.0  # in preload trim a balance carries the lever
+        self._weight = weight(kind)
         self._lever = lever
         self._step = conditions.step
         self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
-        self._rows = _rows(lever, truth, kind, conditions)
+        self._rows = _rows(coefficients(lever, truth, kind), conditions)
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
         """To the next sample, with the torque `command` and one of the arm [N m] held. Raises StopIteration after the
@@ -260,9 +274,8 @@ class Plant:
         lever, period = self._lever, self._step * len(drive)
         middle = 0.5 * (begin + self.theta)
         acceleration, kick, push = (sum(column) for column in zip(*drive, strict=True))
-        own_moment = lever.lever_length * lever.lever_mass_position * lever.lever_mass
         own = lever.own_inertia * (self.theta_dot - begin_dot) / period
         own += resistance(lever, (self.theta - begin) / period)[0] + lever.lever_stiffness * (middle - lever_angle)
-        own += own_moment * (acceleration / len(drive) + self._weight) * math.cos(middle)
+        own += lever.own_moment * (acceleration / len(drive) + self._weight) * math.cos(middle)
         force: float = (own - motor - (kick + push) / period) / lever.lever_length
         return force

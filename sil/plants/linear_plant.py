@@ -66,7 +66,11 @@ class LinearTruth(Truth):
         return Transfer(system.gain[samples, None], np.stack(denominator, axis=1)[samples])
 
     def body(self, conditions: Conditions) -> Plant:
-        return Plant(self.system, conditions)
+        return Plant(self.system, self.felt(conditions))
+
+    def felt(self, conditions: Conditions) -> Conditions:
+        """The conditions with the base acceleration that drives the system."""
+        return conditions
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from numpy.typing import NDArray
 
-from .linear_plant import LinearTruth, Plant, System
+from .linear_plant import LinearTruth, System
 from .truth import Conditions
 
 
@@ -83,9 +83,9 @@ class Mayo(LinearTruth):
         numerator = relative.numerator * (1.0, self.hand.outside)
         return Transfer(numerator, np.pad(relative.denominator, ((0, 0), (0, 1))))
 
-    def body(self, conditions: Conditions) -> Plant:
+    def felt(self, conditions: Conditions) -> Conditions:
+        """With z_ddot + (a - b) z_dot in place of z_ddot."""
         z_ddot = conditions.z_ddot
         z_dot = np.zeros_like(z_ddot)
         np.cumsum(0.5 * conditions.period * (z_ddot[1:] + z_ddot[:-1]), out=z_dot[1:])
-        shaken = z_ddot + self.hand.outside * z_dot
-        return super().body(dataclasses.replace(conditions, z_ddot=shaken))
+        return dataclasses.replace(conditions, z_ddot=z_ddot + self.hand.outside * z_dot)

@@ -117,6 +117,8 @@ class LeverPilot(ArmPilot):
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
         """Where he lets go, the lever's spring keeps its place until he takes it again."""
+        if not self.hands_off:
+            return lever_plant.LeverTruth(lever, lever_plant.Truth(**values, trim=trim), self.preload)
         held = np.ones(len(time), dtype=np.bool_)
         for off in self.hands_off:
             held &= (time < off.start) | (time >= off.end)

@@ -94,14 +94,24 @@ def _times(polynomials: FloatArray, polynomial: FloatArray) -> FloatArray:
     return np.stack([np.convolve(row, polynomial) for row in polynomials])
 
 
+def coefficients(truth: Reflex) -> tuple[FloatArray, ...]:
+    """At every sample, beside those of the arm: k_r, c_r, sin theta_0."""
+    return truth.k_r, truth.c_r, np.sin(truth.trim)
+
+
+def late(truth: Reflex, period: float) -> float:
+    """The delay after the middle of a sample period, in such periods."""
+    return truth.delay / period - 0.5
+
+
 class Plant(lever_plant.Plant):
     """Lever, arm with reflex and motor: a truth.Body."""
 
     def __init__(self, truth: Reflex, conditions: Conditions) -> None:
         super().__init__(truth.lever, truth.arm.pilot, "trim", conditions)
-        self._grip = np.stack((truth.k_r, truth.c_r, np.sin(truth.trim)), axis=1)
+        self._grip = np.stack(coefficients(truth), axis=1)
         self._middle = 0.5 * conditions.period
-        self._late = truth.delay / conditions.period - 0.5
+        self._late = late(truth, conditions.period)
         self._forces: list[float] = []
 
     def advance(self, command: float, reflex: float = 0.0) -> None:

@@ -108,8 +108,10 @@ class Sensor:
     def measure(self, signal: FloatArray, period: float, rng: np.random.Generator) -> FloatArray:
         """All samples of a `signal` that is known beforehand; before its start it had its first value."""
         whole, part = self.lag(period)
-        at = np.arange(len(signal)) - (whole + part)
-        delayed: FloatArray = np.interp(at, np.arange(len(signal)), signal)
+        delayed = signal
+        if whole or part:
+            at = np.arange(len(signal)) - (whole + part)
+            delayed = np.interp(at, np.arange(len(signal)), signal)
         return (1.0 + self.gain_error) * delayed + self.offsets(len(signal), rng)
 
     def corruption(self, time: FloatArray, rng: np.random.Generator) -> Corruption:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
@@ -152,6 +152,23 @@ class Truth(ABC):
     @abstractmethod
     def body(self, conditions: Conditions) -> Body:
         """The lever at the first sample."""
+
+    def at(self, samples: slice) -> Truth:
+        """The same at some of its samples only."""
+        part: Truth = _part(self, samples)
+        return part
+
+
+def _part(value: Any, samples: slice) -> Any:
+    """These samples of every array in a dataclass, and in those that it holds."""
+    parts = {}
+    for each in fields(value):
+        own = getattr(value, each.name)
+        if isinstance(own, np.ndarray):
+            parts[each.name] = own[samples]
+        elif is_dataclass(own):
+            parts[each.name] = _part(own, samples)
+    return replace(value, **parts)
 
 
 def dominant_dynamics(truth: Truth, *columns: FloatArray) -> Dynamics:

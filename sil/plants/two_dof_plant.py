@@ -99,18 +99,22 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
     return product
 
 
-# One sample period, prepared: M, l mu, m_t, c_p, k_p, c_t, k_t, sin theta_0, theta_0, [(z_ddot, M times noise), ...]
+def coefficients(truth: TwoDof) -> tuple[FloatArray, ...]:
+    """At every sample: M, l mu, m_t, c_p, k_p, c_t, k_t, sin theta_0, theta_0."""
+    mass, moment = lever_plant.inertia(truth.lever, truth.arm), lever_plant.moment(truth.lever, truth.arm)
+    springs = (truth.m_t, truth.c_p, truth.k_p, truth.c_t, truth.k_t)
+    return (mass, moment, *springs, np.sin(truth.trim), truth.trim)
+
+
+# One sample period, prepared: coefficients(), [(z_ddot, M times noise), ...]
 _Row = tuple[float, float, float, float, float, float, float, float, float, list[list[float]]]
 
 
-def _rows(truth: TwoDof, conditions: Conditions) -> Iterator[_Row]:
+def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
     """The sample periods between the samples, in order."""
-    mass, moment = lever_plant.inertia(truth.lever, truth.arm), lever_plant.moment(truth.lever, truth.arm)
-    springs = (truth.m_t, truth.c_p, truth.k_p, truth.c_t, truth.k_t)
-    columns = (mass, moment, *springs, np.sin(truth.trim), truth.trim)
     for block in conditions.blocks():
         at = block.periods
-        drive = np.stack((block.z_ddot, mass[at, None] * block.kick + block.push), axis=2).tolist()
+        drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick + block.push), axis=2).tolist()
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
@@ -127,7 +131,7 @@ class Plant:
         self._lever = truth.lever
         self._step = conditions.step
         self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
-        self._rows = _rows(truth, conditions)
+        self._rows = _rows(coefficients(truth), conditions)
 
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""

@@ -18,7 +18,7 @@ from .loop import Recording
 
 def columns_of(recording: Recording, frames: Frames) -> Trace:
     """The columns of trace.csv, in order."""
-    sample = np.array(recording.sample, dtype=np.int64)
+    sample = recording.traffic.sample.astype(np.int64)
     count = len(recording.inputs.time)
     decoded = _Decoded(frames, sample, count, round(recording.scenario.period * 1e6))
     trace = _truth(recording)
@@ -36,7 +36,7 @@ def columns_of(recording: Recording, frames: Frames) -> Trace:
 def published(recording: Recording, frames: Frames) -> NDArray[np.bool_]:
     """At which samples the estimator has sent its parameters, and what else comes at that rate."""
     there = np.zeros(len(recording.inputs.time), np.bool_)
-    there[np.array(recording.sample, dtype=np.int64)[frames.of(codec.message("PILOT_PARAMETERS").frame_id)]] = True
+    there[recording.traffic.sample[frames.of(codec.message("PILOT_PARAMETERS").frame_id)]] = True
     return there
 
 
@@ -45,10 +45,10 @@ def _truth(recording: Recording) -> Trace:
     values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}
     return {
         "time_s": inputs.time,
-        "theta_true_rad": np.array(recording.theta),
-        "theta_dot_true_rad_s": np.array(recording.theta_dot),
+        "theta_true_rad": recording.theta,
+        "theta_dot_true_rad_s": recording.theta_dot,
         "z_ddot_true_m_s2": inputs.z_ddot,
-        "tau_m_true_N_m": np.array(recording.tau_m),
+        "tau_m_true_N_m": recording.tau_m,
         "trim_true_rad": inputs.truth.rest,
         **{quantity.column("true"): values[quantity.key] for quantity in recording.scenario.judged()},
     }

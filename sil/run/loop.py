@@ -20,13 +20,14 @@ import can
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, Commander, refusal, result_of
+from lever_cdkf.host_tools.can.commander import ACCEPTED, SEQUENCE, Commander, refusal, result_of
 from lever_cdkf.host_tools.can.identity import Identity
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
-from numpy.typing import NDArray
 
-from ..plants import excitation, sensors
-from ..plants.truth import Body, Conditions, Truth
+from ..fast.closed_loop import Traffic
+from ..plants import sensors
+from ..scenarios.inputs import Inputs, conditions, prepare, readings
+from ..scenarios.inputs import commands as commands_of
 from ..scenarios.scenario import Scenario
 from .buslog import Frames
 
@@ -58,26 +59,33 @@ class _UnrestedError(Exception):
     """A run has ended so recently that its torque, or the sequence of its COMMANDs, reaches into this one."""
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """What is known of a run before it starts: one value a sample."""
+@dataclass
+class Recording:
+    """What a run left behind, in whole columns."""
 
-    time: FloatArray
-    truth: Truth
-    z_ddot: FloatArray
-    """True base acceleration [m/s^2]."""
-    z_ddot_measured: FloatArray
-    torque: FloatArray
-    """Commanded by the scenario itself [N m]."""
-    disturbance: FloatArray
-    """Unmeasured torque in the lever [N m]."""
-    missing: dict[str, NDArray[np.bool_]]
-    """For each of sensors.VALUES and sensors.FRAMES."""
+    scenario: Scenario
+    inputs: Inputs
+    traffic: Traffic = field(default_factory=Traffic)
+    theta: FloatArray = field(default_factory=lambda: np.empty(0))
+    """True angle of the lever [rad], its rate [rad/s] and the motor's torque [N m] at the samples."""
+    theta_dot: FloatArray = field(default_factory=lambda: np.empty(0))
+    tau_m: FloatArray = field(default_factory=lambda: np.empty(0))
+    unanswered: int = 0
+    misplaced: int = 0
+    """Estimates that belong to another sample than the one that was to be answered."""
+    identity: Identity = field(default_factory=Identity)
+
+    def frames(self) -> Frames:
+        """All frames, with the time of their sample."""
+        period_us = round(self.scenario.period * 1e6)
+        received = np.isin(self.traffic.identifier, list(_from_estimator()))
+        time_us = self.traffic.sample.astype(np.int64) * period_us
+        return Frames(time_us, self.traffic.identifier, self.traffic.data, received)
 
 
 @dataclass
-class Recording:
-    """What a run left behind, in the order in which it happened."""
+class _Tape:
+    """A Recording while it is made, in the order in which everything happens."""
 
     scenario: Scenario
     inputs: Inputs
@@ -90,39 +98,22 @@ class Recording:
     grip_force: list[float] = field(default_factory=list)
     unanswered: int = 0
     misplaced: int = 0
-    """Estimates that belong to another sample than the one that was to be answered."""
     identity: Identity = field(default_factory=Identity)
 
-    def frames(self) -> Frames:
-        """All frames, with the time of their sample."""
-        identifier = np.array(self.identifier, dtype=np.uint16)
-        period_us = round(self.scenario.period * 1e6)
-        return Frames(
-            np.array(self.sample, dtype=np.int64) * period_us,
-            identifier,
-            np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8),
-            np.isin(identifier, list(_from_estimator())),
+    def finished(self) -> Recording:
+        """The whole."""
+        data = np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8)
+        return Recording(
+            self.scenario,
+            self.inputs,
+            Traffic(np.array(self.identifier, dtype=np.uint16), np.array(self.sample, dtype=np.uint32), data),
+            np.array(self.theta),
+            np.array(self.theta_dot),
+            np.array(self.tau_m),
+            self.unanswered,
+            self.misplaced,
+            self.identity,
         )
-
-
-def prepare(scenario: Scenario) -> Inputs:
-    """The parts of a run that do not depend on the estimator."""
-    time, period = scenario.time(), scenario.period
-    base = excitation.total(scenario.base, time, scenario.streams("base", scenario.base))
-    dropouts = scenario.sensors.dropout
-    gone = {}
-    for what in (*sensors.VALUES, *sensors.FRAMES):
-        gone[what] = sensors.missing(dropouts, what, time, period, scenario.streams("dropout", dropouts))
-    measured = scenario.sensors.z_ddot.measure(base, period, scenario.stream("z_ddot"))
-    return Inputs(
-        time=time,
-        truth=scenario.truth(time),
-        z_ddot=base,
-        z_ddot_measured=scenario.corruption("z_ddot", time).of(measured),
-        torque=excitation.total(scenario.torque, time, scenario.streams("torque", scenario.torque)),
-        disturbance=excitation.total(scenario.disturbance, time, scenario.streams("disturbance", scenario.disturbance)),
-        missing=gone,
-    )
 
 
 def run(
@@ -141,15 +132,15 @@ def run(
     """
     inputs, alone = prepare(scenario), commander is None
     commander = commander or Commander()
-    recording = Recording(scenario, inputs)
+    tape = _Tape(scenario, inputs)
     try:
-        _loop(recording, _Link(bus, recording, commander, must_rest=alone), realtime, progress)
+        _loop(tape, _Link(bus, tape, commander, must_rest=alone), realtime, progress)
     except _UnrestedError:
-        resting = Recording(scenario, inputs)
+        resting = _Tape(scenario, inputs)
         _rest(_Link(bus, resting, commander), scenario, float(inputs.truth.rest[0]))
-        recording = Recording(scenario, inputs, identity=resting.identity)
-        _loop(recording, _Link(bus, recording, commander), realtime, progress)
-    return recording
+        tape = _Tape(scenario, inputs, identity=resting.identity)
+        _loop(tape, _Link(bus, tape, commander), realtime, progress)
+    return tape.finished()
 
 
 def _rest(link: _Link, scenario: Scenario, theta: float) -> None:
@@ -170,15 +161,15 @@ def _rest(link: _Link, scenario: Scenario, theta: float) -> None:
 class _Link:
     """The estimator at the other end of the bus; records every frame both ways."""
 
-    def __init__(self, bus: can.BusABC, recording: Recording, commander: Commander, *, must_rest: bool = False) -> None:
+    def __init__(self, bus: can.BusABC, tape: _Tape, commander: Commander, *, must_rest: bool = False) -> None:
         """`must_rest`: what an earlier run has left is an _UnrestedError."""
         self.has_health = False
         """Whether the last answer had a HEALTH in it."""
         self._must_rest = must_rest
         self._bus = bus
-        self._recording = recording
+        self._tape = tape
         self._commander = commander
-        self._period_us = round(recording.scenario.period * 1e6)
+        self._period_us = round(tape.scenario.period * 1e6)
         self._estimate = codec.message("STATE_ESTIMATE").frame_id
         self._motor = codec.message("MOTOR_COMMAND").frame_id
         self._acknowledgement = codec.message("COMMAND_ACK").frame_id
@@ -194,14 +185,14 @@ class _Link:
         """A function that sends a frame of the message `name`: called with the sample and the 8 bytes."""
         identifier = codec.message(name).frame_id
         message = can.Message(arbitration_id=identifier, is_extended_id=False, data=bytes(8))
-        send, recording = self._bus.send, self._recording
+        send, tape = self._bus.send, self._tape
 
         def send_frame(sample: int, data: bytes) -> None:
             message.data = bytearray(data)
             send(message)
-            recording.identifier.append(identifier)
-            recording.sample.append(sample)
-            recording.data += data
+            tape.identifier.append(identifier)
+            tape.sample.append(sample)
+            tape.data += data
 
         return send_frame
 
@@ -252,23 +243,23 @@ class _Link:
                 if self._estimate_time(data) == time_low:
                     self._unanswered_in_a_row = 0
                     return torque
-                self._recording.misplaced += 1
+                self._tape.misplaced += 1
         self._miss(sample)
         return torque
 
     def _take(self, sample: int, timeout: float) -> tuple[int, bytes | bytearray] | None:
         """The next frame of the estimator, recorded; None when none comes in time."""
-        recording = self._recording
+        tape = self._tape
         while (message := self._bus.recv(timeout)) is not None:
             identifier, data = message.arbitration_id, message.data
             if identifier not in self._incoming or len(data) != 8:
                 continue  # somebody else's
-            recording.identifier.append(identifier)
-            recording.sample.append(sample)
-            recording.data += data
+            tape.identifier.append(identifier)
+            tape.sample.append(sample)
+            tape.data += data
             if identifier == self._identity:
-                recording.identity.take(codec.decode(identifier, data)[1])
-                recording.identity.check(f"the estimator on {self._bus.channel_info}")
+                tape.identity.take(codec.decode(identifier, data)[1])
+                tape.identity.check(f"the estimator on {self._bus.channel_info}")
                 self._check_settings()
             return identifier, data
         return None
@@ -276,7 +267,7 @@ class _Link:
     def _check_settings(self) -> None:
         """Settings come by no frame: another process has its own. Raises SettingsError when they are not the
         scenario's."""
-        scenario, says = self._recording.scenario, self._recording.identity.settings_crc
+        scenario, says = self._tape.scenario, self._tape.identity.settings_crc
         if says not in (None, scenario.config.settings_crc):
             raise SettingsError(
                 f"the estimator on {self._bus.channel_info} has other settings than the scenario: start it with those "
@@ -284,7 +275,7 @@ class _Link:
             )
 
     def _miss(self, sample: int) -> None:
-        self._recording.unanswered += 1
+        self._tape.unanswered += 1
         self._unanswered_in_a_row += 1
         if self._unanswered_in_a_row >= MOST_UNANSWERED or not sample:
             raise NoAnswerError(
@@ -305,20 +296,20 @@ def _signed_field(name: str, signal: str) -> Callable[[bytes | bytearray], float
     return lambda data: ((raw(data) ^ half) - half) * scale
 
 
-def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress | None) -> None:
+def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -> None:
     """The samples, one after the other."""
-    scenario, inputs = recording.scenario, recording.inputs
+    scenario, inputs = tape.scenario, tape.inputs
     count = len(inputs.time)
-    body = _body(scenario, inputs)
-    commands = _commands(scenario, inputs.time)
+    body = inputs.truth.body(conditions(scenario, inputs))
+    commands = commands_of(scenario, inputs.time)
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
     encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
-    thetas, theta_dots, torques, forces = recording.theta, recording.theta_dot, recording.tau_m, recording.grip_force
-    measure = [_reader_of(recording, name) for name in ("theta", "theta_dot", "tau_m")]
-    send_grip = _grip_sender(recording, link)
+    thetas, theta_dots, torques, forces = tape.theta, tape.theta_dot, tape.tau_m, tape.grip_force
+    measure = [_reader_of(tape, name) for name in ("theta", "theta_dot", "tau_m")]
+    send_grip = _grip_sender(tape, link)
     no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
-    base = np.where(inputs.missing["z_ddot"], np.nan, inputs.z_ddot_measured).tolist()
+    base = inputs.base.tolist()
     period_us = round(scenario.period * 1e6)
     command, own_torque, last = 0.0, inputs.torque.tolist(), count - 1
 
@@ -346,49 +337,19 @@ def _loop(recording: Recording, link: _Link, realtime: bool, progress: Progress 
         progress(count, count)
 
 
-def _body(scenario: Scenario, inputs: Inputs) -> Body:
-    return inputs.truth.body(
-        Conditions(
-            inputs.z_ddot,
-            scenario.period,
-            scenario.pilot.process_noise,
-            scenario.motor.lag,
-            scenario.stream("process"),
-            disturbance=inputs.disturbance,
-        )
-    )
-
-
-def _commands(scenario: Scenario, time: FloatArray) -> dict[int, dict[str, codec.Value]]:
-    """What to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the start,
-    the dither as it changes, and while it is on, one that keeps it alive."""
-    changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
-    start: dict[str, codec.Value] = {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}
-    commands = {0: start}
-    repetition = max(1, round(KEEP_ALIVE / scenario.period))
-    for (sample, rms), end in zip(changes.items(), [*changes, len(time)][1:], strict=True):
-        commands[sample] = {**commands.get(sample, {}), "dither_rms": rms}
-        if rms > 0.0:
-            commands |= {later: {} for later in range(sample + repetition, end, repetition)}
-    return commands
-
-
-def _reader_of(recording: Recording, name: str) -> Callable[[int], float]:
+def _reader_of(tape: _Tape, name: str) -> Callable[[int], float]:
     """The reading of a signal of the lever at a sample, from the history up to it; NaN when invalid."""
-    scenario, inputs = recording.scenario, recording.inputs
-    sensor: sensors.Sensor = getattr(scenario.sensors, name)
-    offsets = sensor.offsets(len(inputs.time), scenario.stream(name))
-    corruption = scenario.corruption(name, inputs.time)
-    corruption.offset[inputs.missing[name]] = np.nan
-    reader = _reader(sensor, getattr(recording, name), offsets.tolist(), scenario.period)
-    return _corrupted(reader, corruption)
+    scenario = tape.scenario
+    given = readings(scenario, tape.inputs, name)
+    reader = _reader(given.sensor, getattr(tape, name), given.offsets.tolist(), scenario.period)
+    return reader if given.corruption is None else _corrupted(reader, given.corruption)
 
 
-def _grip_sender(recording: Recording, link: _Link) -> Callable[[int], None] | None:
+def _grip_sender(tape: _Tape, link: _Link) -> Callable[[int], None] | None:
     """Sends the GRIP_SAMPLE of a sample; None without that sensor."""
-    if recording.scenario.sensors.grip_force is None:
+    if tape.scenario.sensors.grip_force is None:
         return None
-    read, send, encode = _reader_of(recording, "grip_force"), link.sender("GRIP_SAMPLE"), codec.encoder("GRIP_SAMPLE")
+    read, send, encode = _reader_of(tape, "grip_force"), link.sender("GRIP_SAMPLE"), codec.encoder("GRIP_SAMPLE")
     return lambda sample: send(sample, encode(sample, read(sample)))
 
 

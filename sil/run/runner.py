@@ -21,7 +21,7 @@ from lever_cdkf.host_tools.results.trace import Trace
 from numpy.typing import NDArray
 
 from ..scenarios.scenario import Scenario
-from . import buslog, loop, summary
+from . import buslog, in_process, loop, summary
 from .buslog import Frames
 from .columns import columns_of, published
 from .loop import Progress
@@ -58,9 +58,12 @@ def simulate(
     start = clock.perf_counter()
     if out_dir is not None:
         make_folder(out_dir)  # before a run that could then not be kept
-    with ExitStack() as stack:
-        estimator = bus or stack.enter_context(LeverBus(channel, config=scenario.config))
-        recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
+    if bus is None and not realtime:
+        recording = in_process.run(scenario, channel, progress)
+    else:
+        with ExitStack() as stack:
+            estimator = bus or stack.enter_context(LeverBus(channel, config=scenario.config))
+            recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
     frames = recording.frames()
     columns = columns_of(recording, frames)
     untimed = summary.build(recording, columns)

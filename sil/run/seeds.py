@@ -68,14 +68,10 @@ def _results(function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: i
 
 def simulate(task: Task) -> SimulationSummary:
     """The summary of one run. Raises LeverError."""
-    from lever_cdkf.host_tools.can.bus import LeverBus
-
     from ..scenarios import scenario
     from . import runner
 
-    loaded = scenario.load(task.scenario, (*task.overrides, f"seed={task.seed}"))
-    with LeverBus("lever", config=loaded.config) as bus:
-        return runner.simulate(loaded, bus).summary
+    return runner.simulate(scenario.load(task.scenario, (*task.overrides, f"seed={task.seed}"))).summary
 
 
 # --- figures of one scenario -----------------------------------------------------------------------------------------

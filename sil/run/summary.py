@@ -193,12 +193,18 @@ def missed_limits(
     for name, rms in rms_percent.items():
         limit = limits.get(name)
         if limit is not None and rms is not None and rms > 100.0 * limit:
-            missed.append(f"rms error of {name} {rms:.1f} % (limit {100.0 * limit:g} %)")
+            missed.append(f"rms error of {name} {_above(rms, 100.0 * limit)} % (limit {100.0 * limit:g} %)")
     least = limits.get("coverage")
     for name, share in coverage.items():
         if least is not None and share is not None and share < least:
             missed.append(f"coverage of {name} {_whole_percent(share)} % (limit {100.0 * least:g} %)")
     return missed
+
+
+def _above(value: float, limit: float) -> str:
+    """With as many decimals as it takes to differ from the limit."""
+    texts = (f"{value:.{decimals}f}" for decimals in range(1, 12))
+    return next((text for text in texts if float(text) > limit), f"{value!r}")
 
 
 def _whole_percent(share: float) -> int:

@@ -21,7 +21,11 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.firmware import quantities
+from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
+from lever_cdkf.host_tools.firmware.settings_file import setting_value
+from lever_cdkf.host_tools.firmware.units import UnitError
+from lever_cdkf.host_tools.near_names import did_you_mean
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 
 from ..plants import excitation, lever_plant, pilots
@@ -100,8 +104,20 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
 
 
 def _read_settings() -> Reader:
-    """Reader of a table of settings by the names of lever_settings.def, each in a unit of its dimension."""
-    return _read_numbers({row.name: read_quantity(row.unit) for row in settings_table()})
+    """Reader of a table of settings by the names of lever_settings.def."""
+    return _read_numbers({row.name: _read_setting(row) for row in settings_table()})
+
+
+def _read_setting(row: Setting) -> Reader:
+    """Reader of a setting as everywhere: with a unit, or as a number in the unit of lever_settings.def."""
+
+    def reader(value: Any, place: Place) -> float:
+        try:
+            return setting_value(row, value if isinstance(value, str) else repr(value))
+        except UnitError as error:
+            raise place.error(str(error)) from None
+
+    return reader
 
 
 def _read_lever() -> Reader:
@@ -150,12 +166,12 @@ class Scenario:
         except SettingsError as error:
             raise ScenarioError(f"{self.file}: settings: {error}") from None
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Sample period [s], in whole microseconds as the time in the frames."""
         return round(self.config.settings["sample_period"] * 1e6) * 1e-6
 
-    @property
+    @cached_property
     def true_lever(self) -> lever_plant.Lever:
         return lever_plant.Lever.from_settings(self.config.settings | dict(self.lever or {}))
 
@@ -228,18 +244,26 @@ def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
 
     Raises ScenarioError.
     """
+    return from_toml(content_of(name_or_path), name_or_path, overrides)
+
+
+def content_of(name_or_path: str, folder: Path | None = None) -> bytes:
+    """What the file of a scenario holds; a path is relative to `folder`. Raises ScenarioError."""
     if name_or_path.endswith(".toml"):
-        path, file = Path(name_or_path), name_or_path
+        path = (folder or Path()) / name_or_path
         if not path.is_file():
-            raise ScenarioError(f"{file}: no such file")
-        content, name = path.read_bytes(), path.stem
-    elif name_or_path in names():
-        name, file = name_or_path, f"{name_or_path}.toml"
-        content = (files(__package__) / file).read_bytes()
-    else:
-        raise ScenarioError(
-            f"no scenario {name_or_path!r}; there are {', '.join(names())}, or give a path to a .toml file"
-        )
+            raise ScenarioError(f"{path}: no such file")
+        return path.read_bytes()
+    if name_or_path in names():
+        return (files(__package__) / f"{name_or_path}.toml").read_bytes()
+    hint = did_you_mean(name_or_path, names(), f"there are {', '.join(names())}, or give a path to a .toml file")
+    raise ScenarioError(f"no scenario {name_or_path!r}; {hint}")
+
+
+def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
+    """As load(), of what the file holds."""
+    is_path = name_or_path.endswith(".toml")
+    name, file = (Path(name_or_path).stem, name_or_path) if is_path else (name_or_path, f"{name_or_path}.toml")
     try:
         scenario = dataclasses.replace(_read(content, file, overrides), name=name, file=file)
     except RecursionError:
@@ -259,12 +283,19 @@ def _read(content: bytes, file: str, overrides: Iterable[str]) -> Scenario:
 
 
 def _override(values: dict[str, Any], override: str) -> None:
-    """Puts "key.subkey=value" into the table; a number as subkey goes into a list, as in base.0.rms="0.2 g"."""
+    """Puts "key.subkey=value" into the table; a number as subkey goes into a list, as in base.0.rms="0.2 g".
+
+    Settings and choices of the estimator may stand without the name of their table, as in all commands.
+    """
     key, equals, written = override.partition("=")
     *parents, last = key.strip().split(".")
     if not equals or not last:
         raise ScenarioError(f"--set {override}: must be KEY=VALUE, such as duration='10 s' or settings.m_p='3 kg'")
     target: Any = values
+    if not parents and last in {row.name for row in settings_table()}:
+        parents = ["settings"]
+    elif not parents and last in CHOICES and isinstance(_value(written), str):
+        parents = ["estimator"]
     try:
         for parent in parents:
             target = target[int(parent)] if isinstance(target, list) else target.setdefault(parent, {})

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.results.trace import Trace
 
-from ..run import loop
+from ..run import in_process
 from ..run.columns import columns_of
 from ..scenarios.scenario import Scenario, load
 from ..toml_tables import ScenarioError
@@ -56,8 +55,7 @@ def recorded(name: str, runs: int, seed: int, duration: float | None = None) -> 
 
 
 def _run(scenario: Scenario) -> Trace:
-    with LeverBus(f"study {scenario.name}", config=scenario.config) as bus:
-        recording = loop.run(scenario, bus)
+    recording = in_process.run(scenario)
     return columns_of(recording, recording.frames())
 
 

@@ -27,6 +27,7 @@ def main() -> int:
     parser.add_argument("--random", type=int, metavar="N", help="only so many")
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the choice (default: %(default)s)")
     parser.add_argument("--file", default="", help="only of these files: a part of their path")
+    parser.add_argument("--least", type=float, default=0.0, metavar="PERCENT", help="exit 1 when fewer are killed")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every verdict")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     args = parser.parse_args()
@@ -34,6 +35,7 @@ def main() -> int:
     mutants = [Mutant(**each) for each in found["mutants"] if args.file in each["path"]]
     if args.random:
         mutants = sorted(random.Random(args.seed).sample(mutants, args.random), key=lambda each: each.number)
+        print(f"{args.random} mutants drawn with seed {args.seed}")
     start = time.monotonic()
     programs = [measured(path) for path in sorted((args.build / "programs").iterdir())]
     programs += [measured(args.build / "oracle", case) for case in sorted((args.build / "cases").glob("*.case"))]
@@ -48,7 +50,7 @@ def main() -> int:
     print(f"{found['left_out']} more in constant expressions, which cannot be switched, were left out")
     if args.json:
         args.json.write_text(json.dumps([asdict(verdict) for verdict in verdicts]))
-    return 0
+    return 1 if share < args.least else 0
 
 
 if __name__ == "__main__":

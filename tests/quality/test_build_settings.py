@@ -78,8 +78,11 @@ def test_a_build_starts_with_the_values_of_the_file(tmp_path: Path, build_dir: P
     [
         ("theta_noise = 9", "my.settings:2: theta_noise = 9 is out of range: from 1.0e-7 to 0.2 rad"),
         ("theta_noise = 1e-8", "theta_noise = 1e-8 is out of range"),
-        ("m_p = 3 kg", "my.settings:2: m_p = 3 kg is not understood: write name = value"),
-        ("m_p = nan", "my.settings:2: m_p = nan is not a number (give it in kg, without the unit)"),
+        (
+            "m_p = 3000 g",
+            "my.settings:2: m_p = 3000 g: a build takes it in kg; `lever settings --settings FILE` converts",
+        ),
+        ("m_p = nan", "my.settings:2: m_p = nan is not a number (give it in kg)"),
         ("theta_nois = 1", "my.settings:2: unknown setting theta_nois; `lever settings` lists them all"),
         ("theta_noise 1", "my.settings:2: theta_noise 1 is not understood: write name = value"),
         ("model = levers", "my.settings:2: model = levers is not known; `lever settings` lists what is"),

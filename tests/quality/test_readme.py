@@ -1,25 +1,23 @@
 """What README files and pages tell people to type works: commands and Python run, C compiles.
 
 Each fenced block of language `sh`, `python` or `c` of a README is a file that is run or compiled. All `sh` blocks of
-another page (FLASH.md, SIL.md …) are one script, so that a step finds what the steps before have left in out/. They
-run in a scratch folder that looks like the source tree, with the virtual environment active and a recording
-`session.log` at hand. Not run are lines that begin with ctest or cmake (they are what runs this; but a page may build
-in out/) and sudo (not a test's to use). What pytest is to run is only found.
+another page (FLASH.md, SIL.md …) are one script, so that a step finds what the steps before have left in out/, the only
+place where they leave anything. They run in a scratch folder that looks like the source tree, with the virtual
+environment active, and what conftest.py puts there. Not run are lines that begin with ctest or cmake (they are what
+runs this; but a page may build in out/) and sudo (not a test's to use). What pytest is to run is only found. A block
+`console` is not run and says why; its `lever` commands have at least options that there are.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 import readmes
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.sil.run.runner import simulate
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.signals.mapping import read_mapping
 from quality import tools
 
 FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
@@ -67,29 +65,9 @@ def is_run(line: str, in_page: bool) -> bool:
 
 def run_here(script: str, scratch: Path, in_page: bool = False) -> None:
     lines = "\n".join(line for line in script.splitlines() if is_run(line, in_page))
+    there = set(scratch.iterdir())
     tools.assert_silent(["timeout", TIME_LIMIT, "bash", "-euo", "pipefail", "-c", lines], cwd=scratch)
-
-
-@pytest.fixture
-def scratch(tmp_path: Path, build_dir: Path, recording: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    for entry in tools.ROOT.iterdir():
-        if entry.name != "build" and not entry.name.startswith("."):
-            (tmp_path / entry.name).symlink_to(entry)
-    (tmp_path / "build").symlink_to(build_dir)
-    shutil.copy(recording, tmp_path / "session.log")
-    monkeypatch.setenv("PATH", f"{build_dir}/venv/bin:{os.environ['PATH']}")
-    monkeypatch.setenv("PYTEST_ADDOPTS", "--collect-only")
-    return tmp_path
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A few seconds of a simulation, estimates included, as candump would have recorded them."""
-    steady = scenario.load("steady", ["duration=4 s", "converged_after=2 s", "limits={}"])
-    folder = tmp_path_factory.mktemp("recording")
-    with LeverBus("vcan0", config=steady.config) as bus:
-        simulate(steady, bus, folder, channel="vcan0")
-    return folder / "bus.log"
+    assert set(scratch.iterdir()) == there, "what a page makes belongs into out/ or build/"
 
 
 def test_whatever_a_page_has_been_built_with_makes_lever_can() -> None:
@@ -125,6 +103,25 @@ def test_links_lead_to_files_and_headings(page: Path) -> None:
         file = page.parent / target if target else page
         assert file.exists(), target
         assert not anchor or anchor in anchors(file), f"{target}#{anchor}"
+
+
+@pytest.mark.parametrize("page", LINKING, ids=lambda page: str(page.relative_to(tools.ROOT)))
+def test_what_is_not_run_says_why_and_can_be_typed(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    fences = re.findall(r"^```(.*)$", text, re.MULTILINE)[::2]
+    assert set(fences) <= {"sh", "console", "python", "c", "toml"}, "every block says what it is"
+    reasons = re.findall(r"^<!-- not run: .+ -->\n```console$", text, re.MULTILINE)
+    assert len(reasons) == fences.count("console")
+    for block in readmes.blocks(page, "console").values():
+        for command in readmes.lever_commands(block):
+            cli._parser().parse_args(command)
+
+
+def test_a_mapping_file_is_one(tmp_path: Path) -> None:
+    (block,) = readmes.blocks(tools.ROOT / "host_tools/replay/README.md", "toml").values()
+    (tmp_path / "aircraft.toml").write_text(block, encoding="utf-8")
+    mapping = read_mapping([str(tmp_path / "aircraft.toml")])
+    assert set(mapping.sources) == {"theta", "z_ddot"}
 
 
 @pytest.mark.parametrize("script", blocks("sh"))

@@ -25,14 +25,16 @@ MAY_IMPORT = {
     "host_tools/commands": {"firmware", "board", "can", "replay", "tune", "watch", "signals"},
     "sil/plants": {"models"},
     "sil/oracle": {"models"},
-    "sil/scenarios": {"plants", "firmware", "results"},
-    "sil/run": {"scenarios", "plants", "firmware", "can", "results", "report", "watch", "exports"},
-    "sil/envelope": {"plants", "firmware", "models", "report"},
+    "sil/scenarios": {"plants", "firmware", "can", "results"},
+    "sil/fast": {"scenarios", "plants", "firmware", "can"},
+    "sil/run": {"fast", "scenarios", "plants", "firmware", "can", "results", "report", "watch", "exports"},
+    "sil/envelope": {"fast", "plants", "firmware", "models", "report"},
     "sil/study": {
-        *("run", "scenarios", "plants", "oracle", "envelope"),
+        *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
-    "sil/commands": {"run", "scenarios", "study", "envelope", "firmware", "can", "report", "exports"},
+    "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "report"},
+    "sil/commands": {"campaign", "run", "scenarios", "study", "envelope", "firmware", "can", "report", "exports"},
 }
 """By folder. What lies beside the folders is for all of its package, and imports nothing in them; sil may import
 that of host_tools too. Plants and oracle are what the firmware is compared with, and know neither it nor each other."""

@@ -17,7 +17,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations")
+NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations", "lever_loop")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from lever_cdkf.host_tools.firmware.config import CHOICES, Config
 from lever_cdkf.host_tools.firmware.settings_file import read_assignments
 
-NO_NUMBER = "is not a number (give it in rad, without the unit)"
+NO_NUMBER = "is not a number (give it in rad, or with a unit: rad, mrad, urad, deg)"
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_choices_and_settings_count_in_their_order(program: str, tmp_path: Path)
     expected = Config(
         "hand", "fixed", "joint", "annealing", settings={"m_p": 4.0, "c_p": 30.0, "theta_noise": 1.23456e-3}
     )
-    found = runs_with(program, tmp_path, *choices, "--set", "m_p=3", "--set", "theta_noise = 0.00123456", *late)
+    found = runs_with(program, tmp_path, *choices, "--set", "m_p=3000 g", "--set", "theta_noise = 1.23456 mrad", *late)
     assert found == (expected.choices, expected.settings_crc)
 
 
@@ -78,10 +78,11 @@ def test_what_is_wrong_is_said(line: str, said: str, program: str) -> None:
         ("theta_nose = 1", '"theta_nose" is not a setting; lever_can --help lists them'),
         ("theta_noise", '"theta_noise" has no "=": write name = value'),
         ("theta_noise = 5", "theta_noise: 5 is out of range, which is 1e-07 to 0.2 rad"),
-        ("theta_noise = 1 mrad", f'theta_noise: "1 mrad" {NO_NUMBER}'),
+        ("theta_noise = 1 mm", 'theta_noise: "1 mm" has unit "mm"; allowed: rad, mrad, urad, deg'),
+        ("theta_noise = 90 deg", "theta_noise: 1.5708 is out of range, which is 1e-07 to 0.2 rad"),
         ("theta_noise =", f'theta_noise: "" {NO_NUMBER}'),
         ("theta_noise = nan", f'theta_noise: "nan" {NO_NUMBER}'),
-        ("theta_noise = 0x1p-9", f'theta_noise: "0x1p-9" {NO_NUMBER}'),
+        ("theta_noise = 0x1p-9", 'theta_noise: "0x1p-9" has unit "x1p-9"; allowed: rad, mrad, urad, deg'),
         ("gap_limit = 1e99", "gap_limit: 1e+99 is out of range, which is 0.01 to 1 s"),
         ("preload =", 'preload: "" is not known; it can be fixed, trim'),
     ],

@@ -1,5 +1,5 @@
-/* Samples of a lever with an arm on it, linear about its trim, in double precision. What the estimator makes of a lever that is
- * not linear is compared with the float64 oracle (tests/python/oracle). */
+/* Samples of a lever with an arm on it, linear about its trim, in double precision. What the estimator makes of a
+ * lever that is not linear is compared with the float64 oracle (tests/python/oracle). */
 #ifndef UNIT_SIMULATION_H
 #define UNIT_SIMULATION_H
 

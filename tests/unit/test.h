@@ -1,4 +1,5 @@
-/* How a test is written: TEST(what_it_shows) { … }. A program runs its tests in their order, after setUp() each, if there is one. */
+/* How a test is written: TEST(what_it_shows) { … }. A program runs its tests in their order, after setUp() each, if
+ * there is one. */
 #ifndef UNIT_TEST_H
 #define UNIT_TEST_H
 

@@ -28,6 +28,13 @@ typedef struct choice {
     size_t offset;
 } choice_t;
 
+/* A unit that may follow a number, and its factor to the unit of the setting. */
+typedef struct unit {
+    const char *of;
+    const char *spelling;
+    double factor;
+} unit_t;
+
 static const choice_t choices[] = {
     {"model",
         {[LEVER_MODEL_LEVER] = "lever",
@@ -46,6 +53,13 @@ static const choice_t choices[] = {
         offsetof(lever_config_t, adaptation)},
 };
 enum { CHOICES = sizeof choices / sizeof choices[0] };
+
+static const unit_t units[] = {
+#define LEVER_UNIT(of, spelling, factor) {of, spelling, factor},
+#include "lever_units.def"
+#undef LEVER_UNIT
+};
+enum { UNITS = sizeof units / sizeof units[0] };
 
 static bool refuse(settings_error_t *error, const char *format, ...)
 {
@@ -91,8 +105,8 @@ static const char *after_sign(const char *text)
     return ((*text == '+') || (*text == '-')) ? (text + 1) : text;
 }
 
-/* Whether the text is a number of the grammar; strtod() takes more. */
-static bool is_number(const char *text)
+/* The end of the number of the grammar that a text begins with, the text itself if it does not; strtod() takes more. */
+static const char *after_number(const char *text)
 {
     const char *begin = after_sign(text);
     const char *end = after_digits(begin);
@@ -105,21 +119,54 @@ static bool is_number(const char *text)
     }
     if (good && ((*end == 'e') || (*end == 'E'))) {
         const char *exponent = after_sign(end + 1);
-        end = after_digits(exponent);
-        good = end != exponent;
+        const char *exponent_end = after_digits(exponent);
+        end = (exponent_end != exponent) ? exponent_end : end;
     }
-    return good && (*end == '\0');
+    return good ? end : text;
+}
+
+/* The factor of a unit to that of a setting; 0 if it is none of its units. */
+static double unit_factor(const char *of, const char *spelling)
+{
+    for (uint32_t i = 0u; i < (uint32_t)UNITS; i++) {
+        if ((strcmp(units[i].of, of) == 0) && (strcmp(units[i].spelling, spelling) == 0)) {
+            return units[i].factor;
+        }
+    }
+    return (*spelling == '\0') ? 1.0 : 0.0;
+}
+
+/* The spellings of a unit, as "kg, g". */
+static const char *unit_names(const char *of, char *text, size_t size)
+{
+    size_t used = 0u;
+
+    text[0] = '\0';
+    for (uint32_t i = 0u; i < (uint32_t)UNITS; i++) {
+        if ((strcmp(units[i].of, of) == 0) && (used < size)) {
+            used += (size_t)snprintf(&text[used], size - used, "%s%s", (used > 0u) ? ", " : "", units[i].spelling);
+        }
+    }
+    return text;
 }
 
 static bool set_number(lever_config_t *config, uint32_t index, const char *value, settings_error_t *error)
 {
     const lever_setting_t *setting = lever_setting(index);
-    const double number = strtod(value, NULL);
+    const char *end = after_number(value);
+    const char *spelling = end + strspn(end, BLANK);
+    const double factor = unit_factor(setting->unit, spelling);
+    char names[128];
 
-    if (!is_number(value)) {
-        return refuse(
-            error, "%s: \"%s\" is not a number (give it in %s, without the unit)", setting->name, value, setting->unit);
+    if (end == value) {
+        return refuse(error, "%s: \"%s\" is not a number (give it in %s, or with a unit: %s)", setting->name, value,
+            setting->unit, unit_names(setting->unit, names, sizeof names));
     }
+    if (!(factor > 0.0)) {
+        return refuse(error, "%s: \"%s\" has unit \"%s\"; allowed: %s", setting->name, value, spelling,
+            unit_names(setting->unit, names, sizeof names));
+    }
+    const double number = strtod(value, NULL) * factor;
     const float rounded = (fabs(number) <= (double)FLT_MAX) ? (float)number : INFINITY;
     if (!((rounded >= setting->least) && (rounded <= setting->greatest))) {
         return refuse(error, "%s: %g is out of range, which is %g to %g %s", setting->name, number,

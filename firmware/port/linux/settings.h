@@ -1,24 +1,25 @@
 /* A configuration from text: from the command line, one `name = value` at a time, or from a file.
  *
- * Names are those of lever_settings.def, in its units, and the four choices model, preload, estimator and adaptation;
- * the last of two equal names counts. The grammar of a settings file, for all who read one (lever_can,
+ * Names are those of lever_settings.def, and the four choices model, preload, estimator and adaptation; the last of two
+ * equal names counts. A number is in the unit of that table, or in the unit of lever_units.def that follows it. The grammar of a settings file, for all who read one (lever_can,
  * host_tools/firmware/settings_file.py, firmware/settings.cmake), in bytes:
  *
  *     file       = [ EF BB BF ] line { LF line }
  *     line       = blank [ assignment blank ] [ "#" comment ] [ CR ]
- *     assignment = name blank "=" blank ( number | word )
+ *     assignment = name blank "=" blank ( number [ blank unit ] | word )
  *     name, word = one or more of a-z 0-9 _
  *     number     = [ "+" | "-" ] ( digits [ "." [ digits ] ] | "." digits ) [ ( "e" | "E" ) [ "+" | "-" ] digits ]
  *     digits     = one or more of 0-9
+ *     unit       = a spelling of lever_units.def for the unit of that name
  *     blank      = any number of spaces and tabs
  *     comment    = any bytes but NUL and LF
  *
  * A line has at most 510 bytes, not counting EF BB BF and CR. A number means the double nearest to it, rounded to
- * float; it is that which must be in range. (Only CMake compares the double: it refuses what is out of range before it
- * is rounded.)
+ * float; it is that which must be in range. (CMake cannot calculate: it compares the double before it is rounded, and
+ * takes no unit but that of the table.)
  *
  *     preload = trim
- *     theta_noise = 0.002      # rad
+ *     theta_noise = 2 mrad     # 0.002, 0.002 rad
  */
 #ifndef LEVER_PORT_SETTINGS_H
 #define LEVER_PORT_SETTINGS_H

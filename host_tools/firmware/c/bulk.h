@@ -10,6 +10,9 @@
 #include <stdint.h>
 
 struct lever;
+struct lever_estimate;
+struct lever_health;
+struct lever_sample;
 
 /* --- frames ---------------------------------------------------------------------------------------------------- */
 
@@ -111,5 +114,10 @@ typedef struct bulk_fed {
  * answers. */
 void bulk_feed(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *frames, uint64_t count,
     bulk_frame_t *out, uint64_t out_room, bulk_row_t *rows, uint64_t row_room, bulk_fed_t *fed);
+
+/* Has the estimator take samples in their order, up to the last that is asked for: estimates[i] and healths[i] are of after
+ * samples[at[i]]. The indices `at` rise. */
+void bulk_estimates(struct lever *lever, const struct lever_sample *samples, const int64_t *at, uint64_t count,
+    struct lever_estimate *estimates, struct lever_health *healths);
 
 #endif

@@ -1,4 +1,4 @@
-/* Frames of a recording through an estimator, and what belongs to each sample side by side. */
+/* Frames or samples of a recording through an estimator, and what belongs to each sample side by side. */
 #include "bulk.h"
 #include "lever_cdkf.h"
 
@@ -138,5 +138,18 @@ void bulk_feed(bulk_feeder_t *feeder, struct lever *lever, const bulk_frame_t *f
             keep_recorded(feeder, frame);
         }
         fed->taken++;
+    }
+}
+
+void bulk_estimates(struct lever *lever, const lever_sample_t *samples, const int64_t *at, uint64_t count,
+    lever_estimate_t *estimates, lever_health_t *healths)
+{
+    int64_t next = 0;
+    for (uint64_t i = 0u; i < count; i++) {
+        for (; next <= at[i]; next++) {
+            (void)lever_update(lever, &samples[next]);
+        }
+        lever_estimate(lever, &estimates[i]);
+        lever_health(lever, &healths[i]);
     }
 }

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 from ...oracle.cdkf import C1, C2, H_SQUARED, H
 from ..data import PARAMETERS, STATES, Batch, Estimates
+from .in_c import followed
 from .recursion import (
     apply,
     factor,
-    follow,
     gain,
     no_innovation,
     output_covariance,
@@ -45,7 +45,8 @@ class Algorithm1:
     ahead: float = 0.0
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
-        return follow(ParameterFilter(batch, max(1, round(self.ahead / batch.period))), at)
+        steps = max(1, round(self.ahead / batch.period))
+        return followed("PARAMETERS", batch, at, lambda same: ParameterFilter(same, steps), steps=steps)
 
 
 class ParameterFilter:

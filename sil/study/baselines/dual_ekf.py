@@ -21,10 +21,10 @@ from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import PARAMETERS, STATES, Batch, Estimates
+from .in_c import followed
 from .recursion import (
     Slopes,
     apply,
-    follow,
     gain,
     no_innovation,
     output_covariance,
@@ -36,7 +36,7 @@ from .recursion import (
 
 def dual_ekf(batch: Batch, at: NDArray[np.int64]) -> Estimates:
     """Runs over the whole batch."""
-    return follow(DualEkf(batch), at)
+    return followed("DUAL_EKF", batch, at, DualEkf)
 
 
 class DualEkf:

@@ -15,11 +15,11 @@ from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import OUTPUTS, PARAMETERS, STATES, Batch, Estimates
+from .in_c import followed
 from .recursion import (
     Slopes,
     apply,
     block_diagonal,
-    follow,
     gain,
     no_innovation,
     output_covariance,
@@ -33,7 +33,7 @@ _SKIPPED = 1e6  # noise of a missing output is so many times what it is: it coun
 
 def joint_ekf(batch: Batch, at: NDArray[np.int64]) -> Estimates:
     """Runs over the whole batch."""
-    return follow(JointEkf(batch), at)
+    return followed("JOINT_EKF", batch, at, JointEkf)
 
 
 class Joint:

@@ -18,8 +18,9 @@ from lever_cdkf.host_tools.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import PARAMETERS, STATES, Batch, Estimates
+from .in_c import followed
 from .joint_ekf import Joint
-from .recursion import factor, follow, transposed
+from .recursion import factor, transposed
 
 _SIZE = PARAMETERS + STATES
 
@@ -49,7 +50,10 @@ class UnscentedTransform:
 
 def joint_ukf(batch: Batch, at: NDArray[np.int64]) -> Estimates:
     """Runs over the whole batch."""
-    return follow(JointUkf(batch), at)
+    transform = UnscentedTransform()
+    mean, covariance = (float(weights[0]) for weights in transform.weights)
+    centre = {"reach": transform.reach, "mean_weight": mean, "covariance_weight": covariance}
+    return followed("JOINT_UKF", batch, at, JointUkf, centre=centre)
 
 
 class JointUkf(Joint):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping, Sequence
 
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.near_names import did_you_mean
 
 from . import bode, consistency, grip, identification, linear
 from .description import Figure
@@ -30,8 +30,7 @@ def chosen(names: Sequence[str]) -> list[str]:
     """The names in the order of the page, all without any. Raises LeverError for one that does not exist."""
     for name in names:
         if name not in FIGURES:
-            near = difflib.get_close_matches(name, FIGURES, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(FIGURES)}"
+            hint = did_you_mean(name, FIGURES, f"there are {', '.join(FIGURES)}")
             raise LeverError(f"unknown figure {name!r}; {hint}")
     return [name for name in FIGURES if name in names or not names]
 

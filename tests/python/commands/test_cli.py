@@ -115,6 +115,30 @@ def test_settings_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert lines == [f"{name} = {value}" for name, value in values.items()]
 
 
+def test_one_syntax_of_settings_in_all_commands(
+    installed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Numbers in the unit of the table or with a unit, by hand: 2 mrad, 20 degrees, 6 per cent."""
+    assert installed
+    texts = ["theta_noise=2 mrad", "arm_preload_angle = -20deg", "k_p_walk=6 %/sqrt(s)", "m_p=3", "preload=fixed"]
+    expected = {"theta_noise = 0.002", "arm_preload_angle = -0.34906584", "k_p_walk = 0.06", "m_p = 3.0"}
+    path = tmp_path / "my.settings"
+    path.write_text("\n".join(texts), encoding="utf-8")
+    options = [part for text in texts for part in ("--set", text)]
+    for arguments in (
+        ["settings", *options],
+        ["settings", "--settings", str(path)],
+        ["sim", "steady", *options, "--settings"],
+        ["sim", "steady", "--set", "settings.theta_noise=2 mrad", *options[2:], "--settings"],
+    ):
+        assert cli.main(arguments) == 0
+        lines = {line.split("  #")[0].rstrip() for line in capsys.readouterr().out.splitlines()}
+        assert expected | {"preload = fixed"} <= lines, arguments
+    for arguments in (["replay", "none.log"], ["tune", "none.log"], ["sim", "steady"], ["settings"]):
+        assert cli.main([*arguments, "--set", "theta_noise=2 mm"]) == 2
+        assert "'2 mm' has unit 'mm'; allowed: rad, mrad, urad, deg" in capsys.readouterr().err
+
+
 @pytest.mark.usefixtures("commands")
 def test_dbc_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "a.json"
@@ -148,14 +172,13 @@ def test_dbc_path(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ([], "the following arguments are required: COMMAND (see `lever --help`)"),
         (["none"], "invalid choice: 'none'"),
         (["--none"], "(see `lever --help`)"),
         (["settings", "more"], "unrecognized arguments: more (see `lever --help`)"),
         (["settings", "--sett", "x"], "unrecognized arguments: --sett x"),
         (["settings", "--set"], "argument --set: expected one argument (see `lever settings --help`)"),
         (["settings", "--set", "m_p"], "'m_p' has no '=': write name = value"),
-        (["settings", "--set", "m_p=x"], "m_p = 'x' is not a number (give it in kg, without the unit)"),
+        (["settings", "--set", "m_p=x"], "m_p = 'x' is not a number (give it in kg, or with a unit: kg, g)"),
         (["settings", "--set", "m_p=100"], "m_p = 100.0 is out of range: it must be a number from 0.3 to 10 kg ("),
         (["settings", "--settings", "/none/x"], "/none/x: cannot be read: No such file or directory"),
         (["settings", "--json", "/none/x"], "cannot write /none/x: No such file or directory"),

@@ -17,13 +17,18 @@ from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
 from python.conftest import Refused
 
+QUICK = {
+    "steady", "sway_5deg_0.3hz", "retrim", "rest_20s", "base_invalid", "base_stuck", "theta_stuck", "spikes",
+    "only_rate",
+}  # fmt: skip
+
 
 def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     written = (tmp_path / "envelope.html").read_text(encoding="utf-8")
-    assert set(rows) == {name for name, condition in conditions.CONDITIONS.items() if condition.quick}
+    assert set(rows) == QUICK
     for name, row in rows.items():
         assert row["measured"].keys() == row["limit"].keys()
         assert name in printed
@@ -81,6 +86,14 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     printed = capsys.readouterr().out
     assert "0 of 2 conditions hold. Missed: missed, unknown." in printed
     assert table.MISSED in printed
+
+
+def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
+    limits = (Limit("f_n largest", most=1.0), Limit("f_n largest", most=2.0, over="worst"))
+    condition = Condition("steady", "", limits=limits)
+    result = campaign.Result(condition, dict.fromkeys(condition.figures, np.array([0.5, 1.0004])))
+    (line,) = table.lines([result])
+    assert (line["all runs"], line["median"], line["worst"]) == ("1.0004", "0.75", "1")
 
 
 def test_estimates_that_are_not_finite_keep_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,12 +52,9 @@ def test_friction_takes_its_share_of_each_half_swing() -> None:
     given = motions.lanes(replace(QUIET, duration=2.0, base=0.0, dither=0.0, friction=0.05), range(1))
     given = replace(given, c_p=np.zeros((1, 1)), trim=np.full((1, 1), 0.3), hardware=hardware)
     lanes = plant.Plant(given)
-    lanes.theta = given.trim[0] + 0.01
-    swing = []
-    for i in range(1500):
-        lanes.advance(i)
-        swing.append(float(lanes.theta[0] - 0.3))
-    angle = np.array(swing)
+    lanes.theta[0] += 0.01
+    lanes.move(0, 1500)
+    angle = lanes.theta[1:1501, 0] - 0.3
     peaks = np.abs(angle[1:-1][np.diff(np.sign(np.diff(angle))) != 0])
     stiffness = (hardware.length * math.cos(0.3)) ** 2 * given.k_p[0, 0] + hardware.stiffness
     assert len(peaks) > 5

@@ -11,8 +11,9 @@ _LONG = [("good", _BOM + _LONGEST + b"\r\n" + _LONGEST), ("bad", _LONGEST + b" "
 
 
 def corpus() -> list[tuple[str, bytes]]:
-    """How each file is taken, "good", "bad" or "rounded", and what is in it."""
+    """How each file is taken, "good", "bad" or "not_cmake", and what is in it."""
     lines = [line for line in CORPUS.read_text(encoding="ascii").splitlines() if line and line[0] != "#"]
-    files = [(line[:9].strip(), line[9:].encode().decode("unicode_escape").encode("latin-1")) for line in lines]
-    assert {verdict for verdict, _ in files} == {"good", "bad", "rounded"}
+    split = [line.partition(" ")[::2] for line in lines]
+    files = [(verdict, text.strip(" ").encode().decode("unicode_escape").encode("latin-1")) for verdict, text in split]
+    assert {verdict for verdict, _ in files} == {"good", "bad", "not_cmake"}
     return files + _LONG

@@ -57,8 +57,8 @@ def test_comments_order_and_spaces(tmp_path: Path) -> None:
     ("line", "error"),
     [
         ("m_p 3", "'m_p 3' has no '=': write name = value"),
-        ("m_p = 3 kg", "m_p = '3 kg' is not a number (give it in kg, without the unit)"),
-        ("m_p =", "m_p = '' is not a number (give it in kg, without the unit)"),
+        ("m_p = 3 lb", "m_p = '3 lb' has unit 'lb'; allowed: kg, g"),
+        ("m_p =", "m_p = '' is not a number (give it in kg, or with a unit: kg, g)"),
         ("= 3", "unknown setting ''; `lever settings` lists them all"),
         ("m_q = 3", "unknown setting 'm_q'; did you mean m_p?"),
         ("m_p = 1e9", "m_p = 1000000000.0 is out of range: it must be a number from 0.3 to 10 kg ("),

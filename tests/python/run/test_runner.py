@@ -15,7 +15,7 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from lever_cdkf.sil.run import loop, runner
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.sil.scenarios import inputs, scenario
 from lever_cdkf.sil.scenarios.scenario import Scenario
 from python.conftest import PuppetBus, estimate
 
@@ -99,18 +99,18 @@ def test_dither_is_kept_alive_by_a_command_each_quarter_of_a_second() -> None:
 
 def test_lost_frames_are_not_sent_and_invalid_values_are_marked() -> None:
     lost = scenario.load("sensor_dropout", ["duration=4 s", "sensors.dropout.2.start=1 s", "sensors.dropout.2.end=2 s"])
-    inputs, bus = loop.prepare(lost), PuppetBus(always)
+    known, bus = inputs.prepare(lost), PuppetBus(always)
     loop.run(lost, bus)
     levers, bases = bus.decoded("LEVER_SAMPLE"), bus.decoded("BASE_SAMPLE")
-    assert 0 < inputs.missing["lever_frame"].sum() == 4000 - len(levers)
-    assert 0 < inputs.missing["base_frame"].sum() == 4000 - len(bases)
-    assert [sample["counter"] for sample in levers] == (np.flatnonzero(~inputs.missing["lever_frame"]) % 16).tolist()
-    there = ~inputs.missing["lever_frame"]
-    assert [sample["theta_valid"] == 0 for sample in levers] == inputs.missing["theta"][there].tolist()
-    assert inputs.missing["theta"][1000:2000].all()
+    assert 0 < known.missing["lever_frame"].sum() == 4000 - len(levers)
+    assert 0 < known.missing["base_frame"].sum() == 4000 - len(bases)
+    assert [sample["counter"] for sample in levers] == (np.flatnonzero(~known.missing["lever_frame"]) % 16).tolist()
+    there = ~known.missing["lever_frame"]
+    assert [sample["theta_valid"] == 0 for sample in levers] == known.missing["theta"][there].tolist()
+    assert known.missing["theta"][1000:2000].all()
     assert all(sample["theta_dot_valid"] == 1 for sample in levers)
-    there = ~inputs.missing["base_frame"]
-    assert [sample["z_ddot_valid"] == 0 for sample in bases] == inputs.missing["z_ddot"][there].tolist()
+    there = ~known.missing["base_frame"]
+    assert [sample["z_ddot_valid"] == 0 for sample in bases] == known.missing["z_ddot"][there].tolist()
 
 
 def test_a_delayed_sensor_lags_and_a_wrong_gain_scales(short: Scenario) -> None:

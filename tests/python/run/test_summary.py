@@ -19,6 +19,7 @@ from lever_cdkf.host_tools.results.summary import Firmware, SimulationSummary, o
 from lever_cdkf.host_tools.results.trace import Trace
 from lever_cdkf.host_tools.results.whiteness import Whiteness
 from lever_cdkf.sil.run import loop, summary
+from lever_cdkf.sil.scenarios import inputs
 from lever_cdkf.sil.scenarios.scenario import Scenario
 from scipy import stats
 
@@ -43,7 +44,7 @@ coverage = "90 %"
 @pytest.fixture
 def recording(load: Callable[..., Scenario]) -> loop.Recording:
     scenario = load(TEXT)
-    return loop.Recording(scenario, loop.prepare(scenario))
+    return loop.Recording(scenario, inputs.prepare(scenario))
 
 
 def perfect(recording: loop.Recording) -> Trace:
@@ -203,7 +204,7 @@ def test_whether_the_estimator_has_the_settings_of_the_scenario_is_told(recordin
 
 def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., Scenario]) -> None:
     scenario = load(TEXT, "converged_after=20 s")
-    recording = loop.Recording(scenario, loop.prepare(scenario))
+    recording = loop.Recording(scenario, inputs.prepare(scenario))
     trace = perfect(recording)
     trace["m_p_estimate_kg"][:] = math.nan
     made = summary.build(recording, trace)
@@ -217,7 +218,7 @@ def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., 
 
 def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable[..., Scenario]) -> None:
     scenario = load(TEXT, "estimator.model=linear_physical", "limits={natural_frequency='2 %', coverage='90 %'}")
-    recording = loop.Recording(scenario, loop.prepare(scenario))
+    recording = loop.Recording(scenario, inputs.prepare(scenario))
     trace = perfect(recording)
     trace["damping_ratio_sigma"][:] = 0.0
     trace["damping_ratio_estimate"] *= 1.01
@@ -230,7 +231,7 @@ def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable
 def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(load: Callable[..., Scenario]) -> None:
     """The pilot tightens his c_p at 4 s; against M, D, K and the forcing of firmware/THEORY.md worked out here."""
     scenario = load(TEXT, "estimator.model=linear_physical", "limits={}")
-    recording = loop.Recording(scenario, loop.prepare(scenario))
+    recording = loop.Recording(scenario, inputs.prepare(scenario))
     told = summary.build(recording, perfect(recording)).truth
     assert told.model == "lever"
     assert told.transfer is not None
@@ -269,3 +270,10 @@ def test_what_is_no_summary_is_refused_in_a_line(wrong: str, tmp_path: Path) -> 
 def test_that_of_any_run_is_read_back(name: str) -> None:
     made = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
     assert of(SimulationSummary, json.loads(text(made))) == made
+
+
+@pytest.mark.parametrize(("rms", "shown"), [(5.4, "5.4"), (5.01, "5.01"), (5.0004, "5.0004"), (12.345, "12.3")])
+def test_a_limit_that_is_missed_does_not_look_kept(rms: float, shown: str) -> None:
+    (text,) = summary.missed_limits({"m_p": 0.05}, {"m_p": rms}, {})
+    assert text == f"rms error of m_p {shown} % (limit 5 %)"
+    assert summary.missed_limits({"m_p": 0.05}, {"m_p": 5.0}, {}) == []

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.sil.run import loop, runner
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.sil.run import runner
+from lever_cdkf.sil.scenarios import inputs, scenario
 
 BROKEN = {
     "moving_pilot": "20 s", "grip_moves": "60 s", "friction": "35 s", "hands_off": "50 s", "rough_air": "20 s",
@@ -129,7 +129,7 @@ def test_what_breaks_the_assumptions_is_in_the_run() -> None:
     assert np.count_nonzero(z_ddot[time < 20]) > 19_000
     assert np.std(moving["theta_true_rad"]) == pytest.approx(math.radians(3.0), rel=0.1)
     unknown = scenario.load("unknown_torque", ["duration=60 s"])
-    disturbance = loop.prepare(unknown).disturbance
+    disturbance = inputs.prepare(unknown).disturbance
     assert np.std(disturbance[:40_000]) == pytest.approx(0.2, rel=0.01)
     assert np.std(disturbance[40_000:]) == pytest.approx(1.0, rel=0.1)
     pushed, seen = (result("unknown_torque").trace[f"tau_m_{kind}_N_m"] for kind in ("true", "measured"))

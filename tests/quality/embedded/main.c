@@ -1,11 +1,12 @@
-/* Feeds a lively series of samples to the estimator and prints every estimate as hexadecimal bits, and every frame: two
- * builds that compute alike print alike. The samples come from single-precision arithmetic under the same compiler flags.
+/* Feeds a lively series of samples to the estimator and prints every estimate as hexadecimal bits, and every frame:
+ * two builds that compute alike print alike. The samples come from single-precision arithmetic under the same compiler
+ * flags.
  *
  *     embedded SAMPLES
  *
- * One run for each choice of preload and adaptation, and one for each model and estimator; a line is: run, sample, mode, then
- * the bits of the estimate. Then one run over the bus for each model and estimator; a line is: "bus", run, sample, then the
- * frames that were sent. The last line says whether self_test() passed. */
+ * One run for each choice of preload and adaptation, and one for each model and estimator; a line is: run, sample,
+ * mode, then the bits of the estimate. Then one run over the bus for each model and estimator; a line is: "bus", run,
+ * sample, then the frames that were sent. The last line says whether self_test() passed. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

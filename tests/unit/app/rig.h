@@ -158,7 +158,8 @@ static inline void assert_finite(lever_estimate_t e)
 
 /* --- first guesses ------------------------------------------------------------------------------------------------ */
 
-/* The setting of parameter i of the configured model named like it with `suffix`: "" its first guess, "_sigma", "_walk". */
+/* The setting of parameter i of the configured model named like it with `suffix`: "" its first guess, "_sigma",
+ * "_walk". */
 static inline float *parameter_setting(uint32_t i, const char *suffix)
 {
     char name[32];

@@ -2,7 +2,7 @@
 #include "rig.h"
 
 #ifdef LEVER_MUTATED
-enum { CONFIGURATIONS = 200 };
+enum { CONFIGURATIONS = 64 };
 #else
 enum { CONFIGURATIONS = 900 };
 #endif
@@ -77,7 +77,7 @@ TEST(with_any_samples_it_stays_finite)
 TEST(with_good_samples_it_needs_no_restart)
 {
     source.state = 7u;
-    for (uint32_t k = 0u; k < ((uint32_t)CONFIGURATIONS / 10u); k++) {
+    for (uint32_t k = 0u; k < ((uint32_t)CONFIGURATIONS / 8u); k++) {
         draw_config(k, 0.5);
         for (uint32_t n = 1u; n <= 1000u; n++) {
             simulation_advance(&simulation, (double)config.settings.sample_period);

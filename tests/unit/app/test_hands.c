@@ -42,8 +42,8 @@ static uint32_t run(uint32_t blocks, bool held, bool counts)
     return off;
 }
 
-/* Within a second, both ways; by base and motor, and by each alone. One block that the lever alone explains may be chance, and
- * blocks that do not count leave the verdict. */
+/* Within a second, both ways; by base and motor, and by each alone. One block that the lever alone explains may be
+ * chance, and blocks that do not count leave the verdict. */
 TEST_EACH(3, a_lever_that_is_let_go_is_off_and_held_again)
 {
     simulation.base_rms *= (test_round == 1u) ? 0.0 : 1.0;

@@ -1,4 +1,5 @@
-/* Frames to send: which, in what order, how often, protected how; that they say what the estimate says, and what may be used. */
+/* Frames to send: which, in what order, how often, protected how; that they say what the estimate says, and what may
+ * be used. */
 #include "frames.h"
 
 void setUp(void)

@@ -1,4 +1,5 @@
-/* Modes: init, align, run, coast, frozen, and what leads from one to the other (fault: test_recovery.c); gaps in time. */
+/* Modes: init, align, run, coast, frozen, and what leads from one to the other (fault: test_recovery.c); gaps in
+ * time. */
 #include "model/model.h"
 #include "rig.h"
 
@@ -137,21 +138,4 @@ TEST(a_sample_somewhat_late_or_much_too_early_is_taken_as_it_is)
     TEST_ASSERT_EQUAL_UINT32(0u, health().lost + health().late);
     (void)run(100u);
     TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
-}
-
-/* A gap is predicted in a bounded number of steps, which therefore get long; averages are shorter than that. */
-TEST(the_longest_gaps_that_the_settings_let_coast_need_no_restart)
-{
-    config.settings.gap_limit = 1.0f;                               /* the greatest that may be set */
-    config.settings.trim_corner = 1.5f / config.settings.gap_limit; /* lever_config_check() allows no more */
-    config.settings.excitation_time = 0.01f;
-    config.settings.robbins_monro_time = 0.01f;
-    start();
-    run_for(1000u);
-    for (uint32_t k = 1u; k <= 20u; k++) {
-        const lever_sample_t sample = sample_after(50u * k);
-        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
-        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(200u));
-        TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
-    }
 }

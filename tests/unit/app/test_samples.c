@@ -81,7 +81,8 @@ TEST(not_a_number_in_the_very_first_sample_does_no_harm)
     }
 }
 
-/* What was asked of the motor until the sample is what a perfect torque sensor would have said; without dither, nothing. */
+/* What was asked of the motor until the sample is what a perfect torque sensor would have said; without dither,
+ * nothing. */
 TEST(without_measured_torque_the_torque_asked_for_counts)
 {
     double largest = 0.0;

@@ -85,8 +85,8 @@ static const cause_t causes[] = {{.blind = true, .silence_ms = 20u, .mode = LEVE
     {.platform = LEVER_PLATFORM_WATCHDOG, .mode = LEVER_MODE_RUN}, {.fault = true, .mode = LEVER_MODE_FAULT},
     {.reset = true, .mode = LEVER_MODE_RUN}};
 
-/* Torque is zero from 50 ms after the cause, or the silence that it is, on; never above its limits on the way. A clock that
- * stands counts as 5 ms a sample: so late a port calls lever_idle(). */
+/* Torque is zero from 50 ms after the cause, or the silence that it is, on; never above its limits on the way. A
+ * clock that stands counts as 5 ms a sample: so late a port calls lever_idle(). */
 TEST_EACH(sizeof causes / sizeof causes[0], torque_ends_within_50_ms_of_every_cause)
 {
     const cause_t *cause = &causes[test_round];
@@ -191,8 +191,8 @@ TEST(no_command_brings_torque_back_in_fault)
 
 /* --- gaps --------------------------------------------------------------------------------------------------------- */
 
-/* At any moment of a dither that uses its rms up: a process that was stopped, for one long time in one call; or a gap in the
- * samples and then silence, of which what was let through before is all that may be left. */
+/* At any moment of a dither that uses its rms up: a process that was stopped, for one long time in one call; or a
+ * gap in the samples and then silence, of which what was let through before is all that may be left. */
 TEST(a_long_idle_time_or_gap_ends_torque_and_never_raises_it)
 {
     const uint32_t times_us[] = {100000u, 120000u, 150000u, 300000u, 0x7FFFFFFFu, UINT32_MAX};

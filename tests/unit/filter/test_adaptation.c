@@ -84,13 +84,3 @@ TEST(a_period_longer_than_the_averaging_time_counts_fully_and_stays_between_floo
         }
     }
 }
-
-TEST(without_excitation_every_kind_is_at_its_floor_and_forgets_nothing)
-{
-    for (uint8_t kind = 0u; kind < (uint8_t)LEVER_ADAPTATION_COUNT; kind++) {
-        start(kind);
-        step(1u, large, false);
-        assert_walk(1.0, 0.0);
-        TEST_ASSERT_TRUE(cdkf.growth == 0.0f);
-    }
-}

@@ -41,19 +41,6 @@ static uint32_t run(uint32_t blocks, uint32_t c, double sigmas, double rate)
     return wrong;
 }
 
-/* Ten minutes each. */
-TEST(an_error_within_what_is_stated_is_tolerated)
-{
-    const double sigmas[] = {0.0, 1.5, -1.5};
-    const double rates[] = {0.01, 1.0, 100.0};
-    for (uint32_t c = 0u; c < (uint32_t)C; c++) {
-        for (uint32_t k = 0u; k < 9u; k++) {
-            setUp();
-            TEST_ASSERT_EQUAL_UINT32(0u, run(30000u, c, sigmas[k % 3u], rates[k / 3u]));
-        }
-    }
-}
-
 /* Twice what is stated, and four standard deviations of the innovations' noise. */
 TEST(a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_gone)
 {

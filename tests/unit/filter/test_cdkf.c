@@ -36,31 +36,6 @@ void setUp(void)
 
 /* --- start and opening -------------------------------------------------------------------------------------------- */
 
-TEST(starts_at_the_guess_uncorrelated_with_the_standard_deviations_of_the_prior)
-{
-    float correlation[L];
-    (void)memset(cdkf, 0xA5, sizeof *cdkf);
-    cdkf_init(cdkf, &model_lever, &constants, &prior);
-    cdkf_correlation(cdkf, correlation);
-    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        TEST_ASSERT_TRUE((cdkf->p[i] == prior.guess[i]) && (cdkf->w[i] == 0.0f) && (cdkf->walk[i] == 0.0f));
-        TEST_ASSERT_EQUAL_FLOAT(prior.guess[i] * prior.sigma[i], cdkf_parameter_sigma(cdkf, i));
-        TEST_ASSERT_TRUE(correlation[i] == 0.0f);
-    }
-    TEST_ASSERT_TRUE((cdkf->trust == 0.0f) && (cdkf->growth == 0.0f) && (cdkf->pending.vector[2] == 0.0f));
-}
-
-TEST(correlations_are_those_of_the_factor)
-{
-    static const float s[9] = {1.0f, 0.0f, 0.0f, 0.6f, 0.8f, 0.0f, 0.0f, 0.6f, 0.8f};
-    float correlation[L];
-    (void)memcpy(cdkf->s, s, sizeof s);
-    cdkf_correlation(cdkf, correlation);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.6f, correlation[0]);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.0f, correlation[1]);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.48f, correlation[2]);
-}
-
 /* The state keeps its uncertainty, which is its own now. */
 TEST(opening_forgets_what_was_learnt_and_keeps_estimate_and_state)
 {
@@ -117,24 +92,6 @@ TEST(w_is_held_at_its_bounds_and_said_to_rest_there)
         TEST_ASSERT_TRUE(correction.bounded && (cdkf->w[i] == cdkf->scaling.greatest[i]));
         TEST_ASSERT_TRUE(correction.w[i] == (cdkf->scaling.greatest[i] - 1.0e5f));
     }
-}
-
-TEST(without_walk_or_forgetting_nothing_changes)
-{
-    const float none[L] = {0.0f, 0.0f, 0.0f};
-    const cdkf_t before = *cdkf;
-    for (uint32_t k = 0u; k < 10000u; k++) {
-        cdkf_forget(cdkf, 0.01f, false);
-        cdkf_walk(cdkf, 0.01f, none, false);
-    }
-    TEST_ASSERT_EQUAL_MEMORY(&before, cdkf, sizeof before);
-}
-
-TEST(drawing_caps_standard_deviations_at_the_prior)
-{
-    cdkf->s[0] = 7.0f;
-    cdkf_draw(cdkf, &model_lever, &constants);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, prior.sigma[0] * cdkf->p[0], cdkf_parameter_sigma(cdkf, 0u));
 }
 
 /* --- the invariant ------------------------------------------------------------------------------------------------ */

@@ -82,22 +82,6 @@ TEST(a_window_changes_the_noise_by_the_stated_formulas)
     }
 }
 
-TEST(without_a_window_and_within_one_the_noise_stays_as_set)
-{
-    const innovation_t innovation[CDKF_OUTPUTS] = {
-        {.value = 9.0f, .inverse_variance = 1.0f}, {.value = 9.0f, .inverse_variance = 1.0f}};
-    add(innovation, 200u);
-    TEST_ASSERT_FALSE(noise_estimation_step(&noise, &cdkf, &setting, 0.99f));
-    assert_as_set(0u);
-    setting.window = 0.0f;
-    TEST_ASSERT_FALSE(noise_estimation_step(&noise, &cdkf, &setting, 100.0f));
-    assert_as_set(0u);
-    TEST_ASSERT_TRUE(cdkf.process_noise[1] == setting.process_noise);
-    setting.window = 1.0f;
-    TEST_ASSERT_TRUE(noise_estimation_step(&noise, &cdkf, &setting, 0.0f));
-    TEST_ASSERT_TRUE(cdkf.output_noise[0] > setting.output_noise[0]);
-}
-
 TEST(never_leaves_its_range)
 {
     const float excess[] = {1.0e3f, 1.0e-3f};
@@ -124,18 +108,4 @@ TEST(an_output_that_is_missing_keeps_its_noise)
     (void)noise_estimation_step(&noise, &cdkf, &setting, 1.0f);
     TEST_ASSERT_TRUE(cdkf.output_noise[0] != setting.output_noise[0]);
     assert_as_set(1u);
-}
-
-TEST(a_window_that_is_begun_anew_forgets_what_was_in_it)
-{
-    const innovation_t wild[CDKF_OUTPUTS] = {
-        {.value = 1.0e3f, .inverse_variance = 1.0f, .noise_variance = 0.5f, .response = 1.0f},
-        {.value = 1.0e3f, .inverse_variance = 1.0f, .noise_variance = 0.5f, .response = 1.0f}};
-    add(wild, 200u);
-    TEST_ASSERT_FALSE(noise_estimation_step(&noise, &cdkf, &setting, 0.5f));
-    noise_estimation_begin(&noise);
-    window_of(1.0f);
-    assert_as_set(0u);
-    assert_as_set(1u);
-    TEST_ASSERT_TRUE(cdkf.process_noise[1] == setting.process_noise);
 }

@@ -64,14 +64,6 @@ TEST(w_is_kept_within_its_bounds)
     }
 }
 
-TEST(the_prior_has_standard_deviation_sigma_on_a_logarithmic_scale_and_1_on_a_linear_one)
-{
-    start(0u);
-    TEST_ASSERT_TRUE(scaling_prior_sigma(&scaling, 1u) == 0.6f);
-    start(1u);
-    TEST_ASSERT_TRUE(scaling_prior_sigma(&scaling, 1u) == 1.0f);
-}
-
 /* --- derived ------------------------------------------------------------------------------------------------------ */
 
 /* A falling lever has no natural frequency, but answers the base. */

@@ -7,30 +7,12 @@
 
 #define CORNER 1.0f    /* [Hz] */
 #define PERIOD 1.0e-3f /* [s] */
-#define TURN 6.283185307179586
 
-static high_pass_t filter;
 static trim_t trim;
 
 void setUp(void)
 {
-    filter = (high_pass_t){.level = 0.35f};
     trim_start(&trim, 0.35f, CORNER, true);
-}
-
-/* --- high-pass ---------------------------------------------------------------------------------------------------- */
-
-static double step_with(float value)
-{
-    return (double)high_pass_step(&filter, value, (float)TURN * CORNER * PERIOD, HIGH_PASS_BUTTERWORTH);
-}
-
-TEST(a_constant_has_no_deviation_and_a_value_is_compared_with_the_level_before_it)
-{
-    for (uint32_t k = 0u; k < 1000u; k++) {
-        TEST_ASSERT_TRUE(step_with(0.35f) == 0.0);
-    }
-    TEST_ASSERT_TRUE(step_with(0.45f) == (double)(0.45f - 0.35f));
 }
 
 /* --- trim --------------------------------------------------------------------------------------------------------- */
@@ -41,33 +23,6 @@ static float pass_input(enum trim_signal input, float value)
     float passed = value;
     trim_inputs(&trim, &passed, input, 1u, PERIOD);
     return passed;
-}
-
-/* Value k of each signal into the trim; the deviations of theta, theta_dot, z_ddot, tau_m. */
-static void pass_all(float signal, float deviation[4])
-{
-    const float x[MODEL_STATES] = {0.0f, 0.0f};
-    const bool valid[MODEL_STATES] = {true, true};
-    float y[MODEL_STATES] = {0.35f + signal, signal}; /* the level of theta starts at the trim angle */
-    TEST_ASSERT_FALSE(trim_outputs(&trim, x, y, valid, PERIOD));
-    deviation[0] = y[0];
-    deviation[1] = y[1];
-    deviation[2] = pass_input(TRIM_Z_DDOT, signal);
-    deviation[3] = pass_input(TRIM_TAU_M, signal);
-}
-
-/* Outputs and inputs of a linear system obey it after the same high-pass, too: all four must pass the same. */
-TEST(every_signal_passes_the_same_high_pass)
-{
-    for (uint32_t k = 0u; k < 3000u; k++) {
-        float deviation[4];
-        pass_all((float)sin(TURN * 2.3 * (double)PERIOD * (double)k) + 0.5f, deviation);
-        TEST_ASSERT_TRUE((deviation[1] == deviation[2]) && (deviation[1] == deviation[3]));
-        TEST_ASSERT_FLOAT_WITHIN(5.0e-6f, deviation[1], deviation[0]);
-    }
-    trim_set_origin(&trim);
-    TEST_ASSERT_TRUE(trim.origin[0] == trim_angle(&trim));
-    TEST_ASSERT_FLOAT_WITHIN(5.0e-6f, 0.35f + trim.origin[1], trim.origin[0]);
 }
 
 TEST(in_preload_fixed_signals_stay_and_only_the_trim_angle_follows)

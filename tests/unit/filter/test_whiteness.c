@@ -35,29 +35,6 @@ static uint32_t run(uint32_t blocks, double share, double keep, bool counts)
     return coloured;
 }
 
-/* A share s of n samples' mean has the correlation keep^k s / (s + 1/n) at lag k: far below the noise of a sample,
- * which nis = 1 + s would show. Sign does not matter. */
-TEST(a_coloured_part_far_below_the_noise_of_a_sample_is_found_within_seconds)
-{
-    const double keep[] = {0.9, -0.9, 0.7};
-    for (uint32_t k = 0u; k < 3u; k++) {
-        setUp();
-        (void)run(500u, 0.0, 0.0, true);
-        TEST_ASSERT_FALSE(whiteness.coloured);
-        (void)run(250u, 0.15, keep[k], true);
-        TEST_ASSERT_TRUE(whiteness.coloured);
-        (void)run(1000u, 0.15, keep[k], true);
-        double correlation = 0.0;
-        for (uint32_t block = 0u; block < 5000u; block++) {
-            (void)run(1u, 0.15, keep[k], true);
-            correlation += (double)whiteness_correlation(&whiteness) / 5000.0;
-        }
-        TEST_ASSERT_DOUBLE_WITHIN(0.06, fabs(keep[k]) * 0.15 / (0.15 + 0.05), correlation);
-        (void)run(1000u, 0.0, 0.0, true);
-        TEST_ASSERT_FALSE(whiteness.coloured);
-    }
-}
-
 /* Each alone of the lags is looked at: blocks that repeat k blocks later. */
 TEST(every_lag_of_20_to_80_ms_is_seen)
 {

@@ -84,18 +84,6 @@ TEST(any_damage_is_a_frame_or_a_damaged_line)
     }
 }
 
-TEST(room_that_ends_is_gone_on_from)
-{
-    char text[512] = "";
-    bulk_frame_t frames[2];
-    bulk_parsed_t parsed;
-    for (int i = 0; i < 5; i++) {
-        (void)memcpy(&text[(size_t)i * strlen(lines[0])], lines[0], strlen(lines[0]));
-    }
-    TEST_ASSERT_EQUAL_UINT64(2u, parse(text, 5u * strlen(lines[0]), frames, 2u, &parsed));
-    TEST_ASSERT_EQUAL_UINT64(2u * strlen(lines[0]), parsed.used);
-}
-
 TEST(more_buses_than_there_is_room_for_are_damage)
 {
     static bulk_buses_t buses;

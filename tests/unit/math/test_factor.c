@@ -62,18 +62,6 @@ static void assert_factorises(const float a[3], const float b[3], float s[4])
     TEST_ASSERT_TRUE((s[0] >= 0.0f) && (s[1] == 0.0f) && (s[3] >= 0.0f));
 }
 
-/* What is left of a row beside the other comes from a sum of squares, so it is right to its own last digits. */
-TEST(tria_of_nearly_dependent_rows_keeps_what_is_different)
-{
-    for (double difference = 1.0e-1; difference > 1.0e-6; difference *= 0.1) {
-        const float a[3] = {1.0f, 0.0f, 0.0f};
-        const float b[3] = {2.0f, (float)difference, 0.0f};
-        float s[4];
-        assert_factorises(a, b, s);
-        TEST_ASSERT_DOUBLE_WITHIN(4.0 * EPSILON * difference, difference, (double)s[3]);
-    }
-}
-
 TEST(tria_of_dependent_or_zero_rows_is_deficient_not_nan)
 {
     const float rows[3][3] = {{1.0f, 2.0f, 2.0f}, {-2.0f, -4.0f, -4.0f}, {0.0f, 0.0f, 0.0f}};
@@ -88,35 +76,6 @@ TEST(tria_of_dependent_or_zero_rows_is_deficient_not_nan)
 }
 
 /* --- noise -------------------------------------------------------------------------------------------------------- */
-
-/* As for parameters that do not walk, for minutes. */
-TEST(no_noise_changes_nothing_to_the_bit)
-{
-    float s[MOST_ROWS * MOST_N];
-    float before[MOST_ROWS * MOST_N];
-    float rest[MOST_ROWS - MOST_N];
-    random_factor(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
-    (void)memcpy(before, s, sizeof before);
-    for (uint32_t k = 0u; k < 100000u; k++) {
-        factor_add_noise(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N, k % (uint32_t)MOST_N, 0.0f, rest);
-    }
-    TEST_ASSERT_EQUAL_MEMORY(before, s, sizeof before);
-    TEST_ASSERT_TRUE((rest[0] == 0.0f) && (rest[1] == 0.0f) && (rest[2] == 0.0f));
-}
-
-/* Where nothing was known, other rows have nothing to do with what is known now. */
-TEST(noise_on_nothing_is_the_noise)
-{
-    float s[8] = {0.0f, 0.0f, 0.0f, 0.0f, 0.75f, -2.0f, 0.5f, 3.0f};
-    float rest[2][2];
-    factor_add_noise(s, 4u, 2u, 0u, 1.0e-12f, rest[0]);
-    factor_add_noise(s, 4u, 2u, 1u, 1.0e12f, rest[1]);
-    TEST_ASSERT_TRUE((s[0] == 1.0e-12f) && (s[2] == 0.0f) && (s[3] == 1.0e12f));
-    for (uint32_t k = 4u; k < 8u; k++) {
-        TEST_ASSERT_TRUE(s[k] == 0.0f);
-    }
-    TEST_ASSERT_TRUE((fabsf(rest[0][0]) == 0.75f) && (fabsf(rest[1][0]) == 2.0f) && (fabsf(rest[1][1]) == 3.0f));
-}
 
 /* A millionth of the variance each time; and less than the diagonal can hold, where nothing else may drift either. */
 TEST(tiny_noise_adds_up_or_leaves_the_rest_as_it_is)
@@ -188,20 +147,6 @@ static void condition(known_t known, float *s, uint32_t rows, double *mean)
     }
 }
 
-TEST(no_information_changes_nothing_to_the_bit)
-{
-    float s[MOST_ROWS * MOST_N];
-    float before[MOST_ROWS * MOST_N];
-    double mean[MOST_ROWS];
-    random_factor(s, (uint32_t)MOST_ROWS, (uint32_t)MOST_N);
-    (void)memcpy(before, s, sizeof before);
-    condition(draw_known((uint32_t)MOST_N, 0u, 1.0), s, (uint32_t)MOST_ROWS, mean);
-    TEST_ASSERT_EQUAL_MEMORY(before, s, sizeof before);
-    for (uint32_t r = 0u; r < (uint32_t)MOST_ROWS; r++) {
-        TEST_ASSERT_TRUE(mean[r] == 0.0);
-    }
-}
-
 static void assert_is_factor(const float s[9], const double mean[3])
 {
     for (uint32_t i = 0u; i < 3u; i++) {
@@ -242,14 +187,4 @@ TEST(a_precise_measurement_of_one_element_leaves_its_noise)
     condition(known, s, 2u, mean);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, 1.0e-6, (double)s[0]);
     TEST_ASSERT_TRUE(s[3] == 0.75f); /* the second, given the first, is known as before */
-}
-
-/* --- sigma -------------------------------------------------------------------------------------------------------- */
-
-TEST(sigma_is_the_norm_of_the_row_up_to_the_diagonal)
-{
-    const float s[9] = {2.0f, 9.0f, 9.0f, 3.0f, 4.0f, 9.0f, 1.0e-12f, 2.0e-12f, 2.0e-12f};
-    TEST_ASSERT_TRUE(factor_sigma(s, 3u, 0u) == 2.0f);
-    TEST_ASSERT_TRUE((factor_sigma(s, 3u, 1u) == 5.0f) && (factor_variance(s, 3u, 1u) == 25.0f));
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-18f, 3.0e-12f, factor_sigma(s, 3u, 2u));
 }

@@ -36,19 +36,6 @@ static void receive_text(const char *text)
     }
 }
 
-/* RM0090 30.3.4: 84 MHz and 16 MHz by 1 Mbit/s. */
-TEST(start_gives_rate_and_pins)
-{
-    const clock_rates_t raw = {.pll = false};
-
-    TEST_ASSERT_EQUAL_UINT32(84u, usart1.BRR);
-    TEST_ASSERT_EQUAL_HEX32(0x202Cu, usart1.CR1);           /* UE, RXNEIE, TE, RE */
-    TEST_ASSERT_EQUAL_HEX32(0x770u, gpioa.AFR[1] & 0xFF0u); /* AF7 for PA9 and PA10 */
-    TEST_ASSERT_EQUAL_HEX32(BIT(37 - 32), nvic.ISER[1]);
-    usart_start(&raw);
-    TEST_ASSERT_EQUAL_UINT32(16u, usart1.BRR);
-}
-
 TEST(received_byte_is_read_and_counted_as_overrun_when_one_was_lost)
 {
     uint8_t byte = 0u;
@@ -78,18 +65,6 @@ TEST(an_interrupt_takes_so_many_bytes_and_a_full_ring_counts)
     TEST_ASSERT_EQUAL_UINT32(32u, usart_overruns());
 }
 
-TEST(what_the_hardware_has_no_room_for_goes_by_interrupt)
-{
-    TEST_ASSERT_TRUE(usart_write("ab", 2u));
-    TEST_ASSERT_EQUAL_UINT32(2u, ring_used(&waiting));
-    TEST_ASSERT_BITS_HIGH(BIT(7), usart1.CR1); /* TXEIE */
-    usart1.SR = BIT(7);
-    usart_interrupt();
-    TEST_ASSERT_EQUAL_UINT32(0u, ring_used(&waiting));
-    TEST_ASSERT_EQUAL_HEX32('b', usart1.DR);
-    TEST_ASSERT_BITS_LOW(BIT(7), usart1.CR1);
-}
-
 TEST(a_line_without_room_is_dropped_whole)
 {
     static const char line[31];
@@ -99,19 +74,6 @@ TEST(a_line_without_room_is_dropped_whole)
     }
     TEST_ASSERT_FALSE(usart_write(line, sizeof line));
     TEST_ASSERT_EQUAL_UINT32(66u * 31u, ring_used(&waiting));
-}
-
-TEST(only_data_frames_with_11_bit_identifiers_reach_the_estimator)
-{
-    lever_frame_t frame;
-
-    receive_text("O\rT000001101AA\rr1108\rt111201FF\r");
-    TEST_ASSERT_EQUAL_INT(PORT_DONE, transport_receive(NULL, &frame));
-    TEST_ASSERT_EQUAL_HEX32(0x111, frame.id);
-    TEST_ASSERT_EQUAL_UINT8(2, frame.length);
-    TEST_ASSERT_EQUAL_HEX8(0xFF, frame.data[1]);
-    TEST_ASSERT_EQUAL_INT(PORT_NOTHING, transport_receive(NULL, &frame));
-    TEST_ASSERT_FALSE(transport_has_received());
 }
 
 /* 2,000 bytes take 20 ms at 1 Mbit/s; a line has 22. */

@@ -1,12 +1,13 @@
 /* Runs the estimator over recorded samples and writes, for every sample, the time it took and the stack it used.
  *
- *     budget OUTPUT update|tick [model=N estimator=N preload=N adaptation=N] [SETTING=BITS …] [dither_rms=BITS] [paint=0]
+ *     budget OUTPUT update|tick [model=N estimator=N preload=N adaptation=N] [SETTING=BITS …] [dither_rms=BITS]
+ *         [paint=0]
  *
  * All numbers are hexadecimal, those of settings and torque the bits of a float. The samples lie in flash, behind a
  * header_t: for `update` lever_sample_t, each one measured call of lever_update(); for `tick` two frames for a sample,
  * measured from the first lever_on_frame() to the lever_next_frame() that returns false. OUTPUT gets an intro_t, a
- * record_t for each sample, and the last lever_estimate_t. Time is in ticks of SysTick. Without painting, the stack is not
- * measured. */
+ * record_t for each sample, and the last lever_estimate_t. Time is in ticks of SysTick. Without painting, the stack is
+ * not measured. */
 #include "semihosting.h"
 
 #include "lever_cdkf.h"
@@ -82,7 +83,8 @@ static inline uint32_t *stack_pointer(void)
     return sp;
 }
 
-/* Both are inlined, so that the caller's stack pointer is meant, and use no stack themselves: it is what they look at. */
+/* Both are inlined, so that the caller's stack pointer is meant, and use no stack themselves: it is what they look
+ * at. */
 __attribute__((always_inline)) static inline void paint_stack(void)
 {
     volatile uint32_t *word = stack_pointer();

@@ -1,0 +1,121 @@
+#include "lanes.h"
+
+#include "lever_cdkf.h"
+
+#include <math.h>
+#include <stddef.h>
+
+static double at(const lane_column_t *column, uint32_t sample, uint32_t lane)
+{
+    return column->value[(column->step * sample) + lane];
+}
+
+/* What stays in a sample period of a lane. */
+typedef struct arm {
+    double rest;
+    double spring;
+    double damper;
+    double inverse;
+    double friction;
+} arm_t;
+
+static double acceleration(const lanes_t *lanes, const arm_t *arm, double drive, double torque, double x, double v)
+{
+    const double cosine = cos(x);
+    const double of_arm = drive - arm->rest + (arm->spring * sin(x)) + (arm->damper * cosine * v);
+    double other = torque - (lanes->damping * v) - (lanes->stiffness * x);
+    if (arm->friction > 0.0) {
+        other -= arm->friction * v / sqrt((v * v) + (lanes->stop_rate * lanes->stop_rate));
+    }
+    return (other - (lanes->length * cosine * of_arm)) * arm->inverse;
+}
+
+/* A lane from sample i to sample i + 1 (Runge-Kutta), with further torque [N m] at its begin and end. */
+static void advance(const lanes_t *lanes, uint32_t i, uint32_t lane, double begin, double end)
+{
+    const arm_t arm = {at(&lanes->rest, i, lane), at(&lanes->spring, i, lane), at(&lanes->damper, i, lane),
+        at(&lanes->inverse, i, lane), at(&lanes->friction, i, lane)};
+    const double drive0 = at(&lanes->drive, i, lane);
+    const double drive1 = at(&lanes->drive, i + 1u, lane);
+    const double torque0 = at(&lanes->torque, i, lane) + begin;
+    const double torque1 = at(&lanes->torque, i + 1u, lane) + end;
+    const double drive = 0.5 * (drive0 + drive1);
+    const double torque = 0.5 * (torque0 + torque1);
+    const double period = lanes->period;
+    const double half = 0.5 * period;
+    const size_t here = ((size_t)i * lanes->width) + lane;
+    const double x = lanes->theta[here];
+    const double v = lanes->theta_dot[here];
+    const double a1 = acceleration(lanes, &arm, drive0, torque0, x, v);
+    const double v2 = v + (half * a1);
+    const double a2 = acceleration(lanes, &arm, drive, torque, x + (half * v), v2);
+    const double v3 = v + (half * a2);
+    const double a3 = acceleration(lanes, &arm, drive, torque, x + (half * v2), v3);
+    const double v4 = v + (period * a3);
+    const double a4 = acceleration(lanes, &arm, drive1, torque1, x + (period * v3), v4);
+    const size_t next = here + lanes->width;
+    lanes->theta[next] = x + (period / 6.0 * (v + (2.0 * (v2 + v3)) + v4));
+    lanes->theta_dot[next] = v + (period / 6.0 * (a1 + (2.0 * (a2 + a3)) + a4)) + at(&lanes->kick, i, lane);
+}
+
+void lanes_move(const lanes_t *lanes, uint32_t first, uint32_t last)
+{
+    for (uint32_t i = first; i < last; i++) {
+        for (uint32_t lane = 0u; lane < lanes->width; lane++) {
+            advance(lanes, i, lane, 0.0, 0.0);
+        }
+    }
+}
+
+/* --- with the firmware ------------------------------------------------------------------------------------------- */
+
+/* The firmware takes sample i. */
+static void take(const lanes_t *lanes, const lanes_loop_t *loop, uint32_t i, uint32_t lane)
+{
+    const size_t here = ((size_t)i * lanes->width) + lane;
+    const bool complete = (loop->lost[here] == 0u);
+    const lever_sample_t sample = {.time_us = i * loop->period_us,
+        .theta = (float)(lanes->theta[here] + at(&loop->noise[0], i, lane)),
+        .theta_dot = (float)(lanes->theta_dot[here] + at(&loop->noise[1], i, lane)),
+        .tau_m = (float)(loop->tau_m[here] + at(&loop->noise[2], i, lane)),
+        .z_ddot = (float)(at(&loop->z_ddot, i, lane) + at(&loop->noise[3], i, lane)),
+        .theta_valid = complete,
+        .theta_dot_valid = complete,
+        .tau_m_valid = complete,
+        .z_ddot_valid = true};
+    (void)lever_update(loop->lever[lane], &sample);
+    lever_health_t health;
+    lever_health(loop->lever[lane], &health);
+    loop->asked[lane] = (double)health.torque;
+}
+
+static void close_one(const lanes_t *lanes, const lanes_loop_t *loop, uint32_t i, uint32_t lane)
+{
+    const size_t here = ((size_t)i * lanes->width) + lane;
+    if ((i % loop->keep_alive) == 0u) {
+        (void)lever_command(loop->lever[lane], loop->command);
+    }
+    if ((loop->lost[here] == 0u) || !loop->loses_whole) {
+        take(lanes, loop, i, lane);
+    }
+    if ((i % loop->stride) == 0u) {
+        const size_t row = (loop->rows * lane) + (i / loop->stride);
+        lever_estimate(loop->lever[lane], &loop->estimate[row]);
+        lever_health(loop->lever[lane], &loop->health[row]);
+    }
+    if ((i + 1u) < lanes->count) {
+        const double asked = loop->asked[lane];
+        const double after = asked + ((loop->tau_m[here] - asked) * loop->decay);
+        advance(lanes, i, lane, loop->tau_m[here], after);
+        loop->tau_m[here + lanes->width] = after;
+    }
+}
+
+void lanes_close(const lanes_t *lanes, const lanes_loop_t *loop, uint32_t first, uint32_t last)
+{
+    for (uint32_t i = first; i < last; i++) {
+        for (uint32_t lane = 0u; lane < lanes->width; lane++) {
+            close_one(lanes, loop, i, lane);
+        }
+    }
+}

@@ -1,0 +1,93 @@
+/* The closed loop of a scenario at the speed of C, for Python: plant, sensors and firmware, sample by sample, as in
+ * sil/run/loop.py, from columns that are made beforehand.
+ *
+ * The firmware is the caller's instance, used through its façade. Nothing here allocates.
+ */
+#ifndef LOOP_H
+#define LOOP_H
+
+#include "plants.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct lever; /* of lever_cdkf.h */
+struct lever_command;
+struct lever_estimate;
+struct lever_frame;
+struct lever_health;
+
+enum loop_signal { LOOP_THETA, LOOP_THETA_DOT, LOOP_TAU_M, LOOP_GRIP_FORCE, LOOP_SIGNALS };
+
+enum loop_limits {
+    LOOP_PENDING = 32, /* frames of the estimator that wait to be taken */
+    LOOP_FRAMES = 64   /* that a sample can bring into the record, at most */
+};
+
+/* A field of a frame, as the DBC has it: value = scale * its signed bits. */
+typedef struct loop_field {
+    double scale;
+    uint32_t mask;
+    uint8_t start; /* the lowest bit */
+    uint8_t valid; /* the bit that says whether it is valid */
+} loop_field_t;
+
+/* A sensor of a signal of the lever: gain * value, so much later, plus offset. */
+typedef struct loop_sensor {
+    double gain;
+    const double *offset;  /* a value a sample */
+    uint32_t whole;        /* delay in sample periods, */
+    double part;           /* and what is beyond */
+    const int64_t *source; /* faults: the reading is factor * reading[source] + error; NULL: there are none */
+    const double *factor;
+    const double *error; /* NaN: marked invalid */
+    loop_field_t field;
+} loop_sensor_t;
+
+typedef struct loop {
+    /* given; arrays have a value for each sample */
+    uint32_t count;     /* samples */
+    uint32_t period_us; /* between two of them */
+    bool by_frames;     /* encoded, with E2E protection; otherwise by structs */
+    bool has_grip;      /* there is a sensor of the grip force */
+    plant_t plant;
+    loop_sensor_t sensor[LOOP_SIGNALS];
+    const double *base; /* measured z_ddot [m/s^2]; NaN: marked invalid */
+    loop_field_t base_field;
+    loop_field_t torque_field;               /* of MOTOR_COMMAND */
+    const uint8_t *no_lever;                 /* the frame is never sent */
+    const uint8_t *no_base;                  /* likewise */
+    const double *torque;                    /* asked of the motor besides what the firmware asks for [N m] */
+    uint32_t commands;                       /* before which samples there is a COMMAND, */
+    const uint32_t *command_sample;          /* rising, */
+    const struct lever_command *command;     /* and which, by structs, */
+    const struct lever_frame *command_frame; /* or by frames */
+    uint32_t stride;          /* estimate and health are kept after every so many-th sample, from the first on */
+    uint32_t frame_room;      /* 0: frames are not kept */
+    uint32_t most_unanswered; /* samples in a row without an estimate, that end the run */
+    /* kept */
+    double *signal[LOOP_SIGNALS]; /* the true values, at every sample */
+    struct lever_estimate *estimate;
+    struct lever_health *health;
+    uint16_t *frame_id; /* frames, both ways, in the order in which they are sent and taken, */
+    uint32_t *frame_sample;
+    uint8_t (*frame_data)[8];
+    uint32_t frames;     /* and how many they are */
+    uint32_t unanswered; /* samples without an estimate */
+    uint32_t misplaced;  /* estimates of other samples */
+    uint32_t refused;    /* commands */
+    /* state; zero at the start */
+    uint32_t sample;
+    uint32_t next_command;
+    uint32_t unanswered_in_a_row;
+    double asked; /* what the firmware asks of the motor [N m] */
+    uint32_t pending;
+    uint16_t pending_id[LOOP_PENDING];
+    uint8_t pending_data[LOOP_PENDING][8];
+} loop_t;
+
+/* Goes on to the sample `until`, or to where there is no room for the frames of one more, or the estimator has been
+ * silent for too long. Returns the sample that is next. */
+uint32_t loop_advance(loop_t *loop, struct lever *lever, uint32_t until);
+
+#endif

@@ -1,0 +1,227 @@
+"""A scenario against the firmware in this process, by c/loop.h."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.commander import Commander
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.firmware import quantities
+from lever_cdkf.host_tools.firmware.estimator import Estimator, make_command
+from lever_cdkf.host_tools.firmware.library import ffi, struct_dtype
+from numpy.typing import NDArray
+
+from ..scenarios import inputs as scenario_inputs
+from ..scenarios.inputs import OF_LEVER, Inputs
+from ..scenarios.scenario import Scenario
+from . import plants
+from .library import Struct, lib
+
+STRIDE = 0.02
+"""Time between two estimates that are kept [s]."""
+
+_FRAMES_AT_ONCE = 1 << 17
+
+
+@dataclass(frozen=True)
+class FastRun:
+    """What is kept of a run: arrays with a value for each of the times."""
+
+    time: FloatArray
+    """[s]"""
+    truth: Mapping[str, FloatArray]
+    """The true parameters of the pilot by name, natural_frequency [Hz] and damping_ratio [1]; NaN with hands off."""
+    theta: FloatArray
+    """True angle [rad] and rate [rad/s] of the lever."""
+    theta_dot: FloatArray
+    estimate: Mapping[str, FloatArray]
+    """The parameters of the estimator's model by name, natural_frequency and damping_ratio."""
+    sigma: Mapping[str, FloatArray]
+    """Their standard deviations."""
+    nis: FloatArray
+    """Of the sample at that time; chi-square with nis_size degrees of freedom."""
+    nis_size: NDArray[np.uint8]
+    faults: NDArray[np.uint32]
+    """Of enum lever_fault, at that sample."""
+    mode: NDArray[np.uint32]
+    """Of enum lever_mode."""
+    recoveries: int
+    """How often the filter was restarted."""
+
+
+def run(scenario: Scenario, through_frames: bool = False, stride: float = STRIDE) -> FastRun:
+    """Runs a scenario against a fresh instance of the firmware, by structs, or through CAN frames with E2E protection.
+
+    By structs values keep their single precision; frames round them as on a bus. Raises LeverError, also for a pilot
+    whose plant the C does not have.
+    """
+    inputs = scenario_inputs.prepare(scenario)
+    every = max(1, round(stride / scenario.period))
+    loop = Loop(scenario, inputs, by_frames=through_frames, every=every)
+    loop.advance(len(inputs.time))
+    loop.check()
+    return loop.result()
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """Frames of 8 bytes in the order in which they were on the bus; arrays of equal length."""
+
+    identifier: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
+    sample: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
+    data: NDArray[np.uint8] = field(default_factory=lambda: np.empty((0, 8), np.uint8))
+    """(count, 8)."""
+
+
+class Loop:
+    """A run under way."""
+
+    def __init__(self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int) -> None:
+        """`every`: of how many samples one has its estimate kept."""
+        if not plants.has(inputs.truth):
+            raise LeverError(f"a pilot of model {inputs.truth.model} runs in Python only: use run.runner.simulate()")
+        self._scenario, self._inputs = scenario, inputs
+        self._estimator = Estimator(scenario.config)
+        self.struct = Struct("loop_t")
+        count = len(inputs.time)
+        loop = self.struct.pointer
+        loop.count, loop.period_us, loop.stride = count, round(scenario.period * 1e6), every
+        loop.by_frames, loop.has_grip = by_frames, scenario.sensors.grip_force is not None
+        loop.most_unanswered = 0xFFFFFFFF
+        plants.fill(self.struct, loop.plant, inputs.truth, scenario_inputs.conditions(scenario, inputs))
+        loop.plant.has_grip_force = loop.has_grip
+        names = OF_LEVER if loop.has_grip else OF_LEVER[:-1]
+        self.signals = {name: np.empty(count) for name in names}
+        for index, name in enumerate(names):
+            self._fill_sensor(loop.sensor[index], name)
+            loop.signal[index] = self.struct.doubles(self.signals[name])
+        self._fill_columns()
+        self._fill_commands()
+        rows = (count - 1) // every + 1
+        self._estimates = np.zeros(rows, struct_dtype("lever_estimate_t"))
+        self._healths = np.zeros(rows, struct_dtype("lever_health_t"))
+        loop.estimate = self.struct.array("struct lever_estimate", self._estimates, self._estimates.dtype)
+        loop.health = self.struct.array("struct lever_health", self._healths, self._healths.dtype)
+
+    def _fill_sensor(self, given: Any, name: str) -> None:
+        readings = scenario_inputs.readings(self._scenario, self._inputs, name)
+        given.gain = 1.0 + readings.sensor.gain_error
+        given.whole, given.part = readings.sensor.lag(self._scenario.period)
+        given.offset = self.struct.doubles(readings.offsets)
+        given.field = _field("GRIP_SAMPLE" if name == "grip_force" else "LEVER_SAMPLE", name)
+        if readings.corruption is not None:
+            given.source = self.struct.array("int64_t", readings.corruption.source, np.int64)
+            given.factor = self.struct.doubles(readings.corruption.factor)
+            given.error = self.struct.doubles(readings.corruption.offset)
+
+    def _fill_columns(self) -> None:
+        loop, inputs = self.struct.pointer, self._inputs
+        loop.base, loop.torque = self.struct.doubles(inputs.base), self.struct.doubles(inputs.torque)
+        loop.base_field, loop.torque_field = _field("BASE_SAMPLE", "z_ddot"), _field("MOTOR_COMMAND", "torque")
+        loop.no_lever, loop.no_base = (
+            self.struct.array("uint8_t", inputs.missing[frame], np.uint8) for frame in ("lever_frame", "base_frame")
+        )
+
+    def _fill_commands(self) -> None:
+        loop = self.struct.pointer
+        commands = scenario_inputs.commands(self._scenario, self._inputs.time)
+        samples = sorted(commands)
+        values = [commands[sample] for sample in samples]
+        loop.commands = len(samples)
+        loop.command_sample = self.struct.array("uint32_t", np.array(samples), np.uint32)
+        if loop.by_frames:
+            loop.command_frame = self.struct.keep(_command_frames(values))
+        else:
+            loop.command = self.struct.keep(_command_structs(values))
+
+    def advance(self, until: int) -> int:
+        """Goes on to a sample; returns the one that it came to."""
+        return lib.loop_advance(self.struct.pointer, self._estimator.pointer, until)  # type: ignore[no-any-return]
+
+    def keep_frames(self) -> None:
+        """Has advance() stop where it has filled a Traffic with frames."""
+        loop, room = self.struct.pointer, _FRAMES_AT_ONCE
+        self._traffic = Traffic(np.empty(room, np.uint16), np.empty(room, np.uint32), np.empty((room, 8), np.uint8))
+        loop.frame_room = room
+        loop.frame_id = self.struct.array("uint16_t", self._traffic.identifier, np.uint16)
+        loop.frame_sample = self.struct.array("uint32_t", self._traffic.sample, np.uint32)
+        loop.frame_data = ffi.cast("uint8_t (*)[8]", self.struct.array("uint8_t", self._traffic.data, np.uint8))
+
+    def take_frames(self) -> Traffic:
+        """Those since they were taken last."""
+        loop, traffic = self.struct.pointer, self._traffic
+        taken = slice(0, loop.frames)
+        loop.frames = 0
+        return Traffic(traffic.identifier[taken].copy(), traffic.sample[taken].copy(), traffic.data[taken].copy())
+
+    def check(self) -> None:
+        """Raises LeverError when the firmware has refused a command."""
+        if self.struct.pointer.refused:
+            raise LeverError("the estimator refuses COMMAND")
+
+    @property
+    def outputs(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """What is kept of the firmware: arrays of lever_estimate_t and lever_health_t."""
+        return self._estimates, self._healths
+
+    def result(self) -> FastRun:
+        """What is kept of it."""
+        scenario, inputs, estimates = self._scenario, self._inputs, self._estimates
+        every = self.struct.pointer.stride
+        names = [each.key for each in quantities.parameters(scenario.config.choices["model"])]
+        values, sigma = {}, {}
+        for index, name in enumerate(names):
+            values[name] = estimates["parameter"][:, index].astype(np.float64)
+            sigma[name] = estimates["parameter_sigma"][:, index].astype(np.float64)
+        for name in ("natural_frequency", "damping_ratio"):
+            values[name] = estimates[name].astype(np.float64)
+            sigma[name] = estimates[f"{name}_sigma"].astype(np.float64)
+        truth = inputs.truth.at(slice(None, None, every))
+        return FastRun(
+            time=inputs.time[::every],
+            truth={**truth.parameters, **vars(truth.dynamics)},
+            theta=self.signals["theta"][::every],
+            theta_dot=self.signals["theta_dot"][::every],
+            estimate=values,
+            sigma=sigma,
+            nis=estimates["nis"].astype(np.float64),
+            nis_size=estimates["nis_size"].copy(),
+            faults=self._healths["faults"].copy(),
+            mode=self._healths["mode"].copy(),
+            recoveries=int(self._healths["recoveries"][-1]),
+        )
+
+
+@cache
+def _field(message: str, name: str) -> dict[str, float]:
+    """A loop_field_t of the DBC."""
+    definition = codec.message(message)
+    signal = definition.get_signal_by_name(name)
+    valid = [other.start for other in definition.signals if other.name == f"{name}_valid"]
+    return {
+        "scale": float(signal.scale),
+        "mask": (1 << signal.length) - 1,
+        "start": signal.start,
+        "valid": valid[0] if valid else 0,
+    }
+
+
+def _command_structs(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
+    """Of type lever_command_t[]."""
+    made: list[Any] = [make_command(**values) for values in commands]  # type: ignore[arg-type]
+    return ffi.new("lever_command_t[]", [each[0] for each in made])
+
+
+def _command_frames(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
+    """Of type lever_frame_t[]."""
+    sent: list[dict[str, Any]] = []
+    commander = Commander()
+    for values in commands:
+        commander.send(values, lambda identifier, data: sent.append({"id": identifier, "length": 8, "data": data}))
+    return ffi.new("lever_frame_t[]", sent)

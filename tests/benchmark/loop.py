@@ -1,0 +1,53 @@
+"""How fast a scenario runs in C, by structs and through frames: `cmake --build build --target loop_benchmark`.
+
+For each scenario, of a simulated minute, all that there is but for files: excitation, noise, plant, sensors, firmware
+and estimates at 50 Hz, on one core, best of ten rounds. Exit status 1 when the first is slower than promised.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from lever_cdkf.host_tools.tables import Row, print_tables
+from lever_cdkf.sil import fast
+from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.sil.scenarios.scenario import Scenario
+
+SCENARIOS = ("steady", "base_only", "two_dof", "mayo_ectomorphic", "hysteretic", "reflex", "sensor_dropout")
+PROMISED = {"by structs": 2000.0, "through frames": 1000.0}
+"""Times real time, of the first scenario."""
+_SECONDS, _ROUNDS = 60.0, 10
+
+
+def processor_time(wanted: Scenario, through_frames: bool) -> float:
+    """Of a run [s]."""
+    rounds = []
+    for _ in range(_ROUNDS):
+        start = time.process_time()
+        fast.run(wanted, through_frames)
+        rounds.append(time.process_time() - start)
+    return min(rounds)
+
+
+def main() -> int:
+    """Prints a row for each scenario."""
+    rows: list[Row] = []
+    slow = []
+    for name in SCENARIOS:
+        wanted = scenario.load(name, [f"duration={_SECONDS:g} s"])
+        row: dict[str, str | float | bool | None] = {"scenario": name}
+        for how, promised in PROMISED.items():
+            seconds = processor_time(wanted, how != "by structs")
+            row[f"{how} [ns a sample]"] = round(1e9 * seconds / len(wanted.time()))
+            row[f"{how} [× real time]"] = round(_SECONDS / seconds)
+            if name == SCENARIOS[0] and _SECONDS / seconds < promised:
+                slow.append(f"{name} {how}: less than {promised:g} times real time")
+        rows.append(row)
+    print_tables({"a simulated minute at 1 kHz, one core": rows})
+    sys.stderr.writelines(f"{each}\n" for each in slow)
+    return 1 if slow else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,207 @@
+"""What the commands print fits the terminal: no name and no number is cut, no word is broken."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import re
+import struct
+import subprocess
+import termios
+import unicodedata
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.help_text import HelpFormatter
+from lever_cdkf.host_tools.layout import command_lines, wrapped
+from lever_cdkf.host_tools.tables import Row, print_tables
+from processes import LEVER
+
+Shown = Callable[..., str]
+COMMANDS = (
+    *("compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
+    *("monitor", "qemu", "record", "replay", "settings", "sim", "tune"),
+)
+ROWS: list[Row] = [
+    {
+        "name": f"natural_frequency_{row}",
+        "unit": "rad/s",
+        "estimate at the end [rad/s]": 1234.5678 * 10.0**-row,
+        "count": 1_234_567 * row,
+        "times to converge [s]": "0.3, 5.2, -",
+        "largest difference of all [%]": None if row else 12.345,
+        "remark": "z̈ of the base, measured by an accelerometer with a gain that is not known well " * row,
+    }
+    for row in range(4)
+]
+
+
+def columns(line: str) -> int:
+    """Of a terminal: combining letters take none."""
+    return sum(not unicodedata.combining(letter) for letter in line)
+
+
+@pytest.fixture
+def shown(installed: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Shown:
+    """What a command prints on a terminal of some width."""
+    assert installed
+
+    def run(*arguments: str, width: int = 80) -> str:
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert cli.main(arguments) in (0, 1)
+        return capsys.readouterr().out
+
+    return run
+
+
+def read_all(terminal: int) -> str:
+    """What is written to a terminal until all have closed it."""
+    text = b""
+    with open(terminal, "rb", buffering=0) as stream, contextlib.suppress(OSError):
+        while piece := stream.read(65536):
+            text += piece
+    return text.decode()
+
+
+def assert_fits(text: str, width: int = 80) -> None:
+    for line in text.splitlines():
+        assert columns(line) <= width, line
+    assert "…" not in text
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_help_fits(command: str, width: int, shown: Shown) -> None:
+    names = [command] if command else []
+    text = shown(*names, "--help", width=width)
+    assert max(map(columns, text.splitlines())) <= 80
+    if width == 80:  # no word is broken: each is found in wider help, too
+        assert set(text.split()) - {"\\"} == set(shown(*names, "--help", width=120).split()) - {"\\"}
+
+
+def test_every_command_is_tried_here(shown: Shown) -> None:
+    named = re.findall(r"^    (\w+)  ", shown("--help"), re.MULTILINE)
+    assert set(named) == set(COMMANDS)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "sim --list",
+        "compare --list",
+        "compare --envelope --list",
+        "envelope --list",
+        "figures --list",
+        "settings",
+        "dbc",
+        "sim demo --set duration=6s --set converged_after=3s",
+        "sim demo --set duration=6s --set converged_after=3s --seeds 2",
+        "envelope --only rest_20s base_stuck --seeds 1 --out {folder}",
+        "compare --scenarios step_up --seeds 2 --duration 2",
+        "compare --envelope --scenarios steady base_stuck --seeds 1 --estimators firmware",
+        "monitor --scenario demo --once --duration 1",
+    ],
+)
+def test_tables_fit(command: str, shown: Shown, tmp_path: Path) -> None:
+    assert_fits(shown(*command.format(folder=os.path.relpath(tmp_path)).split()))
+
+
+def test_what_is_made_of_a_log_fits(shown: Shown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shown("sim", "demo", "--set", "duration=30 s", "--out", "out")
+    for command in (
+        "replay out/bus.log",
+        "replay out/trace.csv",
+        "replay out/bus.log out/trace.csv --each",
+        "map out/trace.csv",
+        "tune out/bus.log",
+        "monitor --once out/bus.log",
+    ):
+        assert_fits(shown(*command.split()))
+
+
+@pytest.mark.parametrize("width", [24, 40, 60, 80, 100, 200])
+def test_a_table_keeps_all_its_cells(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    print_tables({"a title that is longer than the narrowest of these terminals": ROWS})
+    text = capsys.readouterr().out
+    assert_fits(text, max(width, columns("  times to converge  natural_frequency_0")))
+    found = " ".join(text.split())
+    for row in ROWS:
+        for cell in (
+            row["name"],
+            str(row["count"]),
+            f"{row['estimate at the end [rad/s]']:.4g}".replace("1.235e+03", ""),
+        ):
+            assert str(cell) in found
+    assert "1235" in found
+    assert found.count("accelerometer") == 6
+
+
+def test_one_row_stands_upright(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    print_tables({"run": [{"samples": 3000, "mean NIS [1]": 1.98765, "time [s]": 0.25, "bias [%]": None}]})
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert lines == [["run"], ["samples", "3000"], ["mean", "NIS", "1.988"], ["time", "0.25", "s"], ["bias", "-"], []]
+
+
+def test_numbers_have_four_digits_and_counts_all(capsys: pytest.CaptureFixture[str]) -> None:
+    numbers = [2094.5678, 0.0123456, 123456.7, 1e-5, 5.0, 1.5e12]
+    print_tables({"numbers": [{"n": number, "count": 1234567} for number in numbers]})
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[3:-1]]
+    assert [row[0] for row in rows] == ["2095", "0.01235", "123457", "1e-05", "5", "1.5e+12"]
+    assert {row[1] for row in rows} == {"1234567"}
+
+
+def test_a_pipe_has_a_row_in_each_line_and_a_terminal_its_width(tmp_path: Path) -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"}
+    piped = subprocess.run([LEVER, "dbc"], capture_output=True, text=True, check=True, env=environment).stdout
+    assert re.search(r"^LEVER_SAMPLE +theta +16 .* Lever angle from the floor", piped, re.MULTILINE)
+    parent, child = pty.openpty()
+    fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("4H", 24, 60, 0, 0))
+    with subprocess.Popen([LEVER, "dbc"], stdin=child, stdout=child, env=environment) as run:
+        os.close(child)
+        text = read_all(parent)
+    assert run.returncode == 0
+    assert "Lever angle from the floor" in text
+    assert "\x1b" not in text
+    assert_fits(text, 60)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_an_encoding_that_has_not_all_letters(encoding: str) -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0", "LC_ALL": "C"}
+    for command in ("--help", "figures --list", "envelope --list", "monitor --once --scenario demo --duration 0.3"):
+        done = subprocess.run([LEVER, *command.split()], capture_output=True, check=False, env=environment)
+        assert (done.returncode, done.stderr) == (0, b""), command
+
+
+def test_text_is_broken_at_spaces_only() -> None:
+    assert wrapped("share of the time [rad / s], 5 % of it", 12) == ["share of the", "time", "[rad / s],", "5 % of it"]
+    assert wrapped("a_name_that_is_long and more", 8) == ["a_name_that_is_long", "and more"]
+    command = "lever sim demo --set 'duration=6 s' --out a/b --realtime"
+    assert command_lines(command, 80) == [command]
+    assert command_lines(command, 32) == [
+        "lever sim demo \\",
+        "    --set 'duration=6 s' \\",
+        "    --out a/b --realtime",
+    ]
+
+
+def test_help_keeps_paragraphs_lists_and_commands() -> None:
+    text = "One sentence that is too long.\nAnd a second.\n\n  key  what it is, in words\n  lever sim --out DIR --a 1\n"
+    assert HelpFormatter("x")._fill_text(text, 24, "").splitlines() == [
+        "One sentence that is too",
+        "long. And a second.",
+        "",
+        "  key  what it is, in",
+        "       words",
+        "  lever sim --out DIR \\",
+        "      --a 1",
+    ]

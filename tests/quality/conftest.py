@@ -1,0 +1,93 @@
+"""What README files and examples of --help find when a test follows them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import can
+import cantools
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.sil.run.runner import simulate
+from lever_cdkf.sil.scenarios import scenario
+from quality import tools
+
+AIRCRAFT = """VERSION ""
+BU_: FCC
+BO_ 256 LEVER: 4 FCC
+ SG_ Angle : 0|16@1- (0.005,0) [-160|160] "deg" FCC
+ SG_ LeverCounter : 16|8@1+ (1,0) [0|255] "" FCC
+BO_ 257 IMU: 4 FCC
+ SG_ AccZ : 0|16@1- (0.001,0) [-32|32] "m/s^2" FCC
+ SG_ AccX : 16|16@1- (0.001,0) [-32|32] "m/s^2" FCC
+BO_ 258 MOTOR: 2 FCC
+ SG_ Torque : 0|16@1- (0.001,0) [-32|32] "N m" FCC
+"""
+
+
+@pytest.fixture
+def scratch(tmp_path: Path, build_dir: Path, recording: Path, aircraft: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that looks like the source tree, with a recording out/session.log and files of a user's own."""
+    for entry in tools.ROOT.iterdir():
+        if entry.name not in ("build", "out") and not entry.name.startswith("."):
+            (tmp_path / entry.name).symlink_to(entry)
+    (tmp_path / "build").symlink_to(build_dir)
+    (tmp_path / "out").mkdir()
+    shutil.copy(recording, tmp_path / "out/session.log")
+    shutil.copytree(aircraft, tmp_path, dirs_exist_ok=True)
+    monkeypatch.setenv("PATH", f"{build_dir}/venv/bin:{os.environ['PATH']}")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--collect-only")
+    return tmp_path
+
+
+@pytest.fixture(scope="session")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A few seconds of a simulation, estimates included, as candump would have recorded them."""
+    return simulated(tmp_path_factory.mktemp("recording"), 4) / "bus.log"
+
+
+@pytest.fixture(scope="session")
+def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same lever as an aircraft records it that knows nothing of lever.dbc: a database, and logs."""
+    folder = tmp_path_factory.mktemp("aircraft")
+    (folder / "aircraft.dbc").write_text(AIRCRAFT, encoding="ascii")
+    flight = simulated(tmp_path_factory.mktemp("flight"), 25)
+    shutil.copy(flight / "bus.log", folder / "flight.log")
+    trace = np.genfromtxt(flight / "trace.csv", delimiter=",", names=True)
+    rows = np.column_stack((trace["time_s"], trace["theta_measured_rad"], trace["z_ddot_measured_m_s2"] / 9.80665 + 1))
+    np.savetxt(folder / "flight.csv", rows, "%.6f", ",", header="time,angle [rad],acc", comments="")
+    (folder / "aircraft.toml").write_text('theta = "LEVER.Angle"\nz_ddot = "IMU.AccZ"\n', encoding="utf-8")
+    database = cantools.database.load_string(AIRCRAFT, "dbc")
+    assert isinstance(database, cantools.database.Database)
+    (folder / "monday").mkdir()
+    logs = [can.Logger(folder / name) for name in ("flight.blf", "monday/1.blf", "monday/2.blf")]
+    for k, row in enumerate(trace):
+        signals = {
+            "LEVER": {"Angle": np.degrees(row["theta_measured_rad"]), "LeverCounter": k % 256},
+            "IMU": {"AccZ": row["z_ddot_measured_m_s2"] + 9.80665, "AccX": 0.1},
+            "MOTOR": {"Torque": row["tau_m_measured_N_m"]},
+        }
+        for name, values in signals.items():
+            kind = database.get_message_by_name(name)
+            message = can.Message(
+                timestamp=1e9 + row["time_s"],
+                arbitration_id=kind.frame_id,
+                is_extended_id=False,
+                data=kind.encode(values),
+            )
+            for log in logs if k < 4000 else logs[:1]:
+                log.on_message_received(message)
+    for log in logs:
+        log.stop()
+    return folder
+
+
+def simulated(folder: Path, seconds: float) -> Path:
+    """A folder with the files of a run."""
+    steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=2 s", "limits={}"])
+    with LeverBus("vcan0", config=steady.config) as bus:
+        simulate(steady, bus, folder, channel="vcan0")
+    return folder

@@ -1,0 +1,78 @@
+"""The examples of `lever COMMAND --help`: all can be typed, and all that need neither hardware nor minutes are run."""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser
+from pathlib import Path
+
+import pytest
+import readmes
+from lever_cdkf.host_tools import cli
+from quality import tools
+
+NOT_RUN = {
+    r"--interface|can0": "needs a CAN interface or a serial device",
+    r"wireshark -C": "needs a display",
+    r"lever (live|monitor)(?!.*--once)": "runs until it is ended",
+    r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
+    r"lever (compare --(out|quick|envelope)|envelope --json|figures --out)": "takes minutes",
+}
+SHORTER = {
+    r"--seeds \d+": "--seeds 1",
+    r"(lever compare --(scenarios|models))": r"lever compare --duration 2 --scenarios step_up --\2",
+    r"(lever envelope --quick)": r"\1 --seeds 1",
+    r"--start 60 --length 120": "--length 25",
+    r"(lever sim sudden_grip)": r'\1 --set "limits={}"',
+}
+"""The same command, with less to calculate."""
+USERS_FILES = """
+cp out/session.log session.log
+head -n 9000 session.log | sed s/vcan0/can1/ | gzip > monday_1.log.gz
+tail -n +9001 session.log | sed s/vcan0/can1/ | gzip > monday_2.log.gz
+cp aircraft.dbc it.dbc
+cp sil/scenarios/steady.toml my_own.toml
+echo theta_noise = 1 mrad | tee my.settings > old.settings
+"""
+"""Besides those that conftest.py makes."""
+
+
+def parsers() -> dict[str, ArgumentParser]:
+    parser = cli._parser()
+    assert parser._subparsers is not None
+    return {"": parser, **parser._subparsers._group_actions[0].choices}  # type: ignore[dict-item]
+
+
+def examples(command: str) -> list[str]:
+    """The lines to type, without what is said beside them."""
+    _, _, text = (parsers()[command].epilog or "").partition(":\n")
+    typed = re.findall(r"^  ((?:lever|lever_can|candump)\b[^\\\n]*(?:\\\n[^\\\n]*)*)", text, re.MULTILINE)
+    return [re.sub(r" {3,}(?=\S).*$", "", line) if "\\" not in line else line for line in typed]
+
+
+def reason(line: str) -> str | None:
+    return next((reason for pattern, reason in NOT_RUN.items() if re.search(pattern, line)), None)
+
+
+def test_every_command_has_examples_and_every_reason_is_needed() -> None:
+    lines = [line for command in parsers() for line in examples(command)]
+    assert [name for name in parsers() if not examples(name)] == ["demo"]
+    assert not [pattern for pattern in NOT_RUN if not any(re.search(pattern, line) for line in lines)]
+    assert not [pattern for pattern in SHORTER if not any(re.search(pattern, line) for line in lines)]
+
+
+@pytest.mark.parametrize("command", parsers())
+def test_examples_can_be_typed(command: str) -> None:
+    for line in examples(command):
+        for arguments in readmes.lever_commands(line):
+            assert cli._parser().parse_args(arguments)
+
+
+@pytest.mark.parametrize("command", [name for name in parsers() if any(not reason(line) for line in examples(name))])
+def test_examples_work(command: str, scratch: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(scratch))
+    lines = [line for line in examples(command) if not reason(line)]
+    script = "\n".join((USERS_FILES, *lines))
+    for pattern, instead in SHORTER.items():
+        script = re.sub(pattern, instead, script)
+    tools.assert_silent(["bash", "-euo", "pipefail", "-c", script], cwd=scratch)
