@@ -18,6 +18,12 @@ def packed(values: Array) -> dict[str, object]:
     return spec
 
 
+def coarse(values: Array, bits: int = 13) -> Array:
+    """To so many binary digits, for colours: what compresses well."""
+    mantissa, exponent = np.frexp(values)
+    return np.ldexp(np.round(np.ldexp(mantissa, bits)), exponent - bits)
+
+
 def spread_indices(count: int, most: int, keep: NDArray[np.intp] | None = None) -> NDArray[np.intp]:
     """At most `most` evenly spread indices of 0 … count-1, and `keep` with the one before each."""
     even: NDArray[np.intp] = np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)

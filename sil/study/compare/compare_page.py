@@ -17,6 +17,8 @@ from .cases import PRIOR, cases
 from .evaluation import Row
 from .verdicts import Claim
 
+_ESTIMATORS = 6  # in a table
+
 
 def build(
     results: Results,
@@ -139,6 +141,19 @@ def _wrong_noise(page: Page, rows: Sequence[Row]) -> None:
 
 
 def _table(lines: Sequence[TableRow]) -> str:
+    """Of estimators with a column for each, as they have more figures than a page is wide."""
+    if not lines or "estimator" not in lines[0]:
+        return _rows(lines)
+    parts = (lines[first : first + _ESTIMATORS] for first in range(0, len(lines), _ESTIMATORS))
+    return "".join(_rows(_turned(part)) for part in parts)
+
+
+def _turned(lines: Sequence[TableRow]) -> list[TableRow]:
+    figures = [name for name in lines[0] if name != "estimator"]
+    return [{"": name, **{str(line["estimator"]): line[name] for line in lines}} for name in figures]
+
+
+def _rows(lines: Sequence[TableRow]) -> str:
     header = [html.escape(column) for column in lines[0]] if lines else []
     return table(header, ([html.escape(number(cell)) for cell in line.values()] for line in lines))
 
