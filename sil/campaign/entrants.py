@@ -169,11 +169,11 @@ ENTRANTS: Mapping[str, Entrant] = {
     entrant.name: entrant
     for entrant in (
         *(Firmware(name) for name in FIRMWARE),
-        Published("dual_ekf", 0.3),
-        Published("joint_ekf", 0.25),
-        Published("joint_ukf", 0.5),
-        Published("rls", 0.07),
-        Published("lms", 0.07),
+        Published("dual_ekf", 0.03),
+        Published("joint_ekf", 0.03),
+        Published("joint_ukf", 0.05),
+        Published("rls", 0.05),
+        Published("lms", 0.05),
     )
 }
 """By name."""

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.report.document import document
 from lever_cdkf.host_tools.report.figure import Spec, axis
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.summary_html import table
@@ -20,6 +19,7 @@ from . import cells as statistics
 from .border import Border
 from .cells import Map, Runs, Scale
 from .chunks import Plan
+from .spec import Failure
 
 _CELL, _TITLE, _FOOT = 170, 60, 60  # [pixels] of a chart, and above and below all
 _GAP = 0.03  # between charts, at least, as part of the whole
@@ -65,27 +65,33 @@ QUANTITIES = (
 
 def build(plan: Plan, cells: Map, borders: Sequence[Border], rows: Sequence[Row], by_estimator: Sequence[Row]) -> str:
     """The whole page; `rows` of the border's table."""
-    page, figures = Page(), dict[str, Spec]()
+    spec, length = plan.spec, f"{60.0 * plan.minutes:g}"
+    page = Page(spec.title, f"{html.escape(spec.description)} {spec.runs:,} runs of {length} s.", "lever campaign")
     for quantity in QUANTITIES:
-        if not any(np.isfinite(_values(cells, quantity, name)).any() for name in cells.runs):
-            continue
-        drawn = figures[f"map-{quantity.key}"] = _figure(cells, borders, quantity)
-        place = f'<div class="chart" id="map-{quantity.key}" style="height:{drawn["layout"]["height"]}px"></div>'
-        caption = f"<figcaption>{quantity.caption} {_LINE}</figcaption>"
-        page.section(quantity.key, quantity.title, quantity.title, f"<figure>{place}{caption}</figure>")
+        if any(np.isfinite(_values(cells, quantity, name)).any() for name in cells.runs):
+            caption = f"{quantity.caption} {_LINE}"
+            drawn = page.figure(f"map-{quantity.key}", _figure(cells, borders, quantity), caption)
+            page.section(quantity.key, quantity.title, quantity.title, drawn)
     page.section("border", "Border", "Where tracking fails", _table(rows))
     page.section("estimators", "Estimators", "All runs of each estimator", _table(by_estimator))
-    links = "".join(f'<a href="#{key}">{name}</a>' for key, name in page.contents)
-    spec, failure = plan.spec, plan.spec.failure
-    title = f"Lever CDKF: {html.escape(spec.title)}"
-    body = (
-        f'<header><h1>{title}</h1><p class="subtitle">{html.escape(spec.description)} '
-        f"{spec.runs:,} runs of {60.0 * plan.minutes:g} s.</p></header>"
-        f'<p class="verdict">Tracking counts as failed where the median error is above {100.0 * failure.error:g} % or '
-        f"the coverage below {100.0 * failure.coverage:g} %.</p><nav>{links}</nav>{''.join(page.sections)}"
-        "<footer>Made by <code>lever campaign</code>. Nothing on this page is loaded from elsewhere.</footer>"
+    return page.html(f'<p class="verdict">{_verdict(cells, spec.failure)}</p>')
+
+
+def _verdict(cells: Map, failure: Failure) -> str:
+    """In how many cells tracking holds."""
+    held = {
+        name: sum(
+            not (statistics.error(each) > failure.error or statistics.coverage(each) < failure.coverage)
+            for each in runs.values()
+        )
+        for name, runs in cells.runs.items()
+    }
+    count = max(len(runs) for runs in cells.runs.values())
+    names = ", ".join(f"{name} in {number}" for name, number in held.items())
+    return (
+        f"Of {count} cells tracking holds with {names}. It counts as failed where the median error is above "
+        f"{100.0 * failure.error:g} % or the coverage below {100.0 * failure.coverage:g} %."
     )
-    return document(f"Lever CDKF: {spec.title}", body, figures)
 
 
 _LINE = "Line: the border where tracking fails, with its 95 % band."

@@ -7,6 +7,7 @@ import json
 import os
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -112,11 +113,12 @@ def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
 def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace) -> int:
     """Files of what is done, and what is printed of it."""
     from lever_cdkf.host_tools.files import write_text
+    from lever_cdkf.host_tools.provenance import provenance
     from lever_cdkf.host_tools.tables import print_tables
 
     from ..campaign import maps, summary
 
-    found = summary.build(plan, folder, session)
+    found = summary.build(plan, folder, session) | {"provenance": asdict(provenance([args.spec]))}
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)
     write_text(folder / summary.FILE, json.dumps(found, indent=2, allow_nan=False) + "\n")
     for row in summary.errors(folder):

@@ -25,7 +25,7 @@ from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.host_tools.firmware.settings_file import setting_value
 from lever_cdkf.host_tools.firmware.units import UnitError
-from lever_cdkf.host_tools.near_names import did_you_mean
+from lever_cdkf.host_tools.near_names import did_you_mean, near_names
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 
 from ..plants import excitation, lever_plant, pilots
@@ -97,7 +97,8 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
             raise place.error(f"{values!r} is not a table")
         for name in values:
             if name not in readers:
-                raise place.error(f"unknown key {name!r}; allowed: {', '.join(readers)}")
+                near = "".join(f"; did you mean {each}?" for each in near_names(name, readers, 1))
+                raise place.error(f"unknown key {name!r}; allowed: {', '.join(readers)}{near}")
         return {name: readers[name](value, place.at(name)) for name, value in values.items()}
 
     return reader
@@ -292,10 +293,10 @@ def _override(values: dict[str, Any], override: str) -> None:
     if not equals or not last:
         raise ScenarioError(f"--set {override}: must be KEY=VALUE, such as duration='10 s' or settings.m_p='3 kg'")
     target: Any = values
-    if not parents and last in {row.name for row in settings_table()}:
-        parents = ["settings"]
-    elif not parents and last in CHOICES and isinstance(_value(written), str):
+    if not parents and last in CHOICES and isinstance(_value(written), str):
         parents = ["estimator"]
+    elif not parents and last not in Scenario.__dataclass_fields__:
+        parents = ["settings"] if near_names(last, (row.name for row in settings_table())) else []
     try:
         for parent in parents:
             target = target[int(parent)] if isinstance(target, list) else target.setdefault(parent, {})

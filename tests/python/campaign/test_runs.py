@@ -106,7 +106,7 @@ def test_chunks_cover_all_flights_once(small: Plan) -> None:
         plan = Plan(dataclasses.replace(small.spec, chunk=flights))
         covered = [flight for number in range(plan.count) for flight in range(*_ends(plan.chunk(number)))]
         assert covered == list(range(24))
-    assert Plan(dataclasses.replace(spec.load("tracking"))).size * 0.13 > 10.0  # seconds of work, measured
+    assert Plan(spec.load("tracking")).size * 0.1 > 10.0  # seconds of work, measured
 
 
 def _ends(chunk: Chunk) -> tuple[int, int]:
