@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.host_tools.firmware.library import ffi
 from lever_cdkf.host_tools.firmware.samples import sample_array
+from lever_cdkf.sil.oracle.scale import PARAMETERS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from python.oracle import test_oracle_against_firmware as reference
@@ -25,7 +26,7 @@ WITHIN = {"theta": reference.THETA_WITHIN, "theta_dot": reference.THETA_DOT_WITH
 def limits(case: reference.Case, expected: reference.Expected) -> Iterator[tuple[reference.Array, reference.Array]]:
     """Value and tolerance of each quantity, in the order of oracle.c."""
     values = expected.values
-    for name in (*reference.STATES, *reference.PARAMETERS[case.model], *reference.DERIVED):
+    for name in (*reference.STATES, *PARAMETERS[case.model], *reference.DERIVED):
         sigma = values[f"{name}_sigma"]
         yield values[name], sigma * WITHIN.get(name, reference.PARAMETERS_WITHIN)
         yield sigma, sigma * reference.SIGMA_WITHIN
