@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
+from lever_cdkf.host_tools.layout import command_lines, say, terminal_width
 from lever_cdkf.host_tools.tables import add_json_option
 
 if TYPE_CHECKING:
@@ -118,16 +119,17 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
 
     from ..campaign import maps, summary
 
-    found = summary.build(plan, folder, session) | {"provenance": asdict(provenance([args.spec]))}
+    origin = provenance([plan.spec.file] if args.spec == plan.spec.file else [])
+    found = summary.build(plan, folder, session) | {"provenance": asdict(origin)}
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)
     write_text(folder / summary.FILE, json.dumps(found, indent=2, allow_nan=False) + "\n")
     for row in summary.errors(folder):
         alone = shlex.join(["lever", "campaign", args.spec, "--run", str(row["run"])])
-        print(f"failed: {row['estimator']}, seed {row['seed']}: {row['error']}; alone: {alone}")
+        say(f"failed: {row['estimator']}, seed {row['seed']}: {row['error']}; alone: {alone}")
     factor = found["real_time_factor_per_core"]
-    print(f"{found['runs']} runs, {found['failed']} failed" + (f", {factor:g} × real time a core." if factor else "."))
-    written = [*maps.write(plan, folder), summary.FILE, f"{plan.count - len(session.lost)} Parquet files"]
-    print(f"Written to {args.out}: {', '.join(written)}")
+    say(f"{found['runs']} runs, {found['failed']} failed" + (f", {factor:g} × real time a core." if factor else "."))
+    written = [*maps.write(plan, folder, origin), summary.FILE, f"{plan.count - len(session.lost)} Parquet files"]
+    say(f"Written to {args.out}: {', '.join(written)}")
     if session.lost:
         flights = ", ".join(f"{chunk.first} to {chunk.end - 1}" for chunk in session.lost)
         print(f"lever: campaign: flights {flights} killed the workers that tried them", file=sys.stderr)
@@ -152,6 +154,7 @@ def _one(chosen: Spec, args: argparse.Namespace) -> int:
     if row["estimator"] in FIRMWARE:
         overrides.append(f"estimator.estimator={row['estimator']}")
     settings = [part for override in overrides for part in ("--set", override)]
-    print("The same flight with the firmware in it, and a report:")
-    print(" ", shlex.join(["lever", "sim", chosen.scenario, "--seed", str(row["seed"]), *settings, "--out", "DIR"]))
+    say("The same flight with the firmware in it, and a report:")
+    command = shlex.join(["lever", "sim", chosen.scenario, "--seed", str(row["seed"]), *settings, "--out", "DIR"])
+    print(*command_lines(command, terminal_width()), sep="\n")
     return 1 if row.get("error") else 0
