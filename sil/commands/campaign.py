@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
-from lever_cdkf.host_tools.layout import say
+from lever_cdkf.host_tools.layout import command_lines, say, terminal_width
 from lever_cdkf.host_tools.tables import add_json_option
 
 if TYPE_CHECKING:
@@ -154,6 +154,7 @@ def _one(chosen: Spec, args: argparse.Namespace) -> int:
     if row["estimator"] in FIRMWARE:
         overrides.append(f"estimator.estimator={row['estimator']}")
     settings = [part for override in overrides for part in ("--set", override)]
-    print("The same flight with the firmware in it, and a report:")
-    print(" ", shlex.join(["lever", "sim", chosen.scenario, "--seed", str(row["seed"]), *settings, "--out", "DIR"]))
+    say("The same flight with the firmware in it, and a report:")
+    command = shlex.join(["lever", "sim", chosen.scenario, "--seed", str(row["seed"]), *settings, "--out", "DIR"])
+    print(*command_lines(command, terminal_width()), sep="\n")
     return 1 if row.get("error") else 0

@@ -13,6 +13,7 @@ from quality import tools
 
 NOT_RUN = {
     r"--interface|can0": "needs a CAN interface or a serial device",
+    r"lever campaign (?!--list)": "takes minutes",
     r"wireshark -C": "needs a display",
     r"lever (live|monitor)(?!.*--once)": "runs until it is ended",
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
