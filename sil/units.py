@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lever_cdkf.host_tools.firmware.units import UnitError, parse
+from lever_cdkf.host_tools.units import UnitError, parse
 
 __all__ = ["GRAVITY", "UnitError", "parse"]
 

@@ -24,9 +24,9 @@ from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.host_tools.firmware.settings_file import setting_value
-from lever_cdkf.host_tools.firmware.units import UnitError
 from lever_cdkf.host_tools.near_names import did_you_mean, near_names
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
+from lever_cdkf.host_tools.units import UnitError
 
 from ..plants import excitation, lever_plant, pilots
 from ..plants.sensors import VALUES, Corruption, Sensor, Sensors

@@ -10,8 +10,8 @@ import math
 import re
 from functools import cache
 
-from ..errors import LeverError
-from ..files import native_file
+from .errors import LeverError
+from .files import native_file
 
 _QUANTITY = re.compile(r"[ \t]*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)[ \t]*(.*?)[ \t]*")
 
