@@ -18,10 +18,11 @@ def packed(values: Array) -> dict[str, object]:
     return spec
 
 
-def coarse(values: Array, bits: int = 13) -> Array:
+def coarse(values: Array, bits: int = 14) -> Array:
     """To so many binary digits, for colours: what compresses well."""
     mantissa, exponent = np.frexp(values)
-    return np.ldexp(np.round(np.ldexp(mantissa, bits)), exponent - bits)
+    rounded: Array = np.ldexp(np.round(np.ldexp(mantissa, bits)), exponent - bits)
+    return rounded
 
 
 def spread_indices(count: int, most: int, keep: NDArray[np.intp] | None = None) -> NDArray[np.intp]:

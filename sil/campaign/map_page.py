@@ -42,7 +42,8 @@ class Quantity:
 QUANTITIES = (
     Quantity(
         "error", "Error", "%", statistics.error, 100.0, (0.0, 50.0),
-        "The largest rms error of a parameter in a run, relative to the truth: median over the runs of a cell.",
+        "The largest rms error of a parameter in a run, relative to the truth: median over the runs of a cell; white "
+        "where most failed.",
     ),
     Quantity(
         "coverage", "Coverage", "%", statistics.coverage, 100.0, (50.0, 100.0),

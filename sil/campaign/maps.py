@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lever_cdkf.host_tools.files import write_text
+from lever_cdkf.host_tools.provenance import Provenance, with_provenance
 from lever_cdkf.host_tools.tables import Row
 
 from . import map_page, map_svg
@@ -20,13 +21,14 @@ from .summary import by_estimator
 FILES = ("map.html", "map.svg", "border.csv")
 
 
-def write(plan: Plan, folder: Path) -> tuple[str, ...]:
+def write(plan: Plan, folder: Path, origin: Provenance | None = None) -> tuple[str, ...]:
     """Writes the files of a campaign whose last axis has numbers; returns their names. Raises LeverError."""
     if not plan.spec.vary or not plan.spec.vary[-1].is_number:
         return ()
     cells = read(plan, folder)
     edge = list(borders(cells, plan.spec.failure))
-    write_text(folder / FILES[0], map_page.build(plan, cells, edge, rows(cells, edge), by_estimator(plan, folder)))
+    page = map_page.build(plan, cells, edge, rows(cells, edge), by_estimator(plan, folder))
+    write_text(folder / FILES[0], with_provenance(page, origin))
     write_text(folder / FILES[1], map_svg.build(cells, edge))
     write_text(folder / FILES[2], _csv(cells, edge))
     return FILES

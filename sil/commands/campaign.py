@@ -119,7 +119,8 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
 
     from ..campaign import maps, summary
 
-    found = summary.build(plan, folder, session) | {"provenance": asdict(provenance([args.spec]))}
+    origin = provenance([plan.spec.file] if args.spec == plan.spec.file else [])
+    found = summary.build(plan, folder, session) | {"provenance": asdict(origin)}
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)
     write_text(folder / summary.FILE, json.dumps(found, indent=2, allow_nan=False) + "\n")
     for row in summary.errors(folder):
@@ -127,7 +128,7 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
         say(f"failed: {row['estimator']}, seed {row['seed']}: {row['error']}; alone: {alone}")
     factor = found["real_time_factor_per_core"]
     say(f"{found['runs']} runs, {found['failed']} failed" + (f", {factor:g} × real time a core." if factor else "."))
-    written = [*maps.write(plan, folder), summary.FILE, f"{plan.count - len(session.lost)} Parquet files"]
+    written = [*maps.write(plan, folder, origin), summary.FILE, f"{plan.count - len(session.lost)} Parquet files"]
     say(f"Written to {args.out}: {', '.join(written)}")
     if session.lost:
         flights = ", ".join(f"{chunk.first} to {chunk.end - 1}" for chunk in session.lost)

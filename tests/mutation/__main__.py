@@ -37,7 +37,7 @@ def main() -> int:
         mutants = sorted(random.Random(args.seed).sample(mutants, args.random), key=lambda each: each.number)
         print(f"{args.random} mutants drawn with seed {args.seed}")
     start = time.monotonic()
-    programs = [measured(path) for path in sorted((args.build / "programs").iterdir())]
+    programs = [measured(args.build / "programs" / name) for name in (args.build / "programs.txt").read_text().split()]
     programs += [measured(args.build / "oracle", case) for case in sorted((args.build / "cases").glob("*.case"))]
     verdicts = []
     for verdict in judged(mutants, programs, args.jobs):

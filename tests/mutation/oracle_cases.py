@@ -48,6 +48,8 @@ def write(case: reference.Case, path: Path) -> None:
 def main() -> int:
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.case"):
+        old.unlink()
     for case in reference.CASES:
         write(case, folder / f"{case}.case")
     return 0

@@ -101,7 +101,7 @@ def test_there_is_an_order() -> None:
 @pytest.mark.parametrize(
     ("file", "line"),
     [
-        ("host_tools/watch/state.py", "from lever_cdkf.sil.units import parse"),
+        ("host_tools/watch/state.py", "from lever_cdkf.sil.toml_tables import read"),
         ("host_tools/files.py", "import lever_cdkf.sil"),
         ("host_tools/firmware/config.py", "    from ..can import codec"),
         ("host_tools/errors.py", "from .can.codec import decode"),
