@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from .errors import LeverError
 
 PACKAGES = {
+    "campaign": ("dask", "distributed", "pyarrow", "plotly", "matplotlib", "scipy"),
     "files": ("asammdf", "h5py", "mcap", "pyarrow", "scipy"),
     "flash": ("pyocd",),
     "live": ("textual", "tornado"),

@@ -13,9 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from lever_cdkf.host_tools import units
 from lever_cdkf.host_tools.errors import LeverError
-
-from . import units
 
 SIGNAL = "signal"
 """Unit of a field that is the unit of whatever the table describes: m/s^2 under [[base]], kg under pilot.m_p."""

@@ -16,12 +16,14 @@ def blocks(readme: Path, language: str) -> dict[int, str]:
 
 def lever_commands(script: str) -> list[list[str]]:
     """The arguments of each call of `lever` in lines of a shell."""
-    words = shlex.shlex(script.replace("\\\n", " "), posix=True, punctuation_chars="|&;<>\n")
-    words.whitespace, words.whitespace_split = " \t", True
-    commands: list[list[str]] = [[]]
-    for word in words:
-        if set(word) <= set("|&;<>\n"):
-            commands.append([])
-        else:
-            commands[-1].append(word)
+    commands: list[list[str]] = []
+    for line in script.replace("\\\n", " ").splitlines():
+        commands.append([])
+        words = shlex.shlex(line, posix=True, punctuation_chars="|&;<>")
+        words.whitespace_split = True
+        for word in words:
+            if set(word) <= set("|&;<>"):
+                commands.append([])
+            else:
+                commands[-1].append(word)
     return [command[1:] for command in commands if command[:1] == ["lever"]]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 from ..provenance import Provenance
 
@@ -19,6 +21,8 @@ RESOLUTION = 300
 """[dots per inch] of a PNG."""
 KINDS = ("png", "svg", "pdf")
 
+_FONT = "DejaVu Sans"  # matplotlib's own
+_STYLE_ELEMENT = b'<style type="text/css">'
 _STYLE: dict[str, Any] = {
     "font.size": 7.5,
     "axes.labelsize": 7.5,
@@ -45,7 +49,7 @@ _STYLE: dict[str, Any] = {
     "figure.constrained_layout.w_pad": 0.03,
     "figure.constrained_layout.wspace": 0.06,
     "pdf.fonttype": 42,  # TrueType, embedded
-    "svg.fonttype": "none",  # text stays text
+    "svg.fonttype": "none",  # text stays text; _with_font() embeds the font
     "svg.hashsalt": "lever",
 }
 
@@ -63,7 +67,26 @@ def render(figure: Figure, kind: str, title: str, provenance: Provenance | None 
     file = io.BytesIO()
     with style():
         figure.savefig(file, format=kind, dpi=RESOLUTION, metadata=_metadata(kind, title, provenance, more))
-    return file.getvalue()
+    return _with_font(file.getvalue()) if kind == "svg" else file.getvalue()
+
+
+def _with_font(svg: bytes) -> bytes:
+    """With those characters of the font in it that there are."""
+    from fontTools import subset
+    from matplotlib.font_manager import findfont
+
+    words = "".join(ElementTree.fromstring(svg).itertext())
+    options = subset.Options(flavor="woff", notdef_outline=True)
+    options.drop_tables += ["FFTM"]  # of FontForge, which subset does not know
+    with subset.load_font(findfont(_FONT), options) as font:
+        subsetter = subset.Subsetter(options)
+        subsetter.populate(text=words)
+        subsetter.subset(font)
+        file = io.BytesIO()
+        subset.save_font(font, file, options)
+    source = f"data:font/woff;base64,{base64.b64encode(file.getvalue()).decode()}"
+    style = f"@font-face{{font-family: '{_FONT}'; src: url({source})}}"
+    return svg.replace(_STYLE_ELEMENT, _STYLE_ELEMENT + style.encode(), 1)
 
 
 def _metadata(kind: str, title: str, provenance: Provenance | None, more: Mapping[str, Any]) -> dict[str, Any]:

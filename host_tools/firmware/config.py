@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -42,6 +42,7 @@ class Setting:
             )
 
 
+@lru_cache(maxsize=4096)
 def shortest(value: float) -> float:
     """The number with the fewest digits that is `value` in single precision: 0.1 for 0.100000001."""
     candidates = (float(f"{value:.{digits}g}") for digits in range(1, 10))

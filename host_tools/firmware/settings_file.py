@@ -14,11 +14,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .. import units
 from ..errors import SettingsError
-from . import units
+from ..units import UnitError
 from .config import CHOICES, Config, Setting, choice_value, setting, settings_table
 from .library import enum_names
-from .units import UnitError
 
 Assignments = Mapping[str, str | float]
 """Values by name, of settings (float) and choices (str)."""

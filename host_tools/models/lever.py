@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
-
-GRAVITY = 9.80665  # [m/s²]
+from ..units import GRAVITY
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,13 @@ def packed(values: Array) -> dict[str, object]:
     return spec
 
 
+def coarse(values: Array, bits: int = 14) -> Array:
+    """To so many binary digits, for colours: what compresses well."""
+    mantissa, exponent = np.frexp(values)
+    rounded: Array = np.ldexp(np.round(np.ldexp(mantissa, bits)), exponent - bits)
+    return rounded
+
+
 def spread_indices(count: int, most: int, keep: NDArray[np.intp] | None = None) -> NDArray[np.intp]:
     """At most `most` evenly spread indices of 0 … count-1, and `keep` with the one before each."""
     even: NDArray[np.intp] = np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)

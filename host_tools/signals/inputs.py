@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
+from ..units import GRAVITY
 from .mapping import Source
 from .recorded import Signal
 from .resample import Samples, sample
 from .slope import slope_ratio
-from .units import GRAVITY, KINDS, check_plausible, factor, gravity_in, guess
+from .units import KINDS, check_plausible, factor, gravity_in, guess
 
 _FASTER = 1.5
 """Periods of a signal in one of the samples from which on it is told that some of it is not used."""

@@ -12,12 +12,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..can import codec
+from ..units import GRAVITY
 from .bus_signals import find, load_database, number, of_fd
 from .inputs import Input, samples_of, understood
 from .mapping import Mapping, Source
 from .recorded import Signal
 from .resample import offset_between
-from .units import GRAVITY, INPUTS, factor
+from .units import INPUTS, factor
 
 LEARNT = 2.0
 """[s]"""

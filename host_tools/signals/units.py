@@ -9,9 +9,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..errors import LeverError
-
-GRAVITY = 9.80665
-"""[m/s²]"""
+from ..units import GRAVITY
 
 KINDS = {
     "time": ("time", "s"),

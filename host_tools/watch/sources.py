@@ -51,6 +51,8 @@ class Source(ABC):
     takes_commands = False
     simulated = False
     """Whether truth() knows what the estimator is to find."""
+    run_number = 1
+    """Counts how often what is watched begins."""
 
     def __init__(self) -> None:
         self.dropped = 0

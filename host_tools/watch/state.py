@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import ComplexArray, FloatArray
 from ..can.fields import COUNTS
 from ..firmware import quantities
 from ..firmware.config import Config, setting
 from ..firmware.library import enum_names
+from ..report import bode
 from . import paired, status
 from .picture import STEP, Picture
 from .sources import Source
@@ -26,6 +27,8 @@ MAP_STEP = 0.5
 """[s] between two columns of the map of magnitude over time."""
 MAP_FREQUENCIES: FloatArray = FREQUENCIES[::2]
 COHERENCE_FREQUENCIES: FloatArray = np.arange(0.5, 12.25, 0.5)
+WITHOUT_TORQUE = frozenset({"linear_black_box"})
+"""Models of the firmware that do not use the motor's torque."""
 OTHERS = ("nis", "excitation", "dither")
 _DIGITS = 4
 _DECIMALS = 5  # of curves
@@ -60,7 +63,7 @@ class State:
         update = self._present()
         update["row"] = self._rows[-1]
         update["bode"] = None if response is None else _bode(response)
-        update["truth"] = None if truth is None else np.degrees(np.abs(truth[1]))
+        update |= {"truth": None, "truth_phase": None} if truth is None else _truth(truth[1])
         update["coherence"] = self._coherence()
         if not self._map or picture.now - self._map[-1][0] >= 0.99 * MAP_STEP:
             self._map.append((picture.now, np.zeros(0) if response is None else response.magnitude[::2]))
@@ -77,6 +80,7 @@ class State:
             "model": self._model,
             "choices": {what: list(enum_names(f"lever_{what}").values()) for what in ("model", "estimator")},
             "dither_limit": self._dither_limit,
+            "without_torque": self._model in WITHOUT_TORQUE,
             "sigmas": SIGMAS,
             "span": SPAN,
             "step": STEP,
@@ -152,6 +156,7 @@ class State:
             "foreign": picture.foreign,
             "error_frames": picture.error_frames,
             "unseen": source.dropped,
+            "run": source.run_number,
         }
 
 
@@ -164,6 +169,11 @@ def _bode(response: Response) -> dict[str, FloatArray]:
         "phase_low": response.phase - response.phase_half_band,
         "phase_high": response.phase + response.phase_half_band,
     }
+
+
+def _truth(response: ComplexArray) -> dict[str, FloatArray]:
+    magnitude, phase = bode.magnitude_and_phase(response)
+    return {"truth": np.degrees(magnitude), "truth_phase": phase}
 
 
 def _json(content: dict[str, Any]) -> str:

@@ -26,6 +26,7 @@ also writes into DIR
 
   compare.csv      every figure of every estimator in every case
   compare.html     verdicts, figures and tables as one page for a browser
+  FIGURE.pdf .svg  each figure of the page for print, two columns of a journal wide; FIGURE.csv: its numbers
   provenance.json  version, revision, date and command that made them
 
 With --envelope instead: the firmware beside joint EKF and UKF in the conditions of `lever envelope` (8 pilots each),
@@ -110,20 +111,25 @@ def run(args: argparse.Namespace) -> int:
     for case, verdict in by_case.items():
         say(f"{case}: {verdict}")
     if args.out is not None:
-        from lever_cdkf.host_tools.files import Outputs, write_text
+        from lever_cdkf.host_tools.files import Outputs, write_text, writing
         from lever_cdkf.host_tools.provenance import provenance, with_provenance
 
-        from ..study.compare import compare_page
+        from ..study.compare import compare_page, printed
 
         with Outputs(args.out) as outputs:
             write_text(outputs.path("compare.csv"), table.csv_text(rows))
+            names = ["compare.csv", "compare.html"]
             origin = provenance()
-            page = compare_page.build(results, rows, by_case, claims, tables)
+            page, figures = compare_page.build(results, rows, by_case, claims, tables)
             write_text(outputs.path("compare.html"), with_provenance(page, origin))
-            written = outputs.written("compare.csv", "compare.html")
-            write_text(outputs.path("provenance.json"), origin.with_outputs(written).text())
+            for name, content in printed.files(figures, origin):
+                names.append(name)
+                path = outputs.path(name)
+                with writing(path):
+                    path.write_bytes(content)
+            write_text(outputs.path("provenance.json"), origin.with_outputs(outputs.written(*names)).text())
             outputs.finish()
-        say(f"Written to {args.out}: compare.html, compare.csv, provenance.json")
+        say(f"Written to {args.out}: compare.html, compare.csv, figures as .pdf, .svg and .csv, provenance.json")
     return 0
 
 

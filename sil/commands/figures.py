@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 _DESCRIPTION = """\
 Computes the paper's figures for this system from simulated runs of the firmware, and writes into DIR
 
-  NAME.pdf .svg .png  each figure for print; fonts are embedded in the PDF, text in the SVG is text, PNG has 300 dots
-                      per inch
+  NAME.pdf .svg .png  each figure for print; text is text, with its font embedded; a PNG has 300 dots per inch
   NAME.csv            what it shows, as numbers
   figures.html        all of them as one page for a browser, to be turned and zoomed; figures.html#NAME is one of them
   captions.md         what each figure shows; its numbers are measured in these runs

@@ -165,6 +165,11 @@ class Loop:
         if self.struct.pointer.refused:
             raise LeverError("the estimator refuses COMMAND")
 
+    @property
+    def outputs(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """What is kept of the firmware: arrays of lever_estimate_t and lever_health_t."""
+        return self._estimates, self._healths
+
     def result(self) -> FastRun:
         """What is kept of it."""
         scenario, inputs, estimates = self._scenario, self._inputs, self._estimates

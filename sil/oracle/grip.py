@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.models.detrend import Detrend
-from lever_cdkf.host_tools.models.lever import GRAVITY, Lever
+from lever_cdkf.host_tools.models.lever import Lever
+from lever_cdkf.host_tools.units import GRAVITY
 
 from .learning import seconds
 

@@ -27,9 +27,9 @@ from typing import Literal
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.models.transfer import Transfer
+from lever_cdkf.host_tools.units import GRAVITY
 from numpy.typing import NDArray
 
-from ..units import GRAVITY
 from . import truth as truths
 from .truth import Conditions, Dynamics
 

@@ -96,7 +96,9 @@ class Sensor:
 
     def offsets(self, count: int, rng: np.random.Generator) -> FloatArray:
         """What is added to `count` samples: bias and noise."""
-        offsets: FloatArray = self.bias + self.noise * rng.standard_normal(count)
+        offsets: FloatArray = rng.standard_normal(count)
+        offsets *= self.noise
+        offsets += self.bias
         return offsets
 
     def lag(self, period: float) -> tuple[int, float]:

@@ -39,6 +39,7 @@ class SimulationSource(Source):
             except _Stopped:
                 return
             scenario = dataclasses.replace(scenario, seed=scenario.seed + 1)
+            self.run_number += 1
 
     def stop(self) -> None:
         super().stop()

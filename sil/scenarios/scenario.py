@@ -24,9 +24,9 @@ from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.host_tools.firmware.settings_file import setting_value
-from lever_cdkf.host_tools.firmware.units import UnitError
-from lever_cdkf.host_tools.near_names import did_you_mean
+from lever_cdkf.host_tools.near_names import did_you_mean, near_names
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
+from lever_cdkf.host_tools.units import UnitError
 
 from ..plants import excitation, lever_plant, pilots
 from ..plants.sensors import VALUES, Corruption, Sensor, Sensors
@@ -97,7 +97,8 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
             raise place.error(f"{values!r} is not a table")
         for name in values:
             if name not in readers:
-                raise place.error(f"unknown key {name!r}; allowed: {', '.join(readers)}")
+                near = "".join(f"; did you mean {each}?" for each in near_names(name, readers, 1))
+                raise place.error(f"unknown key {name!r}; allowed: {', '.join(readers)}{near}")
         return {name: readers[name](value, place.at(name)) for name, value in values.items()}
 
     return reader
@@ -244,17 +245,26 @@ def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
 
     Raises ScenarioError.
     """
+    return from_toml(content_of(name_or_path), name_or_path, overrides)
+
+
+def content_of(name_or_path: str, folder: Path | None = None) -> bytes:
+    """What the file of a scenario holds; a path is relative to `folder`. Raises ScenarioError."""
     if name_or_path.endswith(".toml"):
-        path, file = Path(name_or_path), name_or_path
+        path = (folder or Path()) / name_or_path
         if not path.is_file():
-            raise ScenarioError(f"{file}: no such file")
-        content, name = path.read_bytes(), path.stem
-    elif name_or_path in names():
-        name, file = name_or_path, f"{name_or_path}.toml"
-        content = (files(__package__) / file).read_bytes()
-    else:
-        hint = did_you_mean(name_or_path, names(), f"there are {', '.join(names())}, or give a path to a .toml file")
-        raise ScenarioError(f"no scenario {name_or_path!r}; {hint}")
+            raise ScenarioError(f"{path}: no such file")
+        return path.read_bytes()
+    if name_or_path in names():
+        return (files(__package__) / f"{name_or_path}.toml").read_bytes()
+    hint = did_you_mean(name_or_path, names(), f"there are {', '.join(names())}, or give a path to a .toml file")
+    raise ScenarioError(f"no scenario {name_or_path!r}; {hint}")
+
+
+def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
+    """As load(), of what the file holds."""
+    is_path = name_or_path.endswith(".toml")
+    name, file = (Path(name_or_path).stem, name_or_path) if is_path else (name_or_path, f"{name_or_path}.toml")
     try:
         scenario = dataclasses.replace(_read(content, file, overrides), name=name, file=file)
     except RecursionError:
@@ -283,10 +293,10 @@ def _override(values: dict[str, Any], override: str) -> None:
     if not equals or not last:
         raise ScenarioError(f"--set {override}: must be KEY=VALUE, such as duration='10 s' or settings.m_p='3 kg'")
     target: Any = values
-    if not parents and last in {row.name for row in settings_table()}:
-        parents = ["settings"]
-    elif not parents and last in CHOICES and isinstance(_value(written), str):
+    if not parents and last in CHOICES and isinstance(_value(written), str):
         parents = ["estimator"]
+    elif not parents and last not in Scenario.__dataclass_fields__:
+        parents = ["settings"] if near_names(last, (row.name for row in settings_table())) else []
     try:
         for parent in parents:
             target = target[int(parent)] if isinstance(target, list) else target.setdefault(parent, {})

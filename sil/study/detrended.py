@@ -30,16 +30,13 @@ def deviations(signals: Array, start: Array, corner: float, dt: float) -> tuple[
 
     The levels start at `start` (B, n), at rest; corner [Hz], dt [s].
     """
+    from scipy.signal import sosfilt
+
     w = 2.0 * math.pi * corner
-    level = np.stack((start, *(np.zeros_like(start) for _ in DAMPING[1:])))  # of each section
-    slope = np.zeros_like(level)
-    levels = np.empty((signals.shape[1], *start.shape))
-    for k, values in enumerate(np.ascontiguousarray(signals.swapaxes(0, 1))):
-        levels[k] = level.sum(axis=0)
-        deviation = values
-        for i, damping in enumerate(DAMPING):
-            deviation = deviation - level[i]
-            slope[i] += dt * w**2 * deviation
-            level[i] += dt * (slope[i] + damping * w * deviation)
-    levels = np.ascontiguousarray(levels.swapaxes(0, 1))
-    return signals - levels, levels
+    left, sections = np.zeros((len(DAMPING), len(signals), 2, signals.shape[2])), []
+    for damping in DAMPING:  # slope += dt w² d; level += dt (slope + damping w d) with the deviation d it leaves
+        gain = dt * (dt * w**2 + damping * w)
+        sections.append((1.0, -2.0, 1.0, 1.0, gain - 2.0, 1.0 - gain + (dt * w) ** 2))
+    left[0, :, 0], left[0, :, 1] = -start, start
+    deviation, _ = sosfilt(np.array(sections), signals, axis=1, zi=left)
+    return deviation, signals - deviation

@@ -48,13 +48,13 @@ class Firmware:
         w = np.where(columns["recoveries"][..., None] > 0.0, np.nan, batch.knowledge.scaled(columns["parameter"]))
         scale = columns["parameter"] if batch.knowledge.positive else batch.knowledge.sigma
         sigma = columns["parameter_sigma"] / scale
-        return Estimates(at, w, _covariance(sigma, columns["parameter_correlation"]), columns["nis"])
+        return Estimates(at, w, covariance_of(sigma, columns["parameter_correlation"]), columns["nis"])
 
 
 _COLUMNS = ("parameter", "parameter_sigma", "parameter_correlation", "nis", "recoveries")
 
 
-def _covariance(sigma: Array, correlation: Array) -> Array:
+def covariance_of(sigma: Array, correlation: Array) -> Array:
     """(B, T, 3, 3) of standard deviations (B, T, 3) and correlations of _PAIRS (B, T, 3)."""
     matrix = np.zeros((*sigma.shape, PARAMETERS))
     matrix[..., range(PARAMETERS), range(PARAMETERS)] = 1.0

@@ -22,8 +22,8 @@ from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.firmware.config import setting, settings_table
 from lever_cdkf.host_tools.models.lever import Lever
 from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
+from lever_cdkf.host_tools.units import GRAVITY
 
-from ..units import GRAVITY
 from .data import OUTPUTS, STATES, Batch, Knowledge, Model, Truth, rest_angle
 from .draws import excitation, streams
 

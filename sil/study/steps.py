@@ -13,8 +13,8 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.firmware.config import settings_table
 from lever_cdkf.host_tools.models.lever import Lever
+from lever_cdkf.host_tools.units import GRAVITY
 
-from ..units import GRAVITY
 from .data import OUTPUTS, PARAMETERS, Batch, Truth
 from .detrended import detrended
 from .draws import excitation, streams

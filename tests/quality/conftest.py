@@ -59,7 +59,9 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
     trace = np.genfromtxt(flight / "trace.csv", delimiter=",", names=True)
     rows = np.column_stack((trace["time_s"], trace["theta_measured_rad"], trace["z_ddot_measured_m_s2"] / 9.80665 + 1))
     np.savetxt(folder / "flight.csv", rows, "%.6f", ",", header="time,angle [rad],acc", comments="")
-    (folder / "aircraft.toml").write_text('theta = "LEVER.Angle"\nz_ddot = "IMU.AccZ"\n', encoding="utf-8")
+    (folder / "aircraft.toml").write_text(
+        '[theta]\nsignal = "LEVER.Angle"\n[z_ddot]\nsignal = "IMU.AccZ"\n', encoding="utf-8"
+    )
     database = cantools.database.load_string(AIRCRAFT, "dbc")
     assert isinstance(database, cantools.database.Database)
     (folder / "monday").mkdir()

@@ -13,6 +13,7 @@ from quality import tools
 
 NOT_RUN = {
     r"--interface|can0": "needs a CAN interface or a serial device",
+    r"lever campaign (?!--list)": "takes minutes",
     r"wireshark -C": "needs a display",
     r"lever (live|monitor)(?!.*--once)": "runs until it is ended",
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
@@ -23,7 +24,7 @@ SHORTER = {
     r"(lever compare --(scenarios|models))": r"lever compare --duration 2 --scenarios step_up --\2",
     r"(lever envelope --quick)": r"\1 --seeds 1",
     r"--start 60 --length 120": "--length 25",
-    r"(lever sim sudden_grip)": r'\1 --set "limits={}"',
+    r"(lever sim sudden_grip|lever sim steady --seed 7) (--set)": r'\1 --set "limits={}" \2',
 }
 """The same command, with less to calculate."""
 USERS_FILES = """

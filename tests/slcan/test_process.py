@@ -298,17 +298,6 @@ def test_it_waits_for_an_adapter_that_is_unplugged(start: Start, link: Path) -> 
         line.unplug()
 
 
-@pytest.mark.parametrize("name", ["pci-0000:00:14.0-usb-0:2:1.0-port0", "tty:9600"])
-def test_a_path_may_hold_colons(start: Start, tmp_path: Path, name: str) -> None:
-    """As those in /dev/serial/by-path do; 9600 is no rate where it belongs to the name."""
-    for rate in ("", ":921600"):
-        line = Line(tmp_path / name)
-        process = start("slcan", f"{tmp_path / name}{rate}")
-        assert line.read_until(b"O\r") == b"\r\rC\rS8\rO\r"
-        process.stop()
-        line.unplug()
-
-
 @pytest.mark.parametrize(
     ("device", "reason"),
     [

@@ -4,7 +4,7 @@ acceptance filter after the data sheet of the SJA1000 (6.4.15, dual filter)."""
 from __future__ import annotations
 
 import pytest
-from slcan.peer import IDENTITY, Frame, Peer, library
+from slcan.peer import IDENTITY, Frame, Peer
 
 VERSION, SERIAL = (text.encode() for text in IDENTITY)
 DATA, REMOTE = Frame(0x210, bytes(1), 1), Frame(0x7, b"", 8, remote=True)
@@ -161,15 +161,3 @@ def test_the_filter_of_extended_identifiers_sees_their_upper_half(peer: Peer) ->
     assert not is_heard(peer, 0x1235 << 13, b"", extended=True)
     assert says(peer, b"M0\rC\rM0\rm123456789\rM1234567g\r") == b"\a\r\a\a\a"
     assert peer.state.acceptance_code == 0x12345678
-
-
-def test_numbers_out_of_range_are_cut_when_written() -> None:
-    ffi, lib = library()
-    text = ffi.new("char[]", lib.SLCAN_LINE_BYTES + 1)
-    for extended, length, stamp, line in (
-        (False, 255, lib.SLCAN_NO_TIME, b"t7FF80000000000000000\r"),
-        (True, 9, 0, b"T1FFFFFFF800000000000000000000\r"),
-    ):
-        frame = ffi.new("slcan_frame_t *", {"frame": {"id": 2**32 - 1, "length": length}, "extended": extended})
-        assert lib.slcan_write_frame(frame, stamp, text) == len(line)
-        assert bytes(ffi.buffer(text))[: len(line)] == line

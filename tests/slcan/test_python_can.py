@@ -8,7 +8,7 @@ from collections.abc import Callable
 import can
 import pytest
 from can.interfaces.slcan import slcanBus
-from slcan.peer import COMPILERS, IDENTITY, Frame, Peer, Port, read_frame
+from slcan.peer import COMPILERS, Frame, Peer, Port, read_frame
 
 pytestmark = pytest.mark.requires(COMPILERS)
 
@@ -86,26 +86,12 @@ def test_its_bit_rates(open_bus: Open, peer: Peer, rate: int, command: str) -> N
     assert peer.state.channel == peer.lib.SLCAN_CHANNEL_CLOSED
 
 
-def test_its_bit_timing(open_bus: Open, peer: Peer) -> None:
-    timing = can.BitTiming.from_registers(f_clock=8_000_000, btr0=0x03, btr1=0x1C)
-    with open_bus(timing=timing):
-        assert peer.state.bit_timing == 0x031C
-        assert peer.state.channel == peer.lib.SLCAN_CHANNEL_OPEN
-
-
 def test_it_listens_only(open_bus: Open, peer: Peer) -> None:
     with open_bus(listen_only=True, bitrate=500_000) as bus:
         assert peer.state.channel == peer.lib.SLCAN_CHANNEL_LISTEN
         bus.send(can.Message(arbitration_id=0x110, is_extended_id=False))
         assert peer.received == []
         assert peer.state.counts.refused > 0
-
-
-def test_it_reads_version_and_serial_number(open_bus: Open) -> None:
-    version, serial = IDENTITY
-    with open_bus(bitrate=1_000_000) as bus:
-        assert bus.get_version(1.0) == (int(version[:2]), int(version[2:]))
-        assert bus.get_serial_number(1.0) == serial
 
 
 def test_lines_that_it_takes_for_a_frame_are_that_frame_or_none(monkeypatch: pytest.MonkeyPatch) -> None:

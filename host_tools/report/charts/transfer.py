@@ -11,7 +11,7 @@ from .. import bode
 from ..bode import FREQUENCIES, magnitude_and_phase
 from ..figure import TICKS, Figure, Spec, axis, axis_range, band, frequency_axis, line, time_axis
 from ..run import Run
-from ..series import packed, spread_indices
+from ..series import coarse, packed, spread_indices
 
 TIMES = 200
 SLICES = 25
@@ -68,7 +68,7 @@ def _map(run: Run, time: Array, magnitude: Array, name: str, brightest: float) -
         "name": name,
         "x": packed(time),
         "y": packed(FREQUENCIES),
-        "z": packed(magnitude),
+        "z": packed(coarse(magnitude)),
         "zmin": 0.0,
         "zmax": brightest,
         "colorscale": "Viridis",

@@ -5,6 +5,7 @@ import { drawBand, drawBode, drawMap, drawOther, forgetRanges } from "./charts.j
 const PATIENCE = 1500; // [ms] without news after which the page says so
 const AGAIN = 1000; // [ms] between two attempts to connect
 const SURE = 3000; // [ms] for the second press of reset
+const NOTICED = 15; // [s] that a notice stays
 const DITHERS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1];
 const OTHERS = [
   { key: "excitation", title: "excitation: rms of θ̇ [rad/s]", name: "base" },
@@ -12,12 +13,13 @@ const OTHERS = [
   { key: "nis", title: "mean normalised innovation squared (expected 2)", name: "estimate" },
 ];
 
-const story = { start: null, update: null };
+const story = { start: null, update: null, startsOver: [] };
 const element = (id) => document.getElementById(id);
 let socket, lastHeard = 0, drawn = true, charts = [];
 
 function connect() {
-  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
+  const protocol = location.protocol === "https:" ? "wss" : "ws";
+  socket = new WebSocket(`${protocol}://${location.host}/socket`);
   socket.onmessage = (event) => hear(JSON.parse(event.data));
   socket.onclose = () => {
     lost("The connection to the server is lost; this page keeps trying.");
@@ -30,32 +32,39 @@ function hear(message) {
   if (message.start) begin(message.start);
   if (message.update && story.start) goOn(message.update);
   if (message.refused) answer(`Refused: ${message.refused}`, true);
-  if (message.sent) answer(`Sent: ${Object.entries(message.sent).map(([key, value]) => `${key} ${value}`).join(", ")}`);
+  if (message.sent) {
+    const fields = Object.entries(message.sent).map(([key, value]) => `${key} ${value}`);
+    answer(`Sent: ${fields.join(", ")}`);
+  }
 }
 
 function begin(start) {
   const same = story.start?.model === start.model;
   story.start = start;
   story.update = null;
+  story.startsOver = [];
   if (!same) forgetRanges();
   document.title = `lever live: ${start.title}`;
   element("title").textContent = start.title;
   document.body.classList.toggle("of-simulation", start.simulated);
   element("controls").hidden = !start.controls;
   element("read-only").hidden = start.controls;
-  offer("dither", DITHERS.filter((rms) => rms <= start.dither_limit).map((rms) => [rms, rms ? `${rms} N m rms` : "off"]), "as it is");
+  offerDither(start);
   offer("model", start.choices.model.map((name) => [name, name]), start.model ? null : "as it is", start.model);
   offer("estimator", start.choices.estimator.map((name) => [name, name]), "as it is");
   const rows = start.quantities.map((quantity) => {
     const [letter, index] = quantity.symbol.split(/<\/?sub>/);
     const name = cell("", "name");
     name.append(letter, Object.assign(document.createElement("sub"), { textContent: index ?? "" }), ` ${quantity.name}`);
-    return row([name, cell("–", "value"), cell("", "sigma"), cell(quantity.unit === "1" ? "" : quantity.unit, "unit"), cell("", "truth simulated")]);
+    const unit = cell(quantity.unit === "1" ? "" : quantity.unit, "unit");
+    return row([name, cell("–", "value"), cell("", "sigma"), unit, cell("", "truth simulated")]);
   });
   document.querySelector("#estimates tbody").replaceChildren(...rows);
+  const bands = start.quantities.map((each) => [each.name, (canvas) => drawBand(canvas, story, each)]);
+  const others = OTHERS.map((each) => [each.title, (canvas) => drawOther(canvas, story, each)]);
   charts = [
-    ...place("#bands .charts", start.quantities.map((quantity) => [quantity.name, (canvas) => drawBand(canvas, story, quantity)])),
-    ...place("#health .charts", OTHERS.map((other) => [other.title, (canvas) => drawOther(canvas, story, other)])),
+    ...place("#bands .charts", bands),
+    ...place("#health .charts", others),
     () => drawBode(story),
     () => drawMap(story),
   ];
@@ -64,6 +73,7 @@ function begin(start) {
 
 function goOn(update) {
   const { start } = story;
+  if (story.update && update.run > story.update.run) story.startsOver.push(update.row[0]);
   story.update = update;
   start.rows.push(update.row);
   while (start.rows.length > start.span / start.step) start.rows.shift();
@@ -71,11 +81,13 @@ function goOn(update) {
   while (start.map.length > start.span / start.map_step) start.map.shift();
   document.body.classList.toggle("stale", update.silence === null || update.silence > PATIENCE / 1000);
   tellCondition(update.level, update.condition);
+  tellStart(update);
   tellEstimates(update.row);
   tellHealth(update);
   tellMessages(update.messages);
-  for (const [request, mode] of [["run", "run"], ["freeze", "frozen"]])
+  for (const [request, mode] of [["run", "run"], ["freeze", "frozen"]]) {
     document.querySelector(`[data-request=${request}]`).setAttribute("aria-pressed", update.mode === mode);
+  }
   redraw();
 }
 
@@ -87,6 +99,14 @@ function tellCondition(level, text) {
   place.className = level;
 }
 
+// Which run of a scenario this is, and for a while that it has begun.
+function tellStart({ row, run }) {
+  const { start, startsOver } = story, begun = startsOver.at(-1);
+  element("title").textContent = run > 1 ? `${start.title}, run ${run}` : start.title;
+  const isNew = begun !== undefined && row[0] - begun < NOTICED;
+  element("notice").textContent = isNew ? "The scenario has started over, with other random numbers." : "";
+}
+
 function lost(text) {
   document.body.classList.add("stale");
   tellCondition("bad", text);
@@ -96,7 +116,8 @@ function lost(text) {
 function written(value, digits) {
   if (value === null || value === undefined) return "–";
   if (value === 0) return "0";
-  return value.toFixed(Math.min(5, Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(value))))));
+  const decimals = digits - 1 - Math.floor(Math.log10(Math.abs(value)));
+  return value.toFixed(Math.min(5, Math.max(0, decimals)));
 }
 
 function tellEstimates(values) {
@@ -113,13 +134,14 @@ function tellHealth(update) {
   const lines = [
     ["mode", update.mode ?? "–"],
     ["faults", faults.length ? faults.join("; ") : "none", faults.length > 0],
-    ["estimator counts", `${counts.lost} lost, ${counts.corrupt} corrupt, ${counts.late} late, ${counts.restarts} restarts`],
+    ["estimator counts", ["lost", "corrupt", "late", "restarts"].map((what) => `${counts[what]} ${what}`).join(", ")],
     ["firmware", update.firmware ?? "–"],
     ["choices", Object.values(update.choices).join(", ") || "–"],
     ["lever angle", `${written(update.theta, 4)} deg`],
   ];
   if (machine) {
-    lines.push(["bus controller", `TEC ${machine.transmit_errors}, REC ${machine.receive_errors}, off the bus ${machine.bus_offs} times`]);
+    const errors = `TEC ${machine.transmit_errors}, REC ${machine.receive_errors}`;
+    lines.push(["bus controller", `${errors}, off the bus ${machine.bus_offs} times`]);
     lines.push(["machine", `${machine.overruns} frames overrun, ${machine.dropped} dropped`]);
   }
   if (update.foreign) lines.push(["other frames", update.foreign]);
@@ -134,13 +156,16 @@ function tellHealth(update) {
 function tellMessages(messages) {
   document.querySelector("#messages tbody").replaceChildren(...messages.map(([name, rate, ...counts]) => {
     const silent = rate === null && !counts.some(Boolean);
-    const line = row([cell(name), cell(rate === null ? "–" : rate.toFixed(0)), ...counts.map((count) => cell(silent ? "–" : count))]);
+    const cells = counts.map((count) => cell(silent ? "–" : count));
+    const line = row([cell(name), cell(rate === null ? "–" : rate.toFixed(0)), ...cells]);
     line.className = silent ? "silent" : counts.some(Boolean) ? "bad" : "";
     return line;
   }));
 }
 
-function cell(text, name = "") { return Object.assign(document.createElement("td"), { textContent: text, className: name }); }
+function cell(text, name = "") {
+  return Object.assign(document.createElement("td"), { textContent: text, className: name });
+}
 
 function row(cells) {
   const line = document.createElement("tr");
@@ -151,7 +176,10 @@ function row(cells) {
 // --- charts ---------------------------------------------------------------------------------------------------------
 
 function place(where, named) {
-  const canvases = named.map(([name]) => Object.assign(document.createElement("canvas"), { role: "img", ariaLabel: `${name} over time` }));
+  const canvases = named.map(([name]) => {
+    const said = { role: "img", ariaLabel: `${name} over time` };
+    return Object.assign(document.createElement("canvas"), said);
+  });
   document.querySelector(where).replaceChildren(...canvases);
   return named.map(([, draw], k) => () => draw(canvases[k]));
 }
@@ -169,8 +197,17 @@ function redraw() {
 
 function offer(id, options, keep, chosen = "") {
   const all = keep === null ? options : [["", keep], ...options];
-  element(id).replaceChildren(...all.map(([value, text]) => Object.assign(document.createElement("option"), { value, textContent: text })));
+  const made = ([value, textContent]) => Object.assign(document.createElement("option"), { value, textContent });
+  element(id).replaceChildren(...all.map(made));
   element(id).value = chosen ?? "";
+}
+
+// A model that does not know the motor's torque learns nothing from dither: it can only be switched off then.
+function offerDither({ dither_limit: limit, model, without_torque: useless }) {
+  const shown = DITHERS.filter((rms) => rms <= limit && !(useless && rms));
+  offer("dither", shown.map((rms) => [rms, rms ? `${rms} N m rms` : "off"]), "as it is");
+  element("useless").hidden = !useless;
+  element("useless").textContent = `Dither does nothing for ${model}, which does not use the motor's torque.`;
 }
 
 function ask(command) {
@@ -201,13 +238,18 @@ function unsure(button) {
   button.textContent = button.dataset.request;
 }
 
-document.querySelectorAll("[data-request]").forEach((button) => button.addEventListener("click", () => requested(button)));
-element("dither").addEventListener("change", (event) => event.target.value && ask({ dither_rms: Number(event.target.value) }));
-for (const what of ["model", "estimator"])
-  element(what).addEventListener("change", (event) => event.target.value && ask({ [what]: event.target.value }));
+document.querySelectorAll("[data-request]").forEach((button) => {
+  button.addEventListener("click", () => requested(button));
+});
+for (const [what, field] of [["dither", "dither_rms"], ["model", "model"], ["estimator", "estimator"]]) {
+  element(what).addEventListener("change", ({ target }) => {
+    if (target.value) ask({ [field]: what === "dither" ? Number(target.value) : target.value });
+  });
+}
 window.addEventListener("resize", redraw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 setInterval(() => {
-  if (socket.readyState === WebSocket.OPEN && performance.now() - lastHeard > PATIENCE) lost("No data from the server: what is shown is old.");
+  const isLate = socket.readyState === WebSocket.OPEN && performance.now() - lastHeard > PATIENCE;
+  if (isLate) lost("No data from the server: what is shown is old.");
 }, 500);
 connect();

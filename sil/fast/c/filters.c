@@ -113,7 +113,7 @@ static void slopes(filter_t *f, uint32_t k, double dx[X][X], double dw[X][W])
     const filter_given_t *given = f->given;
     const inputs_t in = inputs_at(given, k);
     const double half = given->difference;
-    angle_t angle = {NAN, 0.0, 0.0};
+    angle_t angle = {(double)NAN, 0.0, 0.0};
     double centre[W];
     for (uint32_t i = 0u; i < (uint32_t)W; i++) {
         centre[i] = physical(given, i, f->w[i]);
@@ -156,14 +156,14 @@ static void invert(double a[X][X], double inverse[X][X])
 /* Lower-triangular factor of a (n by n, in rows of n); NaN where it is not positive definite. */
 static void cholesky(uint32_t n, const double *a, double *factor)
 {
+    (void)memset(factor, 0, (size_t)n * n * sizeof factor[0]);
     for (uint32_t i = 0u; i < n; i++) {
-        for (uint32_t j = 0u; j < n; j++) {
+        for (uint32_t j = 0u; j <= i; j++) {
             double sum = a[(i * n) + j];
             for (uint32_t k = 0u; k < j; k++) {
                 sum -= factor[(i * n) + k] * factor[(j * n) + k];
             }
-            const double own = (i == j) ? sqrt(sum) : (sum / factor[(j * n) + j]);
-            factor[(i * n) + j] = (j <= i) ? own : 0.0;
+            factor[(i * n) + j] = (i == j) ? sqrt(sum) : (sum / factor[(j * n) + j]);
         }
     }
 }
@@ -228,6 +228,41 @@ static void predict_ekf(filter_t *f, uint32_t k)
     }
 }
 
+/* Sigma point 0 is the centre; then one for each column of the factor, and the same on the other side. */
+static uint32_t column_of(uint32_t point)
+{
+    return (point == 0u) ? 0u : ((point - 1u) % (uint32_t)N);
+}
+
+static double side_of(uint32_t point)
+{
+    double side = 0.0;
+    if (point > 0u) {
+        side = (point <= (uint32_t)N) ? 1.0 : -1.0;
+    }
+    return side;
+}
+
+/* P of deviations from the mean, of which those of the states still are values with the mean `predicted`. */
+static void gather(filter_t *f, double deviation[POINTS][N], const double predicted[X])
+{
+    const filter_given_t *given = f->given;
+    const double weight = 0.5 / given->reach;
+    for (uint32_t point = 0u; point < (uint32_t)POINTS; point++) {
+        deviation[point][3] -= predicted[0];
+        deviation[point][4] -= predicted[1];
+    }
+    for (uint32_t i = 0u; i < (uint32_t)N; i++) {
+        for (uint32_t j = 0u; j < (uint32_t)N; j++) {
+            double sum = given->covariance_weight * deviation[0][i] * deviation[0][j];
+            for (uint32_t point = 1u; point < (uint32_t)POINTS; point++) {
+                sum += weight * deviation[point][i] * deviation[point][j];
+            }
+            f->p[i][j] = sum;
+        }
+    }
+}
+
 /* Sigma points in the columns of the Cholesky factor. */
 static void predict_ukf(filter_t *f, uint32_t k)
 {
@@ -235,7 +270,7 @@ static void predict_ukf(filter_t *f, uint32_t k)
     const inputs_t in = inputs_at(given, k);
     const double root = sqrt(given->reach);
     const double weight = 0.5 / given->reach;
-    angle_t angle = {NAN, 0.0, 0.0};
+    angle_t angle = {(double)NAN, 0.0, 0.0};
     double factor[N][N];
     double deviation[POINTS][N];
     double predicted[X] = {0.0, 0.0};
@@ -245,8 +280,8 @@ static void predict_ukf(filter_t *f, uint32_t k)
         centre[i] = physical(given, i, f->w[i]);
     }
     for (uint32_t point = 0u; point < (uint32_t)POINTS; point++) {
-        const double sign = (point == 0u) ? 0.0 : ((point <= (uint32_t)N) ? root : -root);
-        const uint32_t column = (point == 0u) ? 0u : ((point - 1u) % (uint32_t)N);
+        const uint32_t column = column_of(point);
+        const double sign = side_of(point) * root;
         double p[W];
         double x[X];
         for (uint32_t i = 0u; i < (uint32_t)W; i++) {
@@ -263,19 +298,7 @@ static void predict_ukf(filter_t *f, uint32_t k)
             predicted[i] += ((point == 0u) ? given->mean_weight : weight) * x[i];
         }
     }
-    for (uint32_t point = 0u; point < (uint32_t)POINTS; point++) {
-        deviation[point][3] -= predicted[0];
-        deviation[point][4] -= predicted[1];
-    }
-    for (uint32_t i = 0u; i < (uint32_t)N; i++) {
-        for (uint32_t j = 0u; j < (uint32_t)N; j++) {
-            double sum = given->covariance_weight * deviation[0][i] * deviation[0][j];
-            for (uint32_t point = 1u; point < (uint32_t)POINTS; point++) {
-                sum += weight * deviation[point][i] * deviation[point][j];
-            }
-            f->p[i][j] = sum;
-        }
-    }
+    gather(f, deviation, predicted);
     (void)memcpy(f->x, predicted, sizeof f->x);
 }
 
@@ -383,8 +406,8 @@ static void draw(filter_t *f, uint32_t k)
     }
     cholesky((uint32_t)W, &f->prior[0][0], &f->factor[0][0]);
     for (uint32_t point = 0u; point < (uint32_t)POINTS; point++) {
-        const double sign = (point == 0u) ? 0.0 : ((point <= (uint32_t)N) ? root3 : -root3);
-        const uint32_t column = (point == 0u) ? 0u : ((point - 1u) % (uint32_t)N);
+        const uint32_t column = column_of(point);
+        const double sign = side_of(point) * root3;
         for (uint32_t i = 0u; i < (uint32_t)W; i++) {
             const double offset = (column < (uint32_t)W) ? (sign * f->factor[i][column]) : 0.0;
             const bool is_centre = (point > 0u) && (offset == 0.0);
@@ -438,7 +461,7 @@ static void update_parameters(filter_t *f, uint32_t k)
 static void step_parameters(filter_t *f, uint32_t k)
 {
     const inputs_t in = inputs_at(f->given, k - 1u);
-    angle_t angle = {NAN, 0.0, 0.0};
+    angle_t angle = {(double)NAN, 0.0, 0.0};
     for (uint32_t point = 0u; point < (uint32_t)POINTS; point++) {
         move(f->given, f->point_w[point], &in, &angle, f->point_x[point]);
     }
@@ -467,7 +490,7 @@ static void start(filter_t *f, const filter_given_t *given)
         f->x[i] = given->y[0][i];
         f->p_x[i][i] = squared(given->output_noise[i]);
         f->p[(uint32_t)W + i][(uint32_t)W + i] = f->p_x[i][i];
-        f->innovation[i] = NAN;
+        f->innovation[i] = (double)NAN;
         f->s[i][i] = 1.0;
     }
     if (given->kind == (uint32_t)FILTER_PARAMETERS) {

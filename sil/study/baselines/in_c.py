@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.models import lever
 from lever_cdkf.host_tools.models.lever import Lever
 from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
+from lever_cdkf.host_tools.units import GRAVITY
 from numpy.typing import NDArray
 
 from ...fast.library import Struct, lib
@@ -73,7 +73,7 @@ def _fill_model(given: Any, model: Model) -> None:
         zero = np.zeros(())
         given.length, given.damping, given.stiffness = model.length, model.damping, model.stiffness
         given.own_inertia, given.own_moment = float(model.total_inertia(zero)), float(model.unbalance(zero))
-        given.gravity, given.arm_preload_angle = lever.GRAVITY, model.arm_preload_angle
+        given.gravity, given.arm_preload_angle = GRAVITY, model.arm_preload_angle
         given.rest = model.lever_preload_angle
     else:
         given.rest = model.rest  # type: ignore[attr-defined]

@@ -6,6 +6,7 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 
+from lever_cdkf.host_tools.report.figure import Spec
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.summary_html import number, table
 from lever_cdkf.host_tools.tables import Row as TableRow
@@ -16,6 +17,8 @@ from .cases import PRIOR, cases
 from .evaluation import Row
 from .verdicts import Claim
 
+_ESTIMATORS = 6  # in a table
+
 
 def build(
     results: Results,
@@ -23,8 +26,8 @@ def build(
     verdicts: Mapping[str, str],
     claims: Sequence[Claim],
     tables: Mapping[str, Sequence[TableRow]],
-) -> str:
-    """The whole page."""
+) -> tuple[str, dict[str, Spec]]:
+    """The whole page, and its figures by name."""
     plan = results.plan
     length = "" if plan.duration is None else f" of {plan.duration:g} s"
     page = Page(
@@ -42,7 +45,7 @@ def build(
         f"<details><summary>{html.escape(title)}</summary>{_table(lines)}</details>" for title, lines in tables.items()
     )
     page.section("numbers", "Numbers", "All numbers", *details)
-    return page.html(_verdict(claims))
+    return page.html(_verdict(claims)), page.figures
 
 
 def _winners(verdicts: Mapping[str, str]) -> str:
@@ -138,6 +141,19 @@ def _wrong_noise(page: Page, rows: Sequence[Row]) -> None:
 
 
 def _table(lines: Sequence[TableRow]) -> str:
+    """Of estimators with a column for each, as they have more figures than a page is wide."""
+    if not lines or "estimator" not in lines[0]:
+        return _rows(lines)
+    parts = (lines[first : first + _ESTIMATORS] for first in range(0, len(lines), _ESTIMATORS))
+    return "".join(_rows(_turned(part)) for part in parts)
+
+
+def _turned(lines: Sequence[TableRow]) -> list[TableRow]:
+    figures = [name for name in lines[0] if name != "estimator"]
+    return [{"": name, **{str(line["estimator"]): line[name] for line in lines}} for name in figures]
+
+
+def _rows(lines: Sequence[TableRow]) -> str:
     header = [html.escape(column) for column in lines[0]] if lines else []
     return table(header, ([html.escape(number(cell)) for cell in line.values()] for line in lines))
 

@@ -52,6 +52,8 @@ def _draw_surfaces(sheet: Sheet, figure: Figure, surfaces: list[tuple[str, Surfa
     levels = MaxNLocator(_LEVELS).tick_values(0.0, figure.brightest())
     for chart, (title, surface) in zip(charts, surfaces, strict=True):
         filled = chart.contourf(surface.time, surface.frequency, surface.magnitude, levels, cmap="viridis")
+        filled.set_edgecolor("face")  # no seams between the areas of a vector graphic
+        filled.set_linewidth(0.2)
         chart.plot(surface.time, surface.ridge, color="black", linewidth=0.8, label=surface.ridge_name)
         chart.set(title=in_mathtext(title), xlabel="time [s]", xlim=figure.x_range)
         chart.grid(visible=False)

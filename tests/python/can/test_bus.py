@@ -8,7 +8,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import can
@@ -158,20 +157,6 @@ def test_shutdown_ends_a_waiting_receiver(make_bus: MakeBus) -> None:
     bus.shutdown()
     receiver.join(PATIENCE)
     assert len(caught) == 1
-
-
-def test_configurations(make_bus: MakeBus, tmp_path: Path) -> None:
-    path = tmp_path / "my.settings"
-    path.write_text("m_p = 3 # kg\npreload = fixed\n")
-    every: list[dict[str, Any]] = [
-        {"config": Config(preload="fixed", settings={"m_p": 3.0})},
-        {"settings": {"m_p": 3, "preload": "fixed"}},
-        {"settings": path},
-        {"settings": str(path)},
-    ]
-    for arguments in every:
-        bus = make_bus("x", **arguments)
-        assert bus.estimator.estimate().parameter[0] == pytest.approx(3.0, rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -156,18 +156,6 @@ def test_counts_and_time_wrap_but_codes_do_not() -> None:
             codec.encode("HEALTH", 0, {**health, key: value})
 
 
-def test_choices_by_name() -> None:
-    by_name = {"request": "freeze", "model": "keep", "preload": "trim", "estimator": "keep", "adaptation": "annealing"}
-    by_number = {"request": 2, "model": 15, "preload": 1, "estimator": 15, "adaptation": 1}
-    frame = codec.encode("COMMAND", 9, {**by_name, "dither_rms": 0.3})
-    assert frame == codec.encode("COMMAND", 9, {**by_number, "dither_rms": 0.3})
-    assert frame[1:] == by_cantools(MESSAGES["COMMAND"], {**by_number, "dither_rms": 0.3}, 9)
-    with pytest.raises(CodecError, match=r"COMMAND.request cannot be 'stop'; allowed: none, run, freeze, reset"):
-        codec.encode("COMMAND", 0, {**by_name, "request": "stop", "dither_rms": 0.0})
-    with pytest.raises(CodecError, match="dither_rms"):
-        codec.encode("COMMAND", 0, {**by_name, "dither_rms": math.nan})
-
-
 @pytest.mark.parametrize("change", [{"theta": None}, {"speed": 1.0}])
 def test_missing_and_unknown_names(change: dict[str, float | None]) -> None:
     values = {"theta": 0.1, "theta_dot": 0.1, "tau_m": 0.1, **change}

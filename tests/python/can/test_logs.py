@@ -65,14 +65,6 @@ def test_text_is_read_as_python_can_reads_it(tmp_path: Path) -> None:
             assert frame["data"][: len(message.data)].tobytes() == bytes(message.data)
 
 
-def test_can_fd_is_told_from_classic_can(tmp_path: Path) -> None:
-    log = tmp_path / "fd.log"
-    log.write_text("(1.0) can0 123##1" + "AB" * 64 + "\n(1.1) can0 123#1122334455667788_B\n")
-    frames = frames_of(log)
-    assert (frames["flags"] & bulk.FD != 0).tolist() == [True, False]
-    assert frames["length"].tolist() == [0, 8]
-
-
 @pytest.mark.parametrize(
     "line",
     [

@@ -81,6 +81,7 @@ def packages(extras: dict[str, list[str]], extra: str) -> list[str]:
 @pytest.mark.parametrize(
     ("extra", "arguments"),
     [
+        ("campaign", "campaign --list"),
         ("files", "replay flight.parquet"),
         ("files", "replay flight.mat"),
         ("files", "sim steady --out sim --format mcap"),

@@ -80,11 +80,6 @@ def test_printed_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert ["empty:", "none"] in lines
 
 
-def test_table_is_not_folded_in_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
-    print_tables({"wide": [{f"column {index}": "x" * 30 for index in range(20)}]})
-    assert any(line.count("x" * 30) == 20 for line in capsys.readouterr().out.splitlines())
-
-
 def test_json_has_the_same_rows(tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     print_tables(TABLES, str(path))

@@ -23,7 +23,7 @@ from processes import LEVER
 
 Shown = Callable[..., str]
 COMMANDS = (
-    *("compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
+    *("campaign", "compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
     *("monitor", "qemu", "record", "replay", "settings", "sim", "tune"),
 )
 ROWS: list[Row] = [
@@ -92,6 +92,7 @@ def test_every_command_is_tried_here(shown: Shown) -> None:
     "command",
     [
         "sim --list",
+        "campaign --list",
         "compare --list",
         "compare --envelope --list",
         "envelope --list",

@@ -18,8 +18,13 @@ import polars as pl
 import pytest
 from asammdf import MDF
 from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.exports.signal_files import SignalFiles
 from lever_cdkf.host_tools.formats import FORMATS
+from lever_cdkf.host_tools.provenance import provenance
+from lever_cdkf.host_tools.results.trace import Trace
 from mcap.reader import make_reader
+from processes import full_disk
 from pyarrow import parquet
 from python.conftest import Refused, Session, simulated
 
@@ -266,6 +271,24 @@ def test_an_input_is_not_written_over(session: Session, refused: Refused, tmp_pa
         before = (tmp_path / name).read_bytes()
         assert "it is an input" in refused("replay", tmp_path / name, "-o", tmp_path, *ALL)
         assert (tmp_path / name).read_bytes() == before
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of the file that cannot be closed
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_full_disk_is_an_error_that_names_the_file(name: str, tmp_path: Path) -> None:
+    count = 50_000
+    time = np.linspace(0.0, 50.0, count)
+    trace: Trace = {"time_s": time, "theta_measured_rad": np.random.default_rng(1).random(count)}
+    rows = np.ones(count, np.bool_)
+
+    def write() -> None:
+        with SignalFiles([name], tmp_path.joinpath, provenance()) as files:
+            files.start(trace, 0, {"model": "lever"})
+            files.add(trace, rows, rows)
+            files.close()
+
+    with full_disk(100_000), pytest.raises(LeverError, match=f"cannot write .*{FORMATS[name]}"):
+        write()
 
 
 def test_another_model_has_its_own_columns(tmp_path: Path) -> None:

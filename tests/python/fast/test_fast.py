@@ -53,6 +53,7 @@ def test_by_structs_the_firmware_gets_what_the_sensors_read() -> None:
     wanted = scenario.load("base_only", ["duration=3 s"])
     known, every = inputs.prepare(wanted), 20
     quick = fast.run(wanted, stride=wanted.period)
+    assert np.abs(quick.theta - python_run(wanted).theta).max() < SAME
     offsets = {name: inputs.readings(wanted, known, name).offsets for name in ("theta", "theta_dot", "tau_m")}
     samples = {
         "time_us": np.arange(len(known.time)) * 1000,

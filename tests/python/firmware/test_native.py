@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import os
 import re
@@ -155,25 +154,6 @@ def test_frames_that_are_not_for_the_firmware() -> None:
 
 
 # --- many instances, whole recordings --------------------------------------------------------------------------------
-
-
-def test_hundreds_of_instances_are_independent() -> None:
-    count, length = 300, 150
-    settings = [{"m_p": 1.5 + 0.01 * index, "theta_noise": 1e-3 * (1 + index % 3)} for index in range(count)]
-    samples = [recording(length, seed) for seed in range(count)]
-    together = [Estimator(Config(settings=each)) for each in settings]
-    gc.collect()  # nothing but the estimators may be needed any more
-    for index in range(length):
-        for estimator, each in zip(together, samples, strict=True):
-            feed(estimator, each, index)
-    estimates = [estimator.estimate() for estimator in together]
-    assert len(set(estimates)) == count
-    for index in range(0, count, 7):
-        alone = Estimator(Config(settings=settings[index]))
-        for sample in range(length):
-            feed(alone, samples[index], sample)
-        assert alone.estimate() == estimates[index]
-        assert alone.health() == together[index].health()
 
 
 @pytest.mark.parametrize("estimator", native.enum_names("lever_estimator").values())

@@ -211,12 +211,3 @@ def test_a_scale_and_its_inverse_and_its_slope_belong_together(model: str) -> No
     numerical = [(scale.physical(w + d) - scale.physical(w - d)).sum() / 2e-6 for d in 1e-6 * np.eye(3)]
     np.testing.assert_allclose(scale.slope(w), numerical, rtol=1e-6)
     np.testing.assert_array_equal(scale.physical(np.zeros(3)), scale.guess)
-
-
-def test_one_sigma_and_walk_are_those_of_the_settings() -> None:
-    """Relative ones of positive parameters, in the parameter's unit of signed ones."""
-    positive, signed = (Scale.from_settings(SETTINGS, model) for model in ("lever", "linear_black_box"))
-    np.testing.assert_allclose(positive.slope(np.zeros(3)) * positive.sigma, [1.0, 25.2, 750.0])
-    np.testing.assert_allclose(signed.slope(np.zeros(3)) * signed.sigma, [180.0, 6.0, 0.8])
-    np.testing.assert_allclose(np.sqrt(positive.walk), [0.01, 0.02, 0.03])
-    np.testing.assert_allclose(np.sqrt(signed.walk) * signed.unit, [9.0, 0.3, 0.04])

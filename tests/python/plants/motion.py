@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import sympy
 from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.units import GRAVITY
 from lever_cdkf.sil.plants.lever_plant import Lever
 from lever_cdkf.sil.plants.truth import Body, Conditions, Truth
-from lever_cdkf.sil.units import GRAVITY
 
 PERIOD, TRIM = 1e-3, 0.35
 LEVER = Lever(0.45, 1.2, 0.5, 0.020, 0.5, 5.0, math.radians(20), math.radians(18))

@@ -76,14 +76,6 @@ def test_gauss_markov_noise_has_its_variance_and_its_correlation() -> None:
     assert np.var(waves[:, 0]) == pytest.approx(1.0, rel=0.6)  # stationary from the first sample on
 
 
-def test_schroeder_phases_keep_the_crest_factor_low() -> None:
-    values = made({"kind": "multisine", **BAND, "lines": 19})
-    random = np.random.default_rng(0).uniform(0.0, 2.0 * math.pi, (50, 19, 1))
-    waves = np.cos(2.0 * math.pi * np.linspace(1.0, 10.0, 19)[:, None] * TIME[::10] + random).sum(axis=1)
-    usual = np.median(np.abs(waves).max(axis=1) / np.sqrt(np.mean(waves**2, axis=1)))
-    assert np.abs(values).max() / rms(values) < 0.8 * usual
-
-
 def test_chirp_sweeps_its_band_evenly_in_the_logarithm() -> None:
     values = made({"kind": "chirp", "rms": "1 m/s^2", "low": "1 Hz", "high": "16 Hz", "sweep": "30 s"})
     crossings = TIME[1:][np.diff(np.signbit(values).astype(int)) == -1]  # upwards: one a cycle

@@ -54,11 +54,6 @@ def test_dropouts_take_their_share_in_bursts_of_their_length(share: float, burst
         assert lengths.std() == pytest.approx(np.sqrt(expected * (expected - 1.0)), rel=0.25)  # geometric
 
 
-def test_a_whole_outage_lasts_from_start_to_end() -> None:
-    gone = Dropout("theta", share=1.0, start=2.0, end=3.5).missing(TIME, PERIOD, rng())
-    assert np.array_equal(gone, (TIME >= 2.0) & (TIME < 3.5))
-
-
 def test_only_the_dropouts_of_that_value_count_and_they_add_up() -> None:
     dropouts = [
         Dropout("theta", share=1.0, start=1.0, end=2.0),

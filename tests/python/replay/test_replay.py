@@ -330,12 +330,12 @@ def test_the_page_has_all_but_truth(replay: tuple[Path, Summary]) -> None:
     page = read(replay[0] / "report.html")
     names = page.ids("section")
     assert names == [
-        *("explained", "parameters", "dynamics", "comparison", "bode", "states", "excitation", "health", "numbers"),
+        *("parameters", "dynamics", "explained", "comparison", "bode", "states", "excitation", "health", "numbers"),
         "made",
     ]
     curves = {trace["name"] for figure in figures(page).values() for trace in figure["data"]}
     assert {"recorded", "replayed", "measured", "estimate"} <= curves
     assert "truth" not in curves
-    assert "Estimates at the end" in "".join(page.text)
+    assert "Natural frequency at the end" in "".join(page.text)
     cells = {row[0]: row[1:] for table in page.tables for row in table}
     assert cells["theta"][1:3] == ["5\u2009700", "5\u2009700"]

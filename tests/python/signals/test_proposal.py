@@ -76,7 +76,7 @@ def test_columns_and_a_picture(folder: Path, tmp_path: Path, capsys: pytest.Capt
 def test_what_cannot_be_proposed(folder: Path, tmp_path: Path, refused: Refused) -> None:
     log = folder / "flight.blf"
     assert "add --dbc FILE" in refused("map", log)
-    assert "plots are .html or .png" in refused("map", folder / "columns.csv", "-o", tmp_path / "signals.pdf")
+    assert "plots are .html, " in refused("map", folder / "columns.csv", "-o", tmp_path / "signals.gif")
     (tmp_path / "other.dbc").write_text('BU_: A\nBO_ 5 Nothing: 8 A\n SG_ Zero : 0|8@1+ (1,0) [0|0] "" A\n')
     assert "is it the database of this bus?" in refused("map", log, "--dbc", tmp_path / "other.dbc")
     (tmp_path / "few.csv").write_text("time,rpm\n" + "".join(f"{k},{k % 7}\n" for k in range(100)))

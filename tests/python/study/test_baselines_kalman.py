@@ -220,6 +220,7 @@ def test_of_a_linear_system_it_is_the_kalman_filter_which_skips_a_missing_output
             np.testing.assert_allclose(ours.innovation_covariance[0], kf.S, rtol=1e-6)
         else:
             kf.update(batch.y[0, k, :1], R=kf.R[:1, :1], H=kf.H[:1])
+            assert ours.innovation[0, 1] == 0.0
         if k == last:
             nis = follow(joint(batch), np.array([last])).nis
             assert nis is not None

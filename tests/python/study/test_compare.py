@@ -7,16 +7,29 @@ import dataclasses
 import io
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import interrupts
 from lever_cdkf.host_tools.firmware.native import enum_names, settings_table
+from lever_cdkf.host_tools.provenance import provenance
+from lever_cdkf.host_tools.report import figure as drawing
 from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.study.baselines import BASELINES
-from lever_cdkf.sil.study.compare import campaign, charts, compare_page, comparison, evaluation, table, verdicts
+from lever_cdkf.sil.study.compare import (
+    campaign,
+    charts,
+    compare_page,
+    comparison,
+    evaluation,
+    printed,
+    table,
+    verdicts,
+)
 from lever_cdkf.sil.study.compare.campaign import Outcome, Results
 from lever_cdkf.sil.study.compare.cases import Matched, Plan, References, Stepped, cases
 from lever_cdkf.sil.study.compare.entrants import entrants
@@ -432,7 +445,7 @@ def test_claims_stand_in_table_and_page() -> None:
     first = {"claim": claims[0].text, "limit": "≤ 1.1", "measured": 1.58, "±": None, "kept": "no"}
     assert last[1][0] == first | {"worst in": claims[0].where}
     assert [line["limit"] for line in last[1] if "lower" in str(line["claim"])] == ["≥ 1"]
-    page = compare_page.build(Results(Plan(20), {}, {}), rows, {}, claims, {})
+    page, _ = compare_page.build(Results(Plan(20), {}, {}), rows, {}, claims, {})
     kept = sum(claim.kept is True for claim in claims)
     assert f'<p class="verdict bad">{kept} of {len(claims)} claims about the firmware hold.' in page
     cells = ("<strong>no</strong>", "1.58", "≤ 1.1", claims[0].where)
@@ -527,10 +540,12 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     chosen = ("--scenarios", "lever_fixed_dither_rough", "step_up", "--estimators", "joint", "dual_shipped", "rls")
     brief = ("--seeds", "2", "--duration", "3")
     out, tables = tmp_path / "deep" / "out", tmp_path / "tables.json"
-    status, printed, _ = lever("compare", *chosen, *brief, "--jobs", "2", "--out", out, "--json", tables)
+    status, said, _ = lever("compare", *chosen, *brief, "--jobs", "2", "--out", out, "--json", tables)
     assert status == 0
-    assert "lever_fixed_dither_rough: Too few runs for a verdict: 2" in printed
-    assert sorted(path.name for path in out.iterdir()) == ["compare.csv", "compare.html"]
+    assert "lever_fixed_dither_rough: Too few runs for a verdict: 2" in said
+    drawn = figures(Reader((out / "compare.html").read_text()))
+    pictures = [f"{name}.{kind}" for name in drawn for kind in ("pdf", "svg", "csv")]
+    assert {path.name for path in out.iterdir()} == {"compare.csv", "compare.html", "provenance.json", *pictures}
     lines = list(csv.DictReader(io.StringIO((out / "compare.csv").read_text())))
     assert len(lines) == 5
     walk = next(line for line in lines if line["case"].startswith("lever") and line["estimator"] == "joint")
@@ -544,3 +559,28 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
+
+
+def test_a_figure_for_print_is_what_the_page_shows() -> None:
+    """Lanes of two estimators, of which one has no error, and a band about a curve."""
+    lanes: dict[str, Any] = {"tickvals": [0, 1], "ticktext": ["joint", "rls"], "range": [1.5, -0.5]}
+    figure = drawing.Figure([lanes], drawing.axis("error", type="log"), 200, over_time=False)
+    marker = {"color": ["@estimate", "@joint"], "size": 8, "symbol": "square"}
+    errors = {"type": "data", "array": [0.25, 0.0], "color": "@mark"}
+    figure.add(drawing.dots(np.array([1.5, 2.5]), np.array([0.0, 1.0]), "rough", "text", marker=marker, error_x=errors))
+    assert list(csv.reader(io.StringIO(printed.table(figure.spec())))) == [
+        list(printed.COLUMNS), ["rough", "joint", "1.5", "0", "0.25"], ["rough", "rls", "2.5", "1", ""]
+    ]  # fmt: skip
+    x = np.linspace(0.0, 1.0, 50)
+    curve = drawing.Figure([drawing.axis("y", range=[0, 10])], drawing.axis("time [s]"), 380, over_time=False)
+    curve.add(*drawing.band(x, 2.0 + x, 4.0 + x, "middle half", "estimate-band"))
+    curve.add(drawing.line(x, 3.0 + x, "median", "estimate"))
+    curve.level(5.0)
+    for shown in (figure, curve):
+        svg = printed.render(shown.spec(), "name", "svg", provenance()).decode()
+        width = re.search(r'width="([\d.]+)pt"', svg)
+        assert width is not None
+        assert float(width[1]) == pytest.approx(180 / 25.4 * 72, abs=0.1)
+        words = "".join(ElementTree.fromstring(svg).itertext())
+        assert all(name in words for name in (("joint", "rls", "error") if shown is figure else ("median", "time [s]")))
+        assert printed.render(shown.spec(), "name", "pdf", provenance()).startswith(b"%PDF")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import functools
 import hashlib
@@ -20,6 +21,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from fontTools.ttLib import TTFont
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.provenance import provenance
 from lever_cdkf.host_tools.report import screenshot
@@ -144,12 +146,16 @@ def test_the_same_seed_gives_the_same_picture(folder: Path) -> None:
     assert other.caption != anew.caption
 
 
-def test_text_in_svg_is_text_and_fonts_are_in_the_pdf(folder: Path) -> None:
+def test_text_is_text_and_fonts_are_in_svg_and_pdf(folder: Path) -> None:
     for name in NAMES:
         svg = ElementTree.parse(folder / f"{name}.svg").getroot()
         assert float(svg.attrib["width"].removesuffix("pt")) == pytest.approx(88 / 25.4 * 72, abs=0.01)
         words = "".join(text for element in svg.iter("{http://www.w3.org/2000/svg}text") for text in element.itertext())
         assert "time [s]" in words
+        (font,) = re.findall(r"data:font/woff;base64,([\w+/=]+)", (folder / f"{name}.svg").read_text(encoding="utf-8"))
+        with TTFont(io.BytesIO(base64.b64decode(font))) as embedded:
+            assert embedded["name"].getDebugName(1) == "DejaVu Sans"
+            assert {ord(letter) for letter in words if not letter.isspace()} <= embedded.getBestCmap().keys()
         pdf = (folder / f"{name}.pdf").read_bytes()
         assert pdf.startswith(b"%PDF-")
         assert pdf.count(b"/FontFile2") >= 1  # TrueType
@@ -330,7 +336,7 @@ def test_list_names_every_figure_and_writes_nothing(
     monkeypatch.chdir(tmp_path)
     status, out, err = lever("figures", "--list")
     assert (status, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()[4:] if line.strip()] == NAMES
+    assert [line.split()[0] for line in out.splitlines()[3:] if line.strip()] == NAMES
     assert list(tmp_path.iterdir()) == []
 
 

@@ -9,7 +9,8 @@ import pytest
 from lever_cdkf.sil.study.compare import campaign, evaluation, verdicts
 from lever_cdkf.sil.study.compare.cases import Plan
 
-CASES = ("lever_fixed_dither_quiet", "linear_black_box_fixed_base_rough", "step_up", "step_down")
+RUNS = {("lever_fixed_dither_quiet", "linear_black_box_fixed_base_rough"): 10, ("step_up", "step_down"): 20}
+"""Of each case."""
 ESTIMATORS = ("dual", "joint", "dual_shipped", "dual_no_change")
 MEASURED = {
     "joint: error ÷ Kalman filter linearised at the truth",
@@ -26,8 +27,10 @@ MEASURED = {
 
 @pytest.fixture(scope="module")
 def claims() -> dict[str, verdicts.Claim]:
-    results = campaign.run(campaign.tasks(CASES, ESTIMATORS, Plan(20)), jobs=1)
-    return {claim.text: claim for claim in verdicts.claims(evaluation.judge(results))}
+    rows: list[evaluation.Row] = []
+    for cases, runs in RUNS.items():
+        rows += evaluation.judge(campaign.run(campaign.tasks(cases, ESTIMATORS, Plan(runs)), jobs=1))
+    return {claim.text: claim for claim in verdicts.claims(rows)}
 
 
 MISSED = {"dual: step followed in, worst [s]"}

@@ -20,12 +20,6 @@ def test_measured_is_the_truth_with_the_noise_of_the_sensors() -> None:
     assert not np.array_equal(batch.raw_u[0], batch.raw_u[1]), "each seed shakes the lever in its own way"
 
 
-def test_dither_of_the_firmware_is_in_what_was_measured() -> None:
-    dithered, plain = recorded("base_dither", 1, 1, 4.0), recorded("base_only", 1, 1, 4.0)
-    assert dithered.raw_u[0, 2000:, 1].std() > 0.2
-    assert plain.raw_u[0, 2000:, 1].std() < 0.01
-
-
 def test_a_pilot_who_is_none_of_the_model_has_dynamics_and_no_parameters() -> None:
     batch, pilot = recorded("mayo_ectomorphic", 1, 1, 1.0), scenario.load("mayo_ectomorphic")
     assert batch.truth.p is None

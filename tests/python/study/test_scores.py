@@ -65,14 +65,6 @@ def test_two_estimators_are_told_apart_more_finely_than_one_from_the_bound() -> 
     assert pair < 0.6 * scores.ratio_spread(worse, np.ones_like(good), seed=1)[0]
 
 
-def test_an_error_that_is_not_a_number_is_not_hidden() -> None:
-    deviations = np.ones((4, 5, 2))
-    deviations[1, 3:, 0] = np.nan
-    found = scores.ratio(deviations, np.ones((4, 5, 2)))
-    assert np.isnan(found[0])
-    assert found[1] == 1.0
-
-
 def test_spread_of_the_ratio_is_that_of_many_experiments() -> None:
     """40 runs whose errors are correlated in time, and of unlike size: 200 experiments against one's own opinion."""
     rng = np.random.default_rng(3)

@@ -15,7 +15,7 @@ from lever_cdkf.sil.plants.truth import Conditions
 from lever_cdkf.sil.study.data import Batch
 from lever_cdkf.sil.study.steps import Step, follow, stepped
 from numpy.typing import NDArray
-from scipy.stats import chi2, kstest
+from scipy.stats import chi2
 
 Array = NDArray[Any]  # of floats
 DEFAULTS = {row.name: row.default for row in settings_table()}
@@ -69,15 +69,6 @@ def test_process_noise_is_that_of_the_step() -> None:
         assert low < np.sum(np.square(x[:, -1, 1])) / (q**2 * (samples - 1) * PERIOD) < high
 
 
-def test_start_is_uniform_about_the_first_guess() -> None:
-    short = stepped(Step(duration=2e-3, at=1e-3), 400, 3)
-    assert short.samples == 2
-    drawn = truth_of(short)[:, 0]
-    guess = [DEFAULTS[name] for name in ("m_p", "c_p", "k_p")]
-    for index in range(3):
-        assert kstest((drawn[:, index] / guess[index] - 0.75) / 0.5, "uniform").pvalue > 1e-3
-
-
 def test_signals_are_detrended_as_the_oracle_does(batch: Batch) -> None:
     run, corner = 2, DEFAULTS["trim_corner"]
     align = round(DEFAULTS["align_time"] / PERIOD)
@@ -92,10 +83,3 @@ def test_signals_are_detrended_as_the_oracle_does(batch: Batch) -> None:
         np.testing.assert_allclose(mine[:, column], expected, rtol=0, atol=1e-12)
         if column == 0:
             np.testing.assert_allclose(batch.trim[run], levels, rtol=0, atol=1e-12)
-
-
-def test_another_model_sees_the_same_lever(batch: Batch) -> None:
-    seen = stepped(dataclasses.replace(SHORT, model="linear_black_box"), 3, 5)
-    np.testing.assert_array_equal(seen.raw_y, batch.raw_y)
-    np.testing.assert_array_equal(seen.truth.dynamics, batch.truth.dynamics)
-    assert seen.truth.p is None

@@ -19,6 +19,7 @@ from processes import PATIENCE
 from python.conftest import Refused
 from python.watch.conftest import LEVER, Flight
 from rich.segment import Segment
+from textual.pilot import Pilot
 
 
 class Fed(Source):
@@ -49,6 +50,15 @@ def screen(app: Monitor) -> list[str]:
     return ["".join(segment.text for segment in Segment.strip_styles(strip)) for strip in lines]
 
 
+async def shown(app: Monitor, pilot: Pilot[None], pattern: str) -> str:
+    """What the terminal shows, once that is in it; a loaded machine draws late."""
+    end = time.monotonic() + PATIENCE
+    while not re.search(pattern, text := "\n".join(screen(app))):
+        assert time.monotonic() < end, text
+        await pilot.pause(0.02)
+    return text
+
+
 def fly(app: Monitor, source: Fed, flight: Flight, steps: int) -> None:
     """So many tenths of a second, each shown."""
     for _ in range(steps):
@@ -64,9 +74,8 @@ def test_everything_fits_on_the_screen(size: tuple[int, int], flight: Flight) ->
         app = Monitor(source)
         async with app.run_test(size=size) as pilot:
             fly(app, source, flight, 50)
-            await pilot.pause()
-            lines = screen(app)
-        text = "\n".join(lines)
+            text = await shown(app, pilot, r"(?s)LEVER_SAMPLE +1000 .*q quit")
+        lines = text.split("\n")
         assert [len(line) for line in lines] == [size[0]] * size[1]
         assert "a test · model lever" in lines[0]
         assert lines[1].startswith(" ● run")
@@ -99,24 +108,19 @@ def test_keys(flight: Flight) -> None:
             fly(app, source, flight, 20)
             flight.sample += 3  # lost
             fly(app, source, flight, 5)
-            await pilot.pause()
-            assert re.search(r"LEVER_SAMPLE +\d+ +3 ", "\n".join(screen(app)))
+            await shown(app, pilot, r"LEVER_SAMPLE +\d+ +3 ")
             await pilot.press("space")
-            held = "\n".join(screen(app))
-            assert "held: space goes on" in held
+            held = await shown(app, pilot, "held: space goes on")
             fly(app, source, flight, 20)
             await pilot.pause()
             assert "\n".join(screen(app)) == held
             await pilot.press("space", "c")
             fly(app, source, flight, 1)
-            await pilot.pause()
-            assert re.search(r"LEVER_SAMPLE +\d+ +0 ", "\n".join(screen(app)))
-            assert "30 s [%]" in "\n".join(screen(app))
+            assert "30 s [%]" in await shown(app, pilot, r"LEVER_SAMPLE +\d+ +0 ")
             await pilot.press("t")
-            assert f"{SPANS[1]:.0f} s [%]" in "\n".join(screen(app))
+            await shown(app, pilot, rf"{SPANS[1]:.0f} s \[%\]")
             await pilot.press("f")
-            await pilot.pause()
-            assert "phase [deg]" in "\n".join(screen(app))
+            await shown(app, pilot, r"phase \[deg\]")
             source.feed(flight.frames(100), flight.sample * 1e-3)
             end = time.monotonic() + PATIENCE
             while source._waiting and time.monotonic() < end:  # it goes on by itself
@@ -135,21 +139,15 @@ def test_before_the_first_estimate_and_after_the_last(flight: Flight) -> None:
         app = Monitor(source)
         async with app.run_test(size=(80, 24)) as pilot:
             app.advance()
-            await pilot.pause()
-            text = "\n".join(screen(app))
-            assert "no frame has come yet" in text
-            assert re.search(r"parameters +none yet", text)
+            assert "no frame has come yet" in await shown(app, pilot, r"parameters +none yet")
             fly(app, source, flight, 10)
             source.time += 5.0
             app.advance()
-            await pilot.pause()
-            text = "\n".join(screen(app))
-            assert "no frame from the estimator for 5 s: what is shown is old" in text
-            assert re.search(r"m_p +– +± – ", text)
+            old = "no frame from the estimator for 5 s: what is shown is old"
+            assert old in await shown(app, pilot, r"m_p +– +± – ")
             source.error = "Network is down"
             app.advance()
-            await pilot.pause()
-            assert "● Network is down" in "\n".join(screen(app))
+            await shown(app, pilot, "● Network is down")
 
     asyncio.run(drive())
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -102,9 +104,46 @@ def test_a_session(desktop: Browser, start_lever: Start) -> None:
     desktop.wait("document.querySelector('#estimates td').textContent == 'm mass'")
     assert estimates(desktop)["m mass"][3] == ""  # the pilot is not of this model: no truth
 
+    assert not desktop.run("document.getElementById('useless').checkVisibility()")
+    choose(desktop, "#model", "linear_black_box")
+    desktop.wait("document.getElementById('useless').checkVisibility()")
+    assert desktop.run("Array.from(document.querySelectorAll('#dither option'), e => e.value)") == ["", "0"]
+
     origins = desktop.run("performance.getEntriesByType('resource').map(e => new URL(e.name).origin)")
     assert set(origins) == {url.rstrip("/")}
     assert desktop.complaints == []
+    end(process)
+
+
+LABELS = """
+  const draw = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+    if (x == 2 && y == 8) this.canvas.labels = []; // the title, which is drawn first
+    const width = this.measureText(text).width, part = {left: 0, center: 0.5, right: 1}[this.textAlign];
+    this.canvas.labels.push([text, x - part * width, y - 6, x + (1 - part) * width, y + 6]);
+    draw.call(this, text, x, y);
+  };
+"""
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_a_scenario_that_starts_over_is_told_and_no_label_lies_on_another(
+    width: int, start_lever: Start, tmp_path: Path
+) -> None:
+    steady = (resources.files("lever_cdkf.sil.scenarios") / "steady.toml").read_text()
+    (tmp_path / "brief.toml").write_text(re.sub("(?m)^duration = .*$", 'duration = "4 s"', steady))
+    process = start_lever("live", "--scenario", str(tmp_path / "brief.toml"), "--port", "0")
+    with Browser(width, 844) as browser:
+        browser.ask("Page.enable")
+        browser.ask("Page.addScriptToEvaluateOnNewDocument", source=LABELS)
+        browser.open(address(process))
+        browser.wait("document.getElementById('notice').textContent.startsWith('The scenario has started over')")
+        assert "simulation of brief, run " in browser.run("document.getElementById('title').textContent")
+        for labels in browser.run("Array.from(document.querySelectorAll('canvas'), e => e.labels)"):
+            assert len(labels) > 4
+            for first, second in itertools.combinations(labels, 2):
+                apart = first[3] <= second[1] or second[3] <= first[1] or first[4] <= second[2] or second[4] <= first[2]
+                assert apart, (first, second)
     end(process)
 
 

@@ -66,8 +66,10 @@ def test_a_trend_is_more_than_sigma(end: float, shown: str) -> None:
 def test_sparkline() -> None:
     assert panels.sparkline([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], 0.0, 8) == "▁▂▃▄▅▆▇█"
     assert panels.sparkline([1.0, float("nan"), 2.0], 0.0, 3) == "▁ █"
+    assert panels.sparkline([0.0, 7.0, 15.0], 0.0, 3, 2) == "  █\n▁██"
     assert set(panels.sparkline([1.0, 1.01, 0.99, 1.0], 1.0, 4)) <= set("▄▅")  # within sigma: flat
     assert len(panels.sparkline(list(range(1000)), 0.0, 20)) == 20
+    assert panels.sparkline([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0, 0.0], 0.0, 2) == "▁█"  # from the middle of each
     assert panels.sparkline([0.0, 1.0, 2.0, 3.0], 0.0, 4, 2).split("\n") == ["  ▃█", "▁▆██"]
     assert panels.sparkline([], 0.0, 5) == panels.sparkline([float("nan")], 0.0, 5) == ""
 

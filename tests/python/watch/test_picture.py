@@ -298,12 +298,3 @@ def test_history_has_a_row_a_step_and_is_bounded(flight: Flight) -> None:
     times = list(picture.history["time"])
     steps = [after - before for before, after in itertools.pairwise(times)]
     assert steps == pytest.approx([STEP] * len(steps))
-
-
-def test_another_model_starts_another_history(make_flight: Callable[..., Flight]) -> None:
-    picture, first, second = Picture(), make_flight(), make_flight(Config(model="linear_black_box"))
-    watch(picture, first, 0.5)
-    picture.take(second.frames(100), 0.6)
-    assert {"a21", "a21_sigma"} <= picture.history.keys()
-    assert "k_p" not in picture.history
-    assert len(picture.history["time"]) == 1

@@ -13,15 +13,19 @@ from collections.abc import Awaitable, Callable
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.library import enum_names
 from lever_cdkf.host_tools.watch.server import Server
 from lever_cdkf.host_tools.watch.sources import Source
-from lever_cdkf.host_tools.watch.state import State, command_of
+from lever_cdkf.host_tools.watch.state import WITHOUT_TORQUE, State, command_of
+from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
 from processes import PATIENCE
-from python.conftest import Refused
+from python.conftest import Refused, swing
 from python.watch.conftest import Flight
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.websocket import WebSocketClientConnection, websocket_connect
@@ -230,6 +234,32 @@ def test_a_page_hears_the_estimates_as_they_come(on_server: Callable[..., Flight
             assert len(rows) >= 5
 
     on_server(story)
+
+
+def test_the_truth_comes_as_magnitude_and_phase(flight: Flight) -> None:
+    class Known(FlightSource):
+        def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray]:
+            return {"m_p": 3.0}, -0.01 * np.exp(-0.2j * frequencies)  # against the floor, and a delay
+
+    (message,) = State(Known(flight), Config()).advance()[-1:]
+    update = json.loads(message)["update"]
+    assert update["truth"] == pytest.approx([np.degrees(0.01)] * len(FREQUENCIES), abs=1e-5)
+    assert update["truth_phase"] == pytest.approx(-180.0 - np.degrees(0.2 * FREQUENCIES), abs=1e-4)
+
+
+@pytest.mark.parametrize("model", enum_names("lever_model").values())
+def test_models_said_not_to_use_torque_do_not(model: str, make_flight: Callable[..., Flight]) -> None:
+    """The same samples, and once without their torque."""
+    lever, known = codec.encoder("LEVER_SAMPLE"), []
+    for share in (1.0, 0.0):
+        flight = make_flight(Config(model=model))
+        for k in range(2000):
+            (_, motion), base = swing(k, 1)[0]
+            values = codec.decode(0x110, motion)[1]
+            flight.send(0x110, lever(k, values["theta"], values["theta_dot"], share * values["tau_m"]))
+            flight.send(*base)
+        known.append(list(flight.bus.estimator.estimate().parameter))
+    assert (known[0] == known[1]) == (model in WITHOUT_TORQUE)
 
 
 def test_before_the_first_estimate_nothing_is_made_up(flight: Flight) -> None:

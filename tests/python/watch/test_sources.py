@@ -99,20 +99,6 @@ def test_a_bus_that_breaks_is_an_error_in_one_line(on_bus: BusSource, monkeypatc
     other.stop()
 
 
-@pytest.mark.parametrize(
-    ("interface", "channel", "text"),
-    [
-        ("nothing", "x", "cannot open nothing channel x: "),
-        ("socketcan", "no_such0", "cannot open socketcan channel no_such0: "),
-        ("slcan", "/dev/no_such", "cannot open slcan channel /dev/no_such: "),
-        ("slcan", None, "cannot open slcan: "),
-    ],
-)
-def test_a_bus_that_is_not_there(interface: str, channel: str | None, text: str) -> None:
-    with pytest.raises(LeverError, match=text):
-        BusSource(interface, channel)
-
-
 def test_an_interface_that_lacks_a_package_says_which(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "msgpack", None)
     with pytest.raises(LeverError) as caught:
@@ -240,17 +226,3 @@ def test_a_simulation_runs_in_real_time_and_obeys() -> None:
     finally:
         source.stop()
     assert not source._thread.is_alive()
-
-
-def test_a_simulation_begins_again() -> None:
-    source = SimulationSource(load("steady", ["duration=0.3 s", "converged_after=0.1 s"]))
-    source.start()
-    try:
-        resets: list[bytes | bytearray] = []
-        while len(resets) < 3:
-            assert source.now < PATIENCE
-            resets += [data for identifier, data in source.drain() if identifier == 0x120]
-            time.sleep(0.05)
-    finally:
-        source.stop()
-    assert source.error is None

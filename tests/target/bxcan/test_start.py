@@ -134,16 +134,6 @@ def test_crystal_that_has_failed_is_not_trusted_until_power_on(talk: Talk, board
     assert talk.report("PLATFORM_HEALTH")["faults"] == lib.LEVER_PLATFORM_CLOCK
 
 
-def test_crystal_that_fails_later_is_replaced(talk: Talk, board: Board) -> None:
-    assert talk.report("PLATFORM_HEALTH")["faults"] == 0
-    board.chip.clocks.break_crystal()
-    board.run(100 * MS)
-    assert [reset.cause for reset in board.machine.resets] == ["software"]
-    assert board.can.bit_time_ns() == 1000.0
-    assert board.chip.clocks.hclk_hz() == 168 * MHZ
-    assert talk.report("PLATFORM_HEALTH")["faults"] == lib.LEVER_PLATFORM_CLOCK
-
-
 def test_filters_pass_our_identifiers_and_nothing_else(board: Board) -> None:
     """Every standard identifier there is, and extended ones that look like ours in one half."""
     passes = board.can.filters.match

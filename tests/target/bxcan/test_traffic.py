@@ -43,12 +43,6 @@ def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
     assert board.machine.resets == []
 
 
-def test_platform_health_of_a_board_that_is_well(talk: Talk) -> None:
-    report = talk.report("PLATFORM_HEALTH")
-    quantities = ("faults", "transmit_errors", "receive_errors", "bus_offs", "overruns", "dropped")
-    assert {name: report[name] for name in quantities} == dict.fromkeys(quantities, 0)
-
-
 def dither(talk: Talk) -> None:
     """From now on a motor command goes out with every estimate."""
     keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")

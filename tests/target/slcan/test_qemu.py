@@ -131,14 +131,6 @@ def test_an_image_that_does_not_answer(
 
 
 @QEMU
-def test_a_qemu_that_does_not_start(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, slcan_image: Path
-) -> None:
-    monkeypatch.setattr(qemu, "MACHINE", "netduinoplus9")
-    assert "qemu-system-arm has ended: qemu-system-arm: unsupported machine type" in says(capsys, str(slcan_image))
-
-
-@QEMU
 def test_a_command_that_does_not_say_where_the_channel_goes(
     capsys: pytest.CaptureFixture[str], slcan_image: Path
 ) -> None:

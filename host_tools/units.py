@@ -10,8 +10,11 @@ import math
 import re
 from functools import cache
 
-from ..errors import LeverError
-from ..files import native_file
+from .errors import LeverError
+from .files import native_file
+
+GRAVITY = 9.80665
+"""Standard gravity [m/s^2], the same number as in the firmware's model."""
 
 _QUANTITY = re.compile(r"[ \t]*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)[ \t]*(.*?)[ \t]*")
 

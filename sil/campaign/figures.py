@@ -1,0 +1,76 @@
+"""What a row says of a run: errors, coverage, consistency, settling."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.host_tools.firmware.quantities import parameters, quantities
+
+from ..run.summary import times_to
+from ..study.data import PARAMETERS
+from ..study.scores import normalised_squares
+from .entrants import Track
+from .flight import Flight
+
+Figures = dict[str, float | None]
+"""By name of the column; None where there is nothing to say."""
+
+FREQUENCY = 3  # where the natural frequency stands among the five
+WITHIN = 0.05  # of the natural frequency: settled
+
+
+class BrokenDownError(ValueError):
+    """An estimator whose values are no longer finite."""
+
+
+def names(model: str) -> tuple[str, ...]:
+    """Of the columns of figures, for estimators with this model."""
+    judged = [f"{what}_{each.key}" for each in quantities(model) for what in ("rms", "bias", "coverage")]
+    return (*judged, "nees", "nis", "settled_s", "flagged")
+
+
+def of_run(flight: Flight, track: Track, run: int) -> Figures:
+    """Of run `run` of a track, whose truth is that of `flight`. Raises BrokenDownError."""
+    counted = flight.judged
+    values = track.values[run]
+    broken = ~np.isfinite(values).all(axis=1)
+    if broken.any():
+        raise BrokenDownError(f"estimates are not finite from {flight.time[broken.argmax()]:g} s on")
+    truth, sigma = flight.truth, track.sigma[run]
+    with np.errstate(invalid="ignore"):
+        relative = values / truth - 1.0
+        covered = np.abs(values - truth) <= 2.0 * sigma
+    figures: Figures = {}
+    for index, name in enumerate(each.key for each in quantities(flight.scenario.config.choices["model"])):
+        error, share = relative[counted, index], covered[counted, index]
+        figures[f"rms_{name}"] = _finite(np.sqrt(np.mean(np.square(error))))
+        figures[f"bias_{name}"] = _finite(np.mean(error))
+        known = len(share) and np.isfinite(sigma[:, index]).all() and np.isfinite(truth[:, index]).all()
+        figures[f"coverage_{name}"] = float(np.mean(share)) if known else None
+    figures["nees"] = _nees(flight, track, run)
+    figures["nis"] = None if track.nis is None else _finite(np.nanmean(track.nis[run][counted]))
+    times = times_to(relative[:, FREQUENCY], flight.time, flight.scenario.changes(), WITHIN)
+    figures["settled_s"] = None if None in times else max(time for time in times if time is not None)
+    figures["flagged"] = None if track.flagged is None else _finite(np.mean(track.flagged[run][counted]))
+    return figures
+
+
+def _nees(flight: Flight, track: Track, run: int) -> float | None:
+    """Mean over the judged times of eᵀ P⁻¹ e of the parameters, which is 3 where the stated covariance is right."""
+    if track.covariance is None or not np.isfinite(flight.truth[:, :PARAMETERS]).all():
+        return None
+    truth: Array = flight.truth[:, :PARAMETERS]
+    positive = all(not each.signed for each in parameters(flight.scenario.config.choices["model"]))
+    deviation = track.scaled[run] - (np.log(truth) if positive else truth)
+    counted = flight.judged
+    try:
+        squares = normalised_squares(deviation[None, counted], track.covariance[run][None, counted])
+    except np.linalg.LinAlgError:
+        return None
+    return _finite(np.mean(squares))
+
+
+def _finite(value: float | np.floating) -> float | None:
+    return float(value) if math.isfinite(value) else None

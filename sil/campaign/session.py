@@ -1,0 +1,177 @@
+"""A campaign on Dask: chunks go to workers, a few at a time, and come back as counts.
+
+The client keeps the numbers of the chunks that are done and a few futures, whatever the size of the campaign; rows
+leave a worker as a file only. Once a second it looks at the connection itself, as Dask would wait for a scheduler that
+was killed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import queue
+import signal
+import socket
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lever_cdkf.host_tools import interrupts
+from lever_cdkf.host_tools.errors import LeverError
+
+from .chunks import Chunk, Plan, fingerprint, make
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+Show = Callable[[int, int, str], None]
+"""Progress: runs done, runs in all, time left."""
+
+_AHEAD = 3  # chunks for each thread of the workers, so that none waits for the client
+_MOST_LOST = 10  # chunks, after which something is wrong with all
+_CONNECT = 10.0  # [s]
+
+
+@dataclass
+class Session:
+    """What this call of the command has done."""
+
+    runs: int = 0
+    """Rows written."""
+    seconds: float = 0.0
+    """Processor time that workers took for them."""
+    lost: list[Chunk] = field(default_factory=list)
+    """Chunks that killed every worker that tried them."""
+
+
+def run(plan: Plan, folder: Path, client: Client, show: Show) -> Session:
+    """Makes the chunks whose files are not there yet. Raises LeverError."""
+    done = plan.done(folder)
+    todo = (number for number in range(plan.count) if number not in done)
+    session, before = Session(), sum(plan.runs(plan.chunk(number)) for number in done)
+    start, total = clock.monotonic(), plan.spec.runs
+    for chunk, result in _results(client, plan, folder, todo, lambda: show(before + session.runs, total, "")):
+        if isinstance(result, Exception):
+            session.lost.append(chunk)
+            if len(session.lost) >= _MOST_LOST:
+                break
+            continue
+        rows, seconds = result
+        session.runs += rows
+        session.seconds += seconds
+        left = (clock.monotonic() - start) * (total - before - session.runs) / session.runs
+        show(before + session.runs, total, f"{_time(left)} left")
+    return session
+
+
+def _results(
+    client: Client, plan: Plan, folder: Path, todo: Iterator[int], tick: Callable[[], None]
+) -> Iterator[tuple[Chunk, tuple[int, float] | Exception]]:
+    """Of each chunk, when it is finished: rows and processor time, or how it killed the workers. Raises LeverError."""
+    from distributed import KilledWorker
+
+    finished: queue.Queue[Future] = queue.Queue()
+    running: dict[str, Chunk] = {}
+
+    def submit(count: int) -> None:
+        for number in islice(todo, count):
+            chunk = plan.chunk(number)
+            future = client.submit(work, plan, chunk, folder, key=chunk.name(plan.fingerprint), pure=True)
+            running[future.key] = chunk
+            kept[future.key] = future
+            future.add_done_callback(finished.put)
+
+    kept: dict[str, Future] = {}
+    submit(_AHEAD * max(1, sum(client.nthreads().values())))
+    while running:
+        future = _next(client, finished, tick)
+        if future is None:
+            continue
+        chunk = running.pop(future.key)
+        del kept[future.key]
+        error = future.exception()
+        if error is not None and not isinstance(error, KilledWorker):
+            raise LeverError(f"flights {chunk.first} to {chunk.end - 1}: {_line(error)}") from error
+        yield chunk, (error if error is not None else future.result())
+        del future
+        submit(1)
+
+
+def _next(client: Client, finished: queue.Queue[Future], tick: Callable[[], None]) -> Future | None:
+    """The next future that is done; None when a second has passed without. Raises LeverError."""
+    try:
+        future = finished.get(timeout=1.0)
+    except queue.Empty:
+        future = None
+    interrupts.check()
+    if client.status != "running" or (future is not None and future.status in ("cancelled", "lost")):
+        raise LeverError(
+            "the scheduler is gone; what is finished is kept: repeat the command with --resume when there is one again"
+        )
+    if future is None:
+        tick()
+    return future
+
+
+def dashboard(client: Client) -> str:
+    """Where a browser sees the workers: Dask's own pages, or its tables where bokeh is not installed."""
+    page = str(client.dashboard_link)
+    return page if importlib.util.find_spec("bokeh") else page.replace("/status", "/info/main/workers.html")
+
+
+def work(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, float]:
+    """On a worker: makes a chunk; returns its rows and the processor time [s]."""
+    here = socket.gethostname()
+    if fingerprint(plan.spec) != plan.fingerprint:
+        raise LeverError(f"the worker on {here} has another build of lever-cdkf: install the same everywhere")
+    if not folder.is_dir():
+        raise LeverError(f"the worker on {here} has no folder {folder}: it must be on a file system that all share")
+    start = clock.thread_time()
+    rows = make(plan, chunk, folder)
+    return rows, clock.thread_time() - start
+
+
+def _line(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    return text if isinstance(error, LeverError) else f"{type(error).__name__}: {text}"
+
+
+def _time(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+@contextmanager
+def connected(address: str | None, workers: int) -> Iterator[Client]:
+    """A client of the scheduler at `address`, or of a cluster of so many processes on this machine.
+
+    Raises LeverError when nobody is there.
+    """
+    import dask
+    from distributed import Client, LocalCluster
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    if address is not None:
+        try:
+            client = Client(address, timeout=_CONNECT)
+        except (OSError, ValueError) as error:
+            raise LeverError(f"no Dask scheduler at {address}: {_line(error)}") from None
+        with client:
+            if not client.nthreads():
+                raise LeverError(f"the scheduler at {address} has no workers yet: start some (dask worker {address})")
+            yield client
+        return
+    options: dict[str, Any] = {"dashboard_address": "127.0.0.1:0", "memory_limit": 0, "threads_per_worker": 1}
+    with dask.config.set({"distributed.logging.distributed": "critical"}):
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # is passed on: workers leave Ctrl-C to us
+        try:
+            cluster = LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        with cluster, Client(cluster) as client:
+            yield client

@@ -1,0 +1,80 @@
+"""The command `lever campaign`, but for what tests of kills show."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+from lever_cdkf.sil.campaign.chunks import Plan
+from python.conftest import Refused, Run
+
+
+@pytest.fixture
+def done(undisturbed: dict[str, bytes], tmp_path: Path) -> Path:
+    """A folder with the whole small campaign."""
+    for name, content in undisturbed.items():
+        (tmp_path / name).write_bytes(content)
+    return tmp_path
+
+
+def test_list(lever: Run) -> None:
+    status, out, _ = lever("campaign", "--list")
+    assert status == 0
+    assert "quick" in out
+    assert "tracking" in out
+
+
+def test_a_campaign_that_is_done_is_only_summed_up(lever: Run, small_file: Path, done: Path) -> None:
+    status, out, err = lever("campaign", small_file, "-o", done, "--resume", "--json", done / "printed.json")
+    assert (status, err) == (0, "")
+    assert "48 runs, 0 failed" in out
+    summary = json.loads((done / "summary.json").read_text())
+    assert {name: summary[name] for name in ("asked", "runs", "failed")} == {"asked": 48, "runs": 48, "failed": 0}
+    (rows,) = json.loads((done / "printed.json").read_text()).values()
+    assert [(row["estimator"], row["runs"]) for row in rows] == [("dual", 24), ("rls", 24)]
+
+
+def test_the_speed_is_kept_when_nothing_is_left_to_do(lever: Run, small: Plan, small_file: Path, done: Path) -> None:
+    for campaign, expected in ((small.fingerprint, 1234.5), ("another", None)):
+        before = {"campaign": campaign, "real_time_factor_per_core": 1234.5}
+        (done / "summary.json").write_text(json.dumps(before))
+        assert lever("campaign", small_file, "-o", done, "--resume")[0] == 0
+        assert json.loads((done / "summary.json").read_text())["real_time_factor_per_core"] == expected
+
+
+def test_a_run_alone_is_printed_with_the_command_that_shows_it(lever: Run, small_file: Path, tmp_path: Path) -> None:
+    status, out, _ = lever("campaign", small_file, "--run", "14", "--json", tmp_path / "row.json")
+    assert status == 0
+    (rows,) = json.loads((tmp_path / "row.json").read_text()).values()
+    row = {each["column"]: each["value"] for each in rows}
+    assert (row["run"], row["seed"], row["estimator"], row["estimator.adaptation"]) == (14, 8, "dual", "robbins_monro")
+    command = shlex.split(out.strip().splitlines()[-1])
+    assert command[:5] == ["lever", "sim", "steady", "--seed", "8"]
+    assert lever(*command[1:-1], tmp_path / "sim", "--set", "limits={}")[0] == 0
+    quality = json.loads((tmp_path / "sim/summary.json").read_text())["parameters"]["m_p"]
+    assert quality["rms_percent"] == pytest.approx(100.0 * row["rms_m_p"], rel=0.1)  # of ten times as many samples
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["quick"], "-o DIR is missing"),
+        (["quick", "-o", "out", "--workers", "0"], "--workers: must be at least 1"),
+        (["quick", "-o", "out", "--workers", "2", "--scheduler", "tcp://x:1"], "does not go with --scheduler"),
+        (["quick", "--run", "300"], "--run 300: the campaign has the runs 0 to 299"),
+        (["no.toml", "-o", "out"], "no.toml: no such file"),
+        (["what"], "no spec 'what'; there are quick, tracking"),
+    ],
+)
+def test_refused(
+    arguments: list[str], says: str, refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert says in refused("campaign", *arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_resume_what_is_there_is_left_alone(refused: Refused, small_file: Path, done: Path) -> None:
+    assert "holds 24 of the 24 chunks of this campaign: add --resume" in refused("campaign", small_file, "-o", done)

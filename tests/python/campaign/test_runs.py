@@ -1,0 +1,131 @@
+"""Rows of runs: against `lever sim`, against the textbook, however they are grouped, and of runs that fail."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.firmware.native import run_samples
+from lever_cdkf.sil.campaign import chunks, figures, runs, spec
+from lever_cdkf.sil.campaign.chunks import Chunk, Plan
+from lever_cdkf.sil.campaign.entrants import ENTRANTS, Track
+from lever_cdkf.sil.campaign.flight import simulate
+from lever_cdkf.sil.campaign.spec import Spec
+from lever_cdkf.sil.run import runner
+from lever_cdkf.sil.scenarios import scenario
+
+Made = Callable[[str], Spec]
+
+ONE = 'title = "one"\nscenario = "steady"\nevery = "0.02 s"\nset = { duration = "20 s", converged_after = "8 s" }\n'
+
+
+def test_a_run_is_that_of_lever_sim(made: Made) -> None:
+    (row,) = runs.rows(made("seed = 5\n" + ONE), range(1))
+    summary = runner.simulate(scenario.load("steady", ["duration=20 s", "converged_after=8 s", "seed=5"])).summary
+    for name, quality in summary.parameters.items():
+        assert 100.0 * row[f"rms_{name}"] == pytest.approx(quality.rms_percent, rel=0.02)  # frames round
+        assert 100.0 * row[f"bias_{name}"] == pytest.approx(quality.bias_percent, abs=0.05)
+        assert row[f"coverage_{name}"] == pytest.approx(quality.coverage_2sigma, abs=0.02)
+    settled = summary.parameters["natural_frequency"].time_to_5_percent_s[0]
+    assert row["settled_s"] == pytest.approx(settled, abs=0.05)
+    assert row["nis"] == pytest.approx(summary.nis.mean, rel=0.1)  # of every twentieth sample
+    assert row["seed"] == 5
+
+
+SPIKES = 'sensors.theta.fault=[{kind="spikes", start="1 s", end="2 s", share="5 %", size="50 mrad"}]'
+
+
+@pytest.mark.parametrize("faults", [[], [SPIKES]])
+def test_what_was_measured_makes_the_firmware_say_the_same_to_the_bit(faults: list[str]) -> None:
+    steady = scenario.load("steady", ["duration=3 s", "converged_after=1 s", "limits={}", *faults])
+    flight = simulate(steady, 0.1, measured=True)
+    time_us = np.arange(3000) * 1000
+    replayed = run_samples(steady.config, {"time_us": time_us, **flight.measured}, flight.at)
+    for name in ("parameter", "parameter_sigma", "nis", "faults"):
+        np.testing.assert_array_equal(replayed[name], flight.firmware[name], err_msg=name)
+
+
+def test_figures_of_errors_that_are_known(made: Made) -> None:
+    """Parameters 1, 2 and 3 standard deviations off, each relative to a truth of its own, NEES by hand."""
+    flight = simulate(made(ONE).first, 1.0, measured=False)
+    times = len(flight.at)
+    sigma = np.array([0.05, 0.05, 0.05, 0.01, 0.02])
+    off = np.array([1.0, 2.1, -3.0, 0.0, 1.0]) * sigma
+    values = flight.truth * (1.0 + off)
+    scaled = np.log(values[:, :3])
+    track = Track(
+        values[None], (sigma * flight.truth)[None], scaled[None],
+        np.tile(np.diag(sigma[:3] ** 2), (1, times, 1, 1)), np.full((1, times), 2.0),
+    )  # fmt: skip
+    found = figures.of_run(flight, track, 0)
+    assert [found[f"rms_{name}"] for name in ("m_p", "c_p", "k_p")] == pytest.approx([0.05, 0.105, 0.15])
+    assert [found[f"bias_{name}"] for name in ("m_p", "c_p", "k_p")] == pytest.approx([0.05, 0.105, -0.15])
+    assert [found[f"coverage_{name}"] for name in ("m_p", "c_p", "k_p", "damping_ratio")] == [1.0, 0.0, 0.0, 1.0]
+    assert found["nees"] == pytest.approx(np.sum((np.log1p(off[:3]) / sigma[:3]) ** 2))
+    assert (found["nis"], found["settled_s"], found["flagged"]) == (2.0, 0.0, None)
+    broken = values.copy()
+    broken[5:] = np.nan
+    with pytest.raises(figures.BrokenDownError, match="not finite from 5 s on"):
+        figures.of_run(flight, dataclasses.replace(track, values=broken[None]), 0)
+
+
+@pytest.mark.parametrize("name", ENTRANTS)
+def test_every_estimator_follows_a_steady_pilot(name: str, made: Made) -> None:
+    (row,) = runs.rows(made(f'estimators = ["{name}"]\n' + ONE), range(1))
+    assert "error" not in row
+    assert row["rms_natural_frequency"] < 0.1
+    assert (row["coverage_k_p"] is None) == (name == "lms")
+
+
+def test_rows_do_not_depend_on_how_flights_are_grouped(small: Plan) -> None:
+    """Baselines excepted, which are run side by side within a chunk: chunks are the same everywhere."""
+    firmware = dataclasses.replace(small.spec, estimators=("dual", "joint"))
+    together = list(runs.rows(firmware, range(3, 7)))
+    assert together == [row for flight in range(3, 7) for row in runs.rows(firmware, range(flight, flight + 1))]
+    assert [row["run"] for row in together] == list(range(6, 14))
+
+
+def test_a_run_that_cannot_be_is_a_row_with_its_error(made: Made, tmp_path: Path) -> None:
+    text = '[[vary]]\nkey = "settings.theta_noise"\nvalues = ["1 mrad", "-1 mrad", "2 mrad"]\n'
+    plan = Plan(made('estimators = ["dual", "rls"]\n' + ONE.replace("20 s", "2 s").replace("8 s", "1 s") + text))
+    assert chunks.make(plan, Chunk(0, 3), tmp_path) == 6
+    rows = pq.read_table(tmp_path / Chunk(0, 3).name(plan.fingerprint)).to_pylist()
+    assert [row["error"] is not None for row in rows] == [False, False, True, True, False, False]
+    assert "theta_noise = -0.001 is out of range" in rows[2]["error"]
+    assert rows[2]["rms_m_p"] is None
+    assert (rows[2]["run"], rows[2]["seed"], rows[2]["settings.theta_noise"]) == (2, 2, -1.0)
+
+
+def test_chunks_cover_all_flights_once(small: Plan) -> None:
+    for flights in (1, 5, 7, 24, 100):
+        plan = Plan(dataclasses.replace(small.spec, chunk=flights))
+        covered = [flight for number in range(plan.count) for flight in range(*_ends(plan.chunk(number)))]
+        assert covered == list(range(24))
+    assert Plan(spec.load("tracking")).size * 0.1 > 10.0  # seconds of work, measured
+
+
+def _ends(chunk: Chunk) -> tuple[int, int]:
+    return chunk.first, chunk.end
+
+
+def test_what_is_done_is_what_is_whole(small: Plan, tmp_path: Path) -> None:
+    assert small.done(tmp_path) == set()
+    for number in (2, 5, 7):
+        chunks.make(small, small.chunk(number), tmp_path)
+    damaged = tmp_path / small.chunk(5).name(small.fingerprint)
+    damaged.write_bytes(damaged.read_bytes()[:-20])
+    (tmp_path / small.chunk(7).name(small.fingerprint)).write_bytes(b"")
+    (tmp_path / f".{small.chunk(9).name(small.fingerprint)}.1.tmp").touch()
+    assert small.done(tmp_path) == {2}
+
+
+def test_another_campaign_in_the_folder_is_refused(small: Plan, tmp_path: Path) -> None:
+    chunks.make(small, small.chunk(0), tmp_path)
+    for other in (dataclasses.replace(small.spec, seeds=5), dataclasses.replace(small.spec, chunk=3)):
+        with pytest.raises(LeverError, match="give another folder"):
+            Plan(other).done(tmp_path)

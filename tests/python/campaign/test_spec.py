@@ -1,0 +1,119 @@
+"""Specs of campaigns: what they say, what is refused, and the points of their designs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.sil.campaign import design, spec
+from lever_cdkf.sil.campaign.spec import Spec
+from lever_cdkf.sil.toml_tables import ScenarioError
+
+Made = Callable[[str], Spec]
+
+HEAD = 'title = "made"\nscenario = "steady"\nset = { duration = "2 s", converged_after = "1 s" }\n'
+NOISE = '[[vary]]\nkey = "pilot.process_noise"\n'
+LOG = NOISE + 'range = ["0.01 rad/s/sqrt(s)", "1 rad/s/sqrt(s)"]\nscale = "log"\n'
+THETA = '[[vary]]\nkey = "sensors.theta.noise"\nvalues = ["1 mrad", "2 mrad"]\n'
+
+
+def test_a_grid_goes_through_all_values_the_last_axis_fastest(made: Made) -> None:
+    grid = made(HEAD + THETA + LOG + "steps = 3\n")
+    points = [design.columns(grid, design.point(grid, number)) for number in range(grid.size)]
+    assert [tuple(point.values()) for point in points] == [
+        (1.0, 0.01), (1.0, 0.1), (1.0, 1.0), (2.0, 0.01), (2.0, 0.1), (2.0, 1.0),
+    ]  # fmt: skip
+    assert [axis.unit for axis in grid.vary] == ["mrad", "rad/s/sqrt(s)"]
+
+
+def test_what_goes_with_an_axis_moves_in_its_own_range(made: Made) -> None:
+    text = 'steps = 3\nalso = { "settings.theta_dot_process_noise" = ["0.02 rad/s/sqrt(s)", "2 rad/s/sqrt(s)"] }\n'
+    flight = (grid := made(HEAD + LOG + text)).flight(design.point(grid, 1), 7)
+    assert flight.pilot.process_noise == pytest.approx(0.1)
+    assert flight.config.settings["theta_dot_process_noise"] == pytest.approx(0.2)
+    assert (flight.seed, flight.duration) == (7, 2.0)
+
+
+def test_a_latin_hypercube_has_one_point_in_each_part_of_each_axis(made: Made) -> None:
+    text = HEAD + 'design = "latin_hypercube"\npoints = 50\n' + LOG
+    text += '[[vary]]\nkey = "sensors.theta.noise"\nrange = ["1 mrad", "3 mrad"]\n'
+    hypercube = made(text)
+    points = [design.columns(hypercube, design.point(hypercube, number)) for number in range(50)]
+    noise = np.log10([float(point["pilot.process_noise"]) for point in points]) / 2.0 + 1.0
+    theta = (np.array([float(point["sensors.theta.noise"]) for point in points]) - 1.0) / 2.0
+    for positions in (noise, theta):
+        assert sorted((50.0 * positions).astype(int)) == list(range(50))
+    assert abs(np.corrcoef(noise, theta)[0, 1]) < 0.5  # each in an order of its own
+
+
+def test_random_points_are_the_same_every_time_and_each_its_own(made: Made) -> None:
+    random = made(HEAD + 'design = "random"\npoints = 1000000000\n' + LOG + THETA)
+    numbers = (0, 1, 999_999_999)
+    points = [design.point(random, number) for number in numbers]
+    assert points == [design.point(random, number) for number in numbers]
+    assert len({str(point) for point in points}) == 3
+
+
+def test_a_table_can_be_set(made: Made) -> None:
+    text = HEAD.replace("set = { ", 'set = { "pilot.k_p" = { kind = "ramp", first = "1500 N/m", last = "1800 N/m", '
+                        'start = "1 s", duration = "1 s" }, ')  # fmt: skip
+    truth = (flight := made(text).first).truth(flight.time())
+    assert truth.parameters["k_p"][[0, -1]] == pytest.approx([1500.0, 1800.0], abs=1.0)
+
+
+def test_the_hash_is_of_what_makes_rows(made: Made, tmp_path: Path) -> None:
+    first = made(HEAD + LOG + "steps = 3\n")
+    same = made('description = "in other words"\nchunk = 3\n' + HEAD.replace("made", "called") + LOG + "steps = 3\n")
+    assert same.hashed == first.hashed
+    (tmp_path / "own.toml").write_bytes(first.content + b"\n")
+    others = (
+        HEAD + LOG + "steps = 4\n",
+        "seeds = 2\n" + HEAD + LOG + "steps = 3\n",
+        HEAD.replace("2 s", "3 s") + LOG + "steps = 3\n",
+        HEAD.replace("steady", "own.toml") + LOG + "steps = 3\n",
+    )
+    assert len({first.hashed, *(made(text).hashed for text in others)}) == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "key 'title' is missing"),
+        (HEAD.replace("steady", "stead"), "no scenario 'stead'"),
+        (HEAD + 'estimators = ["dual", "jont"]\n', "estimators: 'jont' is not known; allowed: dual, joint"),
+        (HEAD + "points = 5\n", "points: a grid has as many as its axes"),
+        (HEAD + 'design = "random"\n', "points: how many"),
+        (HEAD + LOG, "steps: how many values"),
+        (HEAD + LOG + 'steps = 3\nvalues = ["1 rad/s/sqrt(s)"]\n', "give either values or a range"),
+        (HEAD + NOISE + 'range = ["1 mrad", "2 rad"]\nsteps = 2\n', "two quantities in the same unit"),
+        (HEAD + LOG.replace("0.01", "0") + "steps = 2\n", "above 0"),
+        (HEAD + LOG + 'steps = 2\nalso = { "settings.theta_noise" = ["1 mrad"] }\n', "has 1 values and"),
+        (HEAD + THETA + THETA, "sensors.theta.noise is set twice"),
+        (HEAD + NOISE + 'values = ["1 rad", "2 rad"]\n', "pilot.process_noise: '1 rad' has unit 'rad'"),
+        (HEAD + NOISE.replace("process", "progress") + 'values = ["1 rad", "2 rad"]\n', "unknown key 'progress_noise'"),
+        (HEAD + '[[vary]]\nkey = "estimator.model"\nvalues = ["lever", "linear_physical"]\n', "one estimator.model"),
+        (HEAD.replace("steady", "sensor_dropout") + 'estimators = ["rls"]\n', "rls needs every sample"),
+        (HEAD.replace("steady", "fixed_preload") + 'estimators = ["joint_ekf"]\n', "joint_ekf needs preload trim"),
+    ],
+)
+def test_what_is_refused(text: str, says: str, made: Made) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        made(text)
+    assert says in str(refused.value)
+    assert "made.toml" in str(refused.value) or "stead" in str(refused.value)
+
+
+@pytest.mark.parametrize("name", spec.names())
+def test_shipped_specs(name: str) -> None:
+    shipped = spec.load(name)
+    last = shipped.flight(design.point(shipped, shipped.size - 1), shipped.seed)
+    last.check()
+    assert shipped.description
+
+
+def test_the_map_of_tracking_has_a_hundred_thousand_runs_of_a_minute() -> None:
+    tracking = spec.load("tracking")
+    assert tracking.runs >= 100_000
+    assert tracking.first.duration == 60.0

@@ -1,0 +1,92 @@
+"""Where an output comes from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+from lever_cdkf.host_tools import provenance as origin
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.files import native_file, shared_library
+from lever_cdkf.host_tools.provenance import provenance, with_provenance
+
+
+def test_the_date_is_now_or_that_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    before = datetime.now(tz=timezone.utc).replace(microsecond=0)
+    assert before <= provenance().moment() <= datetime.now(tz=timezone.utc)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1234567890")
+    assert provenance().created == "2009-02-13T23:31:30Z"
+    for wrong in ("yesterday", "1e400", "9" * 30):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", wrong)
+        with pytest.raises(LeverError, match="SOURCE_DATE_EPOCH"):
+            provenance()
+
+
+def test_inputs_are_told_by_the_hash_of_their_bytes(tmp_path: Path) -> None:
+    (tmp_path / "Größe θ.log").write_bytes(b"abc")
+    told = provenance([tmp_path / "Größe θ.log", "-", tmp_path])
+    assert told.inputs == {
+        f"{tmp_path}/Größe θ.log": f"sha256:{hashlib.sha256(b'abc').hexdigest()}",
+        "-": None,
+        str(tmp_path): None,
+    }
+    library = native_file(shared_library("lever_cdkf"))
+    assert told.library == f"sha256:{hashlib.sha256(library.read_bytes()).hexdigest()}"
+
+
+def test_every_format_can_hold_the_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["/bin/lever", "replay", "a b\x07\udcff.log"])
+    told = provenance(["a\x00\udcff"])
+    assert told.command == r"lever replay 'a b\x07\udcff.log'"
+    assert list(told.inputs) == [r"a\x00\udcff"]
+    assert json.loads(told.text())["command"] == told.command
+
+
+@pytest.mark.requires("git")
+def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def git(*arguments: str) -> str:
+        settings = ("-c", "user.name=x", "-c", "user.email=x@y")
+        done = subprocess.run(
+            ["git", "-C", tmp_path, *settings, *arguments], capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    package = tmp_path / "host_tools"
+    package.mkdir()
+    shutil.copy(str(origin.__file__), package / "provenance.py")
+    monkeypatch.setattr(origin, "__file__", str(package / "provenance.py"))
+    asked = origin.revision.__wrapped__
+    assert asked() is None
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-qm", "first")
+    assert asked() == git("rev-parse", "--short=12", "HEAD")
+    (package / "provenance.py").write_text("")
+    assert asked() == git("rev-parse", "--short=12", "HEAD") + "-dirty"
+    inside = tmp_path / "env/site-packages/lever_cdkf/host_tools"  # an environment in somebody's own tree
+    inside.mkdir(parents=True)
+    monkeypatch.setattr(origin, "__file__", str(inside / "provenance.py"))
+    assert asked() is None
+
+
+def test_a_page_says_it_at_its_end() -> None:
+    told = provenance(["</script><b>"])
+    page = with_provenance("<html><body><p>x</p></body></html>", told)
+    assert page.startswith("<html><body><p>x</p><footer>")
+    assert page.endswith("</body></html>")
+    kept = '<script type="application/json" id="provenance">(.*?)</script>'
+    (content,) = re.findall(kept, page)
+    assert json.loads(content) == told.properties()
+    assert "<b>" not in re.sub(kept, "", page)
+    assert with_provenance("<html></html>", None) == "<html></html>"
+    assert with_provenance("<html></html>", told).endswith("</html>")
