@@ -23,7 +23,7 @@ from mutation.schemata import Mutant
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="mutation", description=__doc__.splitlines()[0])
-    parser.add_argument("build", type=Path)
+    parser.add_argument("build", type=lambda path: Path(path).resolve())
     parser.add_argument("--random", type=int, metavar="N", help="only so many")
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the choice (default: %(default)s)")
     parser.add_argument("--file", default="", help="only of these files: a part of their path")

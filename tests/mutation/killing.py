@@ -33,7 +33,7 @@ class Program:
 
     @property
     def name(self) -> str:
-        return self.command[-1].stem
+        return self.command[-1].name
 
     def kills(self, mutant: Mutant) -> bool:
         environment = {"MUTANT": str(mutant.number), "MUTANT_MOST": str(PATIENCE * self.expressions + GRACE)}
