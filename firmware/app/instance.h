@@ -16,8 +16,8 @@
 typedef struct bounce {
     const lever_aircraft_t *aircraft; /* NULL: none */
     margin_t margin;
-    uint32_t since_us; /* the margin was worked out */
-    uint8_t state;     /* enum lever_bounce */
+    uint32_t time_us; /* of the sample with which that was worked out */
+    uint8_t state;    /* enum lever_bounce */
 } bounce_t;
 
 struct lever {
@@ -32,6 +32,9 @@ struct lever {
 
 /* One sample, by struct or from the bus. */
 enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample);
+
+/* After it, with an aircraft: works the margin out, once a publish_period. By itself, so that its stack is not beneath the estimator's. */
+void instance_watch(lever_t *lever);
 
 /* Carries a command out, or says why not and changes nothing. */
 enum message_result instance_command(lever_t *lever, const lever_command_t *command);

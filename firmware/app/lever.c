@@ -49,13 +49,12 @@ static bool carries_margin(const lever_t *lever)
     return ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) && ((lever->estimator.faults & broken) == 0u);
 }
 
-/* Once a publish_period. */
-static void watch_loop(lever_t *lever, uint32_t elapsed_us)
+void instance_watch(lever_t *lever)
 {
     bounce_t *bounce = &lever->bounce;
-    bounce->since_us += elapsed_us;
-    if ((bounce->aircraft != NULL) && (bounce->since_us >= lever->link.publish_us)) {
-        bounce->since_us = 0u;
+    const uint32_t time_us = lever->estimator.time_us;
+    if ((time_us - bounce->time_us) >= lever->link.publish_us) {
+        bounce->time_us = time_us;
         bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
         bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever));
     }
@@ -74,13 +73,16 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
         .measured = ((faults & blind) != blind),
         .permitted = permits_torque(lever)};
     torque_gate_step(&lever->gate, dither_step(&lever->dither), &torque);
-    watch_loop(lever, torque.elapsed_us);
     return mode;
 }
 
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample)
 {
-    return instance_update(lever, sample);
+    const enum lever_mode mode = instance_update(lever, sample);
+    if (lever->bounce.aircraft != NULL) {
+        instance_watch(lever);
+    }
+    return mode;
 }
 
 void lever_idle(lever_t *lever, uint32_t elapsed_us)

@@ -20,7 +20,7 @@ from lever_cdkf.host_tools.errors import LeverError
 
 from .image import call_graph, core_objects, run_tool
 
-FOLDERS = ("math", "model", "can", "filter", "app")
+FOLDERS = ("math", "model", "can", "filter", "bounce", "app")
 """From the bottom up; nothing calls upwards but through a pointer that it was given."""
 
 _INDIRECT = "__indirect_call"
