@@ -14,6 +14,7 @@ import signal
 import socket
 import time as clock
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
@@ -34,6 +35,7 @@ Show = Callable[[int, int, str], None]
 _AHEAD = 3  # chunks for each thread of the workers, so that none waits for the client
 _MOST_LOST = 10  # chunks, after which something is wrong with all
 _CONNECT = 10.0  # [s]
+_GONE = "the scheduler is gone; what is finished is kept: repeat the command with --resume when there is one again"
 
 
 @dataclass
@@ -93,10 +95,14 @@ def _results(
             continue
         chunk = running.pop(future.key)
         del kept[future.key]
-        error = future.exception()
+        try:
+            error = future.exception()
+            result = future.result() if error is None else error
+        except (OSError, CancelledError):  # while it was fetched
+            raise LeverError(_GONE) from None
         if error is not None and not isinstance(error, KilledWorker):
             raise LeverError(f"flights {chunk.first} to {chunk.end - 1}: {_line(error)}") from error
-        yield chunk, (error if error is not None else future.result())
+        yield chunk, result
         del future
         submit(1)
 
@@ -109,9 +115,7 @@ def _next(client: Client, finished: queue.Queue[Future], tick: Callable[[], None
         future = None
     interrupts.check()
     if client.status != "running" or (future is not None and future.status in ("cancelled", "lost")):
-        raise LeverError(
-            "the scheduler is gone; what is finished is kept: repeat the command with --resume when there is one again"
-        )
+        raise LeverError(_GONE)
     if future is None:
         tick()
     return future
@@ -155,7 +159,9 @@ def connected(address: str | None, workers: int) -> Iterator[Client]:
     import dask
     from distributed import Client, LocalCluster
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in logging.root.manager.loggerDict:
+        if name.partition(".")[0] == "distributed":  # what it says of lost connections, the error says in a line
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     if address is not None:
         try:
             client = Client(address, timeout=_CONNECT)

@@ -73,7 +73,7 @@ def test_port_includes_only_what_it_may(folder: str) -> None:
         for bracket, name in includes:
             if bracket == "<":
                 assert folder == "linux" or name in SYSTEM_HEADERS, f"{file}: <{name}>"
-            elif name not in ("lever_cdkf.h", "lever_settings.def", "lever_build.h"):
+            elif name not in ("lever_cdkf.h", "lever_settings.def", "lever_units.def", "lever_build.h"):
                 assert {name, str(Path(name).parent)} & PORT_MAY_INCLUDE[folder], f"{file}: {name}"
 
 
