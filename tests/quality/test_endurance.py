@@ -59,7 +59,7 @@ def flown(program: Path, scene: str, estimator: int, settings: str, seconds: int
 def test_single_precision_goes_where_double_goes(
     programs: Path, scene: str, settings: str, within: float, share: float, estimator: int, name: str
 ) -> None:
-    """`within`: greatest difference of the two in standard deviations, and of their standard deviations, relatively, for
+    """`within`: greatest difference of the two in standard deviations, and of the standard deviations, relatively, for
     a `share` of the time: a comparison with a threshold that goes the other way in single precision is forgotten."""
     with ThreadPoolExecutor() as pool:
         both = pool.map(lambda precision: flown(programs / precision, scene, estimator, settings), ("single", "double"))
