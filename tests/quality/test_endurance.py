@@ -53,13 +53,14 @@ def flown(program: Path, scene: str, estimator: int, settings: str, seconds: int
 
 @pytest.mark.requires("cc|gcc|clang")
 @pytest.mark.parametrize(
-    ("scene", "settings", "within", "share"), [("calm", "plain", 0.003, 1.0), ("drift", "default", 0.05, 0.99)]
+    ("scene", "settings", "within", "share"), [("calm", "plain", 0.003, 0.99), ("drift", "default", 0.05, 0.99)]
 )
 @pytest.mark.parametrize(("estimator", "name"), enum_names("lever_estimator").items())
 def test_single_precision_goes_where_double_goes(
     programs: Path, scene: str, settings: str, within: float, share: float, estimator: int, name: str
 ) -> None:
-    """`within`: greatest difference of the two in standard deviations, and of their standard deviations, relatively."""
+    """`within`: greatest difference of the two in standard deviations, and of the standard deviations, relatively, for
+    a `share` of the time: a comparison with a threshold that goes the other way in single precision is forgotten."""
     with ThreadPoolExecutor() as pool:
         both = pool.map(lambda precision: flown(programs / precision, scene, estimator, settings), ("single", "double"))
     single, double = both

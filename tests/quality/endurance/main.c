@@ -7,7 +7,7 @@
  * estimation). A line is: time [s], then value and standard deviation of each parameter. The exit status is 1 as soon
  * as the belief breaks its invariant after any sample. Samples are the same in both precisions. */
 #include "app/estimator.h"
-#include "model/simulation.h"
+#include "simulation.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -33,17 +33,18 @@ static void set_arm(simulation_t *simulation, bool drifts)
 {
     if (drifts) {
         const double hours = simulation->time / 3600.0;
-        simulation->plant.m_p = 2.5 * exp(0.2 * sin(TURN * 1.1 * hours));
-        simulation->plant.c_p = 45.0 * exp(0.35 * sin(TURN * 1.7 * hours));
-        simulation->plant.k_p = 1600.0 * exp(0.35 * sin(TURN * 2.3 * hours));
+        const double m_p = 2.5 * exp(0.2 * sin(TURN * 1.1 * hours));
+        const double c_p = 45.0 * exp(0.35 * sin(TURN * 1.7 * hours));
+        const double k_p = 1600.0 * exp(0.35 * sin(TURN * 2.3 * hours));
+        simulation->plant = plant_of_lever(m_p, c_p, k_p);
     }
 }
 
 static lever_sample_t sample_of(const simulation_t *simulation, uint32_t index)
 {
     const lever_sample_t sample = {.time_us = index * 1000u,
-        .theta = rounded(simulation->theta),
-        .theta_dot = rounded(simulation->theta_dot),
+        .theta = rounded(simulation->measured_theta),
+        .theta_dot = rounded(simulation->measured_theta_dot),
         .tau_m = rounded(simulation->tau_m),
         .z_ddot = rounded(simulation->z_ddot),
         .theta_valid = true,
@@ -67,7 +68,7 @@ static void print_line(const estimator_t *estimator, const simulation_t *simulat
 static bool fly(const lever_config_t *config, bool drifts, uint32_t samples)
 {
     static estimator_t estimator;
-    simulation_t simulation = simulation_typical();
+    simulation_t simulation = simulation_of((uint8_t)LEVER_MODEL_LEVER);
     bool valid = true;
     if (!drifts) { /* an eighth of the usual motion, just enough to be learnt from, and no torque */
         simulation.base_rms *= 0.125;
