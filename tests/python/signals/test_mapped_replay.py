@@ -59,7 +59,7 @@ def test_what_the_estimator_warns_of_is_said(flight: Flight, tmp_path: Path) -> 
     """In the verdict and in the shares: a base that is stuck, and an angle that is; not that the log has no torque."""
 
     def said(name: str, theta: np.ndarray, z_ddot: np.ndarray) -> tuple[str, dict[str, float], float]:
-        columns = {
+        columns: dict[str, Any] = {
             "time_s": flight.time,
             "theta_rad": theta,
             "theta_dot_rad_s": flight.theta_dot,
@@ -208,9 +208,12 @@ def test_what_is_written_is_read_back(folder: Path, tmp_path: Path) -> None:
 
 
 def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
+    """At 500 Hz nothing is lost."""
     arguments = ["--dbc", folder / "foreign.dbc", "--map", *MAPPED, "-o", tmp_path / "my.settings", "--length", "30"]
+    arguments += ["--page", tmp_path / "tune.html"]
     assert cli.main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
     assert "sample_period = 0.002" in (tmp_path / "my.settings").read_text()
+    assert " lost)" not in (tmp_path / "tune.html").read_text()
 
 
 # --- errors ----------------------------------------------------------------------------------------------------------
