@@ -187,6 +187,10 @@ def _tables(summary: dict[str, Any]) -> Tables:
         ]
     if mapping := summary["recording"]["mapping"]:
         tables["signals"] = [{"input": key, **row} for key, row in mapping["inputs"].items()]
+    shares = {**summary["fault_shares"], "any that warns": summary["flagged_share"]}
+    tables["share of the judged time with each fault"] = [
+        {"fault": name, "share [%]": None if share is None else 100.0 * share} for name, share in shares.items()
+    ]
     return tables | {"recording": [_recording_row(summary)]}
 
 

@@ -23,11 +23,11 @@ SAMPLE = struct_dtype("lever_sample_t")
 INNOVATION = struct_dtype("sample_innovation_t")
 
 
-def samples_of(frames: Array) -> tuple[Array, dict[str, str], Health]:
+def samples_of(frames: Array, config: Config | None = None) -> tuple[Array, dict[str, str], Health]:
     """The samples (SAMPLE) that the firmware makes of received frames (FRAME), the choices (model, preload …) that
-    commands among them have made, and its counts of what was wrong."""
+    commands among them have made, and its counts of what was wrong; lost is what comes later than sample_period."""
     samples = np.empty(len(frames), SAMPLE)
-    config, health = Config(), ffi.new("lever_health_t *")
+    config, health = config or Config(), ffi.new("lever_health_t *")
     with _one_at_a_time:
         count = _lib.innovation_samples(
             ffi.from_buffer("lever_frame_t[]", np.ascontiguousarray(frames)),

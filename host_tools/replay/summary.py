@@ -11,9 +11,13 @@ from ..can.traffic import why_refused
 from ..firmware.native import Config, Health, enum_names
 from ..firmware.quantities import quantities
 from ..results import nis, whiteness
+from ..results.faults import LITTLE, WARNINGS, FaultCounts
 from ..results.nis import Innovations, freedom
 from ..results.trace import CONVERGED_AFTER, Trace
 from .reduction import Groups
+
+_OPTIONAL = {"theta_dot": "theta_dot_measured_rad_s", "torque": "tau_m_measured_N_m"}
+"""Inputs that a log may lack, by the fault that says so."""
 
 
 class Figures:
@@ -27,6 +31,8 @@ class Figures:
         self._residuals = Groups(size, lambda values: (whiteness.averages(values, size),))
         self._average_s = size * self._period
         self._modes: dict[int, int] = {}
+        self._faults = FaultCounts()
+        self._measured: set[str] = set()
         self._last: dict[str, float] = {}
         self._extremes: dict[str, tuple[float, float]] = {}
 
@@ -41,6 +47,8 @@ class Figures:
         modes, counts = np.unique(trace["mode"][np.isfinite(trace["mode"])], return_counts=True)
         for mode, count in zip(modes.tolist(), counts.tolist(), strict=True):
             self._modes[int(mode)] = self._modes.get(int(mode), 0) + count
+        self._measured |= {fault for fault, column in _OPTIONAL.items() if np.isfinite(trace[column]).any()}
+        self._faults.add(trace["faults"][judged], tuple(_OPTIONAL.keys() - self._measured))
         columns = [each.column(kind) for each in self._quantities for kind in ("estimate", "sigma")]
         for name in columns:
             finite = trace[name][np.isfinite(trace[name])]
@@ -76,6 +84,8 @@ class Figures:
             "corrupt": health.corrupt,
             "late": health.late,
             "restarts": health.recoveries,
+            "fault_shares": self._faults.shares,
+            "flagged_share": self._faults.warned_share,
             "modes_s": {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())},
         }
 
@@ -96,11 +106,29 @@ def verdict(summary: dict[str, Any]) -> str:
     measured = summary["whiteness"]
     sentences = [
         *_troubles(summary),
+        *_flags(summary),
         _comparison(summary["comparison"]),
         nis.verdict(nis.Nis(**summary["nis"])),
         whiteness.verdict(whiteness.Whiteness(**measured) if measured else None),
     ]
     return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _flags(summary: dict[str, Any]) -> list[str]:
+    """What the estimator itself says against its estimates."""
+    sentences = []
+    modes = summary["modes_s"]
+    total, estimating = sum(modes.values()), modes.get("run", 0.0) + modes.get("frozen", 0.0)
+    if total and estimating < 0.5 * total:
+        sentences.append(
+            f"It could estimate for {100.0 * estimating / total:.0f} % of the time only; else, what is shown is "
+            "the first guess, or what was known last."
+        )
+    shares = {name: share for name, share in summary["fault_shares"].items() if name in WARNINGS and share > LITTLE}
+    if shares:
+        listed = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares.items())
+        sentences.append(f"Do not trust the estimates while the estimator warns: {listed} of the time.")
+    return sentences
 
 
 def _comparison(comparison: dict[str, Any] | None) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..firmware import native
 from ..firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
+from ..results.faults import LITTLE
 from ..results.nis import Nis
 from ..results.summary import Quality
 from .run import Run
@@ -80,7 +81,10 @@ def _headline(run: Run) -> str:
 def _mood(run: Run) -> str:
     """Good only where sigma and model are right by this run, and errors small, whatever its limits allow."""
     if run.simulated is None:
-        return "" if run.summary is None or run.summary.passed else "bad"
+        if run.summary is not None and not run.summary.passed:
+            return "bad"
+        warned = run.replayed.flagged_share if run.replayed else None
+        return "watch" if (warned or 0.0) > LITTLE else ""
     if not run.simulated.passed:
         return "bad"
     figures = run.simulated.parameters.values()
@@ -241,8 +245,8 @@ def run_table(run: Run) -> str:
     ]
     rows += [(label, number(getattr(run.summary, key, None)), unit) for key, label, unit in RUN_FIGURES]
     shares: dict[str, float | None] = {}
-    if run.simulated:
-        shares = {**run.simulated.fault_shares, "any that warns": run.simulated.flagged_share}
+    if judged := run.simulated or run.replayed:
+        shares = {**judged.fault_shares, "any that warns": judged.flagged_share}
     rows += [
         (f"of the judged time with fault: {html.escape(name)}", number(None if share is None else 100.0 * share), "%")
         for name, share in shares.items()

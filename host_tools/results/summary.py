@@ -190,6 +190,10 @@ class ReplaySummary(Summary):
 
     recording: dict[str, Any]
     """What was in the log."""
+    fault_shares: dict[str, float]
+    """Shares (0 to 1) of the judged time with each fault that there was; without those of inputs that the log lacks."""
+    flagged_share: float | None
+    """Of the judged time with any of faults.WARNINGS of those; None where nothing is judged."""
     estimates: dict[str, Estimate]
     comparison: Comparison | None
 

@@ -14,7 +14,7 @@ from .mapping import Source
 from .recorded import Signal
 from .resample import Samples, sample
 from .slope import slope_ratio
-from .units import KINDS, check_plausible, factor, gravity_in, guess
+from .units import KINDS, check_plausible, factor, gravity_in, guess, level_in
 
 _FASTER = 1.5
 """Periods of a signal in one of the samples from which on it is told that some of it is not used."""
@@ -57,6 +57,11 @@ def understood(key: str, source: Source, signal: Signal) -> Input:
     notes: list[str] = []
     unit, scale = _scale(key, source, signal, notes)
     values = signal.values * scale + source.offset
+    if key == "z_ddot" and not source.unit and source.factor is None and abs(level_in(values) - 1.0) < 0.15:
+        raise LeverError(
+            f"z_ddot = {name}: it is said to be in {unit}, but rests at {level_in(values):.2f} m/s², as gravity in g "
+            f"does: say unit=g, or unit={unit} if that is right"
+        )
     sign, gravity = source.sign or 1, source.gravity
     if key == "z_ddot" and gravity == "auto":
         direction = gravity_in(values)

@@ -100,7 +100,7 @@ def guess(key: str, values: FloatArray) -> tuple[str, str]:
     """The unit that values without one are most likely in, and why. Raises LeverError where no guess is safe."""
     present = values[np.isfinite(values)]
     size = float(np.percentile(np.abs(present), 99.0)) if len(present) else 0.0
-    level = abs(float(np.median(present))) if len(present) else 0.0
+    level = abs(level_in(values))
     if key == "theta":
         return ("deg", f"angles reach {size:.3g}") if size > math.pi else ("rad", f"angles stay below {size:.2g}")
     if key == "theta_dot":
@@ -114,10 +114,15 @@ def guess(key: str, values: FloatArray) -> tuple[str, str]:
     return KINDS[key][1], "none is said"
 
 
+def level_in(values: FloatArray) -> float:
+    """What a signal rests at: its median."""
+    present = values[np.isfinite(values)]
+    return float(np.median(present)) if len(present) else 0.0
+
+
 def gravity_in(values: FloatArray) -> int:
     """1 where an acceleration [m/s²] holds gravity, -1 where it does and points down, 0 where not."""
-    present = values[np.isfinite(values)]
-    level = float(np.median(present)) if len(present) else 0.0
+    level = level_in(values)
     return int(np.sign(level)) if abs(abs(level) - GRAVITY) < 0.15 * GRAVITY else 0
 
 

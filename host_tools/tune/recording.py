@@ -12,6 +12,7 @@ from ..arrays import Array
 from ..can import codec, logs
 from ..can.traffic import Traffic, why_refused
 from ..errors import LeverError
+from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
 from ..signals.reading import Reading
@@ -100,7 +101,11 @@ def _recording(frames: Array, bus: str, log: str) -> Recording:
     if len(samples) < 2:
         why = why_refused(health.corrupt, health.late) or "it holds no more"
         raise LeverError(f"{log}: too few samples to tune on, {len(samples)}: {why}")
-    return Recording(samples, float(np.median(_steps(samples))) * 1e-6, bus, choices, health)
+    period = float(np.median(_steps(samples))) * 1e-6
+    lowest, highest = setting("sample_period").least, setting("sample_period").greatest
+    if lowest <= period <= highest:  # so that samples at the log's own rate are not counted as lost
+        health = samples_of(received, Config(settings={"sample_period": period}))[2]
+    return Recording(samples, period, bus, choices, health)
 
 
 def _steps(samples: Array) -> Array:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, run_samples
+from lever_cdkf.host_tools.results.faults import WARNINGS
 
-from ..run.summary import WARNINGS
 from ..scenarios.scenario import Scenario
 from ..study.baselines import BASELINES
 from ..study.data import PARAMETERS, Batch, Estimates, Truth

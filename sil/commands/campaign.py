@@ -119,6 +119,10 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
 
     from ..campaign import maps, summary
 
+    if len(session.lost) == plan.count:
+        raise LeverError(
+            "every chunk killed the workers that tried it: give the workers more memory, or go on with --resume"
+        )
     origin = provenance([plan.spec.file] if args.spec == plan.spec.file else [])
     found = summary.build(plan, folder, session) | {"provenance": asdict(origin)}
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)

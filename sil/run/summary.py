@@ -15,6 +15,7 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from lever_cdkf.host_tools.results import nis, summary, whiteness
+from lever_cdkf.host_tools.results.faults import FaultCounts
 from lever_cdkf.host_tools.results.nis import Innovations, Nis, freedom
 from lever_cdkf.host_tools.results.summary import Estimator, Firmware, Quality, SimulationSummary, TrueTransfer, Truth
 from lever_cdkf.host_tools.results.trace import Trace
@@ -25,9 +26,6 @@ from .loop import Recording
 
 MOST_TRANSFERS = 50
 """How often, spread over the run, the transfer function of a truth is looked at for changes."""
-
-WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mismatch", "calibration", "hands_off")
-"""Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""
 
 
 def build(recording: Recording, trace: Trace) -> SimulationSummary:
@@ -175,13 +173,9 @@ def _modes(trace: Trace) -> dict[str, float]:
 def _faults(scenario: Scenario, trace: Trace) -> tuple[dict[str, float], float | None]:
     """Shares (0 to 1) of the judged time with each fault that there was, and with any of WARNINGS (null: not known)."""
     column = trace["faults"][judged_samples(scenario, trace["time_s"])]
-    faults = column[np.isfinite(column)].astype(np.int64)
-    if not len(faults):
-        return {}, None
-    bits = {name: bit for bit, name in enum_names("lever_fault").items()}
-    shares = {name: float(np.mean(faults & bit != 0)) for name, bit in bits.items()}
-    warnings = sum(bits[name] for name in WARNINGS)
-    return {name: share for name, share in shares.items() if share > 0.0}, float(np.mean(faults & warnings != 0))
+    counts = FaultCounts()
+    counts.add(column)
+    return counts.shares, counts.warned_share
 
 
 def missed_limits(

@@ -34,7 +34,7 @@ MAY_IMPORT = {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
-    "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "report"},
+    "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
     "sil/commands": {"campaign", "run", "scenarios", "study", "envelope", "firmware", "can", "report", "exports"},
 }
 """By folder. What lies beside the folders is for all of its package, and imports nothing in them; sil may import

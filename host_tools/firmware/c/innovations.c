@@ -99,7 +99,6 @@ uint32_t innovation_samples(const lever_frame_t *frames, uint32_t count, lever_s
 {
     static lever_memory_t memory;
     uint32_t taken = 0u;
-    lever_config_default(config);
     lever_t *lever = lever_init(&memory, config);
     for (uint32_t k = 0u; k < count; k++) {
         if (lever_on_frame(lever, &frames[k]) == LEVER_FRAME_SAMPLE) {

@@ -55,6 +55,34 @@ def test_columns_of_a_csv(folder: Path, flight: Flight, tmp_path: Path) -> None:
     assert frequency(summary) == pytest.approx(fed_directly(flight), rel=1e-3)
 
 
+def test_what_the_estimator_warns_of_is_said(flight: Flight, tmp_path: Path) -> None:
+    """In the verdict and in the shares: a base that is stuck, and an angle that is; not that the log has no torque."""
+
+    def said(name: str, theta: np.ndarray, z_ddot: np.ndarray) -> tuple[str, dict[str, float], float]:
+        columns: dict[str, Any] = {
+            "time_s": flight.time,
+            "theta_rad": theta,
+            "theta_dot_rad_s": flight.theta_dot,
+            "z_ddot_m_s2": z_ddot,
+        }
+        np.savez(tmp_path / f"{name}.npz", **columns)
+        keys = [
+            f"{key}={column}" for key, column in zip(("theta", "theta_dot", "z_ddot"), list(columns)[1:], strict=True)
+        ]
+        summary = replayed(tmp_path / name, tmp_path / f"{name}.npz", "--map", "time=time_s", *keys)
+        return summary["verdict"], summary["fault_shares"], summary["flagged_share"]
+
+    verdict, shares, flagged = said("sound", flight.theta, flight.z_ddot)
+    assert not {"theta", "base", "torque", "mismatch"} & shares.keys()
+    assert flagged == shares.get("calibration", 0.0) < 0.3
+    verdict, shares, flagged = said("stuck", flight.theta, np.where(flight.time < 1.0, flight.z_ddot, flight.z_ddot[0]))
+    assert shares["base"] > 0.9
+    assert flagged > 0.9
+    assert "Do not trust the estimates while the estimator warns: base " in verdict
+    verdict, shares, flagged = said("frozen", np.full_like(flight.theta, flight.theta[0]), flight.z_ddot)
+    assert shares["theta"] > 0.9
+
+
 def test_the_same_as_a_log_of_lever_dbc_to_the_bit(folder: Path, tmp_path: Path) -> None:
     """What the mapping feeds is in bus.log; replayed as it is, it gives the same trace."""
     replayed(tmp_path / "mapped", folder / "flight.log", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
@@ -180,9 +208,12 @@ def test_what_is_written_is_read_back(folder: Path, tmp_path: Path) -> None:
 
 
 def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
+    """At 500 Hz nothing is lost."""
     arguments = ["--dbc", folder / "foreign.dbc", "--map", *MAPPED, "-o", tmp_path / "my.settings", "--length", "30"]
+    arguments += ["--page", tmp_path / "tune.html"]
     assert cli.main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
     assert "sample_period = 0.002" in (tmp_path / "my.settings").read_text()
+    assert " lost)" not in (tmp_path / "tune.html").read_text()
 
 
 # --- errors ----------------------------------------------------------------------------------------------------------

@@ -1,0 +1,46 @@
+"""How much of the time there were faults that tell the user not to trust the estimates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..firmware.library import enum_names
+
+WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mismatch", "calibration", "hands_off")
+"""Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""
+
+LITTLE = 0.02
+"""Share of the judged time, below which a fault is a passing one."""
+
+
+@dataclass
+class FaultCounts:
+    """Over samples as they come."""
+
+    samples: int = 0
+    each: dict[str, int] = field(default_factory=dict)
+    warned: int = 0
+    """Samples with any of WARNINGS."""
+
+    def add(self, column: FloatArray, without: tuple[str, ...] = ()) -> None:
+        """Further samples: masks of lever_fault, NaN where it is not known; `without`: faults that do not count."""
+        names = {name: bit for bit, name in enum_names("lever_fault").items() if name not in without}
+        faults = column[np.isfinite(column)].astype(np.int64)
+        self.samples += len(faults)
+        for name, bit in names.items():
+            if count := int(np.count_nonzero(faults & bit)):
+                self.each[name] = self.each.get(name, 0) + count
+        self.warned += int(np.count_nonzero(faults & sum(names[name] for name in WARNINGS if name in names)))
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Of the samples with each fault that there was (0 to 1)."""
+        return {name: count / self.samples for name, count in self.each.items()}
+
+    @property
+    def warned_share(self) -> float | None:
+        """Of the samples with any of WARNINGS; None without samples."""
+        return self.warned / self.samples if self.samples else None
