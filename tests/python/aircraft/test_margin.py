@@ -10,9 +10,12 @@ from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse, Stability
 from lever_cdkf.host_tools.firmware.native import Config, Estimator
+from lever_cdkf.host_tools.models.transfer import Transfer
 from lever_cdkf.sil.aircraft import aircraft, stability
 from lever_cdkf.sil.aircraft.aircraft import Coupled
+from lever_cdkf.sil.aircraft.flight import Flight
 from lever_cdkf.sil.plants import lever_plant
+from lever_cdkf.sil.scenarios import inputs, scenario
 from python.plants.motion import TRIM
 
 NAMES = ("m_p", "c_p", "k_p")
@@ -37,16 +40,22 @@ def said(arm: FloatArray, sigma: float, watched: AircraftResponse) -> Stability:
     return estimator.stability()
 
 
+def loop_of(coupled: Coupled, transfer: Transfer, row: int) -> stability.Response:
+    numerator, denominator = transfer.numerator[row], transfer.denominator[row]
+
+    def loop(s: ComplexArray) -> ComplexArray:
+        response: ComplexArray = coupled.response(s) * np.polyval(numerator, s) / np.polyval(denominator, s)
+        return response
+
+    return loop
+
+
 def expected(arm: FloatArray, coupled: Coupled, factor: complex = 1.0) -> stability.Margins:
     columns = (np.full(1, value) for value in (*arm, TRIM))
     transfer = lever_plant.LeverTruth(LEVER, lever_plant.Truth(*columns), "trim").transfer(np.array([0]))
 
-    def loop(s: ComplexArray) -> ComplexArray:
-        arm_response = np.polyval(transfer.numerator[0], s) / np.polyval(transfer.denominator[0], s)
-        response: ComplexArray = factor * coupled.response(s) * arm_response
-        return response
-
-    return stability.margins(loop)
+    loop = loop_of(coupled, transfer, 0)
+    return stability.margins(lambda s: factor * loop(s))
 
 
 @pytest.mark.parametrize("name", aircraft.names())
@@ -88,6 +97,44 @@ def test_what_the_table_is_off_by_is_in_the_standard_deviations() -> None:
     of_frequency = math.sqrt(phase.frequency_sigma**2 - exact.frequency_sigma**2)
     assert of_gain == pytest.approx(abs(rotated.gain_db - margins.gain_db), abs=0.02)  # the table is linear between
     assert of_frequency == pytest.approx(abs(rotated.frequency - margins.frequency), rel=0.05)
+
+
+def test_the_alarm_comes_before_the_vibration_grows() -> None:
+    """The shipped scenario with the firmware's own dither: the pilot relaxes from 10 s on."""
+    wanted = scenario.load("bounce", ["duration=42 s"])
+    assert wanted.aircraft is not None
+    known, firmware = inputs.prepare(wanted), Estimator(wanted.config)
+    z_ddot, flight = known.z_ddot, Flight(wanted.aircraft, wanted.period, known.z_ddot.copy())
+    body = known.truth.body(inputs.conditions(wanted, known))
+    firmware.watch(table(wanted.aircraft, 0.05, 0.05))
+    noise = np.random.default_rng(5).standard_normal((len(z_ddot), 4)) * (1e-3, 1e-2, 2e-3, 1e-2)
+    rest, states, margins = body.theta, [], []
+    z_ddot[0] = flight.z_ddot
+    for sample in range(len(z_ddot) - 1):
+        if sample % 500 == 0:
+            firmware.command(dither_rms=0.3)
+        signals = np.array((body.theta, body.theta_dot, body.tau_m, z_ddot[sample])) + noise[sample]
+        firmware.update(1000 * sample, *signals.tolist())
+        if sample % 20 == 0:
+            said_now = firmware.stability()
+            states.append(said_now.state)
+            margins.append((said_now.gain_margin, said_now.gain_margin_sigma))
+        z_ddot[sample + 1] = flight.advance(body.theta - rest)
+        body.advance(firmware.health().torque)
+    at = np.arange(0, len(z_ddot) - 1, 20)
+    transfer = known.truth.transfer(at)
+    true = np.array([stability.margins(loop_of(wanted.aircraft, transfer, i)).gain_db for i in range(0, len(at), 10)])
+    gain, sigma = np.array(margins).T[:, ::10]
+    judged = (at[::10] > 5000) & (true > -1.0)
+    assert np.mean(np.abs(gain - true)[judged] < 2.0 * sigma[judged]) > 0.9
+    assert np.sqrt(np.mean((gain - true)[judged] ** 2)) < 1.0
+    assert "alarm" not in states[: 25 * 50]  # until there the true margin is 2.5 dB or more
+    alarm = 0.02 * states.index("alarm")
+    loudness = np.array([np.std(z_ddot[end - 1000 : end]) for end in range(1000, len(z_ddot), 50)])
+    steady = np.median(loudness[:180])
+    doubled = 0.05 * (20 + int(np.argmax(loudness > 2.0 * steady)))
+    assert alarm < doubled - 2.0
+    assert set(states[states.index("alarm") :]) == {"alarm"}
 
 
 def test_a_loop_that_never_turns_has_the_largest_margin() -> None:

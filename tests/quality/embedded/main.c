@@ -157,11 +157,20 @@ static void print_frame(const lever_frame_t *frame)
 
 static void run_bus(const lever_config_t *config, uint32_t samples)
 {
+    static const lever_aircraft_t aircraft = {.count = 4u,
+        .frequency = {1.5f, 3.0f, 4.5f, 8.0f},
+        .real = {24.0f, 18.0f, 9.0f, -3.0f},
+        .imaginary = {-6.0f, -14.0f, -17.0f, -9.0f},
+        .gain_sigma = 0.05f,
+        .phase_sigma = 0.05f,
+        .warning = 3.0f,
+        .alarm = 1.5f};
     const lever_platform_t platform = {.overruns = 1u};
     arm_t arm = {1u, 0.0f, 0.0f, 0.0f, 0.0f};
     lever_t *lever = start(config);
 
     lever_platform(lever, &platform);
+    (void)lever_aircraft(lever, &aircraft);
     for (uint32_t index = 0u; index < samples; index++) {
         const lever_sample_t sample = next_sample(&arm, index);
         lever_frame_t frame;
