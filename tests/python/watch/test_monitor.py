@@ -185,7 +185,7 @@ def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
         ),
         (["--once", "a.log", "--scenario", "demo"], "log and scenario at once: give a LOG, "),
         (["--once", "no.log"], "cannot read no.log: No such file or directory"),
-        (["--once", "--scenario", "none"], "no scenario 'none'; there are "),
+        (["--once", "--scenario", "xyz"], "no scenario 'xyz'; there are "),
         (["--once", "--interface", "lever"], "interface lever stays inside one process, "),
         (["--once", "--interface", "socketcan", "--channel", "no0"], "cannot open socketcan channel no0: "),
         (["--once", "--interface", "slcan", "--bus-option", "x"], "--bus-option x: must be KEY=VALUE"),

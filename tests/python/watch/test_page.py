@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.report import screenshot
 from processes import PATIENCE
 from python.watch.browser import Browser
@@ -78,7 +79,8 @@ def test_a_session(desktop: Browser, start_lever: Start) -> None:
     assert 500 < float(value) < 5000
     assert re.fullmatch(r"± \d+", sigma)
     assert (unit, truth) == ("N/m", "(2100)")  # steady.toml
-    desktop.wait("document.querySelectorAll('#messages tr').length == 16")
+    rows = 1 + len(codec.database().messages)
+    desktop.wait(f"document.querySelectorAll('#messages tr').length == {rows}")
     desktop.wait("Array.from(document.querySelectorAll('#messages td'), e => Number(e.textContent)).some(n => n > 900)")
     for canvas in ("#magnitude", "#phase", "#coherence", "#magnitude-map", "#bands canvas", "#health canvas"):
         assert drawn(desktop, canvas) > 20, canvas
