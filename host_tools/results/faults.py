@@ -16,6 +16,11 @@ LITTLE = 0.02
 """Share of the judged time, below which a fault is a passing one."""
 
 
+def warning_bits(without: tuple[str, ...] = ()) -> int:
+    """WARNINGS as a mask of lever_fault, but for some."""
+    return sum(bit for bit, name in enum_names("lever_fault").items() if name in WARNINGS and name not in without)
+
+
 @dataclass
 class FaultCounts:
     """Over samples as they come."""
@@ -27,13 +32,14 @@ class FaultCounts:
 
     def add(self, column: FloatArray, without: tuple[str, ...] = ()) -> None:
         """Further samples: masks of lever_fault, NaN where it is not known; `without`: faults that do not count."""
-        names = {name: bit for bit, name in enum_names("lever_fault").items() if name not in without}
         faults = column[np.isfinite(column)].astype(np.int64)
         self.samples += len(faults)
-        for name, bit in names.items():
+        for bit, name in enum_names("lever_fault").items():
+            if name in without:
+                continue
             if count := int(np.count_nonzero(faults & bit)):
                 self.each[name] = self.each.get(name, 0) + count
-        self.warned += int(np.count_nonzero(faults & sum(names[name] for name in WARNINGS if name in names)))
+        self.warned += int(np.count_nonzero(faults & warning_bits(without)))
 
     @property
     def shares(self) -> dict[str, float]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.firmware.native import Config, enum_names, run_samples
-from lever_cdkf.host_tools.results.faults import WARNINGS
+from lever_cdkf.host_tools.firmware.native import Config, run_samples
+from lever_cdkf.host_tools.results.faults import warning_bits
 
 from ..scenarios.scenario import Scenario
 from ..study.baselines import BASELINES
@@ -89,7 +89,7 @@ class Firmware(Entrant):
 
     def _run(self, flight: Flight) -> Columns:
         columns = flight.firmware if self.flies_in(flight.scenario) else self._replayed(flight)
-        return columns | {"flagged": (columns["faults"] & _warnings() != 0).astype(np.float64)}
+        return columns | {"flagged": (columns["faults"] & warning_bits() != 0).astype(np.float64)}
 
     def flies_in(self, scenario: Scenario) -> bool:
         return scenario.config.choices["estimator"] == self.name
@@ -106,10 +106,6 @@ _TAKEN = (
     *("parameter", "parameter_sigma", "parameter_correlation", "nis", "flagged"),
     *("natural_frequency", "natural_frequency_sigma", "damping_ratio", "damping_ratio_sigma"),
 )
-
-
-def _warnings() -> int:
-    return sum(bit for bit, name in enum_names("lever_fault").items() if name in WARNINGS)
 
 
 class Published(Entrant):

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 LONGEST_SUBSTEP = 0.25e-3
 """Longest substep of an integration [s]; at 4 Hz the frequency is then right to 3e-6."""
 
-_BLOCK = 4096  # samples prepared at a time, so that an hour fits into memory
+BLOCK = 4096
+"""Periods prepared at a time, so that an hour fits into memory."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Conditions:
     """In a period; None: as few as LONGEST_SUBSTEP allows."""
     disturbance: FloatArray | float = 0.0
     """Unmeasured torque in the lever, at the samples [N m]; linear between them."""
-    ahead: int = _BLOCK
+    ahead: int = BLOCK
     """Periods that are prepared at a time: 1 where z_ddot is known up to the next sample only."""
 
     @property

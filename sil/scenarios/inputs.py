@@ -14,7 +14,7 @@ from lever_cdkf.host_tools.can.codec import Value
 from lever_cdkf.host_tools.can.commander import KEEP_ALIVE
 
 from ..plants import excitation, sensors
-from ..plants.truth import Conditions, Truth
+from ..plants.truth import BLOCK, Conditions, Truth
 from .scenario import Scenario
 
 OF_LEVER = ("theta", "theta_dot", "tau_m", "grip_force")
@@ -86,7 +86,7 @@ def conditions(scenario: Scenario, inputs: Inputs) -> Conditions:
         scenario.motor.lag,
         scenario.stream("process"),
         disturbance=inputs.disturbance,
-        **({} if scenario.aircraft is None else {"ahead": 1}),
+        ahead=BLOCK if scenario.aircraft is None else 1,
     )
 
 

@@ -10,7 +10,7 @@
 
 enum plant_kind { PLANT_LEVER = 0, PLANT_LINEAR = 1, PLANT_TWO_DOF = 2, PLANT_HYSTERETIC = 3, PLANT_REFLEX = 4 };
 
-enum plant_limits { PLANT_COLUMNS = 9, PLANT_ELEMENTS = 10, PLANT_SUBSTEPS = 1000 };
+enum plant_limits { PLANT_COLUMNS = 9, PLANT_ELEMENTS = 10 };
 
 /* What is constant in a lever; SI units. */
 typedef struct plant_lever {

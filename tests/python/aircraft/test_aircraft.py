@@ -7,13 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.sil.aircraft import aircraft, stability
 from lever_cdkf.sil.aircraft.aircraft import Aircraft, Coupled
 from lever_cdkf.sil.aircraft.flight import Flight
 from lever_cdkf.sil.plants import hysteretic_plant, lever_plant, linear_plant, mayo_plant, two_dof_plant
 from lever_cdkf.sil.plants.truth import Conditions, Truth
 from lever_cdkf.sil.toml_tables import ScenarioError
+from python.aircraft.loops import loop_of
 from python.plants.motion import LEVER, PERIOD, TRIM
 from scipy import integrate
 
@@ -106,15 +107,8 @@ def pilots() -> dict[str, Callable[[int], Truth]]:
     }
 
 
-def loop_of(craft: Aircraft, truth: Truth, gearing: float) -> stability.Response:
-    transfer = truth.transfer(np.array([0]))
-    numerator, denominator = transfer.numerator[0], transfer.denominator[0]
-
-    def loop(s: ComplexArray) -> ComplexArray:
-        response: ComplexArray = gearing * craft.response(s) * np.polyval(numerator, s) / np.polyval(denominator, s)
-        return response
-
-    return loop
+def loop_with(craft: Aircraft, truth: Truth, gearing: float) -> stability.Response:
+    return loop_of(Coupled(craft, gearing), truth.transfer(np.array([0])), 0)
 
 
 @pytest.mark.parametrize("pilot", pilots())
@@ -122,9 +116,9 @@ def loop_of(craft: Aircraft, truth: Truth, gearing: float) -> stability.Response
 def test_growth_is_that_of_the_linearised_loop(name: str, pilot: str) -> None:
     """10 % beyond the gain margin; growth rate and frequency by linear prediction of the last four seconds."""
     craft, truth = aircraft.load(name), pilots()[pilot]
-    limit = stability.margins(loop_of(craft, truth(2), 1.0))
+    limit = stability.margins(loop_with(craft, truth(2), 1.0))
     beyond = 1.1 * limit.gain
-    root = stability.mode(loop_of(craft, truth(2), beyond), 2j * math.pi * limit.frequency)
+    root = stability.mode(loop_with(craft, truth(2), beyond), 2j * math.pi * limit.frequency)
     theta, _ = coupled_motion(Coupled(craft, beyond), truth(8000), 8000)
     late = theta[4000::20]
     behind, ahead = np.stack((late[1:-1], late[:-2]), axis=1), late[2:]
@@ -138,11 +132,11 @@ def test_growth_is_that_of_the_linearised_loop(name: str, pilot: str) -> None:
 @pytest.mark.parametrize("name", AIRCRAFT)
 def test_the_gain_margin_is_where_the_loop_becomes_unstable(name: str) -> None:
     craft, truth = aircraft.load(name), pilots()["slack arm"](2)
-    limit = stability.margins(loop_of(craft, truth, 1.0))
+    limit = stability.margins(loop_with(craft, truth, 1.0))
     guess = 2j * math.pi * limit.frequency
-    assert stability.mode(loop_of(craft, truth, 0.99 * limit.gain), guess).real < 0.0
-    assert stability.mode(loop_of(craft, truth, 1.01 * limit.gain), guess).real > 0.0
-    half = stability.margins(loop_of(craft, truth, 0.5 * limit.gain))
+    assert stability.mode(loop_with(craft, truth, 0.99 * limit.gain), guess).real < 0.0
+    assert stability.mode(loop_with(craft, truth, 1.01 * limit.gain), guess).real > 0.0
+    half = stability.margins(loop_with(craft, truth, 0.5 * limit.gain))
     assert half.gain == pytest.approx(2.0, rel=1e-6)
     assert half.gain_db == pytest.approx(6.02, abs=0.01)
     assert 0.0 < half.modulus < 0.501  # at the crossing 1 - L is 1/2

@@ -6,16 +6,16 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse, Stability
 from lever_cdkf.host_tools.firmware.native import Config, Estimator
-from lever_cdkf.host_tools.models.transfer import Transfer
 from lever_cdkf.sil.aircraft import aircraft, stability
 from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.aircraft.flight import Flight
 from lever_cdkf.sil.plants import lever_plant
 from lever_cdkf.sil.scenarios import inputs, scenario
+from python.aircraft.loops import loop_of
 from python.plants.motion import TRIM
 
 NAMES = ("m_p", "c_p", "k_p")
@@ -38,16 +38,6 @@ def said(arm: FloatArray, sigma: float, watched: AircraftResponse) -> Stability:
     for sample in range(3):
         estimator.update(1000 * sample, theta=TRIM, theta_dot=0.0, tau_m=0.0, z_ddot=0.0)
     return estimator.stability()
-
-
-def loop_of(coupled: Coupled, transfer: Transfer, row: int) -> stability.Response:
-    numerator, denominator = transfer.numerator[row], transfer.denominator[row]
-
-    def loop(s: ComplexArray) -> ComplexArray:
-        response: ComplexArray = coupled.response(s) * np.polyval(numerator, s) / np.polyval(denominator, s)
-        return response
-
-    return loop
 
 
 def expected(arm: FloatArray, coupled: Coupled, factor: complex = 1.0) -> stability.Margins:

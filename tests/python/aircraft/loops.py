@@ -1,0 +1,19 @@
+"""The loop of a pilot on his lever and a helicopter, linearised."""
+
+from __future__ import annotations
+
+import numpy as np
+from lever_cdkf.host_tools.arrays import ComplexArray
+from lever_cdkf.host_tools.models.transfer import Transfer
+from lever_cdkf.sil.aircraft import stability
+from lever_cdkf.sil.aircraft.aircraft import Coupled
+
+
+def loop_of(coupled: Coupled, transfer: Transfer, row: int) -> stability.Response:
+    numerator, denominator = transfer.numerator[row], transfer.denominator[row]
+
+    def loop(s: ComplexArray) -> ComplexArray:
+        response: ComplexArray = coupled.response(s) * np.polyval(numerator, s) / np.polyval(denominator, s)
+        return response
+
+    return loop
