@@ -23,6 +23,7 @@ QUICK = {
 }  # fmt: skip
 
 
+@pytest.mark.requirement("R1", "R6", "R32", "R34")
 def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out

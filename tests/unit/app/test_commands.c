@@ -35,6 +35,7 @@ static void assert_refused(const lever_command_t *command)
 
 /* --- refused ------------------------------------------------------------------------------------------------------ */
 
+/* R24 */
 TEST(a_command_with_one_unknown_part_is_refused_as_a_whole)
 {
     static const uint32_t known[5] = {(uint32_t)LEVER_REQUEST_RESET + 1u, LEVER_MODEL_COUNT, LEVER_PRELOAD_COUNT,

@@ -51,6 +51,7 @@ TEST(a_set_of_divided_messages_is_spread_over_a_publish_period)
     }
 }
 
+/* R22 */
 TEST(when_all_are_due_state_estimate_comes_last)
 {
     const uint32_t wanted[] = {0x215u, 0x218u, 0x211u, 0x212u, 0x213u, 0x21Au, 0x214u, 0x219u, 0x216u, 0x217u, 0x210u};
@@ -171,6 +172,7 @@ static told_t decoded(uint32_t count)
 }
 
 /* Valid: in RUN, COAST and FROZEN, while the sample clock advances; without measurement there is no innovation. */
+/* R22 */
 TEST(every_estimate_says_whether_it_may_be_used)
 {
     const struct {
@@ -241,6 +243,7 @@ TEST(they_say_what_estimate_and_health_say)
 }
 
 /* Sixty gaps gave four frames with the fault once. */
+/* R23 */
 TEST(health_has_every_fault_since_the_last_one)
 {
     uint32_t told = 0u;
