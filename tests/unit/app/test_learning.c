@@ -167,3 +167,25 @@ TEST_EACH(3, a_sudden_grip_is_reported_for_three_seconds_unless_the_threshold_is
     TEST_ASSERT_UINT32_WITHIN(100u, (test_round == 0u) ? 3000u : 0u, reported);
     TEST_ASSERT_EQUAL(test_round == 0u, opened);
 }
+
+/* By one output alone, and with a trunk on its seat. */
+TEST_EACH(3, a_new_grip_is_followed_with_what_is_measured)
+{
+    config = config_of(0u);
+    config.settings.seat_frequency = (test_round == 2u) ? 4.5f : 0.0f;
+    start();
+    (void)run(10000u);
+    simulation.plant = plant_of_lever(0.0, 0.0, 0.0);
+    (void)run(1000u);
+    simulation.plant = plant_of_lever(3.2, 60.0, 2100.0);
+    for (uint32_t k = 0u; k < 4000u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.theta_valid = (test_round != 0u);
+        sample.theta_dot_valid = (test_round != 1u);
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
+    }
+    const lever_estimate_t after = estimate();
+    if (test_round != 2u) { /* what is simulated sits firmly */
+        TEST_ASSERT_FLOAT_WITHIN(4.0f * after.natural_frequency_sigma, 3.637f, after.natural_frequency);
+    }
+}

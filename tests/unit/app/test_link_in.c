@@ -304,7 +304,9 @@ TEST(an_identity_on_the_bus_is_another_estimator_for_two_seconds_unless_it_is_da
     (void)deliver_many(1u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_DUPLICATE));
     TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
-    lever_idle(lever, 2000000u);
+    lever_idle(lever, 1999999u);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_DUPLICATE));
+    lever_idle(lever, 1u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_DUPLICATE));
     frame.data[3] ^= 4u;
     assert_refused(&frame);
