@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib.util
 import logging
 import queue
-import signal
 import socket
 import time as clock
 from collections import deque
@@ -194,10 +193,7 @@ def connected(address: str | None, workers: int) -> Iterator[Client]:
         return
     options: dict[str, Any] = {"dashboard_address": "127.0.0.1:0", "memory_limit": 0, "threads_per_worker": 1}
     with dask.config.set({"distributed.logging.distributed": "critical"}):
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # is passed on: workers leave Ctrl-C to us
-        try:
+        with interrupts.masked():
             cluster = LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         with cluster, Client(cluster) as client:
             yield client
