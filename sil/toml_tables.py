@@ -12,7 +12,6 @@ import math
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.abc import Traversable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
@@ -76,11 +75,12 @@ class Shelf:
             return Path(name_or_path).read_bytes()
         names = self.names()
         if name_or_path in names:
-            return (self._files() / f"{name_or_path}{_ENDING}").read_bytes()
+            content: bytes = (self._files() / f"{name_or_path}{_ENDING}").read_bytes()
+            return content
         hint = did_you_mean(name_or_path, names, f"there are {', '.join(names)}, or give a path to a .toml file")
         raise ScenarioError(f"no {self.kind} {name_or_path!r}; {hint}")
 
-    def _files(self) -> Traversable:
+    def _files(self) -> Any:
         package = files(self.package)
         return package / self.folder if self.folder else package
 

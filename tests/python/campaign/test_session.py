@@ -69,7 +69,8 @@ def run(
     plan: Plan, killers: set[int], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[session.Session, Client, list[tuple[int, int, str]]]:
     """The session, its client, and the progress that was shown."""
-    client, shown = Client(plan, killers), []
+    client = Client(plan, killers)
+    shown: list[tuple[int, int, str]] = []
 
     def following(_client: Client, finished: queue.Queue[Future], tick: Callable[[], None]) -> Future:
         if finished.empty():

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from lever_cdkf.sil.study.figures import data, figures_page, maps, printed
 from lever_cdkf.sil.study.figures.maps import Chart, Line, MapFigure, Scale
+from numpy.typing import NDArray
 from PIL import Image
 from python.report.reading import figures, read
 
@@ -33,7 +34,7 @@ def made() -> MapFigure:
 @pytest.mark.parametrize("width", ["single", "double"])
 def test_no_label_lies_on_another(width: str) -> None:
     sheet = printed.sheet(made(), width)
-    texts = [text for text in (sheet._suptitle, sheet._supxlabel, sheet._supylabel) if text is not None]
+    texts = list(sheet.texts)
     for axes in sheet.axes:
         texts += [axes.title, axes.xaxis.label, axes.yaxis.label]
         texts += [text for tick in (*axes.xaxis.get_major_ticks(), *axes.yaxis.get_major_ticks())
@@ -48,9 +49,10 @@ def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -
     pixels = np.asarray(Image.open(io.BytesIO(printed.render(figure, "png", "double"))).convert("RGB")).astype(int)
     first = printed.sheet(figure, "double").axes[0]
 
-    def colour(x: float, y: float) -> np.ndarray:
+    def colour(x: float, y: float) -> NDArray[np.int64]:
         across, up = first.transData.transform((x, y))
-        return pixels[round(len(pixels) - up), round(across)]
+        found: NDArray[np.int64] = pixels[round(len(pixels) - up), round(across)]
+        return found
 
     for value, x, y in ((30.0, np.log(1.0), 0.3), (20.0, np.log(0.12), -0.3), (50.0, np.log(0.05), 1.3)):
         wanted = 255.0 * np.array(mpl.colormaps["viridis_r"](value / 60.0)[:3])
