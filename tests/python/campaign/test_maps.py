@@ -98,6 +98,18 @@ def test_cells_are_what_polars_says(small: Plan, folder: Path) -> None:
                 assert covered[y, x] == pytest.approx(shares.mean(axis=0).min())
 
 
+def test_a_run_whose_error_is_no_number_has_diverged(small: Plan, folder: Path, tmp_path: Path) -> None:
+    """Estimates of 1e200 are finite, and their squares are not."""
+    for file in folder.glob("*.parquet"):
+        polars.read_parquet(file).with_columns(polars.lit(None, polars.Float64).alias("rms_c_p")).write_parquet(
+            tmp_path / file.name
+        )
+    found = cells.read(small, tmp_path)
+    for name in small.spec.estimators:
+        assert np.all(found.array(name, 0, cells.error) == np.inf)
+        assert np.all(found.array(name, 0, cells.coverage) == 0.0)
+
+
 @pytest.fixture(scope="session")
 def made_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
     """The same with the axes the other way round, and one flight at each point."""
