@@ -43,5 +43,5 @@ def _stretches(time: Array, state: Array, name: str, colour: str, shown: list[fl
     if shown is None or not (state == number).any():
         return []
     foot = np.where(state == number, shown[0], np.nan)
-    hover = {"hovertemplate": f"{name}<extra></extra>", "connectgaps": False}
+    hover: Spec = {"hovertemplate": f"{name}<extra></extra>", "connectgaps": False}
     return [line(time, foot, name, colour, line_width=10, **hover)]

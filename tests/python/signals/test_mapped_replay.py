@@ -98,7 +98,7 @@ def test_the_same_as_a_log_of_lever_dbc_to_the_bit(folder: Path, tmp_path: Path)
     known = np.isfinite(own["faults"])
     assert (own["faults"][known].astype(int) & torque).any()
     np.testing.assert_array_equal(mapped["faults"][known], own["faults"][known].astype(int) & ~torque)
-    for column in set(own.dtype.names) - {"faults"}:
+    for column in set(own.dtype.names or ()) - {"faults"}:
         np.testing.assert_array_equal(mapped[column], own[column])
 
 
