@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -44,7 +45,7 @@ class Traffic:
         """`channel`: the bus with the samples; by default the only one that has any. `start` and `length` [s] of
         recorded time say which part is read; COMMAND frames before it belong to it."""
         self.recording = recording
-        self._start, self._end = start, start + length
+        self._start, self._end = start or -math.inf, start + length  # a clock that was set back belongs to the whole
         self.channel = channel
         """Name of the bus, once it is known."""
         self.frames = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -171,7 +172,7 @@ def _collect(reader: BusSignals, recording: Recording, start: float, length: flo
     for chunk in recording.chunks():
         first_us = int(chunk["time_us"][0]) if first_us is None else first_us
         since = (chunk["time_us"] - first_us) * 1e-6
-        part = chunk[(since >= start) & (since < start + length)]
+        part = chunk[(since >= (start or -math.inf)) & (since < start + length)]
         frames += len(part)
         reader.add(part, recording)
         if progress is not None:

@@ -181,7 +181,7 @@ def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
         output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     assert "a.log: 0 frames, 0 lost" in output
-    assert os.listdir(tmp_path) == ["a.log"]
+    assert sorted(os.listdir(tmp_path)) == ["a.log", "a.log.provenance.json"]
 
 
 @pytest.mark.parametrize("interface", ["lever", "virtual"])
