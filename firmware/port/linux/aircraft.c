@@ -93,7 +93,7 @@ bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, set
             (void)snprintf(error->text, sizeof error->text,
                 "%.200s:%u: neither gain_sigma, phase_sigma, warning or alarm = number, nor frequency, real and "
                 "imaginary part (of %d at most)",
-                path, number, (int)LEVER_AIRCRAFT_POINTS);
+                path, number, LEVER_AIRCRAFT_POINTS);
             return false;
         }
     }
