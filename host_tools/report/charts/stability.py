@@ -11,7 +11,7 @@ from ..run import Run
 from ..series import spread_indices
 
 _POINTS = 1500
-_COLOURS = {"warning": "base", "alarm": "fault"}
+_COLOURS = {"warning": "joint", "alarm": "fault"}
 
 
 def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
@@ -22,7 +22,8 @@ def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
         return None
     chosen = spread_indices(len(run.time), _POINTS)
     time, low, high = run.time[chosen], (gain - 2.0 * sigma)[chosen], (gain + 2.0 * sigma)[chosen]
-    shown = axis_range([low, high, np.array((0.0, *limits))], slice(None))
+    settled = slice(len(chosen) // 10, None)
+    shown = axis_range([low[settled], high[settled], np.array((0.0, *limits))], slice(None))
     rows = [axis("gain margin [dB]", range=shown, weight=2.0), axis("frequency [Hz]")]
     figure = Figure(rows, time_axis(run.end), 400)
     for name, colour in _COLOURS.items():
