@@ -29,7 +29,7 @@ class Runs:
     """The runs of an estimator in a cell."""
 
     error: Array
-    """(n,) the largest rms error of what is judged; infinite for failed runs."""
+    """(n,) the largest rms error of what is judged; infinite for failed runs, and where none is known."""
     coverage: Array
     """(n, q) share of the time with the truth within ±2σ, of each; 0 for failed runs, NaN where no σ is stated."""
     nees: Array
@@ -144,7 +144,7 @@ def _runs(
             yield (
                 (at[0], at[1], at[2]),
                 Runs(
-                    np.where(failed, np.inf, errors)[part],
+                    np.where(failed | np.isnan(errors), np.inf, errors)[part],
                     covered[part],
                     numbers("nees")[part],
                     settled_s[part],

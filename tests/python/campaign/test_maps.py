@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import polars
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from lever_cdkf.sil.campaign import border, cells, chunks, maps, spec
 from lever_cdkf.sil.campaign.cells import Map, Runs
@@ -96,6 +98,16 @@ def test_cells_are_what_polars_says(small: Plan, folder: Path) -> None:
                 assert errors[y, x] == pytest.approx(own["worst"].median())
                 shares = own.select(f"coverage_{parameter}" for parameter in ("m_p", "c_p", "k_p")).to_numpy()
                 assert covered[y, x] == pytest.approx(shares.mean(axis=0).min())
+
+
+def test_a_run_whose_error_is_not_known_counts_as_failed(small: Plan, folder: Path, tmp_path: Path) -> None:
+    for file in folder.glob("*.parquet"):
+        rows = pq.read_table(file)
+        place = rows.schema.get_field_index("rms_k_p")
+        unknown = rows.set_column(place, rows.schema.field(place), pa.nulls(rows.num_rows, pa.float64()))
+        pq.write_table(unknown, tmp_path / file.name)
+    found = cells.read(small, tmp_path)
+    assert np.isinf(found.array("dual", 0, cells.error)).all()
 
 
 @pytest.fixture(scope="session")
