@@ -18,8 +18,8 @@ from .spec import Spec
 Row = dict[str, Any]
 """A value for each column of chunks.schema()."""
 
-SAMPLES = 1_500_000
-"""Of the flights of a point that a baseline is run on at a time: some 500 MB."""
+SAMPLES = 1_000_000
+"""Of the flights of a point that a baseline is run on at a time: some 600 MB in a process."""
 
 _EXPECTED = (LeverError, ArithmeticError, ValueError, OSError)
 """What may go wrong in a run and makes a row with its error. Anything else is a defect, and ends the campaign."""

@@ -71,10 +71,25 @@ def test_figures_of_errors_that_are_known(made: Made) -> None:
     assert [found[f"coverage_{name}"] for name in ("m_p", "c_p", "k_p", "damping_ratio")] == [1.0, 0.0, 0.0, 1.0]
     assert found["nees"] == pytest.approx(np.sum((np.log1p(off[:3]) / sigma[:3]) ** 2))
     assert (found["nis"], found["settled_s"], found["flagged"]) == (2.0, 0.0, None)
-    broken = values.copy()
-    broken[5:] = np.nan
-    with pytest.raises(figures.BrokenDownError, match="not finite from 5 s on"):
-        figures.of_run(flight, dataclasses.replace(track, values=broken[None]), 0)
+    for wrong in (np.nan, -np.inf, 1e160):  # the square of the last overflows
+        broken = values.copy()
+        broken[5:] = wrong
+        with pytest.raises(figures.BrokenDownError, match="from 5 s on"):
+            figures.of_run(flight, dataclasses.replace(track, values=broken[None]), 0)
+
+
+def test_times_without_a_truth_are_not_judged(made: Made) -> None:
+    """As with hands off. By `lever sim`, too, error and coverage are of the others."""
+    flight = simulate(made(ONE).first, 1.0, measured=False)
+    truth = flight.truth.copy()
+    truth[15:, :3] = np.nan
+    values = flight.truth * 1.1
+    track = Track(values[None], 0.1 * flight.truth[None], np.log(values[None, :, :3]), None, None)
+    found = figures.of_run(dataclasses.replace(flight, truth=truth), track, 0)
+    assert (found["rms_m_p"], found["coverage_m_p"]) == (pytest.approx(0.1), 1.0)
+    truth[:] = np.nan
+    found = figures.of_run(dataclasses.replace(flight, truth=truth), track, 0)
+    assert (found["rms_m_p"], found["bias_m_p"], found["coverage_m_p"]) == (None, None, None)
 
 
 @pytest.mark.parametrize("name", ENTRANTS)
