@@ -46,7 +46,8 @@ static float clamped(float value, float most)
 static void fade(float *weight, bool on, float elapsed_us)
 {
     const float next = *weight + (on ? (elapsed_us / OPENING_US) : -(elapsed_us / CLOSING_US));
-    *weight = (next > 1.0f) ? 1.0f : ((next > 0.0f) ? next : 0.0f);
+    const float above = (next > 0.0f) ? next : 0.0f;
+    *weight = (above < 1.0f) ? above : 1.0f;
 }
 
 static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)

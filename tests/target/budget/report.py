@@ -103,7 +103,9 @@ def _spent(budget: dict[str, Any]) -> list[Row]:
     whats = {"update": "lever_update()", "tick": "whole tick", "bounce": "lever_update(), aircraft and mitigation"}
     for form, what in whats.items():
         is_update = form == "update"
-        instructions, cycles = (budget[each] if is_update else budget[each][form] for each in ("instructions", "cycles"))
+        instructions, cycles = (
+            budget[each] if is_update else budget[each][form] for each in ("instructions", "cycles")
+        )
         for estimator in image.ESTIMATORS:
             for model, entry in instructions[estimator].items():
                 operations = budget["floating_point_operations"][estimator][model] if is_update else {}
