@@ -54,6 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--seeds", type=int, metavar="N", help=f"random pilots a condition (default: {_SEEDS})")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="conditions of --list (default: all)")
     parser.add_argument(
+        "-o",
         "--out",
         metavar="DIR",
         type=Path,
