@@ -23,6 +23,7 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
         const float rms_most = (s->torque_rms < s->torque_limit) ? s->torque_rms : s->torque_limit;
         (void)memset(lever, 0, sizeof *lever);
         estimator_init(&lever->estimator, config);
+        lever->bounce.mitigates = (config->mitigation != (uint8_t)LEVER_MITIGATION_NONE);
         dither_init(&lever->dither, s->dither_low, s->dither_high, s->sample_period, rms_most, s->dither_fade);
         torque_gate_init(&lever->gate, s);
         link_init(&lever->link, s);
@@ -63,26 +64,43 @@ void instance_watch(lever_t *lever)
     }
 }
 
-/* Renews correction and lever damping, after the estimator's update; `torque` is what the gate is told. */
-static void mitigate(lever_t *lever, const torque_sample_t *torque)
+enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
+{
+    const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
+    estimator_t *estimator = &lever->estimator;
+    torque_sample_t *to_gate = &lever->to_gate;
+    const uint32_t last_us = estimator->time_us;
+    const bool starts = (estimator->mode == LEVER_MODE_INIT);
+    const enum lever_mode mode = estimator_update(estimator, sample, lever->gate.torque);
+    const uint32_t faults = estimator->faults;
+    to_gate->elapsed_us = starts ? lever->gate.period_us : (estimator->time_us - last_us);
+    to_gate->advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
+    to_gate->measured = ((faults & blind) != blind);
+    to_gate->permitted = permits_torque(lever);
+    return mode;
+}
+
+void instance_mitigate(lever_t *lever)
 {
     const uint32_t broken =
         (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED | (uint32_t)LEVER_FAULT_HANDS_OFF;
     const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE;
     const estimator_t *estimator = &lever->estimator;
     const setup_t *setup = &estimator->setup;
+    const torque_sample_t *to_gate = &lever->to_gate;
     const uint32_t period_us = lever->gate.period_us;
     const uint32_t late_us = period_us + (period_us / 4u);
     const uint32_t faults = estimator->faults;
+    mitigation_t *mitigation = &lever->bounce.mitigation;
     mitigation_sample_t sample = {.constants = &setup->constants,
-        .elapsed_us = torque->advances ? torque->elapsed_us : period_us,
+        .elapsed_us = to_gate->advances ? to_gate->elapsed_us : period_us,
         .silence_us = (late_us > SILENCE_US) ? late_us : SILENCE_US,
         .theta = estimator_state(estimator, 0u),
         .theta_dot = estimator_state(estimator, 1u),
         .drive = lever->gate.gain,
         .mitigation = setup->mitigation,
-        .advances = torque->advances,
-        .permitted = torque->permitted && ((faults & broken) == 0u),
+        .advances = to_gate->advances,
+        .permitted = to_gate->permitted && ((faults & broken) == 0u),
         .sensed = ((faults & blind) == 0u),
         .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u)};
     const model_dynamics_t dynamics = estimator_linearised(estimator, &sample.step);
@@ -90,36 +108,21 @@ static void mitigate(lever_t *lever, const torque_sample_t *torque)
     sample.step.period = 1.0e-6f * (float)sample.elapsed_us;
     sample.step.z_ddot = estimator->last_z_ddot;
     sample.step.tau_m = lever->gate.torque;
-    mitigation_step(&lever->bounce.mitigation, setup->settings, &sample);
+    lever->bounce.mitigates = mitigation_step(mitigation, setup->settings, &sample);
 }
 
-bool instance_is_mitigating(const lever_t *lever)
+void instance_drive(lever_t *lever)
 {
-    return mitigation_is_on(&lever->bounce.mitigation, lever->estimator.setup.mitigation);
-}
-
-enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
-{
-    const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
-    estimator_t *estimator = &lever->estimator;
-    const uint32_t last_us = estimator->time_us;
-    const bool starts = (estimator->mode == LEVER_MODE_INIT);
-    const enum lever_mode mode = estimator_update(estimator, sample, lever->gate.torque);
-    const uint32_t faults = estimator->faults;
-    const torque_sample_t torque = {.elapsed_us = starts ? lever->gate.period_us : (estimator->time_us - last_us),
-        .advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u),
-        .measured = ((faults & blind) != blind),
-        .permitted = permits_torque(lever)};
-    if (instance_is_mitigating(lever)) {
-        mitigate(lever, &torque);
-    }
-    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &torque);
-    return mode;
+    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &lever->to_gate);
 }
 
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample)
 {
     const enum lever_mode mode = instance_update(lever, sample);
+    if (lever->bounce.mitigates) {
+        instance_mitigate(lever);
+    }
+    instance_drive(lever);
     if (lever->bounce.aircraft != NULL) {
         instance_watch(lever);
     }
@@ -135,8 +138,9 @@ void lever_idle(lever_t *lever, uint32_t elapsed_us)
 
 bool instance_is_driving(const lever_t *lever)
 {
-    const bool asks = dither_is_on(&lever->dither) || mitigation_has_damping(lever->estimator.setup.mitigation);
-    return (lever->gate.torque != 0.0f) || (lever->gate.open && asks);
+    return (lever->gate.torque != 0.0f) ||
+           (lever->gate.open &&
+               (dither_is_on(&lever->dither) || mitigation_has_damping(lever->estimator.setup.mitigation)));
 }
 
 /* --- commands ----------------------------------------------------------------------------------------------------- */
@@ -161,6 +165,8 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
     const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
     if (known) {
         torque_gate_keep_alive(&lever->gate);
+        lever->bounce.mitigates =
+            lever->bounce.mitigates || (lever->estimator.setup.mitigation != (uint8_t)LEVER_MITIGATION_NONE);
         if (resets) {
             dither_reset(&lever->dither);
             lever->link.frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;

@@ -259,9 +259,13 @@ enum lever_mode link_step(lever_t *lever)
     link_t *link = &lever->link;
     if (link->has_sample) {
         const bool was_driving = instance_is_driving(lever);
-        const bool was_correcting = instance_is_mitigating(lever);
+        const bool mitigates = lever->bounce.mitigates;
         link->has_sample = false;
         (void)instance_update(lever, &link->sample);
+        if (mitigates) {
+            instance_mitigate(lever);
+        }
+        instance_drive(lever);
         if (lever->bounce.aircraft != NULL) {
             instance_watch(lever);
         }
@@ -269,7 +273,7 @@ enum lever_mode link_step(lever_t *lever)
         link->latched |= instance_faults(lever);
         uint32_t due = BIT(OUTPUT_STATE_ESTIMATE) | divided_due(link);
         due |= (was_driving || instance_is_driving(lever)) ? BIT(OUTPUT_MOTOR_COMMAND) : 0u;
-        due |= (was_correcting || instance_is_mitigating(lever)) ? BIT(OUTPUT_CORRECTION) : 0u;
+        due |= mitigates ? BIT(OUTPUT_CORRECTION) : 0u;
         due |= (link->pages != 0u) ? BIT(OUTPUT_IDENTITY) : 0u;
         due &= lever->has_platform ? UINT32_MAX : ~BIT(OUTPUT_PLATFORM);
         due &= (lever->bounce.aircraft != NULL) ? UINT32_MAX : ~BIT(OUTPUT_STABILITY);

@@ -91,12 +91,6 @@ void mitigation_idle(mitigation_t *mitigation, uint32_t elapsed_us)
     mitigation->counted += (elapsed_us < (UINT32_MAX - mitigation->counted)) ? elapsed_us : 0u;
 }
 
-bool mitigation_is_on(const mitigation_t *mitigation, uint8_t chosen)
-{
-    return (chosen != (uint8_t)LEVER_MITIGATION_NONE) || (mitigation->weight > 0.0f) ||
-           (mitigation->damping_weight > 0.0f);
-}
-
 lever_correction_t mitigation_correction(const mitigation_t *mitigation)
 {
     const lever_correction_t correction = {mitigation->weight * mitigation->correction, mitigation->weight};
@@ -194,7 +188,7 @@ static void advance(mitigation_t *mitigation, const lever_settings_t *settings, 
     }
 }
 
-void mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample)
+bool mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample)
 {
     pass_gate(mitigation, sample);
     if (!mitigation->started || (sample->step.period > LONGEST)) { /* then all has faded */
@@ -205,5 +199,7 @@ void mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings,
         mitigation->damping = 0.0f;
         mitigation->expected_damping = 0.0f;
     }
-    mitigation->started = mitigation_is_on(mitigation, sample->mitigation);
+    mitigation->started = (sample->mitigation != (uint8_t)LEVER_MITIGATION_NONE) || (mitigation->weight > 0.0f) ||
+                          (mitigation->damping_weight > 0.0f);
+    return mitigation->started;
 }

@@ -67,14 +67,12 @@ typedef struct mitigation_sample {
     bool rated;  /* and theta_dot */
 } mitigation_sample_t;
 
-/* A sample came: renews the correction, and the torque to ask of the motor. */
-void mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample);
+/* A sample came: renews the correction, and the torque to ask of the motor. Returns false when none is chosen and all has
+ * faded: then it need not be called. */
+bool mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample);
 
 /* No sample came for `elapsed_us` since the last call of this or the last sample. */
 void mitigation_idle(mitigation_t *mitigation, uint32_t elapsed_us);
-
-/* One of enum lever_mitigation is chosen, or still fades: then a sample needs mitigation_step(). */
-bool mitigation_is_on(const mitigation_t *mitigation, uint8_t chosen);
 
 /* What it says now. */
 lever_correction_t mitigation_correction(const mitigation_t *mitigation);
