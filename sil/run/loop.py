@@ -28,7 +28,7 @@ from ..aircraft.flight import Flight
 from ..fast.closed_loop import Traffic
 from ..plants import sensors
 from ..plants.truth import Body
-from ..scenarios.inputs import Inputs, conditions, prepare, readings
+from ..scenarios.inputs import Inputs, conditions, flight, prepare, readings
 from ..scenarios.inputs import commands as commands_of
 from ..scenarios.scenario import Scenario
 from .buslog import Frames
@@ -307,9 +307,9 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
     """The samples, one after the other."""
     scenario, inputs = tape.scenario, tape.inputs
     count = len(inputs.time)
-    flight = _flight(scenario, inputs)
+    cabin = flight(scenario, inputs)
     body = inputs.truth.body(conditions(scenario, inputs))
-    advance = _advance(body, flight, inputs.z_ddot)
+    advance = _advance(body, cabin, inputs.z_ddot)
     commands = commands_of(scenario, inputs.time)
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
@@ -318,7 +318,7 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
     measure = [_reader_of(tape, name) for name in ("theta", "theta_dot", "tau_m")]
     send_grip = _grip_sender(tape, link)
     no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
-    read_base = inputs.base.tolist().__getitem__ if flight is None else _reader_of(tape, "z_ddot")
+    read_base = inputs.base.tolist().__getitem__ if cabin is None else _reader_of(tape, "z_ddot")
     period_us = round(scenario.period * 1e6)
     command, own_torque, last = 0.0, inputs.torque.tolist(), count - 1
 
@@ -346,23 +346,13 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
         progress(count, count)
 
 
-def _flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
-    """The helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs` then."""
-    if scenario.aircraft is None:
-        return None
-    flight = Flight(scenario.aircraft, scenario.period, inputs.z_ddot.copy())
-    inputs.z_ddot[:] = np.nan
-    inputs.z_ddot[0] = flight.z_ddot
-    return flight
-
-
-def _advance(body: Body, flight: Flight | None, z_ddot: FloatArray) -> Callable[[int, float], None]:
+def _advance(body: Body, cabin: Flight | None, z_ddot: FloatArray) -> Callable[[int, float], None]:
     """A function that takes lever and cabin from a sample to the next, with the torque [N m] held."""
     rest = body.theta
 
     def advance(sample: int, torque: float) -> None:
-        if flight is not None:
-            z_ddot[sample + 1] = flight.advance(body.theta - rest)
+        if cabin is not None:
+            z_ddot[sample + 1] = cabin.advance(body.theta - rest)
         body.advance(torque)
 
     return advance

@@ -13,6 +13,7 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.can.codec import Value
 from lever_cdkf.host_tools.can.commander import KEEP_ALIVE
 
+from ..aircraft.flight import Flight
 from ..plants import excitation, sensors
 from ..plants.truth import BLOCK, Conditions, Truth
 from .scenario import Scenario
@@ -88,6 +89,16 @@ def conditions(scenario: Scenario, inputs: Inputs) -> Conditions:
         disturbance=inputs.disturbance,
         ahead=BLOCK if scenario.aircraft is None else 1,
     )
+
+
+def flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
+    """The helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs` then."""
+    if scenario.aircraft is None:
+        return None
+    hovering = Flight(scenario.aircraft, scenario.period, inputs.z_ddot.copy())
+    inputs.z_ddot[:] = np.nan
+    inputs.z_ddot[0] = hovering.z_ddot
+    return hovering
 
 
 def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
