@@ -40,6 +40,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "figures", help="make the paper's figures for this system", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument(
+        "-o",
         "--out",
         metavar="DIR",
         type=Path,

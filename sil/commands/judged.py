@@ -60,6 +60,7 @@ class JudgedCommand(ABC, Generic[Row]):
         )
         parser.add_argument("--only", nargs="+", metavar="NAME", help="conditions of --list (default: all)")
         parser.add_argument(
+            "-o",
             "--out",
             metavar="DIR",
             type=Path,

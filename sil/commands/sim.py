@@ -90,7 +90,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     what.add_argument("scenario", nargs="?", metavar="SCENARIO", help="a name of --list, or the path of a .toml file")
     what.add_argument("--list", action="store_true", help="print the scenarios that come with the package")
     add_bus_options(sim)
-    sim.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    sim.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     sim.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
     )
@@ -113,7 +113,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         help="simulate a tiring, then startled pilot and write a report",
         description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled.",
     )
-    demo.add_argument("--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
+    demo.add_argument("-o", "--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
     add_format_option(demo, ("csv",))
     add_json_option(demo)
     demo.set_defaults(run=run_demo, realtime=False, settings=None)
