@@ -6,14 +6,16 @@
 #include "app/estimator.h"
 #include "app/link.h"
 #include "app/torque_gate.h"
+#include "bounce/mitigation.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* The watch over the loop of arm, lever and rotor. */
+/* The watch over the loop of arm, lever and rotor, and what is done about it. */
 typedef struct bounce {
+    mitigation_t mitigation;
     const lever_aircraft_t *aircraft; /* NULL: none */
     margin_t margin;
     uint32_t time_us; /* of the sample with which that was worked out */
@@ -44,5 +46,8 @@ uint32_t instance_faults(const lever_t *lever);
 
 /* Torque is not zero, or may become so. */
 bool instance_is_driving(const lever_t *lever);
+
+/* A mitigation is chosen, or still fades. */
+bool instance_is_mitigating(const lever_t *lever);
 
 #endif

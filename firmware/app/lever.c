@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define DITHER_MOST 1.0e4f /* plausible [N m] */
+#define SILENCE_US 20000u  /* or two sample periods: mitigation.h */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -60,6 +61,40 @@ void instance_watch(lever_t *lever)
     }
 }
 
+/* Renews correction and lever damping, after the estimator's update; `torque` is what the gate is told. */
+static void mitigate(lever_t *lever, const torque_sample_t *torque)
+{
+    const uint32_t broken =
+        (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED | (uint32_t)LEVER_FAULT_HANDS_OFF;
+    const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE;
+    const estimator_t *estimator = &lever->estimator;
+    const setup_t *setup = &estimator->setup;
+    const uint32_t period_us = lever->gate.period_us;
+    const uint32_t faults = estimator->faults;
+    mitigation_sample_t sample = {.constants = &setup->constants,
+        .elapsed_us = torque->advances ? torque->elapsed_us : period_us,
+        .silence_us = ((2u * period_us) > SILENCE_US) ? (2u * period_us) : SILENCE_US,
+        .theta = estimator_state(estimator, 0u),
+        .theta_dot = estimator_state(estimator, 1u),
+        .drive = lever->gate.gain,
+        .mitigation = setup->mitigation,
+        .advances = torque->advances,
+        .permitted = torque->permitted && ((faults & broken) == 0u),
+        .sensed = ((faults & blind) == 0u),
+        .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u)};
+    const model_dynamics_t dynamics = estimator_linearised(estimator, &sample.step);
+    sample.dynamics = &dynamics;
+    sample.step.period = 1.0e-6f * (float)sample.elapsed_us;
+    sample.step.z_ddot = estimator->last_z_ddot;
+    sample.step.tau_m = lever->gate.torque;
+    mitigation_step(&lever->bounce.mitigation, setup->settings, &sample);
+}
+
+bool instance_is_mitigating(const lever_t *lever)
+{
+    return mitigation_is_on(&lever->bounce.mitigation, lever->estimator.setup.mitigation);
+}
+
 enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
 {
     const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
@@ -72,7 +107,10 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
         .advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u),
         .measured = ((faults & blind) != blind),
         .permitted = permits_torque(lever)};
-    torque_gate_step(&lever->gate, dither_step(&lever->dither), &torque);
+    if (instance_is_mitigating(lever)) {
+        mitigate(lever, &torque);
+    }
+    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &torque);
     return mode;
 }
 
@@ -89,11 +127,13 @@ void lever_idle(lever_t *lever, uint32_t elapsed_us)
 {
     link_idle(lever, elapsed_us);
     torque_gate_idle(&lever->gate, elapsed_us);
+    mitigation_idle(&lever->bounce.mitigation, elapsed_us);
 }
 
 bool instance_is_driving(const lever_t *lever)
 {
-    return (lever->gate.torque != 0.0f) || (lever->gate.open && dither_is_on(&lever->dither));
+    const bool asks = dither_is_on(&lever->dither) || mitigation_has_damping(lever->estimator.setup.mitigation);
+    return (lever->gate.torque != 0.0f) || (lever->gate.open && asks);
 }
 
 /* --- commands ----------------------------------------------------------------------------------------------------- */
@@ -104,7 +144,8 @@ static bool is_changed(const lever_t *lever, const setup_t *before, float rms_be
     const setup_t *setup = &lever->estimator.setup;
     return (setup->model != before->model) || (setup->preload != before->preload) ||
            (setup->estimator != before->estimator) || (setup->adaptation != before->adaptation) ||
-           (lever->dither.target < rms_before) || (lever->dither.target > rms_before);
+           (setup->mitigation != before->mitigation) || (lever->dither.target < rms_before) ||
+           (lever->dither.target > rms_before);
 }
 
 /* Carries out what is not refused for the mode. Returns false, and changes nothing, when a value is not known. */
@@ -181,8 +222,11 @@ bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft)
 {
     const bool accepted = (aircraft == NULL) || margin_accepts(aircraft);
     if (accepted) {
-        const bounce_t watch = {.aircraft = aircraft, .state = (uint8_t)LEVER_BOUNCE_UNKNOWN};
-        lever->bounce = watch;
+        const margin_t unknown = {.gain = 0.0f};
+        lever->bounce.aircraft = aircraft;
+        lever->bounce.margin = unknown;
+        lever->bounce.time_us = 0u;
+        lever->bounce.state = (uint8_t)LEVER_BOUNCE_UNKNOWN;
     }
     return accepted;
 }
@@ -197,6 +241,11 @@ void lever_stability(const lever_t *lever, lever_stability_t *stability)
     stability->modulus_sigma = margin->modulus_sigma;
     stability->frequency = margin->frequency;
     stability->frequency_sigma = margin->frequency_sigma;
+}
+
+void lever_correction(const lever_t *lever, lever_correction_t *correction)
+{
+    *correction = mitigation_correction(&lever->bounce.mitigation);
 }
 
 void lever_health(const lever_t *lever, lever_health_t *health)

@@ -30,6 +30,15 @@ class Stability(NamedTuple):
     frequency_sigma: float
 
 
+class Correction(NamedTuple):
+    """lever_correction_t: what mitigation adds to the lever's angle where that becomes collective pitch."""
+
+    angle: float
+    """[rad]"""
+    weight: float
+    """Of the fade that is in it: 0 passive, 1 all of it."""
+
+
 class AircraftResponse:
     """lever_aircraft_t: how a helicopter answers to its collective lever, at 3 to 24 frequencies."""
 

@@ -36,6 +36,7 @@ static const char help[] =
     "  --preload NAME       where the springs rest: fixed, or at a trim angle that is followed\n"
     "  --estimator NAME     how state and parameters are estimated together\n"
     "  --adaptation NAME    how the parameter noise is set\n"
+    "  --mitigation NAME    what is done against collective bounce\n"
     "  --lock-step          time is that of the samples alone: for simulations that may pause; never beside a motor\n"
     "  --verbose            also print all settings, and every change of mode\n"
     "  --help, --version    print this, or the version, and exit\n"
@@ -70,6 +71,7 @@ static const struct option known[] = {
     {"preload", required_argument, NULL, '='},
     {"estimator", required_argument, NULL, '='},
     {"adaptation", required_argument, NULL, '='},
+    {"mitigation", required_argument, NULL, '='},
     {"lock-step", no_argument, NULL, 'k'},
     {"verbose", no_argument, NULL, 'v'},
     {"help", no_argument, NULL, 'h'},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from python.can.codec import DBC, MULTIPLEXED, Codec, data_id_base, is_quantity, limits, not_available, scaled
 
 
@@ -78,7 +79,7 @@ def test_scales_have_whole_reciprocals() -> None:
 
 
 def test_named_values_are_the_enums(codec: Codec) -> None:
-    choices = ("model", "preload", "estimator", "adaptation", "request", "mode", "bounce")
+    choices = (*CHOICES, "request", "mode", "bounce")
     enums = {name: codec.enum(f"lever_{name}") for name in choices}
     enums |= {name: codec.enum(f"message_{name}") for name in ("page", "result")}
     tested = 0

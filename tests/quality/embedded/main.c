@@ -116,7 +116,7 @@ static void run(const lever_config_t *config, uint32_t samples)
 static void send_command(lever_t *lever, uint32_t index)
 {
     const message_command_t command = {(uint8_t)LEVER_REQUEST_NONE, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP,
-        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, DITHER};
+        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, DITHER};
     lever_frame_t frame;
 
     if (message_command_encode(&frame, &command)) {

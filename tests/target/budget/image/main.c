@@ -1,6 +1,6 @@
 /* Runs the estimator over recorded samples and writes, for every sample, the time it took and the stack it used.
  *
- *     budget OUTPUT update|tick [model=N estimator=N preload=N adaptation=N] [SETTING=BITS …] [dither_rms=BITS]
+ *     budget OUTPUT update|tick [model=N estimator=N preload=N adaptation=N mitigation=N] [SETTING=BITS …] [dither_rms=BITS]
  *         [paint=0]
  *
  * All numbers are hexadecimal, those of settings and torque the bits of a float. The samples lie in flash, behind a
@@ -223,8 +223,9 @@ static void take_argument(char *word, lever_config_t *config, lever_command_t *c
     }
     *value = '\0';
     const uint32_t bits = (uint32_t)strtoul(value + 1, NULL, 16);
-    uint8_t *choices[] = {&config->model, &config->preload, &config->estimator, &config->adaptation};
-    static const char *const names[] = {"model", "preload", "estimator", "adaptation"};
+    uint8_t *choices[] = {
+        &config->model, &config->preload, &config->estimator, &config->adaptation, &config->mitigation};
+    static const char *const names[] = {"model", "preload", "estimator", "adaptation", "mitigation"};
     void *target = (strcmp(word, "dither_rms") == 0) ? (void *)&command->dither_rms : NULL;
     for (uint32_t i = 0u; i < lever_setting_count(); i++) {
         if (strcmp(word, lever_setting(i)->name) == 0) {
@@ -285,7 +286,7 @@ int main(void)
     static char arguments[1024];
     lever_config_t config;
     lever_command_t command = {(uint8_t)LEVER_REQUEST_NONE, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP,
-        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, 0.0f};
+        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, 0.0f};
     SYST_RVR = SYST_MASK;
     SYST_CVR = 0u;
     SYST_CSR = SYST_ENABLE_FROM_PROCESSOR_CLOCK;
