@@ -143,6 +143,7 @@ class Loop:
         loop, inputs = self.struct.pointer, self._inputs
         loop.base, loop.torque = self.struct.doubles(inputs.base), self.struct.doubles(inputs.torque)
         loop.base_field, loop.torque_field = _field("BASE_SAMPLE", "z_ddot"), _field("MOTOR_COMMAND", "torque")
+        loop.correction_field = _field("CORRECTION", "correction")
         loop.no_lever, loop.no_base = (
             self.struct.array("uint8_t", inputs.missing[frame], np.uint8) for frame in ("lever_frame", "base_frame")
         )

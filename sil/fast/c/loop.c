@@ -10,6 +10,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#define CORRECTION_HOLDS_US 100000u
 #define IDLE_US 5000u      /* without a sample, after which the firmware is told so, as lever_idle() asks for */
 #define TIME_LOW_START 48u /* of the messages of an estimator that belong to a sample */
 #define TIME_LOW_MASK 0xFFFFu
@@ -111,6 +112,9 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
     lever_health_t health;
     lever_health(lever, &health);
     loop->asked = (double)health.torque;
+    lever_correction_t correction;
+    lever_correction(lever, &correction);
+    loop->correction = (double)correction.angle;
 }
 
 /* --- by frames --------------------------------------------------------------------------------------------------- */
@@ -212,6 +216,7 @@ static void take_answer(loop_t *loop)
 {
     const uint32_t time_low = (loop->sample * loop->period_us) & TIME_LOW_MASK;
     double torque = 0.0;
+    double correction = 0.0;
     uint32_t count = 0u;
     bool answered = false;
     while ((count < loop->pending) && !answered) {
@@ -222,6 +227,8 @@ static void take_answer(loop_t *loop)
         const uint32_t id = loop->pending_id[count];
         if ((id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && is_own) {
             torque = value_of(&loop->torque_field, payload);
+        } else if ((id == (uint32_t)MESSAGE_CORRECTION_ID) && is_own) {
+            correction = value_of(&loop->correction_field, payload);
         } else if (id == (uint32_t)MESSAGE_STATE_ESTIMATE_ID) {
             answered = is_own;
             loop->misplaced += is_own ? 0u : 1u;
@@ -232,6 +239,7 @@ static void take_answer(loop_t *loop)
     }
     take(loop, count);
     loop->asked = torque;
+    loop->correction = correction;
     loop->unanswered += answered ? 0u : 1u;
     loop->unanswered_in_a_row = answered ? 0u : (loop->unanswered_in_a_row + 1u);
 }
@@ -257,6 +265,15 @@ static void step_by_frames(loop_t *loop, lever_t *lever)
         const uint64_t payload = bits_of(&loop->base_field, measured_base(loop)) | time_us;
         send_payload(loop, lever, (uint32_t)MESSAGE_BASE_SAMPLE_ID, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, payload);
         take_answer(loop);
+    }
+}
+
+/* A correction that is too old counts as none. */
+static void age_correction(loop_t *loop)
+{
+    loop->silent_us = (loop->no_base[loop->sample] == 0u) ? 0u : (loop->silent_us + loop->period_us);
+    if (loop->silent_us > CORRECTION_HOLDS_US) {
+        loop->correction = 0.0;
     }
 }
 
@@ -289,6 +306,7 @@ uint32_t loop_advance(loop_t *loop, lever_t *lever, uint32_t until)
         } else {
             step_by_struct(loop, lever);
         }
+        age_correction(loop);
         if ((loop->sample % loop->stride) == 0u) {
             lever_estimate(lever, &loop->estimate[loop->sample / loop->stride]);
             lever_health(lever, &loop->health[loop->sample / loop->stride]);

@@ -69,6 +69,7 @@ typedef struct loop {
     const double *base; /* measured z_ddot, without a cabin [m/s^2]; NaN: marked invalid */
     loop_field_t base_field;
     loop_field_t torque_field;               /* of MOTOR_COMMAND */
+    loop_field_t correction_field;           /* of CORRECTION */
     const uint8_t *no_lever;                 /* the frame is never sent */
     const uint8_t *no_base;                  /* likewise */
     const uint32_t *time_us;                 /* by structs, of the samples; NULL: as they are */
@@ -96,9 +97,10 @@ typedef struct loop {
     uint32_t sample;
     uint32_t next_command;
     uint32_t unanswered_in_a_row;
-    uint32_t idle_us;  /* by structs: without a sample, since the firmware was told so */
-    double asked;      /* what the firmware asks of the motor [N m], */
-    double correction; /* and adds to the lever's angle that the flight control computer reads [rad] */
+    uint32_t idle_us;   /* by structs: without a sample, since the firmware was told so */
+    uint32_t silent_us; /* without a sample */
+    double asked;       /* what the firmware asks of the motor [N m], */
+    double correction;  /* and adds to the lever's angle that the flight control computer reads [rad] */
     uint32_t pending;
     uint16_t pending_id[LOOP_PENDING];
     uint8_t pending_data[LOOP_PENDING][8];
