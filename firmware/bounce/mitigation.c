@@ -8,7 +8,7 @@
 #define BAND_LOW 1.5f        /* [Hz] */
 #define BAND_HIGH 8.0f       /* [Hz] */
 #define OPENING_US 5.0e5f    /* [us] */
-#define CLOSING_US 5.0e4f    /* [us] */
+#define CLOSING_US 7.0e4f    /* [us] */
 #define MEMORY 0.5f          /* of how the lever moves [s] */
 #define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
 #define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
