@@ -1,2 +1,1 @@
-"""`lever bounce`: flights of a helicopter whose pilot closes the loop of collective bounce, and what the firmware makes of
-it."""
+"""`lever bounce`: flights in which a pilot may close the loop of collective bounce, and what the firmware does then."""

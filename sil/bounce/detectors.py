@@ -1,7 +1,7 @@
 """What others watch for oscillations with: the lever's angle and the cabin's acceleration alone, without a model.
 
-Both give a level that rises with an oscillation; above a threshold they would raise an alarm. The thresholds here are the
-lowest that raise none in ten hours of the stable flights of conditions.py: `lever bounce --only false_alarms` measures them.
+Both give a level that rises with an oscillation; above a threshold they would raise an alarm. The thresholds are the
+lowest that raise none in the ten hours of stable flight of conditions.py: `lever bounce --only false_alarms`.
 
 `rover` is the logic of the Real-time Oscillation VERifier (Mitchell, Arencibia, Munoz: Real-time detection of
 pilot-induced oscillations, AIAA 2004-4700): half cycles of both signals in a band, an oscillation where frequency,
@@ -18,6 +18,7 @@ import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
@@ -26,6 +27,9 @@ RATE = 50
 """Of what they watch [Hz]."""
 LEVER_UNIT = math.radians(0.5)
 """Of the lever's angle, where the acceleration counts in m/s^2: about what one makes of the other at the coupling."""
+
+ROVER_THRESHOLD, SPECTRUM_THRESHOLD = 1.0, 1.0
+"""[m/s^2]"""
 
 Response = Callable[[complex], complex]
 """z_ddot / delta of the aircraft [m/s^2 per rad] at s [rad/s]."""
@@ -62,7 +66,7 @@ def rover(watched: Watched, response: Response) -> FloatArray:
     cabin, lever = (_band_passed(signal) for signal in (watched.z_ddot, watched.theta))
     peaks, own = _extrema(cabin), _extrema(lever)
     level, last = np.zeros(len(cabin)), [0.0] * HALF_CYCLES
-    for before, now in zip(peaks[:-1], peaks[1:], strict=True):
+    for before, now in pairwise(peaks):
         last = [*last[1:], _half_cycle(cabin, lever, own, before, now, response)]
         level[now:] = min(last)
     return level
@@ -112,7 +116,7 @@ def _filtered(signal: FloatArray, numerator: tuple[float, float, float], warped:
 def _extrema(signal: FloatArray) -> list[int]:
     """Where it turns: in turn the highest and the lowest between two changes of its sign."""
     ends = np.flatnonzero(np.diff(np.signbit(signal))) + 1
-    return [int(a + np.argmax(np.abs(signal[a:b]))) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    return [int(a + np.argmax(np.abs(signal[a:b]))) for a, b in pairwise(ends)]
 
 
 # --- spectrum --------------------------------------------------------------------------------------------------------

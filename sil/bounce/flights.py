@@ -27,12 +27,12 @@ AIRCRAFT = ("uh60_like", "puma_like", "bo105_like")
 STRIDE = 20
 """Samples between two notes of what the firmware says."""
 UNSURE = 0.05
-"""The response that the firmware is given is wrong by a gain and a phase of this standard deviation [1, rad]; it is told
-so."""
+"""Standard deviation by which gain [1] and phase [rad] of the response that the firmware is given are wrong, as it is
+told."""
 RAISED = (20.0, 25.0)
 """When a gearing goes up that does so [s]: the firmware knows the pilot by then."""
 _TABLE = np.geomspace(1.5, 8.0, 24)
-_GRID = np.geomspace(*BAND, 1000)
+_GRID = np.geomspace(*BAND, 500)
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,14 @@ class Plan:
     """rms [g], 1 to 10 Hz."""
     dither: float = 0.3
     """rms [N m]"""
-    mitigation: tuple[str, ...] = ()
+    mitigation: str = "none"
+    """Of enum lever_mitigation."""
     correction_delay: float = 0.0
     """Beyond a sample period [s]."""
+    told_delay: float = 1e-3
+    """What the firmware is told of that, with the sample period [s]."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further tables of the scenario."""
-    freezes: bool = False
-    """The parameters stay as in the settings."""
     clock_stops: float | None = None
     """From then on all samples have the same time [s]."""
 
@@ -80,7 +81,11 @@ class Plan:
         }
         if self.dither:
             values["torque"] = [{"kind": "firmware", "rms": f"{self.dither} N m"}]
-        scenario: Scenario = read(Scenario, values | dict(self.more), Place("flight"))
+        merged = {
+            "estimator": {"mitigation": self.mitigation, **self.more.get("estimator", {})},
+            "settings": {"correction_delay": self.told_delay, **self.more.get("settings", {})},
+        }
+        scenario: Scenario = read(Scenario, {**values, **self.more, **merged}, Place("flight"))
         return scenario
 
     def gearings(self, time: FloatArray) -> FloatArray:

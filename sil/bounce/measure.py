@@ -12,13 +12,12 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.library import lib
 
 from ..aircraft import aircraft
-from ..aircraft.aircraft import Coupled
 from ..fast import plants
 from ..judged.result import Figure, largest, least, mean
 from ..plants.truth import Conditions
 from . import detectors, pilots
 from .detectors import Watched
-from .flights import RAISED, STRIDE, Flown, Plan, critical_gearing, fly, truth_of
+from .flights import STRIDE, Flown, Plan, critical_gearing, fly, truth_of
 
 Figures = Mapping[str, float]
 
@@ -59,12 +58,13 @@ class Measured:
     excerpt: Excerpt | None = None
 
 
-def excerpt(flown: Flown) -> Excerpt:
-    """The part of a flight that a reader gets to see: at every fifth note."""
-    said, step = flown.stability[::5], 5 * STRIDE
+def excerpt(flown: Flown, points: int = 500) -> Excerpt:
+    """The part of a flight that a reader gets to see."""
+    every = max(1, len(flown.notes) // points)
+    said, step = flown.stability[::every], every * STRIDE
     return Excerpt(
-        flown.notes[::5],
-        flown.margins(5),
+        flown.notes[::every],
+        flown.margins(every),
         said["gain_margin"].astype(np.float64),
         said["gain_margin_sigma"].astype(np.float64),
         np.degrees(flown.theta - flown.theta[0])[::step],
@@ -110,7 +110,6 @@ def relaxing(craft: str, seed: int) -> Measured:
     doubled = min(_first((loudness > LOUD * steady) & (notes > 10.0), notes), float(notes[-1]))
     alarm = _first(flown.stability["state"] == lib.LEVER_BOUNCE_ALARM, notes)
     rover, spectrum = (_first(level > limit, time) for time, level, limit in _detected(flown))
-    margins = flown.margins(1)
     at = int(np.searchsorted(notes, alarm)) if math.isfinite(alarm) else 0
     figures = {
         "alarm lead": doubled - alarm,
@@ -118,7 +117,7 @@ def relaxing(craft: str, seed: int) -> Measured:
         "spectrum lead": doubled - spectrum,
         "ahead of ROVER": min(rover, float(notes[-1])) - alarm,
         "ahead of spectrum": min(spectrum, float(notes[-1])) - alarm,
-        "margin at the alarm": float(margins[at]) if math.isfinite(alarm) else math.nan,
+        "margin at the alarm": float(flown.margins(10)[at // 10]) if math.isfinite(alarm) else math.nan,
     }
     return Measured(figures | _margins(flown), excerpt(flown))
 
@@ -136,7 +135,7 @@ def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:
 
 def _margins(flown: Flown) -> Figures:
     """How right the stated gain margin is, where one is stated and the lever does not swing by more than SWUNG."""
-    every = 10
+    every = 25
     said, true = flown.stability[::every], flown.margins(every)
     angle = np.abs(flown.theta - flown.truth.rest)
     swing = np.maximum.accumulate(angle)[:: STRIDE * every]
@@ -174,8 +173,8 @@ _JUDGED = (40.0, 60.0)
 _COARSE, _FINE, _MOST = 1.3, 2, 12.0
 
 
-def _slack(craft: str, seed: int, mitigation: Sequence[str], **changes: Any) -> Plan:
-    plan = Plan(craft, seed, pilots.table(pilots.arm(seed, pilots.SLACK)), 1.0, mitigation=tuple(mitigation))
+def _slack(craft: str, seed: int, mitigation: str, **changes: Any) -> Plan:
+    plan = Plan(craft, seed, pilots.table(pilots.arm(seed, pilots.SLACK)), 1.0, mitigation=mitigation)
     return replace(plan, **changes)
 
 
@@ -192,10 +191,10 @@ def _vibration(flown: Flown) -> float:
 
 def _uncoupled(plan: Plan) -> float:
     """The vibration by the same gusts while nobody's lever turns the blades."""
-    return _vibration(fly(replace(plan, gearing=1e-9, raised_from=None, mitigation=(), dither=0.0)))
+    return _vibration(fly(replace(plan, gearing=1e-9, raised_from=None, mitigation="none", dither=0.0)))
 
 
-def largest_gearing(craft: str, seed: int, *, mitigation: Sequence[str], **changes: Any) -> Measured:
+def largest_gearing(craft: str, seed: int, *, mitigation: str, **changes: Any) -> Measured:
     """Up to which gearing the vibration stays below LOUD times that without the lever: in steps of a factor, finer
     about the first at which it does not."""
     plan = _slack(craft, seed, mitigation, **changes)
@@ -222,7 +221,7 @@ CANCELLED_AT = 2.0
 """Gearing over the critical one."""
 
 
-def cancelled(craft: str, seed: int, *, mitigation: Sequence[str]) -> Measured:
+def cancelled(craft: str, seed: int, *, mitigation: str) -> Measured:
     """How much of what the cabin does to the lever is left in its corrected angle."""
     flown = fly(raised(_slack(craft, seed, mitigation), CANCELLED_AT))
     involuntary, residual = _involuntary(flown)
@@ -275,12 +274,12 @@ VOLUNTARY = 0.5
 """[Hz]"""
 
 
-def voluntary(craft: str, seed: int, *, mitigation: Sequence[str]) -> Measured:
-    """What the mitigation makes of the pilot's own flying: corrected angle over commanded trim, with it over without."""
+def voluntary(craft: str, seed: int, *, mitigation: str) -> Measured:
+    """What the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over without."""
     pilot = pilots.table(pilots.arm(seed, pilots.SLACK))
     moves = {"kind": "sinusoid", "mean": pilot["trim"], "amplitude": "2 deg", "frequency": f"{VOLUNTARY} Hz"}
     plan = geared(_slack(craft, seed, mitigation, pilot=pilot | {"trim": moves}), STABLE)
-    ratio = _answer(fly(plan)) / _answer(fly(replace(plan, mitigation=())))
+    ratio = _answer(fly(plan)) / _answer(fly(replace(plan, mitigation="none")))
     return Measured(
         {
             "gain changed": 100.0 * abs(abs(ratio) - 1.0),
@@ -302,11 +301,11 @@ STABLE_WITHOUT = 0.7
 """Gearing over critical of the flights in which a wrong model must do no harm: 3 dB."""
 
 
-def wrong(craft: str, seed: int, *, mitigations: Sequence[Sequence[str]], spoil: Callable[[Plan], Plan]) -> Measured:
+def wrong(craft: str, seed: int, *, mitigations: Sequence[str], spoil: Callable[[Plan], Plan]) -> Measured:
     """Vibration with each mitigation over that without, in a loop that is stable without."""
-    plan = geared(spoil(_slack(craft, seed, ())), STABLE_WITHOUT)
+    plan = geared(spoil(_slack(craft, seed, "none")), STABLE_WITHOUT)
     passive = _vibration(fly(plan))
-    ratios = [_vibration(fly(replace(plan, mitigation=tuple(each)))) / passive for each in mitigations]
+    ratios = [_vibration(fly(replace(plan, mitigation=each))) / passive for each in mitigations]
     return Measured({"vibration ÷ passive": max(ratios), "destabilised": float(max(ratios) > LOUD)})
 
 
@@ -315,7 +314,7 @@ FAULT = 40.0
 _NOTHING, _NO_TORQUE = math.radians(0.005), 2e-3
 
 
-def faulty(craft: str, seed: int, *, mitigation: Sequence[str], spoil: Callable[[Plan], Plan]) -> Measured:
+def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Plan]) -> Measured:
     """How soon after a fault correction and torque are zero, and by how much the correction jumps in a sample."""
     plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 2.0))
     flown = fly(raised(plan, CANCELLED_AT))

@@ -25,19 +25,23 @@ MAY_IMPORT = {
     "host_tools/commands": {"firmware", "board", "can", "replay", "tune", "watch", "signals"},
     "sil/plants": {"models"},
     "sil/oracle": {"models"},
-    "sil/aircraft": set(),
+    "sil/aircraft": {"firmware"},
     "sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
     "sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
     "sil/run": {"fast", "scenarios", "plants", "aircraft", "firmware", "can", "results", "report", "watch", "exports"},
     "sil/judged": {"report"},
     "sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
+    "sil/bounce": {
+        *("judged", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
+        *("firmware", "models", "report"),
+    },
     "sil/study": {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
     "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
     "sil/commands": {
-        *("campaign", "run", "scenarios", "study", "judged", "envelope"),
+        *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce"),
         *("firmware", "can", "report", "exports"),
     },
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -94,9 +95,20 @@ def test_by_structs_the_firmware_gets_what_the_sensors_read() -> None:
     assert np.array_equal(run.mode, expected["mode"])
 
 
-@pytest.mark.parametrize("name", ["steady", "grip_force", "sensor_dropout", "sensor_faults", "mayo_ectomorphic"])
-def test_a_run_in_process_has_the_frames_of_one_over_a_bus(name: str) -> None:
-    wanted = scenario.load(name, ["duration=6 s"])
+MITIGATED = ("aircraft.gearing=0.3 1", "estimator.mitigation=cancellation_and_damping")
+GAPS = 'sensors.dropout=[{what="base_frame", share="60 %", burst="150 ms", start="2 s"}]'
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        *((name, ()) for name in ("steady", "grip_force", "sensor_dropout", "sensor_faults", "mayo_ectomorphic")),
+        ("bounce", MITIGATED),
+        ("bounce", (*MITIGATED, "aircraft.correction_delay=5 ms", GAPS)),
+    ],
+)
+def test_a_run_in_process_has_the_frames_of_one_over_a_bus(name: str, overrides: Sequence[str]) -> None:
+    wanted = scenario.load(name, ["duration=6 s", *overrides])
     slow, quick = python_run(wanted), in_process.run(wanted)
     for column, expected in vars(slow.frames()).items():
         assert np.array_equal(vars(quick.frames())[column], expected)
