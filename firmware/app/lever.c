@@ -7,7 +7,7 @@
 #include <string.h>
 
 #define DITHER_MOST 1.0e4f /* plausible [N m] */
-#define SILENCE_US 20000u  /* or two sample periods: mitigation.h */
+#define SILENCE_US 20000u  /* or 1.25 sample periods: mitigation.h */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -70,10 +70,11 @@ static void mitigate(lever_t *lever, const torque_sample_t *torque)
     const estimator_t *estimator = &lever->estimator;
     const setup_t *setup = &estimator->setup;
     const uint32_t period_us = lever->gate.period_us;
+    const uint32_t late_us = period_us + (period_us / 4u);
     const uint32_t faults = estimator->faults;
     mitigation_sample_t sample = {.constants = &setup->constants,
         .elapsed_us = torque->advances ? torque->elapsed_us : period_us,
-        .silence_us = ((2u * period_us) > SILENCE_US) ? (2u * period_us) : SILENCE_US,
+        .silence_us = (late_us > SILENCE_US) ? late_us : SILENCE_US,
         .theta = estimator_state(estimator, 0u),
         .theta_dot = estimator_state(estimator, 1u),
         .drive = lever->gate.gain,

@@ -14,16 +14,18 @@ void involuntary_start(involuntary_t *involuntary, float z_ddot)
 }
 
 /* By the base acceleration at the end of the step; the torque is held. A trunk on its seat, or a hand that is damped in
- * space, is driven by the base's motion, too: base_motion.h. */
+ * space, is driven by the base's velocity, too: base_motion.h. */
 static void integrate(involuntary_t *involuntary, const model_dynamics_t *dynamics, const model_constants_t *constants,
     const model_step_t *now, float turn)
 {
+    const float before = involuntary->z_ddot;
+    const float velocity_before = involuntary->velocity;
+    involuntary->velocity = high_pass_step(&involuntary->base, now->z_ddot, turn, HIGH_PASS_BUTTERWORTH);
+    involuntary->z_ddot = involuntary->velocity + (HIGH_PASS_BUTTERWORTH * involuntary->base.slope);
     model_step_t step = *now;
-    const float last = involuntary->z_ddot;
-    involuntary->z_ddot = high_pass_step(&involuntary->base, now->z_ddot, turn, HIGH_PASS_BUTTERWORTH);
-    step.z_ddot = 0.5f * (last + involuntary->z_ddot);
-    float drive = (dynamics->forcing * step.z_ddot) + (dynamics->torque * step.tau_m);
+    float drive = (dynamics->forcing * (0.5f * (before + involuntary->z_ddot))) + (dynamics->torque * step.tau_m);
     if ((dynamics->space > 0.0f) || (constants->seat_stiffness > 0.0f)) {
+        step.z_ddot = 0.5f * (velocity_before + involuntary->velocity);
         base_motion_step(&involuntary->base_motion, constants, &step);
         drive += (dynamics->arm_stiffness * step.seat) + ((dynamics->arm_damping + dynamics->space) * step.seat_dot);
     }
@@ -54,12 +56,4 @@ bool involuntary_step(involuntary_t *involuntary, const model_dynamics_t *dynami
         involuntary_start(involuntary, step->z_ddot);
     }
     return plausible;
-}
-
-/* The phase lead of the high-pass is about damping corner / frequency, which at the natural frequency is a time of
- * damping corner / stiffness. */
-float involuntary_angle(const involuntary_t *involuntary, const model_dynamics_t *dynamics, float corner, float ahead)
-{
-    const float lead = (HIGH_PASS_BUTTERWORTH * (HIGH_PASS_TURN * corner)) / dynamics->stiffness;
-    return involuntary->theta + ((ahead - lead) * involuntary->theta_dot);
 }

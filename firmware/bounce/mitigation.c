@@ -154,8 +154,7 @@ static float angle_of(
         const float turn = sqrtf(sample->dynamics->stiffness) * period;
         angle = pass_notch(&mitigation->notch, sample->theta, turn, 2.0f * settings->notch_damping_ratio);
     } else {
-        angle = involuntary_angle(
-            &mitigation->involuntary, sample->dynamics, settings->cancellation_corner, settings->correction_delay);
+        angle = involuntary_angle(&mitigation->involuntary, settings->correction_delay);
     }
     return angle;
 }
@@ -204,8 +203,9 @@ void mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings,
         start(mitigation, sample->step.z_ddot);
     } else if (sample->advances) {
         advance(mitigation, settings, sample);
-    } else {
-        /* no time has passed */
+    } else { /* no time has passed, and the torque gate is closed */
+        mitigation->damping = 0.0f;
+        mitigation->expected_damping = 0.0f;
     }
     mitigation->started = mitigation_is_on(mitigation, sample->mitigation);
 }

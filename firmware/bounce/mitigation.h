@@ -1,7 +1,7 @@
 /* What is done against collective bounce, by README.md: a correction of the lever's angle for the flight control
  * computer, and torque against the lever's rate. All of it passes one gate, which is open while all of this holds:
  *   - the mode, the sample clock and the machine permit it, and somebody holds the lever: mitigation_sample_t;
- *   - a sample with all its sensors came within 20 ms or two sample periods, whichever is longer.
+ *   - a sample with all its sensors came within 20 ms or 1.25 sample periods, whichever is longer.
  * It opens within half a second. Otherwise all fades to zero within 70 ms; for that no sample is needed: the port calls
  * mitigation_idle().
  *
