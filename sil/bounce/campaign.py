@@ -47,12 +47,15 @@ def measure(task: Task) -> Measured:
 
 
 def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[Result]:
-    """The results of the rows, in their order: `seeds` pilots with each of the aircraft."""
+    """The results of the rows, in their order: `seeds` pilots with each of the aircraft. Rows that measure the same
+    share the flights."""
     flights = [(craft, seed) for craft in AIRCRAFT for seed in range(seeds)]
-    tasks = [Task(row.name, *flight) for row in rows for flight in flights]
+    flown = list({row.measure: row.name for row in reversed(rows)}.items())
+    tasks = [Task(name, *flight) for _, name in flown for flight in flights]
     found = in_processes(measure, tasks, os.cpu_count() or 1, show)
     own = len(flights)
-    return [_result(row, flights, found[own * i : own * (i + 1)]) for i, row in enumerate(rows)]
+    parts = {measured: found[own * i : own * (i + 1)] for i, (measured, _) in enumerate(flown)}
+    return [_result(row, flights, parts[row.measure]) for row in rows]
 
 
 def _result(row: Condition, flights: Sequence[tuple[str, int]], found: Sequence[Measured]) -> Result:

@@ -114,6 +114,8 @@ _LIMITS = (
     _limit(DAMPING, "lever damping"),
     _limit(NOTCH, "the notch"),
     _limit("notch_and_damping", "notch and lever damping"),
+    _limit(CANCELLATION, "cancellation, gusts of 0.1 g", suffix="_0.1g", gust=0.1),
+    _limit(BOTH, "cancellation and lever damping, gusts of 0.1 g", suffix="_0.1g", gust=0.1),
     _limit(CANCELLATION, "cancellation that comes 5 ms later", suffix="_5ms", correction_delay=5e-3),
     _limit(CANCELLATION, "cancellation that comes 10 ms later", suffix="_10ms", correction_delay=10e-3),
     _limit(
@@ -144,11 +146,12 @@ _AWAY = (
 )
 
 
-def _voluntary(mitigation: str, *limits: Limit) -> Condition:
+def _voluntary(mitigation: str, *limits: Limit, in_flight: bool = False) -> Condition:
+    where = "in the loop, gain margin 6 dB" if in_flight else "a cabin that only gusts shake"
     return Condition(
-        f"voluntary_{mitigation}",
-        f"the pilot's input at 0.5 Hz, gain margin 6 dB, {mitigation.replace('_', ' ')}",
-        partial(measure.voluntary, mitigation=mitigation),
+        f"voluntary_{mitigation}{'_in_flight' if in_flight else ''}",
+        f"the pilot's input at 0.5 Hz, {where}, {mitigation.replace('_', ' ')}",
+        partial(measure.voluntary, mitigation=mitigation, ratio=measure.STABLE if in_flight else 0.0),
         limits,
         ("gain changed", "phase changed"),
         quick=bool(limits),
@@ -192,23 +195,36 @@ def _wrong(name: str, title: str, spoil: Callable[[Plan], Plan], quick: bool = F
         f"{title}, gearing 0.7 × critical",
         partial(measure.wrong, mitigations=MITIGATIONS, spoil=spoil),
         (_most("destabilised", 0.0),),
-        ("vibration ÷ passive",),
+        ("vibration ÷ passive", "angle ÷ passive"),
         quick=quick,
     )
 
 
+def _left(name: str, title: str, spoil: Callable[[Plan], Plan]) -> Condition:
+    return Condition(
+        f"limit_{name}",
+        f"largest gearing with cancellation, {title}",
+        partial(measure.largest_gearing, mitigation=CANCELLATION, spoil=spoil),
+        also=("gearing ÷ critical",),
+    )
+
+
 _TRUNK = {"model": "two_dof", "m_p": "3.2 kg", "c_p": "30 N s/m", "k_p": "2100 N/m"}
-_WRONG = (
+_SPOILT: tuple[tuple[str, str, Callable[[Plan], Plan]], ...] = (
     *(
-        _wrong(f"{name}_{word}", f"{name} {sign} 30 %, and held there", _stuck_with(name, factor))
+        (f"{name}_{word}", f"{name} {sign} 30 %, and held there", _stuck_with(name, factor))
         for name in ("m_p", "c_p", "k_p")
         for word, sign, factor in (("high", "+", 1.3), ("low", "−", 0.7))
     ),
-    _wrong("mayo_ectomorphic", "Mayo's ectomorphic pilot", _held_by({"model": "hand", "somatotype": "ectomorphic"})),
-    _wrong("mayo_mesomorphic", "Mayo's mesomorphic pilot", _held_by({"model": "hand", "somatotype": "mesomorphic"})),
-    _wrong("two_dof", "arm on a trunk on a seat", _held_by(_TRUNK)),
-    _wrong("base_late", "accelerometer 5 ms late", _more(sensors={"z_ddot": {"noise": "0.01 m/s^2", "delay": "5 ms"}})),
-    _wrong("friction", "Coulomb friction of 0.3 N m", _more(lever={"lever_friction": "0.3 N m"})),
+    ("mayo_ectomorphic", "Mayo's ectomorphic pilot", _held_by({"model": "hand", "somatotype": "ectomorphic"})),
+    ("mayo_mesomorphic", "Mayo's mesomorphic pilot", _held_by({"model": "hand", "somatotype": "mesomorphic"})),
+    ("two_dof", "arm on a trunk on a seat", _held_by(_TRUNK)),
+    ("base_late", "accelerometer 5 ms late", _more(sensors={"z_ddot": {"noise": "0.01 m/s^2", "delay": "5 ms"}})),
+    ("friction", "Coulomb friction of 0.3 N m", _more(lever={"lever_friction": "0.3 N m"})),
+)
+_WRONG = (
+    *(_wrong(name, title, spoil) for name, title, spoil in _SPOILT),
+    *(_left(name, title, spoil) for name, title, spoil in _SPOILT),
 )
 
 
@@ -255,6 +271,9 @@ CONDITIONS = {
         _voluntary(DAMPING),
         _voluntary(BOTH),
         _voluntary(NOTCH),
+        _voluntary(CANCELLATION, in_flight=True),
+        _voluntary(BOTH, in_flight=True),
+        _voluntary(NOTCH, in_flight=True),
         *_WRONG,
         *_FAULTS,
     )

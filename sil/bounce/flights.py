@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..aircraft import aircraft
 from ..aircraft.aircraft import Aircraft, Coupled
 from ..aircraft.stability import BAND
+from ..envelope.motions import stream
 from ..fast.closed_loop import Loop
 from ..plants.truth import Truth
 from ..scenarios import inputs as scenario_inputs
@@ -165,7 +166,7 @@ def fly(plan: Plan) -> Flown:
 
 def known(coupled: Coupled, seed: int) -> AircraftResponse:
     """What the firmware is given of an aircraft: its response, off by what is stated."""
-    gain, phase = UNSURE * np.random.default_rng([seed, 7]).standard_normal(2)
+    gain, phase = UNSURE * stream(f"known {coupled.aircraft.title}", seed).standard_normal(2)
     response = coupled.response(2j * np.pi * _TABLE.astype(np.complex128)) * (1.0 + gain) * np.exp(1j * phase)
     return AircraftResponse(_TABLE.tolist(), response.tolist(), gain_sigma=UNSURE, phase_sigma=UNSURE)
 

@@ -194,10 +194,12 @@ def _uncoupled(plan: Plan) -> float:
     return _vibration(fly(replace(plan, gearing=1e-9, raised_from=None, mitigation="none", dither=0.0)))
 
 
-def largest_gearing(craft: str, seed: int, *, mitigation: str, **changes: Any) -> Measured:
+def largest_gearing(
+    craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Plan] = lambda plan: plan, **changes: Any
+) -> Measured:
     """Up to which gearing the vibration stays below LOUD times that without the lever: in steps of a factor, finer
     about the first at which it does not."""
-    plan = _slack(craft, seed, mitigation, **changes)
+    plan = spoil(_slack(craft, seed, mitigation, **changes))
     return Measured({"gearing ÷ critical": _largest_quiet(plan, LOUD * _uncoupled(plan))})
 
 
@@ -239,13 +241,13 @@ def cancelled(craft: str, seed: int, *, mitigation: str) -> Measured:
 
 
 def _involuntary(flown: Flown) -> tuple[FloatArray, FloatArray]:
-    """What the cabin alone makes of the lever's angle [rad], and what the correction leaves of that; 2 to 8 Hz."""
-    plan = flown.plan.scenario
-    quiet = Conditions(flown.z_ddot, plan.period, 0.0, plan.motor.lag, np.random.default_rng(0))
-    theta, _, _ = plants.move(flown.truth, quiet, np.zeros_like(flown.z_ddot))
+    """What cabin and motor alone make of the lever's angle [rad], and what the correction leaves of that; 2 to 8 Hz."""
+    period = flown.plan.scenario.period
+    quiet = Conditions(flown.z_ddot, period, 0.0, 0.0, np.random.default_rng(0))
+    theta, _, _ = plants.move(flown.truth, quiet, flown.tau_m)
     alone = theta - flown.truth.rest
     left = alone + (flown.corrected - flown.theta)
-    return _in_band(alone, plan.period), _in_band(left, plan.period)
+    return _in_band(alone, period), _in_band(left, period)
 
 
 def _in_band(signal: FloatArray, period: float) -> FloatArray:
@@ -274,16 +276,17 @@ VOLUNTARY = 0.5
 """[Hz]"""
 
 
-def voluntary(craft: str, seed: int, *, mitigation: str) -> Measured:
-    """What the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over without."""
+def voluntary(craft: str, seed: int, *, mitigation: str, ratio: float = STABLE) -> Measured:
+    """What the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over without, at so
+    many times the critical gearing. At 0 the cabin does not answer."""
     pilot = pilots.table(pilots.arm(seed, pilots.SLACK))
     moves = {"kind": "sinusoid", "mean": pilot["trim"], "amplitude": "2 deg", "frequency": f"{VOLUNTARY} Hz"}
-    plan = geared(_slack(craft, seed, mitigation, pilot=pilot | {"trim": moves}), STABLE)
-    ratio = _answer(fly(plan)) / _answer(fly(replace(plan, mitigation="none")))
+    plan = geared(_slack(craft, seed, mitigation, pilot=pilot | {"trim": moves}), max(ratio, 1e-9))
+    answer = _answer(fly(plan)) / _answer(fly(replace(plan, mitigation="none")))
     return Measured(
         {
-            "gain changed": 100.0 * abs(abs(ratio) - 1.0),
-            "phase changed": abs(math.degrees(math.atan2(ratio.imag, ratio.real))),
+            "gain changed": 100.0 * abs(abs(answer) - 1.0),
+            "phase changed": abs(math.degrees(math.atan2(answer.imag, answer.real))),
         }
     )
 
@@ -304,9 +307,17 @@ STABLE_WITHOUT = 0.7
 def wrong(craft: str, seed: int, *, mitigations: Sequence[str], spoil: Callable[[Plan], Plan]) -> Measured:
     """Vibration with each mitigation over that without, in a loop that is stable without."""
     plan = geared(spoil(_slack(craft, seed, "none")), STABLE_WITHOUT)
-    passive = _vibration(fly(plan))
-    ratios = [_vibration(fly(replace(plan, mitigation=each))) / passive for each in mitigations]
-    return Measured({"vibration ÷ passive": max(ratios), "destabilised": float(max(ratios) > LOUD)})
+    passive = fly(plan)
+    flown = [fly(replace(plan, mitigation=each)) for each in mitigations]
+    ratio = max(map(_vibration, flown)) / _vibration(passive)
+    angle = max(map(_lever_in_band, flown)) / _lever_in_band(passive)
+    return Measured({"vibration ÷ passive": ratio, "angle ÷ passive": angle, "destabilised": float(ratio > LOUD)})
+
+
+def _lever_in_band(flown: Flown) -> float:
+    """rms of the corrected angle, 2 to 8 Hz [rad]."""
+    period = flown.plan.scenario.period
+    return float(np.std(_in_band(flown.corrected - flown.truth.rest, period)[flown.during(*_JUDGED)]))
 
 
 FAULT = 40.0
@@ -316,7 +327,7 @@ _NOTHING, _NO_TORQUE = math.radians(0.005), 2e-3
 
 def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Plan]) -> Measured:
     """How soon after a fault correction and torque are zero, and by how much the correction jumps in a sample."""
-    plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 2.0))
+    plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 2.0, dither=0.0))
     flown = fly(raised(plan, CANCELLED_AT))
     after = flown.during(FAULT, FAULT + 2.0)
     acts = (np.abs(flown.correction[after]) > _NOTHING) | (np.abs(flown.tau_m[after]) > _NO_TORQUE)
@@ -354,11 +365,14 @@ FIGURES: Mapping[str, Figure] = {
     "ROVER false alarms": Figure("1", "flights in which the ROVER-like detector raises an alarm", _total),
     "spectrum false alarms": Figure("1", "flights in which the recursive Fourier transform does", _total),
     "gearing ÷ critical": Figure("1", f"largest with {LOUD:g} × the vibration without the lever at most", least, False),
-    "involuntary cancelled": Figure("%", "power of θ by z̈ that the correction takes away, 2 to 8 Hz", mean, False),
+    "involuntary cancelled": Figure(
+        "%", "power of θ by cabin and motor that the correction takes away, 2 to 8 Hz", mean, False
+    ),
     "back after a grip": Figure("s", "until 80 % of two seconds are cancelled again", largest),
     "gain changed": Figure("%", f"of the pilot's input at {VOLUNTARY:g} Hz", largest),
     "phase changed": Figure("°", f"of the pilot's input at {VOLUNTARY:g} Hz", largest),
-    "vibration ÷ passive": Figure("1", "greatest of the mitigations", largest),
+    "vibration ÷ passive": Figure("1", "of the cabin, greatest of the mitigations", largest),
+    "angle ÷ passive": Figure("1", "corrected angle of the lever, 2 to 8 Hz, greatest of the mitigations", largest),
     "destabilised": Figure("1", f"runs with more than {LOUD:g} × the vibration without mitigation", _total),
     "to zero": Figure("s", "from the fault until correction and torque are zero", largest),
     "jump": Figure("°", "greatest change of the correction from sample to sample after the fault", largest),

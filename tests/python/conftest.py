@@ -52,7 +52,14 @@ class PuppetBus(can.BusABC):
         elif msg.arbitration_id == codec.message("COMMAND").frame_id:
             result = next(self._results, "accepted")
             if result is not None:
-                choices = {"model": 0, "preload": 0, "estimator": 0, "adaptation": 0, "mitigation": 0, "dither_rms": 0.0}
+                choices = {
+                    "model": 0,
+                    "preload": 0,
+                    "estimator": 0,
+                    "adaptation": 0,
+                    "mitigation": 0,
+                    "dither_rms": 0.0,
+                }
                 self._put("COMMAND_ACK", {"command_counter": msg.data[1] & 15, "result": result, **choices})
 
     def _put(self, name: str, values: dict[str, Any]) -> None:
