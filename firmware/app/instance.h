@@ -35,7 +35,7 @@ struct lever {
 /* One sample, by struct or from the bus. */
 enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample);
 
-/* After it, with an aircraft: works the margin out, once a publish_period. By itself, so that its stack is not beneath the estimator's. */
+/* After it, with an aircraft: works the margin out, once a publish_period, but at most 25 times a second. By itself, so that its stack is not beneath the estimator's. */
 void instance_watch(lever_t *lever);
 
 /* Carries a command out, or says why not and changes nothing. */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define DITHER_MOST 1.0e4f /* plausible [N m] */
+#define MARGIN_US 40000u   /* least time between two margins */
 #define SILENCE_US 20000u  /* or 1.25 sample periods: mitigation.h */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
@@ -54,7 +55,8 @@ void instance_watch(lever_t *lever)
 {
     bounce_t *bounce = &lever->bounce;
     const uint32_t time_us = lever->estimator.time_us;
-    if ((time_us - bounce->time_us) >= lever->link.publish_us) {
+    const uint32_t publish_us = lever->link.publish_us;
+    if ((time_us - bounce->time_us) >= ((publish_us > MARGIN_US) ? publish_us : MARGIN_US)) {
         bounce->time_us = time_us;
         bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
         bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever));
@@ -226,7 +228,7 @@ bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft)
         const margin_t unknown = {.gain = 0.0f};
         lever->bounce.aircraft = aircraft;
         lever->bounce.margin = unknown;
-        lever->bounce.time_us = 0u;
+        lever->bounce.time_us = lever->estimator.time_us - MARGIN_US;
         lever->bounce.state = (uint8_t)LEVER_BOUNCE_UNKNOWN;
     }
     return accepted;

@@ -46,7 +46,8 @@ static float clamped(float value, float most)
 static void fade(float *weight, bool on, float elapsed_us)
 {
     const float next = *weight + (on ? (elapsed_us / OPENING_US) : -(elapsed_us / CLOSING_US));
-    *weight = (next > 1.0f) ? 1.0f : ((next > 0.0f) ? next : 0.0f);
+    const float above = (next > 0.0f) ? next : 0.0f;
+    *weight = (above < 1.0f) ? above : 1.0f;
 }
 
 static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)
@@ -106,10 +107,11 @@ lever_correction_t mitigation_correction(const mitigation_t *mitigation)
 
 /* At the square root of both corners, where bounce is, it has no phase; everywhere it is within 90 degrees of the
  * signal, so that torque against it takes energy from the lever. */
-static float pass_band(mitigation_band_t *band, float value, float low, float high)
+static float pass_band(mitigation_band_t *band, float value, float period)
 {
-    band->low_pass += high * (value - band->low_pass);
-    band->level += low * (band->low_pass - band->level);
+    const float share = (HIGH_PASS_TURN * BAND_HIGH) * period;
+    band->low_pass += ((share < 1.0f) ? share : 1.0f) * (value - band->low_pass);
+    band->level += ((HIGH_PASS_TURN * BAND_LOW) * period) * (band->low_pass - band->level);
     return band->low_pass - band->level;
 }
 
@@ -178,12 +180,8 @@ static void advance(mitigation_t *mitigation, const lever_settings_t *settings, 
     step.tau_m += sample->drive * (mitigation->expected_damping - mitigation->damping);
     const bool stable = involuntary_step(
         &mitigation->involuntary, sample->dynamics, sample->constants, &step, settings->cancellation_corner);
-    const float low = (HIGH_PASS_TURN * BAND_LOW) * period;
-    const float high = (HIGH_PASS_TURN * BAND_HIGH) * period;
-    const float low_share = low / (1.0f + low);
-    const float high_share = high / (1.0f + high);
-    const float moved = pass_band(&mitigation->moved, sample->theta_dot, low_share, high_share);
-    const float expected = pass_band(&mitigation->expected, mitigation->involuntary.theta_dot, low_share, high_share);
+    const float moved = pass_band(&mitigation->moved, sample->theta_dot, period);
+    const float expected = pass_band(&mitigation->expected, mitigation->involuntary.theta_dot, period);
     compare(mitigation, moved, expected, period);
     const float gain = mitigation->damping_weight * settings->damping_gain;
     mitigation->damping = -clamped(gain * moved, settings->damping_limit);

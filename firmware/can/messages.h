@@ -185,7 +185,7 @@ typedef struct message_correction {
     float weight;     /* [1] */
     uint16_t time_low;
     uint8_t mitigation; /* enum lever_mitigation */
-    bool valid;         /* it is on, or fades in */
+    bool valid;         /* its gate is open */
 } message_correction_t;
 
 bool message_correction_encode(lever_frame_t *frame, const message_correction_t *message);

@@ -12,9 +12,8 @@ static uint32_t now_us(const loop_t *loop)
 
 static bool is_stale(const loop_t *loop)
 {
-    const bool acts =
-        (loop->frame.id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) || (loop->frame.id == (uint32_t)MESSAGE_CORRECTION_ID);
-    return !loop->lock_step && acts && ((now_us(loop) - loop->frame_us) > (1000u * (uint32_t)PORT_STALE_MS));
+    return !loop->lock_step && PORT_GOES_STALE(loop->frame.id) &&
+           ((now_us(loop) - loop->frame_us) > (1000u * (uint32_t)PORT_STALE_MS));
 }
 
 /* Sends the frame that is held or has just been fetched; PORT_NOTHING if it is held now. */
