@@ -365,9 +365,7 @@ FIGURES: Mapping[str, Figure] = {
     "ROVER false alarms": Figure("1", "flights in which the ROVER-like detector raises an alarm", _total),
     "spectrum false alarms": Figure("1", "flights in which the recursive Fourier transform does", _total),
     "gearing ÷ critical": Figure("1", f"largest with {LOUD:g} × the vibration without the lever at most", least, False),
-    "involuntary cancelled": Figure(
-        "%", "power of θ by cabin and motor that the correction takes away, 2 to 8 Hz", mean, False
-    ),
+    "involuntary cancelled": Figure("%", "of the power of θ by cabin and motor, 2 to 8 Hz", mean, False),
     "back after a grip": Figure("s", "until 80 % of two seconds are cancelled again", largest),
     "gain changed": Figure("%", f"of the pilot's input at {VOLUNTARY:g} Hz", largest),
     "phase changed": Figure("°", f"of the pilot's input at {VOLUNTARY:g} Hz", largest),

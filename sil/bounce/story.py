@@ -11,16 +11,16 @@ from lever_cdkf.host_tools.units import GRAVITY
 
 from . import pilots
 from .conditions import BOTH
-from .flights import STRIDE, Flown, Plan, fly
+from .flights import STRIDE, Plan, fly
 from .measure import geared
 
 TITLE = "Seen coming, and stopped"
 CAPTION = (
     "A pilot in a UH-60-like helicopter in gusts of 0.05 g relaxes: from 10 to 40 s the damping of his arm falls from "
-    "42 to 18 N s/m, and with it the gain margin of the loop through arm, lever and rotor. The same flight twice: without "
-    "mitigation it ends in a limit cycle, with cancellation and lever damping it goes on. The dotted line is where the "
-    "firmware raises its alarm; it knows the helicopter by a table of its response. Made by the same simulation as "
-    "<code>lever bounce</code>."
+    "42 to 18 N s/m, and with it the gain margin of the loop through arm, lever and rotor. The same flight twice: "
+    "without mitigation it ends in a limit cycle, with cancellation and lever damping it goes on. The dotted line is "
+    "where the firmware raises its alarm; it knows the helicopter by a table of its response. Made by the same "
+    "simulation as <code>lever bounce</code>."
 )
 _BEYOND = 1.2  # gearing over critical in the end
 _MOST = 15.0  # [dB]
@@ -44,11 +44,6 @@ def picture() -> Figure:
             line(time, angle[:: 5 * STRIDE], name, colour, 1), line(time, z_ddot[:: 5 * STRIDE], name, colour, 2)
         )
     figure.level(0.0)
-    figure.mark([alarm for alarm in (alarm_time(mitigated),) if alarm is not None])
+    alarms = mitigated.notes[mitigated.stability["state"] == lib.LEVER_BOUNCE_ALARM]
+    figure.mark(alarms[:1].tolist())
     return figure
-
-
-def alarm_time(flown: Flown) -> float | None:
-    """When the firmware raises its first alarm [s]."""
-    raised = flown.stability["state"] == lib.LEVER_BOUNCE_ALARM
-    return float(flown.notes[int(np.argmax(raised))]) if raised.any() else None

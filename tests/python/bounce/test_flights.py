@@ -21,7 +21,7 @@ def test_the_critical_gearing_is_that_of_the_margins(craft: str) -> None:
     transfer = flights.truth_of(plan).transfer(np.array([0, 1500, 2999]))
     found = flights.critical_gearing(aircraft.load(craft), transfer)
     loops = (loop_of(Coupled(aircraft.load(craft), 1.0), transfer, row) for row in range(3))
-    assert found == pytest.approx([stability.margins(loop).gain for loop in loops], rel=1e-3)
+    assert found == pytest.approx([stability.margins(loop).gain for loop in loops], rel=2e-3)  # 0.02 dB
 
 
 def test_a_gearing_goes_up_after_a_while() -> None:
