@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from lever_cdkf.host_tools.firmware.library import lib
 from lever_cdkf.host_tools.report.figure import Figure, axis, band, line, time_axis
+from lever_cdkf.host_tools.report.page import Story
 from lever_cdkf.host_tools.units import GRAVITY
 
 from . import pilots
@@ -26,8 +27,8 @@ _BEYOND = 1.2  # gearing over critical in the end
 _MOST = 15.0  # [dB]
 
 
-def picture() -> Figure:
-    """Margin, lever and cabin in both flights."""
+def tell() -> Story:
+    """Margin, lever and cabin in both flights. Raises LeverError."""
     plan = geared(Plan("uh60_like", 1, pilots.relaxing(1), 1.0), _BEYOND)
     without, mitigated = fly(plan), fly(replace(plan, mitigation=BOTH))
     rows = [axis("gain margin [dB]", range=[-5.0, _MOST]), axis("lever [°]"), axis("cabin [g]")]
@@ -46,4 +47,4 @@ def picture() -> Figure:
     figure.level(0.0)
     alarms = mitigated.notes[mitigated.stability["state"] == lib.LEVER_BOUNCE_ALARM]
     figure.mark(alarms[:1].tolist())
-    return figure
+    return Story(TITLE, figure, CAPTION)
