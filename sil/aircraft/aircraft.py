@@ -24,21 +24,13 @@ The correction is what the estimator has put out correction_delay and a sample p
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 
-from ..toml_tables import Place, ScenarioError, quantity, read, read_quantity, text, whole
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from ..toml_tables import Place, ScenarioError, Shelf, parse, quantity, read, read_quantity, text, whole
 
 Z_DOT, BETA, BETA_DOT = range(3)
 """Places in the state of the airframe [m/s, rad, rad/s]."""
@@ -95,29 +87,14 @@ class Aircraft:
         return response
 
 
-def names() -> list[str]:
-    """The aircraft that come with the package."""
-    folder = files(__package__)
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+SHELF = Shelf("aircraft", __package__)
+names = SHELF.names
 
 
 def load(name_or_path: str, **changes: Any) -> Aircraft:
     """The aircraft of that name, or in the file of that path (ending in .toml), with some of its keys changed: values
     as they stand in such a file. Raises ScenarioError."""
-    if name_or_path.endswith(".toml"):
-        if not Path(name_or_path).is_file():
-            raise ScenarioError(f"{name_or_path}: no such file")
-        content = Path(name_or_path).read_bytes()
-    elif name_or_path in names():
-        content = (files(__package__) / f"{name_or_path}.toml").read_bytes()
-    else:
-        raise ScenarioError(
-            f"no aircraft {name_or_path!r}; there are {', '.join(names())}, or give a path to a .toml file"
-        )
-    try:
-        values = tomllib.loads(content.decode("utf-8"))
-    except ValueError as error:  # also of text that is not UTF-8
-        raise ScenarioError(f"{name_or_path}: not TOML: {error}") from None
+    values = parse(SHELF.content(name_or_path), name_or_path)
     aircraft: Aircraft = read(Aircraft, values | changes, Place(name_or_path))
     return aircraft
 

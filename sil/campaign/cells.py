@@ -15,44 +15,13 @@ from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, parameters
 from numpy.typing import NDArray
 
+from ..study.figures.maps import Scale
 from .axis import Axis
 from .chunks import Plan
 from .summary import table
 
 BINS = 8
 """Of an axis of a design that is no grid."""
-
-
-@dataclass(frozen=True)
-class Scale:
-    """An axis of the map."""
-
-    label: str
-    """With its unit."""
-    values: tuple[float | str, ...]
-    """Of its cells; the middle of a bin."""
-    is_log: bool = False
-
-    @property
-    def position(self) -> Array:
-        """Of the cells, evenly spaced where the scale is even; names stand at 0, 1, 2 …"""
-        if self.is_named:
-            return np.arange(len(self.values), dtype=np.float64)
-        numbers = np.array(self.values, dtype=np.float64)
-        return np.log(numbers) if self.is_log else numbers
-
-    @property
-    def is_named(self) -> bool:
-        """Whether its values are names."""
-        return any(isinstance(value, str) for value in self.values)
-
-    def shown(self, most: int) -> list[int]:
-        """Indices of values that are written at the axis."""
-        return list(range(0, len(self.values), math.ceil(len(self.values) / most)))
-
-    def value(self, position: float) -> float:
-        """What is at a position; infinities stay."""
-        return float(np.exp(position)) if self.is_log else position
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from lever_cdkf.host_tools.arrays import Array, BoolArray
 from lever_cdkf.host_tools.firmware import quantities
 from numpy.typing import NDArray
 
-from ..fast.closed_loop import Loop
+from ..fast.closed_loop import Loop, available
 from ..run.summary import judged_samples
 from ..scenarios import inputs as scenario_inputs
 from ..scenarios.inputs import Inputs
@@ -72,7 +72,8 @@ def _measured(scenario: Scenario, inputs: Inputs, loop: Loop) -> dict[str, Array
         columns[name] = values if readings.corruption is None else readings.corruption.of(values)
         if name != "z_ddot":
             columns[name][inputs.missing["lever_frame"]] = np.nan
-    return columns if "z_ddot" in columns else columns | {"z_ddot": inputs.base}
+    columns.setdefault("z_ddot", inputs.base)
+    return {name: available(name, values) for name, values in columns.items()}
 
 
 def beside(flights: Sequence[Flight], name: str) -> Array:

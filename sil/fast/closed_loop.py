@@ -62,8 +62,8 @@ class FastRun:
 def run(scenario: Scenario, through_frames: bool = False, stride: float = STRIDE) -> FastRun:
     """Runs a scenario against a fresh instance of the firmware, by structs, or through CAN frames with E2E protection.
 
-    By structs values keep their single precision; frames round them as on a bus. Raises LeverError, also for a pilot
-    whose plant the C does not have.
+    By structs values keep their single precision; frames round them as on a bus. What is beyond the range of a frame is
+    not available either way. Raises LeverError, also for a pilot whose plant the C does not have.
     """
     inputs = scenario_inputs.prepare(scenario)
     every = max(1, round(stride / scenario.period))
@@ -197,8 +197,9 @@ class Loop:
 
     def check(self) -> None:
         """Raises LeverError when the firmware has refused a command."""
-        if self.struct.pointer.refused:
-            raise LeverError("the estimator refuses COMMAND")
+        loop = self.struct.pointer
+        if loop.refused:
+            raise LeverError(f"the estimator refuses COMMAND at {(loop.sample - 1) * self._scenario.period:g} s")
 
     @property
     def outputs(self) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -231,6 +232,15 @@ class Loop:
             mode=self._healths["mode"].copy(),
             recoveries=int(self._healths["recoveries"][-1]),
         )
+
+
+def available(name: str, values: FloatArray) -> FloatArray:
+    """Readings of the sensor `name`, NaN where they are beyond the range of their frame."""
+    field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
+    return np.where(np.abs(values / field["scale"]) < (field["mask"] >> 1) + 0.5, values, np.nan)
+
+
+_MESSAGES = {"grip_force": "GRIP_SAMPLE", "z_ddot": "BASE_SAMPLE"}
 
 
 @cache

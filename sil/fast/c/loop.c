@@ -66,11 +66,19 @@ static bool has_command(const loop_t *loop)
     return (loop->next_command < loop->commands) && (loop->command_sample[loop->next_command] == loop->sample);
 }
 
+/* Whether a frame can carry a value of so many steps of its field, as in the codec of host_tools; NaN does not fit. */
+static bool fits(const loop_field_t *field, double steps)
+{
+    const double most = (double)(field->mask >> 1u);
+    return (steps > (-most - 0.5)) && (steps < (most + 0.5));
+}
+
 /* --- by structs -------------------------------------------------------------------------------------------------- */
 
-static float single(double value, bool *valid)
+/* Not rounded as in a frame; but what does not fit into one is not available. */
+static float single(const loop_field_t *field, double value, bool *valid)
 {
-    *valid = !isnan(value);
+    *valid = fits(field, value / field->scale);
     return *valid ? (float)value : 0.0f;
 }
 
@@ -82,6 +90,11 @@ static void idle(loop_t *loop, lever_t *lever)
         lever_idle(lever, loop->idle_us);
         loop->idle_us = 0u;
     }
+}
+
+static float reading_of(const loop_t *loop, enum loop_signal which, bool *valid)
+{
+    return single(&loop->sensor[which].field, measured(loop, which), valid);
 }
 
 static void step_by_struct(loop_t *loop, lever_t *lever)
@@ -96,13 +109,13 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
             sample.time_us = loop->time_us[loop->sample];
         }
         if (loop->no_lever[loop->sample] == 0u) {
-            sample.theta = single(measured(loop, LOOP_THETA), &sample.theta_valid);
-            sample.theta_dot = single(measured(loop, LOOP_THETA_DOT), &sample.theta_dot_valid);
-            sample.tau_m = single(measured(loop, LOOP_TAU_M), &sample.tau_m_valid);
+            sample.theta = reading_of(loop, LOOP_THETA, &sample.theta_valid);
+            sample.theta_dot = reading_of(loop, LOOP_THETA_DOT, &sample.theta_dot_valid);
+            sample.tau_m = reading_of(loop, LOOP_TAU_M, &sample.tau_m_valid);
         }
-        sample.z_ddot = single(measured_base(loop), &sample.z_ddot_valid);
+        sample.z_ddot = single(&loop->base_field, measured_base(loop), &sample.z_ddot_valid);
         if (loop->has_grip) {
-            sample.grip_force = single(measured(loop, LOOP_GRIP_FORCE), &sample.grip_force_valid);
+            sample.grip_force = reading_of(loop, LOOP_GRIP_FORCE, &sample.grip_force_valid);
         }
         (void)lever_update(lever, &sample);
         loop->idle_us = 0u;
@@ -123,10 +136,9 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
  * precision, half to even; what does not fit is not available. */
 static uint64_t bits_of(const loop_field_t *field, double value)
 {
-    const double most = (double)(field->mask >> 1u);
     const double steps = value / field->scale;
     uint64_t bits = 0u;
-    if ((steps > (-most - 0.5)) && (steps < (most + 0.5))) {
+    if (fits(field, steps)) {
         const uint32_t count = (uint32_t)(int32_t)rint(steps) & field->mask;
         bits = ((uint64_t)count << field->start) | ((uint64_t)1u << field->valid);
     } else if (!isnan(value)) {

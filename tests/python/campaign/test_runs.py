@@ -40,9 +40,12 @@ def test_a_run_is_that_of_lever_sim(made: Made) -> None:
 SPIKES = 'sensors.theta.fault=[{kind="spikes", start="1 s", end="2 s", share="5 %", size="50 mrad"}]'
 
 
-@pytest.mark.parametrize("faults", [[], [SPIKES]])
-def test_what_was_measured_makes_the_firmware_say_the_same_to_the_bit(faults: list[str]) -> None:
-    steady = scenario.load("steady", ["duration=3 s", "converged_after=1 s", "limits={}", *faults])
+BEYOND = "pilot.process_noise=1e4 rad/s/sqrt(s)"  # what a frame can carry
+
+
+@pytest.mark.parametrize("changes", [[], [SPIKES], [BEYOND]])
+def test_what_was_measured_makes_the_firmware_say_the_same_to_the_bit(changes: list[str]) -> None:
+    steady = scenario.load("steady", ["duration=3 s", "converged_after=1 s", "limits={}", *changes])
     flight = simulate(steady, 0.1, measured=True)
     time_us = np.arange(3000) * 1000
     replayed = run_samples(steady.config, {"time_us": time_us, **flight.measured}, flight.at)
@@ -92,13 +95,15 @@ def test_rows_do_not_depend_on_how_flights_are_grouped(small: Plan) -> None:
 
 def test_a_run_that_cannot_be_is_a_row_with_its_error(made: Made, tmp_path: Path) -> None:
     text = '[[vary]]\nkey = "settings.theta_noise"\nvalues = ["1 mrad", "-1 mrad", "2 mrad"]\n'
+    text += '[[vary]]\nkey = "estimator.preload"\nvalues = ["trim", "fixed"]\n'
     plan = Plan(made('estimators = ["dual", "rls"]\n' + ONE.replace("20 s", "2 s").replace("8 s", "1 s") + text))
-    assert chunks.make(plan, Chunk(0, 3), tmp_path) == 6
-    rows = pq.read_table(tmp_path / Chunk(0, 3).name(plan.fingerprint)).to_pylist()
-    assert [row["error"] is not None for row in rows] == [False, False, True, True, False, False]
-    assert "theta_noise = -0.001 is out of range" in rows[2]["error"]
-    assert rows[2]["rms_m_p"] is None
-    assert (rows[2]["run"], rows[2]["seed"], rows[2]["settings.theta_noise"]) == (2, 2, -1.0)
+    assert chunks.make(plan, Chunk(0, 4), tmp_path) == 8
+    rows = pq.read_table(tmp_path / Chunk(0, 4).name(plan.fingerprint)).to_pylist()
+    assert [row["error"] is not None for row in rows] == [False, False, False, True, True, True, True, True]
+    assert rows[3]["error"].startswith("rls needs preload trim")
+    assert rows[4]["error"].startswith("ScenarioError: vary[0]: settings: theta_noise = -0.001 is out of range")
+    assert rows[4]["rms_m_p"] is None
+    assert (rows[4]["run"], rows[4]["seed"], rows[4]["settings.theta_noise"]) == (4, 3, -1.0)
 
 
 def test_chunks_cover_all_flights_once(small: Plan) -> None:

@@ -11,7 +11,7 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.can.commander import KEEP, Commander
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.native import run_samples
+from lever_cdkf.host_tools.firmware.native import lib, run_samples
 from lever_cdkf.sil import fast
 from lever_cdkf.sil.aircraft import aircraft
 from lever_cdkf.sil.aircraft.aircraft import Coupled
@@ -114,6 +114,18 @@ def test_a_run_in_process_has_the_frames_of_one_over_a_bus(name: str, overrides:
         assert np.array_equal(vars(quick.frames())[column], expected)
     assert (quick.unanswered, quick.misplaced) == (slow.unanswered, slow.misplaced)
     assert quick.identity.settings_crc == wanted.config.settings_crc
+
+
+def test_what_is_beyond_the_range_of_a_frame_is_not_available_by_structs_either() -> None:
+    sensors = [
+        f"sensors.{name}.fault=[{{kind='spikes', start='1 s', share='20 %', size='{size}'}}]"
+        for name, size in (("theta", "4 rad"), ("theta_dot", "20 rad/s"), ("tau_m", "40 N m"), ("z_ddot", "40 m/s^2"))
+    ]
+    wanted = scenario.load("steady", ["duration=3 s", "limits={}", *sensors])
+    missing = lib.LEVER_FAULT_THETA | lib.LEVER_FAULT_THETA_DOT | lib.LEVER_FAULT_TORQUE
+    by_structs, by_frames = (fast.run(wanted, through_frames, stride=1e-3) for through_frames in (False, True))
+    assert np.array_equal(by_structs.faults & missing, by_frames.faults & missing)
+    assert all((by_structs.faults & fault).any() for fault in (missing, lib.LEVER_FAULT_BASE))
 
 
 LOSSY = 'sensors.dropout=[{what="base_frame", share="50 %", burst="20 ms", start="1 s"}]'
