@@ -43,7 +43,7 @@ def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(campaign, "CONDITIONS", {"made_up": row})
     monkeypatch.setattr(campaign.os, "cpu_count", lambda: 1)
     (result,) = campaign.run([row], 2, lambda *_: None)
-    assert sorted(result.values["alarm lead"].tolist()) == [9.0, 9.0, 9.0, 19.0, 19.0, 19.0]
+    assert sorted(result.values["alarm lead"].tolist()) == [9.0, 9.0, 10.0, 19.0, 19.0, 20.0]
     assert not result.ok
     assert result.shown == "uh60_like, pilot 0"
     assert "MISSED" in bounce_page.build([result], 2)
