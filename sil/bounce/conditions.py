@@ -111,6 +111,7 @@ def _limit(mitigation: str, title: str, *limits: Limit, suffix: str = "", **chan
         partial(measure.largest_gearing, mitigation=mitigation, **changes),
         limits,
         () if limits else ("gearing ÷ critical",),
+        quick=mitigation == CANCELLATION and bool(limits),
     )
 
 
@@ -230,7 +231,7 @@ _SPOILT: tuple[tuple[str, str, Callable[[Plan], Plan]], ...] = (
     ("friction", "Coulomb friction of 0.3 N m", _more(lever={"lever_friction": "0.3 N m"})),
 )
 _WRONG = (
-    *(_wrong(name, title, spoil) for name, title, spoil in _SPOILT),
+    *(_wrong(name, title, spoil, quick=name == "k_p_low") for name, title, spoil in _SPOILT),
     *(_left(name, title, spoil) for name, title, spoil in _SPOILT),
 )
 
