@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.response_file import read_response
 from lever_cdkf.sil.aircraft import aircraft, stability
 from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.aircraft.tabulated import Tabulated
@@ -55,9 +54,9 @@ def test_what_is_no_response_is_refused(tmp_path: Path, content: str | bytes, er
     path = tmp_path / "bad.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(LeverError, match=error):
-        read_response(path)
+        Tabulated.load(path)
 
 
 def test_a_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(LeverError, match=r"none\.csv: No such file"):
-        read_response(tmp_path / "none.csv")
+        Tabulated.load(tmp_path / "none.csv")
