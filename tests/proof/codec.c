@@ -36,6 +36,7 @@ PROVE(stability,
     (SET(gain_margin), SET(gain_margin_sigma), SET(modulus), SET(modulus_sigma), SET(frequency), FLAG(valid)))
 PROVE(health, SET(excitation))
 PROVE(motor_command, (SET(torque), SET(dither), FLAG(valid)))
+PROVE(correction, (SET(correction), SET(weight), FLAG(valid)))
 PROVE(platform_health, FLAG(valid))
 PROVE(identity, SET(dither_rms))
 PROVE(command_ack, SET(dither_rms))
@@ -55,6 +56,7 @@ static void prove_all(float f)
     prove_stability(f);
     prove_health(f);
     prove_motor_command(f);
+    prove_correction(f);
     prove_platform_health(f);
     prove_identity(f);
     prove_command_ack(f);

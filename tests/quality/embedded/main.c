@@ -5,8 +5,8 @@
  *     embedded SAMPLES
  *
  * One run for each choice of preload and adaptation, and one for each model and estimator; a line is: run, sample,
- * mode, then the bits of the estimate. Then one run over the bus for each model and estimator; a line is: "bus", run,
- * sample, then the frames that were sent. The last line says whether self_test() passed. */
+ * mode, then the bits of the estimate. Then one run over the bus for each model and estimator, with an aircraft and a
+ * mitigation; a line is: "bus", run, sample, then the frames that were sent. The last line says whether self_test() passed. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -116,7 +116,7 @@ static void run(const lever_config_t *config, uint32_t samples)
 static void send_command(lever_t *lever, uint32_t index)
 {
     const message_command_t command = {(uint8_t)LEVER_REQUEST_NONE, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP,
-        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, DITHER};
+        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, DITHER};
     lever_frame_t frame;
 
     if (message_command_encode(&frame, &command)) {
@@ -209,7 +209,9 @@ int main(int argc, char **argv)
         if (choice > 0u) {
             run(&config, samples);
         }
+        config.mitigation = (uint8_t)(1u + (choice % ((uint8_t)LEVER_MITIGATION_COUNT - 1u)));
         run_bus(&config, samples);
+        config.mitigation = (uint8_t)LEVER_MITIGATION_NONE;
     }
     lever_memory_t memory;
     (void)printf("self test %s\n", self_test(&memory) ? "passed" : "failed");
