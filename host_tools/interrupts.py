@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command in silence, with exit status 130, whenever it comes.
+"""Ctrl-C ends a command with one line and exit status 130, whenever it comes.
 
 KeyboardInterrupt alone does not do that: it is lost when it is raised while an object is deleted, or in a library that
 catches everything. So it is remembered as well, and looked for now and then, and before files are put into place.

@@ -29,9 +29,9 @@ class Runs:
     """The runs of an estimator in a cell."""
 
     error: Array
-    """(n,) the largest rms error of what is judged; infinite for failed runs, and where none is known."""
+    """(n,) the largest rms error of what is judged; infinite for runs that failed or diverged."""
     coverage: Array
-    """(n, q) share of the time with the truth within ±2σ, of each; 0 for failed runs, NaN where no σ is stated."""
+    """(n, q) share of the time with the truth within ±2σ, of each; 0 for these, NaN where no σ is stated."""
     nees: Array
     settled: Array
     """[s]; infinite: never."""
@@ -128,9 +128,10 @@ def _runs(
         return values
 
     errors = np.max(np.stack([numbers(f"rms_{name}") for name in judged]), axis=0)
+    diverged = failed | ~np.isfinite(errors)  # also where the estimates' squares are beyond double precision
     covered = np.stack([numbers(f"coverage_{name}") for name in judged], axis=-1)
     settled_s = np.where(np.isnan(numbers("settled_s")), np.inf, numbers("settled_s"))
-    covered[failed] = 0.0
+    covered[diverged] = 0.0
     place = [
         _cell(rows[key].to_numpy(), scale) if key else np.zeros(rows.num_rows, dtype=np.int64)
         for key, scale in zip(keys, scales, strict=True)
@@ -144,7 +145,7 @@ def _runs(
             yield (
                 (at[0], at[1], at[2]),
                 Runs(
-                    np.where(failed | np.isnan(errors), np.inf, errors)[part],
+                    np.where(diverged, np.inf, errors)[part],
                     covered[part],
                     numbers("nees")[part],
                     settled_s[part],

@@ -34,7 +34,7 @@ def test_a_campaign_that_is_done_is_only_summed_up(lever: Run, small_file: Path,
     assert "48 runs, 0 failed" in out
     summary = json.loads((done / "summary.json").read_text())
     assert {name: summary[name] for name in ("asked", "runs", "failed")} == {"asked": 48, "runs": 48, "failed": 0}
-    (rows,) = json.loads((done / "printed.json").read_text()).values()
+    rows, _ = json.loads((done / "printed.json").read_text()).values()
     assert [(row["estimator"], row["runs"]) for row in rows] == [("dual", 24), ("rls", 24)]
 
 
@@ -49,7 +49,7 @@ def test_the_speed_is_kept_when_nothing_is_left_to_do(lever: Run, small: Plan, s
 def test_a_run_alone_is_printed_with_the_command_that_shows_it(lever: Run, small_file: Path, tmp_path: Path) -> None:
     status, out, _ = lever("campaign", small_file, "--run", "14", "--json", tmp_path / "row.json")
     assert status == 0
-    (rows,) = json.loads((tmp_path / "row.json").read_text()).values()
+    rows, _ = json.loads((tmp_path / "row.json").read_text()).values()
     row = {each["column"]: each["value"] for each in rows}
     assert (row["run"], row["seed"], row["estimator"], row["estimator.adaptation"]) == (14, 8, "dual", "robbins_monro")
     command = shlex.split(out.strip().splitlines()[-1])

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import polars
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from lever_cdkf.sil.campaign import border, cells, chunks, maps, spec
 from lever_cdkf.sil.campaign.cells import Map, Runs
@@ -100,14 +98,16 @@ def test_cells_are_what_polars_says(small: Plan, folder: Path) -> None:
                 assert covered[y, x] == pytest.approx(shares.mean(axis=0).min())
 
 
-def test_a_run_whose_error_is_not_known_counts_as_failed(small: Plan, folder: Path, tmp_path: Path) -> None:
+def test_a_run_whose_error_is_no_number_has_diverged(small: Plan, folder: Path, tmp_path: Path) -> None:
+    """Estimates of 1e200 are finite, and their squares are not."""
     for file in folder.glob("*.parquet"):
-        rows = pq.read_table(file)
-        place = rows.schema.get_field_index("rms_k_p")
-        unknown = rows.set_column(place, rows.schema.field(place), pa.nulls(rows.num_rows, pa.float64()))
-        pq.write_table(unknown, tmp_path / file.name)
+        polars.read_parquet(file).with_columns(polars.lit(None, polars.Float64).alias("rms_c_p")).write_parquet(
+            tmp_path / file.name
+        )
     found = cells.read(small, tmp_path)
-    assert np.isinf(found.array("dual", 0, cells.error)).all()
+    for name in small.spec.estimators:
+        assert np.all(found.array(name, 0, cells.error) == np.inf)
+        assert np.all(found.array(name, 0, cells.coverage) == 0.0)
 
 
 @pytest.fixture(scope="session")

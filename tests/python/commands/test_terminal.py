@@ -23,7 +23,7 @@ from processes import LEVER
 
 Shown = Callable[..., str]
 COMMANDS = (
-    *("campaign", "compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
+    *("aircraft", "campaign", "compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
     *("monitor", "qemu", "record", "replay", "settings", "sim", "tune"),
 )
 ROWS: list[Row] = [
