@@ -72,7 +72,7 @@ lever_sample_t arm_sample(arm_t *arm, uint32_t ms)
 
 void draw_settings(lever_config_t *config, arm_t *arm)
 {
-    float *value = &config->settings.sample_period;
+    float *value = (float *)(void *)&config->settings; /* an array of them: lever_cdkf.h */
     const float wide = 0.5f + (0.5f * arm_noise(arm)); /* how far from the defaults, 0 to 1 */
     do {
         for (uint32_t i = 0u; i < lever_setting_count(); i++) {

@@ -7,6 +7,7 @@
  *
  * The digest is the CRC-32 of every estimate, health and torque, or of every frame. The last run is self_test(). */
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,7 +41,7 @@ static void put_word(uint32_t word)
 static uint32_t bits_of(float value)
 {
     uint32_t bits = 0x7FC00000u; /* of every NaN */
-    if (value <= value) {
+    if (!isnan(value)) {
         (void)memcpy(&bits, &value, sizeof bits);
     }
     return bits;
@@ -216,13 +217,19 @@ static void send(sender_t *sender, lever_frame_t *frame, enum message_data_id da
 {
     e2e_protect(frame, (uint8_t)data_id, (uint8_t)(counter & 15u));
     const uint32_t fate = sender->rough ? arm_random(&sender->dice, 60u) : 60u;
+    uint32_t times = 1u;
     if (fate == 0u) {
         frame->data[arm_random(&sender->dice, 8u)] ^= (uint8_t)(1u << arm_random(&sender->dice, 8u));
-    }
-    if (fate == 1u) {
+    } else if (fate == 1u) {
         frame->length = (uint8_t)arm_random(&sender->dice, 8u);
+    } else if (fate == 2u) {
+        frame->id ^= 1u << arm_random(&sender->dice, 11u);
+    } else if (fate <= 4u) {
+        times = (fate - 3u) * 2u; /* lost, or twice */
+    } else {
+        /* as it is */
     }
-    for (uint32_t times = (fate == 2u) ? 0u : ((fate == 3u) ? 2u : 1u); times > 0u; times--) {
+    for (; times > 0u; times--) {
         put_word((uint32_t)lever_on_frame(sender->lever, frame));
     }
 }
@@ -290,6 +297,21 @@ static void disturb(sender_t *sender, uint32_t ms)
     }
 }
 
+/* Values that a frame cannot hold, or hardly. */
+static void exceed(arm_t *dice, lever_sample_t *sample)
+{
+    float *const value[] = {&sample->theta, &sample->theta_dot, &sample->tau_m, &sample->z_ddot, &sample->grip_force};
+    static const float most[] = {3.2767f, 16.3835f, 32.767f, 32.767f, 655.34f};
+    const uint32_t which = arm_random(dice, 200u);
+    if (which < 5u) {
+        *value[which] = most[which] * (1.0f + (4.0e-5f * arm_noise(dice))) * ((arm_noise(dice) < 0.0f) ? -1.0f : 1.0f);
+    } else if (which < 10u) {
+        *value[which - 5u] = 1000.0f * most[which - 5u] * arm_noise(dice);
+    } else {
+        /* as it is */
+    }
+}
+
 static void talk(const char *name, const lever_config_t *config, bool rough, uint32_t samples, uint32_t seed)
 {
     static const lever_aircraft_t aircraft = {.count = 4u,
@@ -316,6 +338,7 @@ static void talk(const char *name, const lever_config_t *config, bool rough, uin
         }
         if (rough) {
             disturb(&sender, ms);
+            exceed(&sender.dice, &sample);
         }
         send_sample(&sender, &sample, ms);
         const enum lever_mode mode = lever_step(sender.lever);
