@@ -279,11 +279,13 @@ bool message_platform_health_decode(message_platform_health_t *message, const le
 
 /* --- IDENTITY, multiplexed by page -------------------------------------------------------------------------------- */
 
+enum { PAGE_CODES = 6 }; /* of the page that has most */
+
 /* Code 0 is the page. */
 static const place_t version_code[] = {
     CODE(12u, 15u), CODE(16u, 255u), CODE(24u, 255u), CODE(32u, 255u), CODE(40u, 255u)};
 static const place_t settings_code[] = {CODE(12u, 15u), CODE(16u, UINT32_MAX)};
-static const place_t choices_code[] = {
+static const place_t choices_code[PAGE_CODES] = {
     CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(48u, 15u)};
 static const quantity_t choices_quantity[] = {UNSIGNED(32u, 65535u, 1000.0f)};
 static const layout_t identity[MESSAGE_PAGE_COUNT] = {
@@ -294,7 +296,7 @@ static const layout_t identity[MESSAGE_PAGE_COUNT] = {
 
 bool message_identity_encode(lever_frame_t *frame, const message_identity_t *message)
 {
-    const uint32_t code[MESSAGE_PAGE_COUNT][COUNT(choices_code)] = {
+    const uint32_t code[MESSAGE_PAGE_COUNT][PAGE_CODES] = {
         {message->page, message->firmware_major, message->firmware_minor, message->firmware_patch, message->contract},
         {message->page, message->settings_crc},
         {message->page, message->model, message->preload, message->estimator, message->adaptation, message->mitigation},
@@ -306,7 +308,7 @@ bool message_identity_encode(lever_frame_t *frame, const message_identity_t *mes
 
 bool message_identity_decode(message_identity_t *message, const lever_frame_t *frame)
 {
-    uint32_t code[COUNT(choices_code)] = {0u};
+    uint32_t code[PAGE_CODES] = {0u};
     float value[1] = {0.0f};
     const bool fits =
         layout_decode(code, value, &identity[MESSAGE_PAGE_SETTINGS], frame) && (code[0] < (uint32_t)MESSAGE_PAGE_COUNT);

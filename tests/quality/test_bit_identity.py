@@ -77,6 +77,7 @@ def test_the_program_exercises_the_filter(reference: list[str]) -> None:
 
 
 @pytest.mark.parametrize(("compiler", "flags"), BUILDS)
+@pytest.mark.requirement("R11")
 def test_same_bits(reference: list[str], compiler: str, flags: str, tmp_path: Path, build_dir: Path) -> None:
     program = build(compiler, flags, tools.core_sources(), tmp_path, build_dir)
     lines = output(*(BIG_ENDIAN[1:] if compiler == BIG_ENDIAN[0] else ()), program)

@@ -198,7 +198,7 @@ def test_bad_input_is_one_line(arguments: list[str], text: str, refused: Refused
         (LeverError("two\nlines"), 2, "lever: error: two lines\n"),
         (PermissionError(13, "Permission denied", "/x"), 2, "lever: error: [Errno 13] Permission denied: '/x'\n"),
         (can.CanInitializationError("no such interface"), 2, "lever: error: no such interface\n"),
-        (KeyboardInterrupt(), 130, ""),
+        (KeyboardInterrupt(), 130, "lever: interrupted\n"),
     ],
 )
 def test_errors_of_commands(

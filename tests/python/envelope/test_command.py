@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware, table
-from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
+from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware
+from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition
 from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
+from lever_cdkf.sil.judged import table
+from lever_cdkf.sil.judged.result import Limit
 from python.conftest import Refused
 
 QUICK = {
@@ -23,6 +25,7 @@ QUICK = {
 }  # fmt: skip
 
 
+@pytest.mark.requirement("R1", "R6", "R32", "R34")
 def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out

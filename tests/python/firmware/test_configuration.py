@@ -44,6 +44,7 @@ def test_the_defaults_are_those_of_the_table_and_are_accepted(config: Any) -> No
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: str(row.name))
+@pytest.mark.requirement("R28")
 def test_a_setting_is_accepted_at_both_limits_and_refused_by_name_beyond(row: Setting, config: Any) -> None:
     assert row.least <= row.default <= row.greatest
     assert row.unit
@@ -71,6 +72,7 @@ def test_a_setting_is_accepted_at_both_limits_and_refused_by_name_beyond(row: Se
         (2e-2, 4e-2, 1.0, True),
     ],
 )
+@pytest.mark.requirement("R28")
 def test_settings_that_do_not_go_together_are_refused_by_name(
     sample_period: float, gap_limit: float, trim_corner: float, accepted: bool, config: Any
 ) -> None:
@@ -100,6 +102,7 @@ def test_there_is_no_parameter_beyond() -> None:
         assert of(count - 1, 2) != ffi.NULL
 
 
+@pytest.mark.requirement("R26")
 def test_the_crc_of_the_settings_is_that_of_their_bytes_and_tells_every_one_of_them() -> None:
     def crc(values: list[float]) -> int:
         settings = ffi.new("lever_settings_t *", values)

@@ -69,6 +69,7 @@ def estimates(log: Path) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("name", ["sensor_dropout", "linear_black_box", "fixed_preload"])
+@pytest.mark.requirement("R52")
 def test_the_log_of_a_simulation_is_reproduced_to_the_byte(name: str, tmp_path: Path) -> None:
     session = simulated(name, tmp_path / "sim")
     summary = replayed(tmp_path / "out", session.log, "--settings", settings_of(session, tmp_path))

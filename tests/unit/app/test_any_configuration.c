@@ -59,6 +59,7 @@ static lever_sample_t draw_sample(void)
     return sample;
 }
 
+/* R12 */
 TEST(with_any_samples_it_stays_finite)
 {
     source.state = 99u;

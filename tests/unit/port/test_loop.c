@@ -155,6 +155,7 @@ TEST(without_room_a_frame_is_dropped_and_counted)
 }
 
 /* Linux sent one that was 2,999 ms old, after an outage. */
+/* R40 */
 TEST(only_what_acts_goes_stale)
 {
     static const struct {
@@ -189,6 +190,7 @@ TEST(only_what_acts_goes_stale)
     }
 }
 
+/* R38 */
 TEST(without_a_sample_the_estimator_is_told_each_5_ms)
 {
     const uint32_t since_us = clock_us;
