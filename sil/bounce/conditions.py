@@ -59,7 +59,6 @@ _ALARMS = (
         measure.relaxing,
         (_least("ahead of ROVER", 2.0, "worst"), _least("ahead of spectrum", 2.0, "worst")),
         ("ROVER lead", "spectrum lead"),
-        quick=True,
     ),
     Condition(
         "margin",

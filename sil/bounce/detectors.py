@@ -5,7 +5,7 @@ lowest that raise none in the ten hours of stable flight of conditions.py: `leve
 
 `rover` is the logic of the Real-time Oscillation VERifier (Mitchell, Arencibia, Munoz: Real-time detection of
 pilot-induced oscillations, AIAA 2004-4700): half cycles of both signals in a band, an oscillation where frequency,
-both amplitudes and the phase between them are those of the coupling, in three half cycles on end. The phase is taken
+both amplitudes and the phase between them are those of the coupling, in some half cycles on end. The phase is taken
 from the aircraft's response, which the original does not have.
 
 `spectrum` is a recursive Fourier transform with exponential forgetting (Morelli: Real-time parameter estimation in the
@@ -28,8 +28,8 @@ RATE = 50
 LEVER_UNIT = math.radians(0.5)
 """Of the lever's angle, where the acceleration counts in m/s^2: about what one makes of the other at the coupling."""
 
-ROVER_THRESHOLD, SPECTRUM_THRESHOLD = 1.0, 1.0
-"""[m/s^2]"""
+THRESHOLDS = {"uh60_like": (0.947, 0.833), "puma_like": (0.949, 0.826), "bo105_like": (0.983, 0.920)}
+"""Of `rover` and `spectrum` with each of the aircraft [m/s^2]."""
 
 Response = Callable[[complex], complex]
 """z_ddot / delta of the aircraft [m/s^2 per rad] at s [rad/s]."""
@@ -58,7 +58,8 @@ ROVER_BAND = (1.5, 8.0)
 """[Hz]"""
 PHASE = math.radians(60.0)
 """By which the phase may differ from that of a sustained oscillation."""
-HALF_CYCLES = 3
+HALF_CYCLES = 5
+"""Of 2, 3 and 5 that with the earliest alarm, as a median."""
 
 
 def rover(watched: Watched, response: Response) -> FloatArray:
@@ -123,8 +124,8 @@ def _extrema(signal: FloatArray) -> list[int]:
 
 SPECTRUM = np.arange(2.0, 8.01, 0.25)
 """[Hz]"""
-MEMORY = 1.0
-"""Time constant with which it forgets [s]."""
+MEMORY = 2.0
+"""Time constant with which it forgets [s]: of 0.5, 1 and 2 that with the earliest alarm, as a median."""
 
 
 def spectrum(watched: Watched) -> FloatArray:

@@ -97,6 +97,16 @@ def _loudness(flown: Flown) -> FloatArray:
     return loudness
 
 
+def _doubled(flown: Flown) -> float:
+    """From when on the vibration is LOUD times what it was in the first ten seconds, for two seconds at least [s]; the
+    end of the flight: never. A single gust does not count."""
+    loudness, notes = _loudness(flown), flown.notes
+    steady = float(np.median(loudness[(notes > 2.0) & (notes < 10.0)]))
+    lasts = round(2.0 / (notes[1] - notes[0]))
+    loud = np.lib.stride_tricks.sliding_window_view(loudness > LOUD * steady, lasts).all(axis=1)
+    return min(_first(loud & (notes[: len(loud)] > 10.0), notes), float(notes[-1]))
+
+
 def _first(where: BoolArray, time: FloatArray) -> float:
     """The first of these times [s]; inf: never."""
     return float(time[int(np.argmax(where))]) if where.any() else math.inf
@@ -105,9 +115,7 @@ def _first(where: BoolArray, time: FloatArray) -> float:
 def relaxing(craft: str, seed: int) -> Measured:
     """A pilot relaxes until the loop is unstable: who sees it coming?"""
     flown = fly(geared(Plan(craft, seed, pilots.relaxing(seed), 1.0, duration=75.0), BEYOND))
-    loudness, notes = _loudness(flown), flown.notes
-    steady = float(np.median(loudness[(notes > 2.0) & (notes < 10.0)]))
-    doubled = min(_first((loudness > LOUD * steady) & (notes > 10.0), notes), float(notes[-1]))
+    notes, doubled = flown.notes, _doubled(flown)
     alarm = _first(flown.stability["state"] == lib.LEVER_BOUNCE_ALARM, notes)
     rover, spectrum = (_first(level > limit, time) for time, level, limit in _detected(flown))
     at = int(np.searchsorted(notes, alarm)) if math.isfinite(alarm) else 0
@@ -130,7 +138,8 @@ def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:
     rover = detectors.rover(watched, lambda s: complex(coupled.response(np.array([s]))[0]))
     spectrum = detectors.spectrum(watched)
     time = (np.arange(len(spectrum)) + 1.0) / detectors.RATE
-    return (time, rover, detectors.ROVER_THRESHOLD), (time, spectrum, detectors.SPECTRUM_THRESHOLD)
+    limits = detectors.THRESHOLDS[flown.plan.craft]
+    return (time, rover, limits[0]), (time, spectrum, limits[1])
 
 
 def _margins(flown: Flown) -> Figures:
@@ -170,7 +179,7 @@ def stable(craft: str, seed: int, *, duration: float, ratio: float = STABLE) -> 
 
 _JUDGED = (40.0, 60.0)
 """When vibration is [s]."""
-_COARSE, _FINE, _MOST = 1.3, 2, 12.0
+_LEAST, _COARSE, _FINE, _MOST = 0.5, 1.5, 2, 13.0
 
 
 def _slack(craft: str, seed: int, mitigation: str, **changes: Any) -> Plan:
@@ -207,7 +216,7 @@ def _largest_quiet(plan: Plan, most: float) -> float:
     def is_quiet(ratio: float) -> bool:
         return _vibration(fly(raised(plan, ratio))) <= most
 
-    quiet, factor = 0.25, _COARSE
+    quiet, factor = _LEAST, _COARSE
     while quiet * factor <= _MOST and is_quiet(quiet * factor):
         quiet *= factor
     for _ in range(_FINE):
@@ -349,7 +358,7 @@ def _rms(values: FloatArray) -> float:
 
 
 FIGURES: Mapping[str, Figure] = {
-    "alarm lead": Figure("s", f"alarm before the vibration is {LOUD:g} × usual", least, False),
+    "alarm lead": Figure("s", f"alarm before the vibration is {LOUD:g} × usual for two seconds", least, False),
     "ROVER lead": Figure("s", "the same of the ROVER-like detector", least, False),
     "spectrum lead": Figure("s", "the same of the recursive Fourier transform", least, False),
     "ahead of ROVER": Figure("s", "alarm before that of the ROVER-like detector", least, False),

@@ -121,4 +121,4 @@ def test_the_contract_has_a_word_for_each_state() -> None:
     choices = codec.message("STABILITY").get_signal_by_name("bounce").choices
     assert choices is not None
     assert [str(word) for word in choices.values()] == ["unknown", "clear", "warning", "alarm"]
-    assert AircraftResponse([1.0, 2.0, 3.0], [1j] * 3, gain_sigma=0.0, phase_sigma=0.0).warning == 3.0
+    assert AircraftResponse([1.0, 2.0, 3.0], [1j] * 3, gain_sigma=0.0, phase_sigma=0.0).warning == 5.0

@@ -30,7 +30,7 @@ def oscillating(amplitude: float, frequency: float = 4.0, phase: float = 0.0) ->
 def test_rover_finds_the_amplitude_of_an_oscillation_of_the_coupling() -> None:
     level = detectors.rover(oscillating(0.7), lambda s: ANSWER)
     assert level[5 * RATE :].min() == pytest.approx(0.7, rel=0.15)
-    assert level[: round(0.3 * RATE)].max() == 0.0
+    assert level[: round(0.5 * RATE)].max() == 0.0
 
 
 @pytest.mark.parametrize(("frequency", "phase"), [(1.0, 0.0), (4.0, 2.0), (4.0, -2.0), (4.0, math.pi)])
