@@ -20,6 +20,7 @@ REQUIRE_ALL = os.environ.get("LEVER_REQUIRE_ALL") == "1"
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "requires(*tools): skip unless these programs are installed")
+    config.addinivalue_line("markers", "requirement(*numbers): proves these of firmware/REQUIREMENTS.md")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

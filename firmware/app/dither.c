@@ -61,7 +61,7 @@ static float band_variance(const dither_t *dither)
 void dither_init(dither_t *dither, float low, float high, float period, float rms_most, float fade)
 {
     const float highest = HIGHEST / period;
-    dither->low = (HIGH_PASS_TURN * period) * ((low < highest) ? low : highest);
+    dither->low = (HIGH_PASS_TURN * period) * low; /* 2 Hz of at least 50 samples a second */
     dither->high = (HIGH_PASS_TURN * period) * ((high < highest) ? high : highest);
     dither->scale = sqrtf(3.0f / band_variance(dither)); /* uniform() has a variance of 1/3 */
     dither->rms_most = rms_most;

@@ -45,7 +45,7 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
 /* The lesson teaches the parameters: besides, the sensors are right and somebody holds the lever. */
 static bool teaches(const learning_t *learning, const lesson_t *lesson)
 {
-    return lesson->walks && lesson->measured && lesson->excited && !learning->monitor.base_wrong &&
+    return lesson->measured && lesson->excited && !learning->monitor.base_wrong &&
            !monitor_has_stuck(&learning->monitor) && !learning->hands.off && (learning->wait <= 0.0f);
 }
 
@@ -219,7 +219,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     correction_t correction;
     learning->elapsed = 0.0f;
     learning->wait = (learning->wait > period) ? (learning->wait - period) : 0.0f;
-    if (!lesson->excited && (learning->wait < AWAKE)) {
+    if (!lesson->excited) {
         learning->wait = AWAKE;
     }
     learning->changed = (learning->changed > period) ? (learning->changed - period) : 0.0f;

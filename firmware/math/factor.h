@@ -119,7 +119,7 @@ static inline void factor_reverse_solve(const float *u, uint32_t n, float *row, 
     }
 }
 
-/* Variance of element i, and its standard deviation: the norm of row i. */
+/* Variance of element i: the square of the norm of row i. */
 static inline float factor_variance(const float *factor, uint32_t n, uint32_t i)
 {
     float square = 0.0f;
@@ -127,11 +127,6 @@ static inline float factor_variance(const float *factor, uint32_t n, uint32_t i)
         square += factor[(i * n) + k] * factor[(i * n) + k];
     }
     return square;
-}
-
-static inline float factor_sigma(const float *factor, uint32_t n, uint32_t i)
-{
-    return sqrtf(factor_variance(factor, n, i));
 }
 
 #endif

@@ -39,7 +39,7 @@ lever.dbc (IDENTITY says so), they are compared with the new ones, signal by sig
 
 {MAP_HELP}
 The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
-choice (model, preload, estimator, adaptation) that is made here. sample_period is that of mapped signals.
+choice (model, preload, estimator, adaptation, mitigation) that is made here. sample_period is that of mapped signals.
 """
 _EPILOG = """\
 examples:
@@ -69,7 +69,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--channel", metavar="NAME", help="the bus with the samples (default: the only one that has any)"
     )
-    for what in ("model", "preload", "estimator", "adaptation"):
+    for what in ("model", "preload", "estimator", "adaptation", "mitigation"):
         parser.add_argument(f"--{what}", help=f"choose the {what}, whatever the log says (`lever settings` lists them)")
     parser.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
     parser.add_argument(

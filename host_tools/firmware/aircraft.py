@@ -13,7 +13,7 @@ from .library import ffi, lib
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-WARNING, ALARM = 3.0, 1.5
+WARNING, ALARM = 4.5, 3.0
 """Gain margins below which there is a warning and an alarm, where nothing else is said [dB]."""
 
 
@@ -31,6 +31,15 @@ class Stability(NamedTuple):
     frequency: float
     """At which it becomes unstable [Hz]."""
     frequency_sigma: float
+
+
+class Correction(NamedTuple):
+    """lever_correction_t: what mitigation adds to the lever's angle where that becomes collective pitch."""
+
+    angle: float
+    """[rad]"""
+    weight: float
+    """Of the fade that is in it: 0 passive, 1 all of it."""
 
 
 class AircraftResponse:

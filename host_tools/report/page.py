@@ -2,6 +2,7 @@
 
 import html
 from importlib.resources import files
+from typing import NamedTuple
 
 from . import captions, summary_html
 from .charts import comparison, health, signals, stability, tracking, transfer
@@ -49,13 +50,24 @@ class Page:
         return document(f"Lever CDKF: {self.title}", body, self.figures, style)
 
 
-def build(run: Run) -> str:
+class Story(NamedTuple):
+    """A picture that is no chart of the run, in front of those that are."""
+
+    title: str
+    figure: Figure
+    caption: str
+    """HTML"""
+
+
+def build(run: Run, story: Story | None = None) -> str:
     """The whole page."""
     scenario = run.simulated.scenario if run.simulated else None
     title = (
         (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.get("logs", ())) or "recorded run"
     )
     page = Page(title, _subtitle(run), "lever sim" if run.simulated else "lever replay")
+    if story is not None:
+        page.section("story", "Bounce", story.title, page.figure("figure-story", story.figure, story.caption))
     _estimates(page, run)
     _explained(page, run)
     _comparison(page, run)

@@ -30,6 +30,7 @@ class Estimator:
     preload: str
     estimator: str
     adaptation: str
+    mitigation: str
     settings: dict[str, float]
 
 

@@ -18,7 +18,8 @@ Science and Technology 36, 2014.) Signs: a cabin that accelerates upwards leaves
 at low frequency the loop is a negative feedback; the arm beyond its own frequency, the delay and the actuator turn it
 round.
 
-The pitch follows gearing * delta(t - delay) as a first-order actuator with limits of rate and travel.
+The pitch follows gearing * (delta + correction)(t - delay) as a first-order actuator with limits of rate and travel.
+The correction is what the estimator has put out correction_delay and a sample period earlier.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ class Aircraft:
     mass: float = quantity("kg", above=0.0)
     lift_deficiency: float = quantity("1", 0.7, above=0.0, greatest=1.0)
     delay: float = quantity("s", 0.020, least=0.0, greatest=0.2)
+    correction_delay: float = quantity("s", 0.0, least=0.0, greatest=0.2)
     actuator_bandwidth: float = quantity("Hz", 8.0, above=0.0)
     actuator_rate: float = quantity("rad/s", np.radians(100.0), above=0.0)
     actuator_travel: float = quantity("rad", np.radians(8.0), above=0.0)

@@ -70,8 +70,9 @@ def _measured(scenario: Scenario, inputs: Inputs, loop: Loop) -> dict[str, Array
         readings = scenario_inputs.readings(scenario, inputs, name)
         values = readings.sensor.measure(signal, scenario.period, scenario.stream(name))
         columns[name] = values if readings.corruption is None else readings.corruption.of(values)
-        columns[name][inputs.missing["lever_frame"]] = np.nan
-    columns["z_ddot"] = inputs.base
+        if name != "z_ddot":
+            columns[name][inputs.missing["lever_frame"]] = np.nan
+    columns.setdefault("z_ddot", inputs.base)
     return {name: available(name, values) for name, values in columns.items()}
 
 

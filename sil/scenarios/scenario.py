@@ -84,6 +84,7 @@ class Estimator:
     preload: str | None = _one_of("lever_preload")
     estimator: str | None = _one_of("lever_estimator")
     adaptation: str | None = _one_of("lever_adaptation")
+    mitigation: str | None = _one_of("lever_mitigation")
 
 
 def _read_numbers(readers: Mapping[str, Reader]) -> Reader:

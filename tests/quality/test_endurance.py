@@ -56,6 +56,7 @@ def flown(program: Path, scene: str, estimator: int, settings: str, seconds: int
     ("scene", "settings", "within", "share"), [("calm", "plain", 0.003, 0.99), ("drift", "default", 0.05, 0.99)]
 )
 @pytest.mark.parametrize(("estimator", "name"), enum_names("lever_estimator").items())
+@pytest.mark.requirement("R2")
 def test_single_precision_goes_where_double_goes(
     programs: Path, scene: str, settings: str, within: float, share: float, estimator: int, name: str
 ) -> None:

@@ -78,6 +78,7 @@ def test_port_includes_only_what_it_may(folder: str) -> None:
                 assert {name, str(Path(name).parent)} & PORT_MAY_INCLUDE[folder], f"{file}: {name}"
 
 
+@pytest.mark.requirement("R15")
 def test_no_double() -> None:
     for file in [*tools.core_sources(), *HEADERS, FACADE]:
         code = re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -96,6 +97,7 @@ def test_shared_library_exports_the_facade_and_nothing_else(build_dir: Path) -> 
 
 
 @pytest.mark.requires("nm")
+@pytest.mark.requirement("R15")
 def test_core_calls_nothing_but_a_few_library_functions(build_dir: Path) -> None:
     library = build_dir / "firmware/liblever_cdkf.a"
     called = symbols(library, "--undefined-only") - symbols(library, "--defined-only")
@@ -103,6 +105,7 @@ def test_core_calls_nothing_but_a_few_library_functions(build_dir: Path) -> None
 
 
 @pytest.mark.requires("readelf")
+@pytest.mark.requirement("R15")
 def test_core_has_no_mutable_statics(build_dir: Path) -> None:
     output = tools.run(["readelf", "--section-headers", "--wide", build_dir / "firmware/liblever_cdkf.a"]).stdout
     section = re.compile(r"\] (\.t?(?:data|bss)\S*)\s+\w+\s+[0-9a-f]+ [0-9a-f]+ ([0-9a-f]+)")

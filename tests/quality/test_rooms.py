@@ -27,16 +27,22 @@ MAY_IMPORT = {
     "sil/oracle": {"models"},
     "sil/aircraft": set(),
     "sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
-    "sil/fast": {"scenarios", "plants", "firmware", "can"},
+    "sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
     "sil/run": {"fast", "scenarios", "plants", "aircraft", "firmware", "can", "results", "report", "watch", "exports"},
-    "sil/envelope": {"fast", "plants", "firmware", "models", "report"},
+    "sil/judged": {"report"},
+    "sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
+    "sil/bounce": {
+        *("judged", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
+        *("firmware", "models", "report"),
+    },
+    "sil/faults": {"fast", "envelope", "firmware", "can"},
     "sil/study": {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
     "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
     "sil/commands": {
-        *("campaign", "run", "scenarios", "study", "envelope", "aircraft"),
+        *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "faults", "aircraft"),
         *("firmware", "can", "report", "exports"),
     },
 }

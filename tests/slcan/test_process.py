@@ -76,6 +76,7 @@ class Line:
 # --- as an adapter, behind a pseudo-terminal ----------------------------------------------------------------------
 
 
+@pytest.mark.requirement("R49")
 def test_its_answers_are_those_of_the_firmware_in_this_process(start: Start, link: Path) -> None:
     process = start("pty", link)
     there = host(link)
@@ -123,6 +124,7 @@ def test_a_host_that_was_killed_leaves_nothing_behind(start: Start, link: Path) 
     process.stop()
 
 
+@pytest.mark.requirement("R50")
 def test_a_host_that_never_reads_is_not_waited_for(start: Start, link: Path) -> None:
     process = start("pty", link)
     flood = b"O\r" + b"".join(as_line(frame) for sample in rig.samples(0, 4000) for frame in sample)

@@ -51,6 +51,7 @@ def hears(peer: Peer, frame: Frame, time_ms: int = 0) -> bytes:
         (b"O\rt" + 397 * b"1" + b"\rt1100\r", b"\r\az\r"),  # too long: refused once, and over with its end
     ],
 )
+@pytest.mark.requirement("R51")
 def test_answers(data: bytes, answer: bytes, peer: Peer) -> None:
     assert says(peer, data) == answer
 
@@ -67,6 +68,7 @@ def test_bit_rates_are_set_while_closed(peer: Peer) -> None:
     assert (peer.state.bit_rate, peer.state.bit_timing) == (3, 0)
 
 
+@pytest.mark.requirement("R51")
 def test_malformed_frames_and_unknown_commands_are_refused(peer: Peer) -> None:
     for opening in (b"", b"O\r"):
         says(peer, opening)

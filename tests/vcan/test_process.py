@@ -45,6 +45,7 @@ def test_an_interface_that_is_not_can(build_dir: Path) -> None:
     assert refusal(build_dir / "lever_can", "lo") == "not a CAN interface\n"
 
 
+@pytest.mark.requirement("R49")
 def test_its_answers_are_those_of_the_firmware_in_this_process(start: rig.Starter, host: rig.Host) -> None:
     process = start()
     began = time.perf_counter()
@@ -79,6 +80,7 @@ def test_a_signal_ends_it_under_full_load(start: rig.Starter, interface: str) ->
         flood.wait()
 
 
+@pytest.mark.requirement("R50")
 def test_it_goes_on_after_the_interface_was_down(start: rig.Starter, interface: str, host: rig.Host) -> None:
     process = start()
     answers = host.run(SAMPLES)
@@ -192,6 +194,7 @@ def test_another_estimator_on_the_bus_is_noticed(start: rig.Starter, host: rig.H
 
 
 @pytest.mark.requires("cangen")
+@pytest.mark.requirement("R50")
 def test_a_full_receive_buffer_is_counted(start: rig.Starter, interface: str, host: rig.Host) -> None:
     """While the process is stopped more frames come than the kernel keeps for it."""
     process = start()

@@ -37,6 +37,7 @@ static const char help[] =
     "  --preload NAME       where the springs rest: fixed, or at a trim angle that is followed\n"
     "  --estimator NAME     how state and parameters are estimated together\n"
     "  --adaptation NAME    how the parameter noise is set\n"
+    "  --mitigation NAME    what is done against collective bounce\n"
     "  --aircraft FILE      watch the margin to collective bounce with the response of this helicopter (STABILITY);\n"
     "                       `lever aircraft` writes such a file, firmware/port/linux/aircraft.h says what is in it\n"
     "  --lock-step          time is that of the samples alone: for simulations that may pause; never beside a motor\n"
@@ -73,6 +74,7 @@ static const struct option known[] = {
     {"preload", required_argument, NULL, '='},
     {"estimator", required_argument, NULL, '='},
     {"adaptation", required_argument, NULL, '='},
+    {"mitigation", required_argument, NULL, '='},
     {"aircraft", required_argument, NULL, 'a'},
     {"lock-step", no_argument, NULL, 'k'},
     {"verbose", no_argument, NULL, 'v'},

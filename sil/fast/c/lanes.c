@@ -67,6 +67,11 @@ void lanes_move(const lanes_t *lanes, uint32_t first, uint32_t last)
     }
 }
 
+void lanes_advance(const lanes_t *lanes, uint32_t i, double begin, double end)
+{
+    advance(lanes, i, 0u, begin, end);
+}
+
 /* --- with the firmware ------------------------------------------------------------------------------------------- */
 
 /* The firmware takes sample i. */

@@ -42,6 +42,9 @@ typedef struct lanes {
 /* Moves all lanes from sample `first` to sample `last`. */
 void lanes_move(const lanes_t *lanes, uint32_t first, uint32_t last);
 
+/* Moves the only lane from sample i to sample i + 1, with further torque [N m] at its begin and end. */
+void lanes_advance(const lanes_t *lanes, uint32_t i, double begin, double end);
+
 /* The firmware of each lane, and what it gets to see. */
 typedef struct lanes_loop {
     struct lever *const *lever; /* [width] */

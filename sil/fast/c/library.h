@@ -2,6 +2,7 @@
 #ifndef LIBRARY_H
 #define LIBRARY_H
 
+#include "channel.h"
 #include "filters.h"
 #include "lanes.h"
 #include "loop.h"

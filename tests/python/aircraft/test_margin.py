@@ -49,6 +49,7 @@ def expected(arm: FloatArray, coupled: Coupled, factor: complex = 1.0) -> stabil
 
 
 @pytest.mark.parametrize("name", aircraft.names())
+@pytest.mark.requirement("R42")
 def test_margins_are_those_of_the_linearised_loop(name: str) -> None:
     random, craft = np.random.default_rng(3), aircraft.load(name)
     for _ in range(30):
@@ -64,6 +65,7 @@ def test_margins_are_those_of_the_linearised_loop(name: str) -> None:
             assert found.modulus < 0.0
 
 
+@pytest.mark.requirement("R42")
 def test_standard_deviations_are_those_of_drawn_arms() -> None:
     """1000 arms with independent log-normal errors of 10 %."""
     arm, coupled = np.array((2.5, 30.0, 1500.0)), Coupled(aircraft.load("uh60_like"), 0.5)
@@ -75,6 +77,7 @@ def test_standard_deviations_are_those_of_drawn_arms() -> None:
     assert found.modulus_sigma == pytest.approx(np.std([each.modulus for each in drawn]), rel=0.15)
 
 
+@pytest.mark.requirement("R42")
 def test_what_the_table_is_off_by_is_in_the_standard_deviations() -> None:
     arm, coupled = np.array((2.5, 30.0, 1500.0)), Coupled(aircraft.load("uh60_like"), 0.5)
     exact, margins = said(arm, 1e-3, table(coupled)), expected(arm, coupled)
@@ -89,6 +92,7 @@ def test_what_the_table_is_off_by_is_in_the_standard_deviations() -> None:
     assert of_frequency == pytest.approx(abs(rotated.frequency - margins.frequency), rel=0.05)
 
 
+@pytest.mark.requirement("R43")
 def test_the_alarm_comes_before_the_vibration_grows() -> None:
     """The shipped scenario with the firmware's own dither: the pilot relaxes from 10 s on."""
     wanted = scenario.load("bounce", ["duration=42 s"])
@@ -96,7 +100,7 @@ def test_the_alarm_comes_before_the_vibration_grows() -> None:
     known, firmware = inputs.prepare(wanted), Estimator(wanted.config)
     z_ddot, flight = known.z_ddot, Flight(wanted.aircraft, wanted.period, known.z_ddot.copy())
     body = known.truth.body(inputs.conditions(wanted, known))
-    firmware.watch(table(wanted.aircraft, 0.05, 0.05))
+    firmware.watch(table(wanted.aircraft, 0.05, 0.05, warning=3.0, alarm=1.5))
     noise = np.random.default_rng(5).standard_normal((len(z_ddot), 4)) * (1e-3, 1e-2, 2e-3, 1e-2)
     rest, states, margins = body.theta, [], []
     z_ddot[0] = flight.z_ddot

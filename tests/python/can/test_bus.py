@@ -106,6 +106,7 @@ def test_queue_is_bounded(
 
 
 @pytest.mark.parametrize("kind", ["is_extended_id", "is_remote_frame", "is_error_frame"])
+@pytest.mark.requirement("R20")
 def test_frames_of_other_kinds_pass_by(make_bus: MakeBus, samples: Samples, message: ToMessage, kind: str) -> None:
     bus = make_bus("x", receive_own_messages=True)
     lever, base = (message(frame) for frame in samples(0, 1)[0])

@@ -106,6 +106,7 @@ def test_every_flipped_bit_is_found(name: str) -> None:
 
 
 @pytest.mark.parametrize(("message", "signal"), FIELDS, ids=FIELD_NAMES)
+@pytest.mark.requirement("R16")
 def test_field_against_cantools(message: Message, signal: Signal) -> None:
     assert signal.minimum is not None
     assert signal.maximum is not None

@@ -18,6 +18,7 @@ DATA_IDS = bytes(range(BASE, BASE + 16))
 BASES = [data_id_base(message) for message in DBC.messages]
 
 
+@pytest.mark.requirement("R17")
 def test_protect(codec: Codec) -> None:
     dice = random.Random(1)
     for base in BASES:
@@ -131,6 +132,7 @@ class Channel:
         return None
 
 
+@pytest.mark.requirement("R17")
 def test_receiver_over_random_sequences(codec: Codec) -> None:
     dice = random.Random(3)
     seen: set[str] = set()

@@ -54,6 +54,7 @@ def answers(estimator: Estimator, name: str) -> list[dict[str, float]]:
     return [codec.decode(*frame)[1] for frame in frames if frame[0] == codec.message(name).frame_id]
 
 
+@pytest.mark.requirement("R24")
 def test_every_command_is_acknowledged_and_a_repeated_one_refused(samples: Samples) -> None:
     estimator, commander, sent = Estimator(), Commander(), list[bytes]()
     for lever, base in samples(0, 20):
@@ -77,6 +78,7 @@ def test_every_command_is_acknowledged_and_a_repeated_one_refused(samples: Sampl
     assert commander.send({}, lambda _, data: None) == 20 % 16
 
 
+@pytest.mark.requirement("R26")
 def test_an_estimator_says_what_it_is(samples: Samples) -> None:
     config = Config(preload="fixed", estimator="joint", settings={"m_p": 3.0})
     estimator, identity = Estimator(config), Identity()

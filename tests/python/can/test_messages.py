@@ -120,6 +120,7 @@ def encode_one(codec: Codec, message: Message, signal: Signal, value: float) -> 
 
 
 @pytest.mark.parametrize(("message", "signal"), QUANTITIES)
+@pytest.mark.requirement("R16")
 def test_limits_and_beyond(codec: Codec, message: Message, signal: Signal) -> None:
     values = [-1e30, 1e30, -math.inf, math.inf, math.nan, 0.0, -0.0]
     for raw in limits(signal):
@@ -178,6 +179,7 @@ def random_values(message: Message, dice: random.Random) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("message", MESSAGES)
+@pytest.mark.requirement("R16")
 def test_random_values_both_ways(codec: Codec, message: Message) -> None:
     dice = random.Random(message.frame_id)
     for _ in range(SWEEP):

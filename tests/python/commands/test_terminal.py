@@ -23,8 +23,8 @@ from processes import LEVER
 
 Shown = Callable[..., str]
 COMMANDS = (
-    *("aircraft", "campaign", "compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
-    *("monitor", "qemu", "record", "replay", "settings", "sim", "tune"),
+    *("aircraft", "bounce", "campaign", "compare", "dbc", "demo", "envelope", "faults", "figures", "flash"),
+    *("live", "map", "monitor", "qemu", "record", "replay", "settings", "sim", "tune"),
 )
 ROWS: list[Row] = [
     {
@@ -95,13 +95,17 @@ def test_every_command_is_tried_here(shown: Shown) -> None:
         "campaign --list",
         "compare --list",
         "compare --envelope --list",
+        "bounce --list",
         "envelope --list",
+        "faults --list",
         "figures --list",
         "settings",
         "dbc",
         "sim demo --set duration=6s --set converged_after=3s",
         "sim demo --set duration=6s --set converged_after=3s --seeds 2",
+        "bounce --only alarm fault_clock --seeds 1 --out {folder}",
         "envelope --only rest_20s base_stuck --seeds 1 --out {folder}",
+        "faults --only theta_stuck lever_crc --seeds 1",
         "compare --scenarios step_up --seeds 2 --duration 2",
         "compare --envelope --scenarios steady base_stuck --seeds 1 --estimators firmware",
         "monitor --scenario demo --once --duration 1",

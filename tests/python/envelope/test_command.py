@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware, table
-from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
+from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware
+from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition
 from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
+from lever_cdkf.sil.judged import table
+from lever_cdkf.sil.judged.result import Limit
 from python.conftest import Refused
 
 QUICK = {
@@ -23,6 +25,7 @@ QUICK = {
 }  # fmt: skip
 
 
+@pytest.mark.requirement("R1", "R6", "R32", "R34")
 def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
@@ -31,6 +34,12 @@ def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert set(rows) == QUICK
     for name, row in rows.items():
         assert row["measured"].keys() == row["limit"].keys()
+        of = {
+            (" " if over == "all runs" else f", {over} ").join((each["figure"], f"[{each['unit']}]")): each[over]
+            for each in row["figures"]
+            for over in ("all runs", "median", "worst")
+        }
+        assert row["measured"].items() <= of.items()
         assert name in printed
         assert f'id="chart-{name}"' in written
     assert {name: row["measured"] for name, row in rows.items() if not row["ok"]} == {}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
 from lever_cdkf.host_tools.firmware.native import Config, Setting, settings_table
 
@@ -43,6 +44,7 @@ def test_the_defaults_are_those_of_the_table_and_are_accepted(config: Any) -> No
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: str(row.name))
+@pytest.mark.requirement("R28")
 def test_a_setting_is_accepted_at_both_limits_and_refused_by_name_beyond(row: Setting, config: Any) -> None:
     assert row.least <= row.default <= row.greatest
     assert row.unit
@@ -70,6 +72,7 @@ def test_a_setting_is_accepted_at_both_limits_and_refused_by_name_beyond(row: Se
         (2e-2, 4e-2, 1.0, True),
     ],
 )
+@pytest.mark.requirement("R28")
 def test_settings_that_do_not_go_together_are_refused_by_name(
     sample_period: float, gap_limit: float, trim_corner: float, accepted: bool, config: Any
 ) -> None:
@@ -84,7 +87,7 @@ def test_no_accepted_dither_band_is_empty() -> None:
     assert limits["dither_low"].greatest < limits["dither_high"].least
 
 
-@pytest.mark.parametrize("choice", ["model", "preload", "estimator", "adaptation"])
+@pytest.mark.parametrize("choice", CHOICES)
 def test_an_unknown_choice_is_refused_by_name(choice: str, config: Any) -> None:
     """Nor is LEVER_KEEP one, which is for commands."""
     for value in (len(enum_names(f"lever_{choice}")), lib.LEVER_KEEP):
@@ -99,6 +102,7 @@ def test_there_is_no_parameter_beyond() -> None:
         assert of(count - 1, 2) != ffi.NULL
 
 
+@pytest.mark.requirement("R26")
 def test_the_crc_of_the_settings_is_that_of_their_bytes_and_tells_every_one_of_them() -> None:
     def crc(values: list[float]) -> int:
         settings = ffi.new("lever_settings_t *", values)

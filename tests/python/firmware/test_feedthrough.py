@@ -50,6 +50,7 @@ def swing(estimator: Estimator, plant: tuple[float, float, float, float], second
 
 
 @pytest.mark.parametrize("model", ["lever", "linear_physical", "linear_black_box", "hand"])
+@pytest.mark.requirement("R10")
 def test_value_and_band_are_those_of_the_parameters_and_their_covariance(model: str) -> None:
     estimator = Estimator(Config(model=model, settings=EXACT))
     swing(estimator, PLANTS[model], 20.0)  # until the black box, too, is known well enough for a first order

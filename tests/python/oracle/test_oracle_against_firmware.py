@@ -184,6 +184,7 @@ def expected_of(case: Case) -> Expected:
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.requirement("R2")
 def test_float_agrees_with_double(case: Case) -> None:
     of_oracle = expected_of(case)
     samples, first, expected = of_oracle.samples, of_oracle.first, of_oracle.values

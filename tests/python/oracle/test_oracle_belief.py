@@ -85,6 +85,7 @@ class Linear:
 
 @pytest.mark.parametrize("block", [1, 4, 50])
 @pytest.mark.parametrize(("form", "walk"), [("joint", 1.0), ("dual", 0.0), ("augmented", 1.0)])
+@pytest.mark.requirement("R3")
 def test_on_a_linear_system_it_is_the_kalman_filter(form: str, walk: float, block: int) -> None:
     """The dual filter as long as the parameters neither walk nor are forgotten."""
     linear = Linear(form)
@@ -130,6 +131,7 @@ def test_what_is_not_to_be_learnt_leaves_the_parameters_alone(form: str) -> None
 
 
 @pytest.mark.parametrize("form", ["dual", "joint", "augmented"])
+@pytest.mark.requirement("R4")
 def test_considered_errors_are_what_an_unknown_push_makes(form: str) -> None:
     """Two filters on the same outputs: one knows the push, the other does not."""
     rng = np.random.default_rng(31)

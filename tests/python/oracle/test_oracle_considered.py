@@ -112,6 +112,7 @@ CASES = (
 @pytest.mark.parametrize(
     ("case", "name"), [(case, name) for case in CASES for name in STEPS if case.torque or name != "tau_m_gain"], ids=str
 )
+@pytest.mark.requirement("R4")
 def test_stated_is_what_a_small_error_does(case: Case, name: str) -> None:
     """To first order. What was learnt while the accelerometer was dead is taken back, the derivative not quite: the
     latest is taken for the one of then."""

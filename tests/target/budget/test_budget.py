@@ -11,11 +11,13 @@ from target.budget import golden
 pytestmark = pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm")
 
 
+@pytest.mark.requirement("R48")
 def test_limits_hold(budget: dict[str, Any]) -> None:
     beyond = golden.beyond_limits(budget)
     assert not beyond, "\n".join(beyond)
 
 
+@pytest.mark.requirement("R48")
 def test_nothing_is_dearer_than_what_was_accepted(budget: dict[str, Any]) -> None:
     accepted = golden.load()
     if not golden.is_comparable(budget, accepted):

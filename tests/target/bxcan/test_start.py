@@ -134,6 +134,7 @@ def test_crystal_that_has_failed_is_not_trusted_until_power_on(talk: Talk, board
     assert talk.report("PLATFORM_HEALTH")["faults"] == lib.LEVER_PLATFORM_CLOCK
 
 
+@pytest.mark.requirement("R20")
 def test_filters_pass_our_identifiers_and_nothing_else(board: Board) -> None:
     """Every standard identifier there is, and extended ones that look like ours in one half."""
     passes = board.can.filters.match

@@ -72,6 +72,7 @@ def go_off_the_bus(talk: Talk) -> None:
     assert board.machine.run(MS, lambda: not any(box.is_pending for box in board.can.tx.boxes)), "old answers are kept"
 
 
+@pytest.mark.requirement("R47")
 def test_bus_off_and_recovery(talk: Talk, board: Board) -> None:
     talk.report("PLATFORM_HEALTH")
     go_off_the_bus(talk)
@@ -120,6 +121,7 @@ def test_bus_that_stays_short(talk: Talk, board: Board) -> None:
 
 
 @pytest.mark.parametrize(("frames", "lost"), [(3, 0), (4, 1), (8, 5)])
+@pytest.mark.requirement("R47")
 def test_fifo_overrun_is_counted_and_shown(talk: Talk, board: Board, frames: int, lost: int) -> None:
     """The processor stands still, as a debugger makes it; three frames have room, and the first are kept."""
     talk.report("PLATFORM_HEALTH")
@@ -154,6 +156,7 @@ def test_watchdog_is_fed_with_and_without_samples(talk: Talk, board: Board) -> N
     assert board.machine.resets == []
 
 
+@pytest.mark.requirement("R46")
 def test_watchdog_resets_a_loop_that_hangs(talk: Talk, board: Board) -> None:
     """Interrupts still work, and must not keep the watchdog quiet."""
     assert talk.report("PLATFORM_HEALTH")["faults"] == 0

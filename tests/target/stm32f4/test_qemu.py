@@ -37,6 +37,7 @@ def go_on_until(condition: Callable[[], bool], debugger: Debugger) -> None:
         debugger.stop()
 
 
+@pytest.mark.requirement("R45")
 def test_starts_and_passes_its_self_tests(slcan_image: Path, tmp_path: Path) -> None:
     """QEMU has no crystal, which the image is to notice; and nothing else is wrong."""
     with running(slcan_image, tmp_path) as board:
@@ -54,6 +55,7 @@ def test_image_for_can_goes_round_without_a_controller_that_answers(can_image: P
         assert debugger.words(tested, 1)[0] & 0xFF == CLOCK
 
 
+@pytest.mark.requirement("R45")
 def test_rom_crc_finds_a_flipped_bit(slcan_image: Path, tmp_path: Path) -> None:
     """The bit is in the serial number, so that the image runs on and shows it."""
     flash = elf.flash_bytes(slcan_image)
@@ -66,6 +68,7 @@ def test_rom_crc_finds_a_flipped_bit(slcan_image: Path, tmp_path: Path) -> None:
         assert board.platform_health()["faults"] == CLOCK | ROM
 
 
+@pytest.mark.requirement("R45")
 def test_self_test_finds_a_wrong_instruction(slcan_image: Path, tmp_path: Path) -> None:
     """An addition in the filter has become a subtraction, with the CRC made good again."""
     flash = elf.flash_bytes(slcan_image)
@@ -78,6 +81,7 @@ def test_self_test_finds_a_wrong_instruction(slcan_image: Path, tmp_path: Path) 
     assert faults_of(damaged, tmp_path) == CLOCK | SELF_TEST
 
 
+@pytest.mark.requirement("R46")
 def test_hard_fault_is_recorded_and_reported_once(slcan_image: Path, tmp_path: Path) -> None:
     fault_last = elf.symbol(slcan_image, "fault_last")
     with ExitStack() as stack:
@@ -103,6 +107,7 @@ def test_hard_fault_is_recorded_and_reported_once(slcan_image: Path, tmp_path: P
         assert board.platform_health()["faults"] == CLOCK, "the last reset was not that of a fault"
 
 
+@pytest.mark.requirement("R46")
 def test_stack_overflow_is_a_hard_fault(slcan_image: Path, tmp_path: Path) -> None:
     """A stack that leaves RAM damages no data, and is recorded without what it would have held."""
     fault_last = elf.symbol(slcan_image, "fault_last")

@@ -35,6 +35,7 @@ static void assert_refused(const lever_command_t *command)
 
 /* --- refused ------------------------------------------------------------------------------------------------------ */
 
+/* R24 */
 TEST(a_command_with_one_unknown_part_is_refused_as_a_whole)
 {
     static const uint32_t known[5] = {(uint32_t)LEVER_REQUEST_RESET + 1u, LEVER_MODEL_COUNT, LEVER_PRELOAD_COUNT,
@@ -102,6 +103,21 @@ TEST(reset_ends_dither_and_the_next_run_is_the_first_one_again)
     }
     assert_same_estimates(lever, other);
     TEST_ASSERT_TRUE((health().torque != 0.0f) && (health().torque == health_of(other).torque));
+}
+
+/* Dither that a reset asks for fades in anew, as there is no torque to fade from. */
+TEST(a_reset_may_ask_for_dither)
+{
+    lever_command_t command = command_none();
+    dither(0.3f);
+    (void)run(900u);
+    command.request = (uint8_t)LEVER_REQUEST_RESET;
+    command.dither_rms = 0.2f;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    (void)run(1u);
+    TEST_ASSERT_FALSE(health().gate_open);
+    (void)run(900u);
+    TEST_ASSERT_TRUE(health().gate_open && (health().torque != 0.0f));
 }
 
 /* --- choices ------------------------------------------------------------------------------------------------------ */

@@ -75,6 +75,7 @@ static float limit_of(const char *name, bool greatest)
 }
 
 /* Every corner of what the settings allow, within 20 %: a band of 1 Hz needs more than a hundred seconds for less. */
+/* R41 */
 TEST_EACH(8, has_the_rms_that_is_asked_in_every_band_that_the_settings_allow)
 {
     const float low = limit_of("dither_low", (test_round & 1u) != 0u);
@@ -99,6 +100,7 @@ TEST(no_command_exceeds_the_greatest_rms)
 
 /* --- fades -------------------------------------------------------------------------------------------------------- */
 
+/* R41 */
 TEST(fades_in_linearly_over_its_time)
 {
     ask(0.4f);

@@ -37,6 +37,7 @@ TEST_EACH(LEVER_ESTIMATOR_COUNT, parameters_learn_once_a_learn_period_and_move_a
     }
 }
 
+/* R5 */
 TEST_EACH(COMBINATIONS, frozen_neither_learns_nor_walks_nor_forgets)
 {
     start_with(test_round, (uint8_t)(test_round % (uint32_t)LEVER_ADAPTATION_COUNT));
@@ -58,6 +59,7 @@ TEST_EACH(COMBINATIONS, frozen_neither_learns_nor_walks_nor_forgets)
 
 /* However wildly they walk, and whatever the adaptation: at the floor of the walk, no less certain than at the
  * start. */
+/* R5 */
 TEST_EACH(COMBINATIONS, without_excitation_nothing_is_learnt_and_nothing_winds_up)
 {
     config = config_of(test_round);
@@ -95,6 +97,7 @@ TEST_EACH(COMBINATIONS, without_excitation_nothing_is_learnt_and_nothing_winds_u
 /* --- what the model cannot explain -------------------------------------------------------------------------------- */
 
 /* Torque of 1 N m rms that nobody measures, with a correlation time of 0.3 s: no arm of this order does that. */
+/* R8 */
 TEST(unknown_torque_is_a_mismatch_and_ordinary_flight_is_none)
 {
     random_source_t source = {41u};
@@ -114,6 +117,7 @@ TEST(unknown_torque_is_a_mismatch_and_ordinary_flight_is_none)
 }
 
 /* Seen within a second, both ways; and what the lever does alone is not learnt of the arm. A grip is a change. */
+/* R7 */
 TEST(hands_off_is_flagged_and_not_learnt_and_a_new_grip_is_a_change)
 {
     start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
@@ -139,6 +143,7 @@ TEST(hands_off_is_flagged_and_not_learnt_and_a_new_grip_is_a_change)
 }
 
 /* Twice as stiff and damped, at once. */
+/* R6 */
 TEST_EACH(3, a_sudden_grip_is_reported_for_three_seconds_unless_the_threshold_is_0_or_nothing_moves)
 {
     config = config_of(0u);
@@ -161,4 +166,26 @@ TEST_EACH(3, a_sudden_grip_is_reported_for_three_seconds_unless_the_threshold_is
     }
     TEST_ASSERT_UINT32_WITHIN(100u, (test_round == 0u) ? 3000u : 0u, reported);
     TEST_ASSERT_EQUAL(test_round == 0u, opened);
+}
+
+/* By one output alone, and with a trunk on its seat. */
+TEST_EACH(3, a_new_grip_is_followed_with_what_is_measured)
+{
+    config = config_of(0u);
+    config.settings.seat_frequency = (test_round == 2u) ? 4.5f : 0.0f;
+    start();
+    (void)run(10000u);
+    simulation.plant = plant_of_lever(0.0, 0.0, 0.0);
+    (void)run(1000u);
+    simulation.plant = plant_of_lever(3.2, 60.0, 2100.0);
+    for (uint32_t k = 0u; k < 4000u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.theta_valid = (test_round != 0u);
+        sample.theta_dot_valid = (test_round != 1u);
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
+    }
+    const lever_estimate_t after = estimate();
+    if (test_round != 2u) { /* what is simulated sits firmly */
+        TEST_ASSERT_FLOAT_WITHIN(4.0f * after.natural_frequency_sigma, 3.637f, after.natural_frequency);
+    }
 }

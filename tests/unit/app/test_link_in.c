@@ -54,6 +54,7 @@ TEST(a_lever_sample_serves_the_one_base_sample_with_its_counter)
 }
 
 /* By the validity bits of each value; and a code for "not available" is no measurement, whatever its flag says. */
+/* R31 */
 TEST(values_that_are_not_valid_or_not_available_are_missing)
 {
     const uint32_t fault[4] = {LEVER_FAULT_THETA, LEVER_FAULT_THETA_DOT, LEVER_FAULT_TORQUE, LEVER_FAULT_BASE};
@@ -78,6 +79,7 @@ TEST(values_that_are_not_valid_or_not_available_are_missing)
 }
 
 /* An outage may end at any counter: those that look like a repetition or a step back cost a few frames more. */
+/* R21 */
 TEST(after_an_outage_of_any_length_samples_are_taken_again_within_three)
 {
     const lever_memory_t before = memory;
@@ -102,6 +104,7 @@ TEST(after_an_outage_of_any_length_samples_are_taken_again_within_three)
 
 /* --- corrupt and repeated ----------------------------------------------------------------------------------------- */
 
+/* R18 */
 TEST(every_single_bit_error_wrong_length_or_identifier_is_refused_counted_and_said)
 {
     next_pair();
@@ -125,6 +128,7 @@ TEST(every_single_bit_error_wrong_length_or_identifier_is_refused_counted_and_sa
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_COMMUNICATION));
 }
 
+/* R19 */
 TEST_EACH(2, a_pair_that_is_repeated_or_was_overtaken_is_refused_as_late)
 {
     next_pair();
@@ -136,6 +140,7 @@ TEST_EACH(2, a_pair_that_is_repeated_or_was_overtaken_is_refused_as_late)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
 }
 
+/* R20 */
 TEST(foreign_frames_are_ignored_without_a_trace)
 {
     const lever_memory_t before = memory;
@@ -196,6 +201,7 @@ TEST(a_command_is_carried_out_before_the_next_sample_and_answered_with_the_choic
     TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, deliver_many(400u));
 }
 
+/* R24 */
 TEST(an_unknown_command_is_refused_said_and_changes_nothing_and_a_damaged_one_gets_no_answer)
 {
     lever_command_t command = command_none();
@@ -229,6 +235,7 @@ TEST(after_a_reset_a_sender_may_start_anew_with_any_counter_and_time)
 }
 
 /* Whoever asks for no torque gets none, whatever his counter says; all else of such a frame is refused. */
+/* R25 */
 TEST(off_is_obeyed_in_any_order)
 {
     lever_command_t off = command_none();
@@ -245,6 +252,7 @@ TEST(off_is_obeyed_in_any_order)
 }
 
 /* Once it turned the dither on again. */
+/* R25 */
 TEST(an_on_that_is_sent_again_after_an_off_is_refused_however_often)
 {
     const lever_frame_t on = dither_frame(0.3f);
@@ -283,6 +291,7 @@ TEST(a_command_is_accepted_by_its_place_in_the_sequence)
 
 /* --- another estimator -------------------------------------------------------------------------------------------- */
 
+/* R27 */
 TEST(an_identity_on_the_bus_is_another_estimator_for_two_seconds_unless_it_is_damaged)
 {
     const message_identity_t identity = {.page = (uint8_t)MESSAGE_PAGE_VERSION, .firmware_minor = 1u};
@@ -295,7 +304,9 @@ TEST(an_identity_on_the_bus_is_another_estimator_for_two_seconds_unless_it_is_da
     (void)deliver_many(1u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_DUPLICATE));
     TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
-    lever_idle(lever, 2000000u);
+    lever_idle(lever, 1999999u);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_DUPLICATE));
+    lever_idle(lever, 1u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_DUPLICATE));
     frame.data[3] ^= 4u;
     assert_refused(&frame);

@@ -1,6 +1,9 @@
 /* Frames to send: which, in what order, how often, protected how; that they say what the estimate says, and what may
  * be used. */
+#include "app/instance.h"
 #include "frames.h"
+
+#include <math.h>
 
 void setUp(void)
 {
@@ -51,6 +54,7 @@ TEST(a_set_of_divided_messages_is_spread_over_a_publish_period)
     }
 }
 
+/* R22 */
 TEST(when_all_are_due_state_estimate_comes_last)
 {
     const uint32_t wanted[] = {0x215u, 0x218u, 0x211u, 0x212u, 0x213u, 0x21Au, 0x214u, 0x219u, 0x216u, 0x217u, 0x210u};
@@ -171,6 +175,7 @@ static told_t decoded(uint32_t count)
 }
 
 /* Valid: in RUN, COAST and FROZEN, while the sample clock advances; without measurement there is no innovation. */
+/* R22 */
 TEST(every_estimate_says_whether_it_may_be_used)
 {
     const struct {
@@ -241,6 +246,7 @@ TEST(they_say_what_estimate_and_health_say)
 }
 
 /* Sixty gaps gave four frames with the fault once. */
+/* R23 */
 TEST(health_has_every_fault_since_the_last_one)
 {
     uint32_t told = 0u;
@@ -316,4 +322,48 @@ TEST(platform_health_is_what_the_port_reports)
     lever_platform(lever, &report);
     (void)deliver_many(1u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_PLATFORM));
+}
+
+/* --- what is not a number ------------------------------------------------------------------------------------------ */
+
+static bool says_valid(enum link_output output)
+{
+    lever_frame_t frame;
+    TEST_ASSERT_TRUE(link_encode(lever, output, &frame));
+    return (output == OUTPUT_FEEDTHROUGH) ? ((frame.data[2] & 1u) != 0u) : ((frame.data[1] & 0x80u) != 0u);
+}
+
+static bool state_is_valid(void)
+{
+    lever_frame_t frame;
+    message_state_estimate_t message;
+    TEST_ASSERT_TRUE(link_encode(lever, OUTPUT_STATE_ESTIMATE, &frame));
+    TEST_ASSERT_TRUE(message_state_estimate_decode(&message, &frame));
+    return message.valid;
+}
+
+TEST(what_is_not_a_number_is_not_valid)
+{
+    (void)deliver_many(500u);
+    cdkf_t *cdkf = &lever->estimator.cdkf;
+    const cdkf_t before = *cdkf;
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        TEST_ASSERT_TRUE(says_valid(OUTPUT_PARAMETERS) && says_valid(OUTPUT_SIGMA) && says_valid(OUTPUT_DYNAMICS));
+        cdkf->p[i] = NAN;
+        TEST_ASSERT_FALSE(says_valid(OUTPUT_PARAMETERS));
+        *cdkf = before;
+        cdkf->s[(i * (uint32_t)MODEL_PARAMETERS) + i] = NAN;
+        TEST_ASSERT_FALSE(says_valid(OUTPUT_SIGMA));
+        *cdkf = before;
+        cdkf->considered[0].w[i] = NAN;
+        TEST_ASSERT_FALSE(says_valid(OUTPUT_DYNAMICS));
+        TEST_ASSERT_FALSE(says_valid(OUTPUT_FEEDTHROUGH));
+        *cdkf = before;
+    }
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
+        TEST_ASSERT_TRUE(state_is_valid());
+        cdkf->x[i] = NAN;
+        TEST_ASSERT_FALSE(state_is_valid());
+        *cdkf = before;
+    }
 }

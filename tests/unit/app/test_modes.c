@@ -92,6 +92,7 @@ TEST(frozen_before_the_first_sample_freezes_after_alignment_at_any_first_guess)
 
 /* --- gaps --------------------------------------------------------------------------------------------------------- */
 
+/* R29 */
 TEST(a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew)
 {
     run_for(1000u);
@@ -107,6 +108,7 @@ TEST(a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew)
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(301u));
 }
 
+/* R29 */
 TEST(a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk)
 {
     config.settings.z_ddot_gain_sigma = 0.0f; /* of a standard deviation that does not grow */

@@ -45,6 +45,7 @@ static bool is_alive(uint32_t which, float value)
 
 /* 100 ms without a change, when the innovations say that something is wrong; said once, and no longer as soon as it
  * changes. */
+/* R32 */
 TEST(a_signal_that_stands_still_against_the_innovations_is_stuck)
 {
     for (uint32_t which = 0u; which < (uint32_t)MONITOR_SIGNALS; which++) {
@@ -127,6 +128,7 @@ static bool is_spike(uint32_t i, float sigmas, float level)
     return monitor_is_spike(&monitor, &cdkf, i, cdkf.x[i] + (sigmas * sigma), level, PERIOD);
 }
 
+/* R34 */
 TEST(an_output_beyond_eight_standard_deviations_is_refused)
 {
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
@@ -171,6 +173,7 @@ static uint32_t respond(uint32_t blocks, double gain, double rate)
 }
 
 /* No sensor, the wrong sign, the wrong unit: within a second, said once; and used again within one when it is right. */
+/* R33 */
 TEST(a_wrong_base_is_found_and_trusted_again)
 {
     const double gains[] = {0.0, -1.0, 9.81, 2.0};

@@ -57,6 +57,7 @@ static void assert_recovers(float *first, uint32_t count, uint32_t samples)
     }
 }
 
+/* R13 */
 TEST_EACH(LEVER_ESTIMATOR_COUNT, recovers_from_damage_to_any_part_of_the_belief)
 {
     start_running(test_round * (uint32_t)LEVER_MODEL_COUNT);
@@ -94,6 +95,7 @@ TEST_EACH(COMBINATIONS, restarts_from_the_measurement_and_the_first_guess_or_wit
     TEST_ASSERT_TRUE(cdkf_is_valid(cdkf));
 }
 
+/* R13 */
 TEST(six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none)
 {
     for (uint32_t k = 0u; k < 7u; k++) {
@@ -105,6 +107,7 @@ TEST(six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none)
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(1u));
 }
 
+/* R13 */
 TEST(only_a_reset_leaves_fault)
 {
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(6u));
@@ -137,6 +140,7 @@ TEST(frozen_survives_a_restart)
     TEST_ASSERT_EQUAL_UINT32(1u, health().recoveries);
 }
 
+/* R9 */
 TEST_EACH(COMBINATIONS, an_estimate_beyond_a_bound_is_held_there_and_said)
 {
     const model_t *const models[] = {&model_lever, &model_linear_physical, &model_linear_black_box, &model_hand};

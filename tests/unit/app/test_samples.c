@@ -44,6 +44,7 @@ static void invalidate(lever_sample_t *sample, uint32_t which)
 
 /* --- what is missing or wrong ------------------------------------------------------------------------------------- */
 
+/* R31 */
 TEST(a_value_that_is_not_finite_or_plausible_is_corrupt_and_counts_as_missing_and_one_marked_invalid_is_not_read)
 {
     const float bad[] = {NAN, INFINITY, -INFINITY, 1.1e4f};
@@ -106,6 +107,7 @@ TEST(without_measured_torque_the_torque_asked_for_counts)
 
 /* --- time --------------------------------------------------------------------------------------------------------- */
 
+/* R30 */
 TEST(a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothing)
 {
     const uint32_t older_us[] = {0u, 5000u, 1800000000u}; /* half a turn of the clock is 36 minutes */
@@ -138,6 +140,7 @@ static enum lever_mode run_lagging(uint32_t count, uint32_t lag_us)
 }
 
 /* A sender that restarts its clock is late for gap_limit; then the estimator aligns anew, parameters kept, and runs. */
+/* R30 */
 TEST(a_clock_that_starts_anew_is_followed_after_gap_limit)
 {
     const uint32_t lags_us[] = {2000000000u, 1000000u};
@@ -179,6 +182,7 @@ TEST(late_samples_that_do_not_advance_are_no_new_clock)
     TEST_ASSERT_EQUAL_UINT32(1005u, health().samples);
 }
 
+/* R30 */
 TEST(time_may_wrap_at_2_to_the_32)
 {
     const uint32_t shift = UINT32_MAX - 400000u; /* wraps 0.4 s after the start, running */

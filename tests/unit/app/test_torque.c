@@ -87,6 +87,7 @@ static const cause_t causes[] = {{.blind = true, .silence_ms = 20u, .mode = LEVE
 
 /* Torque is zero from 50 ms after the cause, or the silence that it is, on; never above its limits on the way. A
  * clock that stands counts as 5 ms a sample: so late a port calls lever_idle(). */
+/* R37 */
 TEST_EACH(sizeof causes / sizeof causes[0], torque_ends_within_50_ms_of_every_cause)
 {
     const cause_t *cause = &causes[test_round];
@@ -119,6 +120,7 @@ TEST(what_the_port_reports_without_breaking_anything_ends_no_torque)
 }
 
 /* A reset, a report of the port, or silence: each without a sample, by the port's clock alone. Every frame is sent. */
+/* R38 */
 TEST_EACH(3, torque_ends_without_samples_by_the_clock_of_the_port)
 {
     const lever_platform_t broken = {.faults = (uint8_t)LEVER_PLATFORM_ROM};
@@ -157,6 +159,7 @@ TEST(torque_ends_when_the_clock_stands_and_samples_are_few)
     TEST_ASSERT_TRUE(torque_now() == 0.0f);
 }
 
+/* R39 */
 TEST(torque_ends_a_second_after_the_last_command_and_goes_on_with_the_next)
 {
     (void)deliver_many(400u);

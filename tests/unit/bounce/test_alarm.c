@@ -17,6 +17,7 @@ static uint8_t next(enum lever_bounce state, float gain, float sigma, bool carri
     return alarm_next((uint8_t)state, &margin, &aircraft, carried);
 }
 
+/* R44 */
 TEST(a_state_is_entered_and_left_when_it_is_sure)
 {
     static const struct {
@@ -42,6 +43,7 @@ TEST(a_state_is_entered_and_left_when_it_is_sure)
     }
 }
 
+/* R44 */
 TEST(a_margin_that_nothing_carries_says_nothing_and_leaves_an_alarm)
 {
     TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, next(LEVER_BOUNCE_CLEAR, 10.0f, 1.0f, false));

@@ -83,3 +83,12 @@ TEST(a_verdict_has_hysteresis)
         TEST_ASSERT_EQUAL(was == 1u, whiteness.coloured);
     }
 }
+
+TEST(innovations_of_nothing_have_no_colour)
+{
+    for (uint32_t block = 0u; block < 1000u; block++) {
+        whiteness_step(&whiteness, PERIOD, true);
+    }
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, whiteness_correlation(&whiteness));
+    TEST_ASSERT_FALSE(whiteness.coloured);
+}

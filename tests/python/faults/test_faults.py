@@ -1,0 +1,105 @@
+"""The fault matrix, each row with one pilot; and that its faults are what they say."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.library import lib
+from lever_cdkf.sil.envelope import firmware
+from lever_cdkf.sil.envelope.condition import ClosedLoop
+from lever_cdkf.sil.faults import bus, judge, matrix, readings
+from lever_cdkf.sil.faults.flight import Pilot
+from lever_cdkf.sil.faults.rows import MOTION, ROWS, TIME
+from python.conftest import Refused
+
+SILENT = {"theta_gain_drift", "theta_dot_gain_half", "tau_m_sign", "tau_m_gain_double", "z_ddot_gain_double", "clock_1.1"}
+    "theta_gain_drift",
+    "theta_dot_gain_half",
+    "tau_m_sign",
+    "tau_m_gain_double",
+    "z_ddot_gain_double",
+    "clock_1.1",
+}
+"""Rows in which the firmware is known to be wrong for a second or more without a flag."""
+
+
+@pytest.fixture(scope="module")
+def pilot() -> Pilot:
+    return Pilot(MOTION, 0)
+
+
+@pytest.mark.requirement("R12", "R19", "R22", "R30", "R33", "R35", "R36")
+@pytest.mark.parametrize("name", ROWS)
+def test_a_fault_is_met_as_demanded(name: str, pilot: Pilot) -> None:
+    (verdict,) = matrix.flights([ROWS[name]], pilot)
+    assert verdict.broken == [], verdict.measured
+    assert verdict.measured["silent"] < judge.SILENT or name in SILENT, verdict.measured
+
+
+def test_without_a_fault_it_is_the_loop_by_structs(pilot: Pilot) -> None:
+    """The same pilot, dither and noise, but for the rounding of the frames."""
+    record = pilot.fly(Config(), TIME)
+    _, track = firmware.closed_loop(Config(), MOTION, [0], ClosedLoop(lost=0.0), lambda: None)
+    late = track.time >= TIME[0]
+    own = record.estimate["natural_frequency"][late]
+    np.testing.assert_allclose(own, track.value["f_n"][late, 0], rtol=2e-3)
+    assert record.results[lib.LEVER_FRAME_REFUSED] == record.unanswered == 0
+
+
+@pytest.mark.requirement("R18")
+@pytest.mark.parametrize("message", ["LEVER_SAMPLE", "BASE_SAMPLE"])
+def test_every_flipped_bit_is_counted(message: str, pilot: Pilot) -> None:
+    record = pilot.fly(Config(), TIME, bus.flipped(message, 5))
+    assert record.health["corrupt"][-1] == 1000
+    assert record.results[lib.LEVER_FRAME_REFUSED] == 1000
+
+
+def test_frames_arrive_as_the_fault_says() -> None:
+    def arrive(fault: bus.Fault) -> list[tuple[int, int, int]]:
+        sent = bus.Bus(6, 1e-3, False, 0.3, np.random.default_rng(1))
+        fault(sent, (2e-3, 4e-3))
+        frames = sent.delivered()
+        return [(int(each["at"]), int(each["of"]), int(each["id"]) & 15) for each in frames if each["id"] < 0x120]
+
+    usual = [(i, i, message) for i in range(6) for message in (0, 1)]
+    assert arrive(bus.nothing) == usual
+    assert arrive(bus.lost("LEVER_SAMPLE", 1.1)) == [each for each in usual if each not in ((2, 2, 0), (3, 3, 0))]
+    assert arrive(bus.late("BASE_SAMPLE", 1.0))[5:9] == [(3, 3, 0), (3, 2, 1), (4, 4, 0), (4, 3, 1)]
+    assert arrive(bus.repeated("LEVER_SAMPLE"))[4:7] == [(2, 2, 0), (2, 2, 0), (2, 2, 1)]
+    assert arrive(bus.stale("BASE_SAMPLE"))[5:8] == [(2, 2, 1), (3, 3, 0), (3, 2, 1)]
+
+
+def test_readings_are_spoilt_as_the_fault_says() -> None:
+    def spoilt(fault: readings.Fault) -> readings.Readings:
+        right = readings.Readings.right(6, 1e-3, np.random.default_rng(1))
+        fault(right, np.array([2, 3]))
+        return right
+
+    assert spoilt(readings.stuck("theta")).of["theta"].source.tolist() == [0, 1, 1, 1, 4, 5]
+    assert spoilt(readings.scaled("tau_m", -1.0)).of["tau_m"].factor.tolist() == [1, 1, -1, -1, 1, 1]
+    assert spoilt(readings.clock(lambda t: 0.0 * t)).time_us.tolist() == [0, 1000, 2000, 2000, 4000, 5000]
+    assert spoilt(readings.clock_offset(1.0)).time_us.tolist()[1:3] == [1000, 1002000]
+
+
+def test_longest() -> None:
+    assert judge.longest(np.array([True, False, True, True, False])) == 2
+    assert judge.longest(np.array([False])) == 0
+
+
+def test_the_command_writes_its_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "rows.json"
+    cli.main(["faults", "--only", "theta_stuck", "foreign_load", "--seeds", "1", "--json", str(file)])
+    content = json.loads(file.read_text(encoding="utf-8"))
+    assert [row["name"] for row in content["rows"]] == ["theta_stuck", "foreign_load"]
+    assert content["count"] == 2
+    assert "theta_stuck" in capsys.readouterr().out
+
+
+def test_bad_input_is_one_line(refused: Refused) -> None:
+    assert "did you mean theta_stuck?" in refused("faults", "--only", "theta_stucl")
+    assert "from 1 to 1000" in refused("faults", "--seeds", "0")

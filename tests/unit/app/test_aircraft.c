@@ -1,0 +1,138 @@
+/* An aircraft beside the estimator: which one is taken, what the bus says of it, and what carries its margin. */
+#include "app/instance.h"
+#include "frames.h"
+
+#include <math.h>
+
+enum { POINTS = 14 };
+
+/* Heave of a light aircraft: an acceleration that lags with frequency. */
+static lever_aircraft_t aircraft_of(void)
+{
+    lever_aircraft_t aircraft = {.count = POINTS, .gain_sigma = 0.1f, .phase_sigma = 0.1f, .warning = 6.0f};
+    aircraft.alarm = 3.0f;
+    for (uint32_t i = 0u; i < (uint32_t)POINTS; i++) {
+        const float frequency = 1.5f + (0.5f * (float)i);
+        const float lag = frequency / 3.0f;
+        aircraft.frequency[i] = frequency;
+        aircraft.real[i] = 20.0f / (1.0f + (lag * lag));
+        aircraft.imaginary[i] = -20.0f * lag / (1.0f + (lag * lag));
+    }
+    return aircraft;
+}
+
+static lever_aircraft_t aircraft;
+
+void setUp(void)
+{
+    lever_config_default(&config);
+    aircraft = aircraft_of();
+    start_bus();
+}
+
+static lever_stability_t stability(void)
+{
+    lever_stability_t result;
+    lever_stability(lever, &result);
+    return result;
+}
+
+TEST(an_aircraft_is_taken_or_refused_as_a_whole)
+{
+    float *const wrong[] = {&aircraft.gain_sigma, &aircraft.phase_sigma, &aircraft.alarm, &aircraft.warning,
+        &aircraft.frequency[POINTS - 1], &aircraft.real[POINTS - 1], &aircraft.imaginary[POINTS - 1]};
+    static const float sigmas[] = {-0.1f, 1.1f};
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    for (uint32_t i = 0u; i < (sizeof wrong / sizeof wrong[0]); i++) {
+        const float right = *wrong[i];
+        *wrong[i] = NAN;
+        TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+        *wrong[i] = INFINITY;
+        TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+        for (uint32_t k = 0u; (i < 2u) && (k < 2u); k++) {
+            *wrong[i] = sigmas[k];
+            TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+        }
+        *wrong[i] = right;
+        TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    }
+    aircraft.alarm = -INFINITY;
+    TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+    aircraft = aircraft_of();
+    aircraft.warning = aircraft.alarm - 0.1f;
+    TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+    aircraft = aircraft_of();
+    aircraft.frequency[3] = aircraft.frequency[2];
+    TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+    aircraft = aircraft_of();
+    aircraft.count = 2u;
+    TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+    aircraft.count = (uint8_t)LEVER_AIRCRAFT_POINTS + 1u;
+    TEST_ASSERT_FALSE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_TRUE(lever_aircraft(lever, NULL));
+}
+
+/* The last STABILITY among the answers to so many samples; how many there were. */
+static uint32_t stabilities(uint32_t samples, message_stability_t *message)
+{
+    uint32_t found = 0u;
+    for (uint32_t k = 0u; k < samples; k++) {
+        const uint32_t count = answers();
+        for (uint32_t i = 0u; i < count; i++) {
+            found += message_stability_decode(message, &frames[i]) ? 1u : 0u;
+        }
+    }
+    return found;
+}
+
+/* R42 */
+TEST(the_bus_says_how_stable_the_loop_is_once_a_publish_period)
+{
+    message_stability_t message;
+    TEST_ASSERT_EQUAL_UINT32(0u, stabilities(1000u, &message));
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_EQUAL_UINT32(50u, stabilities(1000u, &message));
+    TEST_ASSERT_TRUE(message.valid);
+    TEST_ASSERT_EQUAL_UINT8(stability().state, message.bounce);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, stability().gain_margin, message.gain_margin);
+    bounce_t *bounce = &lever->bounce;
+    const bounce_t before = *bounce;
+    float *const sigma[] = {&bounce->margin.gain_sigma, &bounce->margin.modulus_sigma};
+    for (uint32_t i = 0u; i < 2u; i++) {
+        lever_frame_t frame;
+        *sigma[i] = NAN;
+        TEST_ASSERT_TRUE(link_encode(lever, OUTPUT_STABILITY, &frame) && message_stability_decode(&message, &frame));
+        TEST_ASSERT_FALSE(message.valid);
+        *bounce = before;
+    }
+}
+
+TEST(an_estimate_that_waits_for_samples_or_was_never_one_says_nothing_of_stability)
+{
+    message_stability_t message;
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_GREATER_THAN_UINT32(0u, stabilities(100u, &message));
+    TEST_ASSERT_FALSE(message.valid);
+    (void)deliver_many(4000u);
+    TEST_ASSERT_NOT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
+    (void)run_blind(100u);
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
+}
+
+/* R44 */
+TEST(frozen_parameters_carry_a_margin_and_a_base_that_is_missing_does_not)
+{
+    lever_command_t command = command_none();
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    (void)deliver_many(4000u);
+    command.request = (uint8_t)LEVER_REQUEST_FREEZE;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+    (void)run(100u);
+    TEST_ASSERT_NOT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
+    for (uint32_t k = 0u; k < 100u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.z_ddot_valid = false;
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
+}
