@@ -210,7 +210,11 @@ def connected(address: str | None, workers: int) -> Iterator[Client]:
             yield client
         return
     options: dict[str, Any] = {"dashboard_address": "127.0.0.1:0", "memory_limit": 0, "threads_per_worker": 1}
-    settings = {"distributed.logging.distributed": "critical", "distributed.nanny.pre-spawn-environ": _ENVIRONMENT}
+    settings = {
+        "distributed.logging.distributed": "critical",
+        "distributed.nanny.pre-spawn-environ": _ENVIRONMENT,
+        "distributed.deploy.lost-worker-timeout": f"{_NO_WORKERS:g} s",  # 15 s are too short for a busy machine
+    }
     with dask.config.set(settings):
         with interrupts.masked():
             cluster = LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
