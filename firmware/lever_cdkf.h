@@ -73,6 +73,19 @@ enum lever_adaptation {
     LEVER_ADAPTATION_COUNT
 };
 
+/* What is done against collective bounce: firmware/bounce/README.md. CANCELLATION takes the involuntary part, as the
+ * estimated arm makes it of the base acceleration, from the lever's angle; NOTCH what is at the arm's natural
+ * frequency; DAMPING is torque against the lever's rate. */
+enum lever_mitigation {
+    LEVER_MITIGATION_NONE = 0,
+    LEVER_MITIGATION_DAMPING = 1,
+    LEVER_MITIGATION_CANCELLATION = 2,
+    LEVER_MITIGATION_CANCELLATION_AND_DAMPING = 3,
+    LEVER_MITIGATION_NOTCH = 4,
+    LEVER_MITIGATION_NOTCH_AND_DAMPING = 5,
+    LEVER_MITIGATION_COUNT
+};
+
 /* Every tunable number, in SI units; see lever_settings.def for unit, default, range and meaning of each. */
 typedef struct lever_settings {
 /* cppcheck-suppress misra-c2012-20.7 ; D1 */
@@ -85,6 +98,7 @@ typedef struct lever_config {
     uint8_t preload;    /* enum lever_preload */
     uint8_t estimator;  /* enum lever_estimator */
     uint8_t adaptation; /* enum lever_adaptation */
+    uint8_t mitigation; /* enum lever_mitigation */
     lever_settings_t settings;
 } lever_config_t;
 
@@ -103,12 +117,12 @@ typedef struct lever_setting {
 uint32_t lever_setting_count(void);
 const lever_setting_t *lever_setting(uint32_t index);
 
-/* Fills in the defaults: lever model, trim preload, dual estimator, Robbins-Monro. */
+/* Fills in the defaults: lever model, trim preload, dual estimator, Robbins-Monro, no mitigation. */
 void lever_config_default(lever_config_t *config);
 
 /* NULL when the configuration is usable, otherwise the name of the first thing that is out of range (a setting, or
- * "model", "preload", "estimator", "adaptation"), or of a setting that does not go with another; its meaning says with
- * which. */
+ * "model", "preload", "estimator", "adaptation", "mitigation"), or of a setting that does not go with another; its
+ * meaning says with which. */
 const char *lever_config_check(const lever_config_t *config);
 
 /* CRC-32 (IEEE 802.3) over the settings in their order, each as the four bytes of its float, lowest first. */
@@ -117,7 +131,7 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
 /* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1792 };
+enum lever_limits { LEVER_MEMORY_BYTES = 1856 };
 typedef union lever_memory {
     uint64_t aligned;
     uint8_t bytes[LEVER_MEMORY_BYTES];
@@ -182,6 +196,7 @@ typedef struct lever_command {
     uint8_t preload;    /* enum lever_preload or LEVER_KEEP; a change resets the estimator */
     uint8_t estimator;  /* enum lever_estimator or LEVER_KEEP; a change resets the estimator */
     uint8_t adaptation; /* enum lever_adaptation or LEVER_KEEP */
+    uint8_t mitigation; /* enum lever_mitigation or LEVER_KEEP */
     float dither_rms;   /* identification torque [N m]: 0 fades it out, torque_rms and torque_limit limit it, from
                            LEVER_KEEP on it stays as it is (on CAN: 65.535) */
 } lever_command_t;
@@ -270,9 +285,19 @@ typedef struct lever_stability {
  * must outlive the instance unchanged. Returns false, changing nothing, if it is not usable. */
 bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft);
 
-/* As of the last publish_period; all but `state` is 0 before the first. A state is entered when the margin is below its
+/* As of the last publish_period, or 40 ms where that is shorter; all but `state` is 0 before the first. A state is entered when the margin is below its
  * limit with a probability of 80 %, and left when it is above with that. ALARM stays while nothing better is known. */
 void lever_stability(const lever_t *lever, lever_stability_t *stability);
+
+/* What mitigation adds to the lever's angle, until the next sample: pitch = gearing (theta - trim + angle). */
+typedef struct lever_correction {
+    float angle;  /* [rad], at most correction_limit; 0 without mitigation, and where it is not permitted */
+    float weight; /* of the fade: 0 passive, 1 all of it */
+} lever_correction_t;
+
+/* After the last sample, or lever_idle(). It fades in within a second, and is 0 within 100 ms after a sensor, the sample
+ * clock or the samples have failed; whoever gets none for 100 ms takes 0. */
+void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
 /* --- names ------------------------------------------------------------------------------------------------------ */
 
@@ -356,8 +381,9 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
  * Opening takes dither_fade. */
 
 /* No sample came for elapsed_us since the last lever_step(), lever_update() or lever_idle(), by the port's own clock
- * [us]. The estimate stays; the gate ages, and while torque is not yet zero a MOTOR_COMMAND becomes due: fetch it with
- * lever_next_frame(). Call it when no sample has come for about 5 ms, and again each 5 ms or so. */
+ * [us]. The estimate stays; the gate and the fade of the correction age, and while these are not yet zero MOTOR_COMMAND
+ * and CORRECTION become due: fetch them with lever_next_frame(). Call it when no sample has come for about 5 ms, and
+ * again each 5 ms or so. */
 void lever_idle(lever_t *lever, uint32_t elapsed_us);
 
 /* --- CAN ------------------------------------------------------------------------------------------------------- */
@@ -384,7 +410,7 @@ enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *fram
 enum lever_mode lever_step(lever_t *lever);
 
 /* The next frame to send; false when there is none left. Fetch after lever_step(), after every frame taken or refused
- * (a COMMAND is answered) and after lever_idle(). MOTOR_COMMAND comes first. Every step ends with one STATE_ESTIMATE,
+ * (a COMMAND is answered) and after lever_idle(). MOTOR_COMMAND and CORRECTION come first. Every step ends with one STATE_ESTIMATE,
  * so who has received that has everything the step gives. Frames not fetched before the next step are replaced by newer
  * ones. */
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame);

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from . import interrupts
 from .errors import LeverError
-from .exit_status import INTERRUPTED
+from .exit_status import INTERRUPTED, MESSAGE
 from .extras import hide_mf4, reveal_mf4
 from .help_text import HelpFormatter
 from .provenance import version
@@ -45,7 +45,7 @@ a first session:
 
 `lever` alone prints this; `lever COMMAND --help` explains a command. Exit status: 0 when all went well; 1 when the
 command ran, but what it checks does not hold (limits of a scenario, no estimate from a log, …); 2 with one line on
-standard error when the command line or an input is wrong; 130 after Ctrl-C.
+standard error when the command line or an input is wrong; 130, with one line too, after Ctrl-C.
 
 Tables fold at the width of the terminal. In a pipe or file each row is one line, unless COLUMNS says how wide.
 """
@@ -77,6 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except KeyboardInterrupt:
+        print(MESSAGE, file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # the reader, such as `head`, has what it wants; nothing is left to say at exit either
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

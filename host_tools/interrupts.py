@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command in silence, with exit status 130, whenever it comes.
+"""Ctrl-C ends a command with one line and exit status 130, whenever it comes.
 
 KeyboardInterrupt alone does not do that: it is lost when it is raised while an object is deleted, or in a library that
 catches everything. So it is remembered as well, and looked for now and then, and before files are put into place.
@@ -67,13 +67,21 @@ def worker_pool(processes: int) -> Pool:
 
     ignore: Any = (signal.signal, (signal.SIGINT, signal.SIG_IGN))
     context = multiprocessing.get_context("spawn")
-    if sys.platform == "win32":
+    with masked():
         return context.Pool(processes, *ignore)
+
+
+@contextmanager
+def masked() -> Iterator[None]:
+    """Processes that this thread, or a new one, starts inside leave Ctrl-C to this one. Not on Windows."""
+    if sys.platform == "win32":
+        yield
+        return
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # else the pool starts it, which lets the signal through again
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # is passed on to processes
+    resource_tracker.ensure_running()  # else the first process starts it, which lets the signal through again
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # is passed on to threads and processes
     try:
-        return context.Pool(processes, *ignore)
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)

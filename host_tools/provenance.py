@@ -50,9 +50,13 @@ class Provenance:
         """And of these files."""
         return replace(self, outputs={path.name: sha256(path) for path in paths})
 
+    def content(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"software": SOFTWARE, **asdict(self)}
+
     def text(self) -> str:
         """The content of provenance.json."""
-        return json.dumps({"software": SOFTWARE, **asdict(self)}, indent=2, ensure_ascii=False) + "\n"
+        return json.dumps(self.content(), indent=2, ensure_ascii=False) + "\n"
 
     def comment(self) -> str:
         """As lines that begin with #."""

@@ -1,4 +1,5 @@
-"""Where the command `lever` starts: Ctrl-C ends it in silence before Python has read the rest, which takes a moment.
+"""Where the command `lever` starts: Ctrl-C ends it in one line before Python has read the rest, which takes a moment,
+and does nothing any more once all is done: while Python ends, it would be a signal that kills.
 
 Imports next to nothing, for the same reason.
 """
@@ -17,4 +18,6 @@ def main() -> int:
         signal.signal(signal.SIGINT, exit_at_once)
     from .cli import main
 
-    return main()
+    status = main()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return status

@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 
 from .files import write_text
 from .layout import UNLIMITED, terminal_width, wrapped
+from .provenance import provenance
 from .table_layout import Column, table_lines, upright_lines
 
 Cell = str | float | bool | None
@@ -19,16 +21,21 @@ Tables = Mapping[str, Sequence[Row]]
 
 def add_json_option(parser: argparse._ActionsContainer) -> None:
     """Gives a command the option --json FILE, for print_tables()."""
-    parser.add_argument("--json", metavar="FILE", help="also write what is printed to FILE, as JSON: {title: [row, …]}")
+    parser.add_argument(
+        "--json", metavar="FILE", help="also write what is printed to FILE, as JSON: {title: [row, …], provenance: …}"
+    )
 
 
-def print_tables(tables: Tables, json_file: str | None = None, digits: int = 4) -> None:
-    """Prints the tables, numbers with so many `digits`; with `json_file` also writes them there. Raises LeverError.
+def print_tables(
+    tables: Tables, json_file: str | None = None, digits: int = 4, inputs: Iterable[str | os.PathLike[str]] = ()
+) -> None:
+    """Prints the tables, numbers with so many `digits`; with `json_file` also writes them there, and that they are from
+    the files `inputs`. Raises LeverError.
 
     On a terminal they fit its width, and a table of one row stands upright; elsewhere a row is a line.
     """
     if json_file is not None:
-        write_json(json_file, tables)
+        write_json(json_file, tables, inputs)
     width = terminal_width()
     for title, rows in tables.items():
         if rows:
@@ -52,9 +59,10 @@ def _columns(rows: Sequence[Row], digits: int) -> list[Column]:
     ]
 
 
-def write_json(path: str, tables: Tables) -> None:
-    """Writes the tables as {title: [row, …]}; NaN and infinity become null. Raises LeverError."""
-    content = {title: [_json_row(row) for row in rows] for title, rows in tables.items()}
+def write_json(path: str, tables: Tables, inputs: Iterable[str | os.PathLike[str]] = ()) -> None:
+    """Writes the tables as {title: [row, …]}, and their provenance; NaN and infinity become null. Raises LeverError."""
+    rows = {title: [_json_row(row) for row in rows] for title, rows in tables.items()}
+    content = {**rows, "provenance": provenance(inputs).content()}
     write_text(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 

@@ -9,12 +9,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
 from typing import Any, TypeVar
 
 from lever_cdkf.host_tools import units
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.near_names import did_you_mean
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 SIGNAL = "signal"
 """Unit of a field that is the unit of whatever the table describes: m/s^2 under [[base]], kg under pilot.m_p."""
@@ -42,6 +51,54 @@ class Place:
 
     def error(self, message: str) -> ScenarioError:
         return ScenarioError(f"{self.file}: {self.path}: {message}" if self.path else f"{self.file}: {message}")
+
+
+@dataclass(frozen=True)
+class Shelf:
+    """The .toml files of one kind that come with the package, found by name; those of others are found by path."""
+
+    kind: str
+    """In errors."""
+    package: str
+    folder: str = ""
+
+    def names(self) -> list[str]:
+        """Of the files."""
+        names = (entry.name for entry in self._files().iterdir())
+        return sorted(name.removesuffix(_ENDING) for name in names if name.endswith(_ENDING))
+
+    def content(self, name_or_path: str) -> bytes:
+        """Of the file of that name or path (ending in .toml). Raises ScenarioError."""
+        if name_or_path.endswith(_ENDING):
+            if not Path(name_or_path).is_file():
+                raise ScenarioError(f"{name_or_path}: no such file")
+            return Path(name_or_path).read_bytes()
+        names = self.names()
+        if name_or_path in names:
+            content: bytes = (self._files() / f"{name_or_path}{_ENDING}").read_bytes()
+            return content
+        hint = did_you_mean(name_or_path, names, f"there are {', '.join(names)}, or give a path to a .toml file")
+        raise ScenarioError(f"no {self.kind} {name_or_path!r}; {hint}")
+
+    def _files(self) -> Any:
+        package = files(self.package)
+        return package / self.folder if self.folder else package
+
+
+_ENDING = ".toml"
+
+
+def file_of(name_or_path: str) -> str:
+    """How errors call the file that Shelf.content() finds."""
+    return name_or_path if name_or_path.endswith(_ENDING) else f"{name_or_path}{_ENDING}"
+
+
+def parse(content: bytes, file: str) -> dict[str, Any]:
+    """The table that a file holds. Raises ScenarioError."""
+    try:
+        return tomllib.loads(content.decode("utf-8"))
+    except ValueError as error:  # also of text that is not UTF-8, and of a whole number with too many digits
+        raise ScenarioError(f"{file}: not TOML: {error}") from None
 
 
 Reader = Callable[[Any, Place], Any]

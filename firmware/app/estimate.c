@@ -39,6 +39,13 @@ derived_dynamics_t estimator_dynamics(const estimator_t *estimator)
     return derived_dynamics(&estimator->cdkf, setup->model_in_use, &setup->constants, &step);
 }
 
+model_dynamics_t estimator_linearised(const estimator_t *estimator, model_step_t *step)
+{
+    const setup_t *setup = &estimator->setup;
+    *step = at_trim(estimator);
+    return setup->model_in_use->dynamics(&setup->constants, step, &estimator->cdkf.points[0]);
+}
+
 derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float frequency)
 {
     const setup_t *setup = &estimator->setup;

@@ -87,6 +87,10 @@ void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_P
 /* The quantities that are derived from the parameters; frequency [Hz]. */
 derived_dynamics_t estimator_dynamics(const estimator_t *estimator);
 derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float frequency);
+
+/* The model about the trim, which is written into the step. */
+model_dynamics_t estimator_linearised(const estimator_t *estimator, model_step_t *step);
+
 margin_t estimator_margin(const estimator_t *estimator, const lever_aircraft_t *aircraft);
 
 /* Mode, faults and counts; what concerns torque and machine is not the estimator's. */

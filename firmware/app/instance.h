@@ -6,14 +6,17 @@
 #include "app/estimator.h"
 #include "app/link.h"
 #include "app/torque_gate.h"
+#include "bounce/mitigation.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* The watch over the loop of arm, lever and rotor. */
+/* The watch over the loop of arm, lever and rotor, and what is done about it. */
 typedef struct bounce {
+    mitigation_t mitigation;
+    bool mitigates;                   /* one is chosen, or still fades */
     const lever_aircraft_t *aircraft; /* NULL: none */
     margin_t margin;
     uint32_t time_us; /* of the sample with which that was worked out */
@@ -24,16 +27,23 @@ struct lever {
     estimator_t estimator;
     dither_t dither;
     torque_gate_t gate;
+    torque_sample_t to_gate; /* of the last sample */
     link_t link;
     bounce_t bounce;
     lever_platform_t platform; /* the port's last report, if there was one */
     bool has_platform;
 };
 
-/* One sample, by struct or from the bus. */
+/* One sample, by struct or from the bus: the estimator first, then what is done about bounce, the motor's torque, and the
+ * margin. One by one, so that the stack of one is not beneath that of another. */
 enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample);
 
-/* After it, with an aircraft: works the margin out, once a publish_period. By itself, so that its stack is not beneath the estimator's. */
+/* Where something mitigates: renews correction and lever damping. */
+void instance_mitigate(lever_t *lever);
+
+void instance_drive(lever_t *lever);
+
+/* With an aircraft: works the margin out, once a publish_period, but at most 25 times a second. */
 void instance_watch(lever_t *lever);
 
 /* Carries a command out, or says why not and changes nothing. */

@@ -7,6 +7,8 @@
 #include <string.h>
 
 #define DITHER_MOST 1.0e4f /* plausible [N m] */
+#define MARGIN_US 40000u   /* least time between two margins */
+#define SILENCE_US 20000u  /* or 1.25 sample periods: mitigation.h */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -21,6 +23,7 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
         const float rms_most = (s->torque_rms < s->torque_limit) ? s->torque_rms : s->torque_limit;
         (void)memset(lever, 0, sizeof *lever);
         estimator_init(&lever->estimator, config);
+        lever->bounce.mitigates = (config->mitigation != (uint8_t)LEVER_MITIGATION_NONE);
         dither_init(&lever->dither, s->dither_low, s->dither_high, s->sample_period, rms_most, s->dither_fade);
         torque_gate_init(&lever->gate, s);
         link_init(&lever->link, s);
@@ -53,7 +56,8 @@ void instance_watch(lever_t *lever)
 {
     bounce_t *bounce = &lever->bounce;
     const uint32_t time_us = lever->estimator.time_us;
-    if ((time_us - bounce->time_us) >= lever->link.publish_us) {
+    const uint32_t publish_us = lever->link.publish_us;
+    if ((time_us - bounce->time_us) >= ((publish_us > MARGIN_US) ? publish_us : MARGIN_US)) {
         bounce->time_us = time_us;
         bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
         bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever));
@@ -64,21 +68,61 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
 {
     const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
     estimator_t *estimator = &lever->estimator;
+    torque_sample_t *to_gate = &lever->to_gate;
     const uint32_t last_us = estimator->time_us;
     const bool starts = (estimator->mode == LEVER_MODE_INIT);
     const enum lever_mode mode = estimator_update(estimator, sample, lever->gate.torque);
     const uint32_t faults = estimator->faults;
-    const torque_sample_t torque = {.elapsed_us = starts ? lever->gate.period_us : (estimator->time_us - last_us),
-        .advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u),
-        .measured = ((faults & blind) != blind),
-        .permitted = permits_torque(lever)};
-    torque_gate_step(&lever->gate, dither_step(&lever->dither), &torque);
+    to_gate->elapsed_us = starts ? lever->gate.period_us : (estimator->time_us - last_us);
+    to_gate->advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
+    to_gate->measured = ((faults & blind) != blind);
+    to_gate->permitted = permits_torque(lever);
     return mode;
+}
+
+void instance_mitigate(lever_t *lever)
+{
+    const uint32_t broken =
+        (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED | (uint32_t)LEVER_FAULT_HANDS_OFF;
+    const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE;
+    const estimator_t *estimator = &lever->estimator;
+    const setup_t *setup = &estimator->setup;
+    const torque_sample_t *to_gate = &lever->to_gate;
+    const uint32_t period_us = lever->gate.period_us;
+    const uint32_t late_us = period_us + (period_us / 4u);
+    const uint32_t faults = estimator->faults;
+    mitigation_t *mitigation = &lever->bounce.mitigation;
+    mitigation_sample_t sample = {.constants = &setup->constants,
+        .elapsed_us = to_gate->advances ? to_gate->elapsed_us : period_us,
+        .silence_us = (late_us > SILENCE_US) ? late_us : SILENCE_US,
+        .theta = estimator_state(estimator, 0u),
+        .theta_dot = estimator_state(estimator, 1u),
+        .drive = lever->gate.gain,
+        .mitigation = setup->mitigation,
+        .advances = to_gate->advances,
+        .permitted = to_gate->permitted && ((faults & broken) == 0u),
+        .sensed = ((faults & blind) == 0u),
+        .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u)};
+    const model_dynamics_t dynamics = estimator_linearised(estimator, &sample.step);
+    sample.dynamics = &dynamics;
+    sample.step.period = 1.0e-6f * (float)sample.elapsed_us;
+    sample.step.z_ddot = estimator->last_z_ddot;
+    sample.step.tau_m = lever->gate.torque;
+    lever->bounce.mitigates = mitigation_step(mitigation, setup->settings, &sample);
+}
+
+void instance_drive(lever_t *lever)
+{
+    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &lever->to_gate);
 }
 
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample)
 {
     const enum lever_mode mode = instance_update(lever, sample);
+    if (lever->bounce.mitigates) {
+        instance_mitigate(lever);
+    }
+    instance_drive(lever);
     if (lever->bounce.aircraft != NULL) {
         instance_watch(lever);
     }
@@ -89,11 +133,14 @@ void lever_idle(lever_t *lever, uint32_t elapsed_us)
 {
     link_idle(lever, elapsed_us);
     torque_gate_idle(&lever->gate, elapsed_us);
+    mitigation_idle(&lever->bounce.mitigation, elapsed_us);
 }
 
 bool instance_is_driving(const lever_t *lever)
 {
-    return (lever->gate.torque != 0.0f) || (lever->gate.open && dither_is_on(&lever->dither));
+    return (lever->gate.torque != 0.0f) ||
+           (lever->gate.open &&
+               (dither_is_on(&lever->dither) || mitigation_has_damping(lever->estimator.setup.mitigation)));
 }
 
 /* --- commands ----------------------------------------------------------------------------------------------------- */
@@ -104,7 +151,8 @@ static bool is_changed(const lever_t *lever, const setup_t *before, float rms_be
     const setup_t *setup = &lever->estimator.setup;
     return (setup->model != before->model) || (setup->preload != before->preload) ||
            (setup->estimator != before->estimator) || (setup->adaptation != before->adaptation) ||
-           (lever->dither.target < rms_before) || (lever->dither.target > rms_before);
+           (setup->mitigation != before->mitigation) || (lever->dither.target < rms_before) ||
+           (lever->dither.target > rms_before);
 }
 
 /* Carries out what is not refused for the mode. Returns false, and changes nothing, when a value is not known. */
@@ -117,6 +165,8 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
     const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
     if (known) {
         torque_gate_keep_alive(&lever->gate);
+        lever->bounce.mitigates =
+            lever->bounce.mitigates || (lever->estimator.setup.mitigation != (uint8_t)LEVER_MITIGATION_NONE);
         if (resets) {
             dither_reset(&lever->dither);
             lever->link.frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;
@@ -181,8 +231,11 @@ bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft)
 {
     const bool accepted = (aircraft == NULL) || margin_accepts(aircraft);
     if (accepted) {
-        const bounce_t watch = {.aircraft = aircraft, .state = (uint8_t)LEVER_BOUNCE_UNKNOWN};
-        lever->bounce = watch;
+        const margin_t unknown = {.gain = 0.0f};
+        lever->bounce.aircraft = aircraft;
+        lever->bounce.margin = unknown;
+        lever->bounce.time_us = lever->estimator.time_us - MARGIN_US;
+        lever->bounce.state = (uint8_t)LEVER_BOUNCE_UNKNOWN;
     }
     return accepted;
 }
@@ -197,6 +250,11 @@ void lever_stability(const lever_t *lever, lever_stability_t *stability)
     stability->modulus_sigma = margin->modulus_sigma;
     stability->frequency = margin->frequency;
     stability->frequency_sigma = margin->frequency_sigma;
+}
+
+void lever_correction(const lever_t *lever, lever_correction_t *correction)
+{
+    *correction = mitigation_correction(&lever->bounce.mitigation);
 }
 
 void lever_health(const lever_t *lever, lever_health_t *health)

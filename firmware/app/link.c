@@ -18,10 +18,11 @@ static const uint16_t parts[] = {(uint16_t)(BIT(OUTPUT_HEALTH) | BIT(OUTPUT_STAB
     (uint16_t)BIT(OUTPUT_FEEDTHROUGH), (uint16_t)BIT(OUTPUT_LINK_HEALTH), (uint16_t)BIT(OUTPUT_PLATFORM)};
 #define PARTS ((uint32_t)(sizeof(parts) / sizeof(parts[0])))
 
-static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_COMMAND_ACK_DATA_ID,
-    MESSAGE_PILOT_PARAMETERS_DATA_ID, MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID,
-    MESSAGE_FEEDTHROUGH_DATA_ID, MESSAGE_STABILITY_DATA_ID, MESSAGE_HEALTH_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID,
-    MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID, MESSAGE_STATE_ESTIMATE_DATA_ID};
+static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_CORRECTION_DATA_ID,
+    MESSAGE_COMMAND_ACK_DATA_ID, MESSAGE_PILOT_PARAMETERS_DATA_ID, MESSAGE_PILOT_SIGMA_DATA_ID,
+    MESSAGE_PILOT_DYNAMICS_DATA_ID, MESSAGE_FEEDTHROUGH_DATA_ID, MESSAGE_STABILITY_DATA_ID, MESSAGE_HEALTH_DATA_ID,
+    MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID,
+    MESSAGE_STATE_ESTIMATE_DATA_ID};
 
 /* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame
  * that is repeated or one step late (which a sample's time would tell, too). */
@@ -258,8 +259,13 @@ enum lever_mode link_step(lever_t *lever)
     link_t *link = &lever->link;
     if (link->has_sample) {
         const bool was_driving = instance_is_driving(lever);
+        const bool mitigates = lever->bounce.mitigates;
         link->has_sample = false;
         (void)instance_update(lever, &link->sample);
+        if (mitigates) {
+            instance_mitigate(lever);
+        }
+        instance_drive(lever);
         if (lever->bounce.aircraft != NULL) {
             instance_watch(lever);
         }
@@ -267,6 +273,7 @@ enum lever_mode link_step(lever_t *lever)
         link->latched |= instance_faults(lever);
         uint32_t due = BIT(OUTPUT_STATE_ESTIMATE) | divided_due(link);
         due |= (was_driving || instance_is_driving(lever)) ? BIT(OUTPUT_MOTOR_COMMAND) : 0u;
+        due |= mitigates ? BIT(OUTPUT_CORRECTION) : 0u;
         due |= (link->pages != 0u) ? BIT(OUTPUT_IDENTITY) : 0u;
         due &= lever->has_platform ? UINT32_MAX : ~BIT(OUTPUT_PLATFORM);
         due &= (lever->bounce.aircraft != NULL) ? UINT32_MAX : ~BIT(OUTPUT_STABILITY);
@@ -281,6 +288,9 @@ void link_idle(lever_t *lever, uint32_t elapsed_us)
     link->duplicate_us -= (elapsed_us < link->duplicate_us) ? elapsed_us : link->duplicate_us;
     if (instance_is_driving(lever)) {
         link->due |= (uint16_t)BIT(OUTPUT_MOTOR_COMMAND);
+    }
+    if (lever->bounce.mitigation.weight > 0.0f) {
+        link->due |= (uint16_t)BIT(OUTPUT_CORRECTION);
     }
 }
 

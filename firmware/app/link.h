@@ -9,9 +9,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Messages that are sent, in the order in which they are fetched: the motor first, STATE_ESTIMATE last. */
+/* Messages that are sent, in the order in which they are fetched: what is to act first, STATE_ESTIMATE last. */
 enum link_output {
     OUTPUT_MOTOR_COMMAND,
+    OUTPUT_CORRECTION,
     OUTPUT_COMMAND_ACK,
     OUTPUT_PARAMETERS,
     OUTPUT_SIGMA,

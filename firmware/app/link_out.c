@@ -35,11 +35,23 @@ static bool encode_motor_command(lever_t *lever, lever_frame_t *frame)
 {
     const float torque = lever->gate.torque;
     const message_motor_command_t message = {.torque = torque,
-        .dither = torque, /* there is no other yet */
+        .dither = torque - (lever->gate.gain * lever->bounce.mitigation.damping),
         .time_low = low_16(lever->estimator.time_us),
         .model = lever->estimator.setup.model,
         .valid = lever->gate.open};
     return message_motor_command_encode(frame, &message);
+}
+
+static bool encode_correction(lever_t *lever, lever_frame_t *frame)
+{
+    lever_correction_t correction;
+    lever_correction(lever, &correction);
+    const message_correction_t message = {.correction = correction.angle,
+        .weight = correction.weight,
+        .time_low = low_16(lever->estimator.time_us),
+        .mitigation = lever->estimator.setup.mitigation,
+        .valid = lever->bounce.mitigation.open};
+    return message_correction_encode(frame, &message);
 }
 
 static bool encode_command_ack(lever_t *lever, lever_frame_t *frame)
@@ -51,6 +63,7 @@ static bool encode_command_ack(lever_t *lever, lever_frame_t *frame)
         .preload = setup->preload,
         .estimator = setup->estimator,
         .adaptation = setup->adaptation,
+        .mitigation = setup->mitigation,
         .dither_rms = lever->dither.target};
     return message_command_ack_encode(frame, &message);
 }
@@ -173,6 +186,7 @@ static bool encode_identity(lever_t *lever, lever_frame_t *frame)
         .preload = setup->preload,
         .estimator = setup->estimator,
         .adaptation = setup->adaptation,
+        .mitigation = setup->mitigation,
         .dither_rms = lever->dither.target};
     return message_identity_encode(frame, &message);
 }
@@ -190,7 +204,7 @@ static bool encode_state_estimate(lever_t *lever, lever_frame_t *frame)
 }
 
 /* In the order of enum link_output. */
-static bool (*const encoders[OUTPUTS])(lever_t *lever, lever_frame_t *frame) = {encode_motor_command,
+static bool (*const encoders[OUTPUTS])(lever_t *lever, lever_frame_t *frame) = {encode_motor_command, encode_correction,
     encode_command_ack, encode_parameters, encode_sigma, encode_dynamics, encode_feedthrough, encode_stability,
     encode_health, encode_link_health, encode_platform, encode_identity, encode_state_estimate};
 

@@ -36,6 +36,7 @@ void lever_config_default(lever_config_t *config)
     config->preload = (uint8_t)LEVER_PRELOAD_TRIM;
     config->estimator = (uint8_t)LEVER_ESTIMATOR_DUAL;
     config->adaptation = (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO;
+    config->mitigation = (uint8_t)LEVER_MITIGATION_NONE;
 }
 
 /* Bit by bit, lowest first: it is asked for once. */
@@ -85,6 +86,9 @@ const char *lever_config_check(const lever_config_t *config)
     const char *wrong = settings_check(&config->settings);
     if (wrong == NULL) {
         wrong = combination_check(&config->settings);
+    }
+    if (config->mitigation >= (uint8_t)LEVER_MITIGATION_COUNT) {
+        wrong = "mitigation";
     }
     if (config->adaptation >= (uint8_t)LEVER_ADAPTATION_COUNT) {
         wrong = "adaptation";

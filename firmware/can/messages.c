@@ -15,14 +15,15 @@ static uint32_t bit_of(bool flag)
 
 /* --- COMMAND ------------------------------------------------------------------------------------------------------ */
 
-static const place_t command_code[] = {CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u)};
+static const place_t command_code[] = {
+    CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u), CODE(36u, 15u)};
 static const quantity_t command_quantity[] = {UNSIGNED(48u, 65535u, 1000.0f)};
 static const layout_t command = LAYOUT(MESSAGE_COMMAND_ID, command_code, command_quantity);
 
 bool message_command_encode(lever_frame_t *frame, const message_command_t *message)
 {
-    const uint32_t code[] = {
-        message->request, message->model, message->preload, message->estimator, message->adaptation};
+    const uint32_t code[] = {message->request, message->model, message->preload, message->estimator,
+        message->adaptation, message->mitigation};
     return (message->dither_rms >= 0.0f) && layout_encode(frame, &command, code, &message->dither_rms);
 }
 
@@ -37,6 +38,7 @@ bool message_command_decode(message_command_t *message, const lever_frame_t *fra
         message->preload = (uint8_t)code[2];
         message->estimator = (uint8_t)code[3];
         message->adaptation = (uint8_t)code[4];
+        message->mitigation = (uint8_t)code[5];
         message->dither_rms = (value[0] >= 0.0f) ? value[0] : 65.535f; /* not available: keep */
     }
     return fits;
@@ -281,7 +283,8 @@ bool message_platform_health_decode(message_platform_health_t *message, const le
 static const place_t version_code[] = {
     CODE(12u, 15u), CODE(16u, 255u), CODE(24u, 255u), CODE(32u, 255u), CODE(40u, 255u)};
 static const place_t settings_code[] = {CODE(12u, 15u), CODE(16u, UINT32_MAX)};
-static const place_t choices_code[] = {CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u)};
+static const place_t choices_code[] = {
+    CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(48u, 15u)};
 static const quantity_t choices_quantity[] = {UNSIGNED(32u, 65535u, 1000.0f)};
 static const layout_t identity[MESSAGE_PAGE_COUNT] = {
     CODES_ONLY(MESSAGE_IDENTITY_ID, version_code),
@@ -291,10 +294,10 @@ static const layout_t identity[MESSAGE_PAGE_COUNT] = {
 
 bool message_identity_encode(lever_frame_t *frame, const message_identity_t *message)
 {
-    const uint32_t code[MESSAGE_PAGE_COUNT][COUNT(version_code)] = {
+    const uint32_t code[MESSAGE_PAGE_COUNT][COUNT(choices_code)] = {
         {message->page, message->firmware_major, message->firmware_minor, message->firmware_patch, message->contract},
-        {message->page, message->settings_crc, 0u, 0u, 0u},
-        {message->page, message->model, message->preload, message->estimator, message->adaptation},
+        {message->page, message->settings_crc},
+        {message->page, message->model, message->preload, message->estimator, message->adaptation, message->mitigation},
     };
     const uint8_t page = message->page;
     return (page < (uint8_t)MESSAGE_PAGE_COUNT) &&
@@ -303,7 +306,7 @@ bool message_identity_encode(lever_frame_t *frame, const message_identity_t *mes
 
 bool message_identity_decode(message_identity_t *message, const lever_frame_t *frame)
 {
-    uint32_t code[COUNT(version_code)] = {0u, 0u, 0u, 0u, 0u};
+    uint32_t code[COUNT(choices_code)] = {0u};
     float value[1] = {0.0f};
     const bool fits =
         layout_decode(code, value, &identity[MESSAGE_PAGE_SETTINGS], frame) && (code[0] < (uint32_t)MESSAGE_PAGE_COUNT);
@@ -323,6 +326,7 @@ bool message_identity_decode(message_identity_t *message, const lever_frame_t *f
             message->preload = (uint8_t)code[2];
             message->estimator = (uint8_t)code[3];
             message->adaptation = (uint8_t)code[4];
+            message->mitigation = (uint8_t)code[5];
             message->dither_rms = value[0];
         }
     }
@@ -332,14 +336,14 @@ bool message_identity_decode(message_identity_t *message, const lever_frame_t *f
 /* --- COMMAND_ACK -------------------------------------------------------------------------------------------------- */
 
 static const place_t command_ack_code[] = {
-    CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u)};
+    CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 15u), CODE(24u, 15u), CODE(28u, 15u), CODE(32u, 15u), CODE(36u, 15u)};
 static const quantity_t command_ack_quantity[] = {UNSIGNED(48u, 65535u, 1000.0f)};
 static const layout_t command_ack = LAYOUT(MESSAGE_COMMAND_ACK_ID, command_ack_code, command_ack_quantity);
 
 bool message_command_ack_encode(lever_frame_t *frame, const message_command_ack_t *message)
 {
     const uint32_t code[] = {message->command_counter, message->result, message->model, message->preload,
-        message->estimator, message->adaptation};
+        message->estimator, message->adaptation, message->mitigation};
     const float value[] = {message->dither_rms};
     return layout_encode(frame, &command_ack, code, value);
 }
@@ -356,6 +360,7 @@ bool message_command_ack_decode(message_command_ack_t *message, const lever_fram
         message->preload = (uint8_t)code[3];
         message->estimator = (uint8_t)code[4];
         message->adaptation = (uint8_t)code[5];
+        message->mitigation = (uint8_t)code[6];
         message->dither_rms = value[0];
     }
     return fits;

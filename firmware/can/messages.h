@@ -44,7 +44,8 @@ enum message_id {
     MESSAGE_COMMAND_ACK_ID = 0x218,
     MESSAGE_LINK_HEALTH_ID = 0x219,
     MESSAGE_FEEDTHROUGH_ID = 0x21A,
-    MESSAGE_STABILITY_ID = 0x21B
+    MESSAGE_STABILITY_ID = 0x21B,
+    MESSAGE_CORRECTION_ID = 0x21C
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -64,7 +65,8 @@ enum message_data_id {
     MESSAGE_LINK_HEALTH_DATA_ID = 193,
     MESSAGE_FEEDTHROUGH_DATA_ID = 209,
     MESSAGE_GRIP_SAMPLE_DATA_ID = 225,
-    MESSAGE_STABILITY_DATA_ID = 240
+    MESSAGE_STABILITY_DATA_ID = 240,
+    MESSAGE_CORRECTION_DATA_ID = 9
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -178,6 +180,17 @@ typedef struct message_stability {
 bool message_stability_encode(lever_frame_t *frame, const message_stability_t *message);
 bool message_stability_decode(message_stability_t *message, const lever_frame_t *frame);
 
+typedef struct message_correction {
+    float correction; /* [rad] */
+    float weight;     /* [1] */
+    uint16_t time_low;
+    uint8_t mitigation; /* enum lever_mitigation */
+    bool valid;         /* its gate is open */
+} message_correction_t;
+
+bool message_correction_encode(lever_frame_t *frame, const message_correction_t *message);
+bool message_correction_decode(message_correction_t *message, const lever_frame_t *frame);
+
 typedef struct message_health {
     float excitation; /* [rad/s] */
     uint32_t faults;  /* of enum lever_fault, present since the last HEALTH; 24 bits */
@@ -227,6 +240,7 @@ typedef struct message_identity {
     uint8_t preload;
     uint8_t estimator;
     uint8_t adaptation;
+    uint8_t mitigation;
     float dither_rms; /* as commanded [N m] */
 } message_identity_t;
 
@@ -248,6 +262,7 @@ typedef struct message_command_ack {
     uint8_t preload;
     uint8_t estimator;
     uint8_t adaptation;
+    uint8_t mitigation;
     float dither_rms; /* [N m] */
 } message_command_ack_t;
 

@@ -158,3 +158,35 @@ bool message_motor_command_decode(message_motor_command_t *message, const lever_
     }
     return fits;
 }
+
+/* --- CORRECTION -------------------------------------------------------------------------------------------------- */
+
+static const quantity_t correction_angle = SIGNED(16u, 65535u, 50000.0f);
+static const quantity_t correction_weight = UNSIGNED(32u, 255u, 200.0f);
+static const place_t correction_mitigation = CODE(12u, 7u);
+
+bool message_correction_encode(lever_frame_t *frame, const message_correction_t *message)
+{
+    const uint64_t payload = ((uint64_t)message->mitigation << correction_mitigation.start) |
+                             bit_at(message->valid, 15u) | layout_bits(&correction_angle, message->correction) |
+                             layout_bits(&correction_weight, message->weight) | ((uint64_t)message->time_low << 48u);
+    const bool fits = (message->mitigation <= correction_mitigation.mask);
+    if (fits) {
+        layout_write(frame, (uint32_t)MESSAGE_CORRECTION_ID, payload);
+    }
+    return fits;
+}
+
+bool message_correction_decode(message_correction_t *message, const lever_frame_t *frame)
+{
+    const bool fits = layout_is(frame, (uint32_t)MESSAGE_CORRECTION_ID);
+    if (fits) {
+        const uint64_t payload = layout_read(frame);
+        message->correction = layout_value(payload, &correction_angle);
+        message->weight = layout_value(payload, &correction_weight);
+        message->time_low = (uint16_t)(payload >> 48u);
+        message->mitigation = (uint8_t)layout_code(payload, correction_mitigation);
+        message->valid = has_bit(payload, 15u);
+    }
+    return fits;
+}

@@ -47,7 +47,8 @@ static model_dynamics_t dynamics(
         .forcing = -base_motion_angle(constants, step),
         .space = coefficients->c[LINEAR_TORQUE],
         .arm_stiffness = 0.0f,
-        .arm_damping = 0.0f};
+        .arm_damping = 0.0f,
+        .torque = 1.0f / constants->hand_inertia};
     return result;
 }
 

@@ -157,7 +157,8 @@ static model_dynamics_t dynamics(
         .forcing = -((c[FORCING] * step->trim_cosine) * inverse),
         .space = 0.0f,
         .arm_stiffness = (c[STIFFNESS] * squared) * inverse,
-        .arm_damping = (c[DAMPING] * squared) * inverse};
+        .arm_damping = (c[DAMPING] * squared) * inverse,
+        .torque = inverse};
     return result;
 }
 

@@ -60,6 +60,7 @@ model_dynamics_t linear_dynamics(
         .forcing = coefficients->c[LINEAR_BASE],
         .space = 0.0f,
         .arm_stiffness = 0.0f,
-        .arm_damping = 0.0f};
+        .arm_damping = 0.0f,
+        .torque = coefficients->c[LINEAR_TORQUE]};
     return result;
 }

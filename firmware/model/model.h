@@ -83,7 +83,7 @@ typedef struct model_parameter {
 } model_parameter_t;
 
 /* theta_ddot + damping theta_dot + stiffness theta
- *   = forcing (z_ddot + space z_dot) + arm_stiffness seat + arm_damping seat_dot */
+ *   = forcing (z_ddot + space z_dot) + arm_stiffness seat + arm_damping seat_dot + torque tau_m */
 typedef struct model_dynamics {
     float stiffness;     /* [1/s^2] */
     float damping;       /* [1/s] */
@@ -91,6 +91,7 @@ typedef struct model_dynamics {
     float space;         /* [1/s] */
     float arm_stiffness; /* [1/s^2] */
     float arm_damping;   /* [1/s] */
+    float torque;        /* [1/(kg m^2)] */
 } model_dynamics_t;
 
 typedef struct model {

@@ -12,7 +12,7 @@ static uint32_t now_us(const loop_t *loop)
 
 static bool is_stale(const loop_t *loop)
 {
-    return !loop->lock_step && (loop->frame.id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) &&
+    return !loop->lock_step && PORT_GOES_STALE(loop->frame.id) &&
            ((now_us(loop) - loop->frame_us) > (1000u * (uint32_t)PORT_STALE_MS));
 }
 

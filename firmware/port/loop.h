@@ -12,8 +12,8 @@
  *  - what a frame is answered with goes out, in order, once, before the next frame is received;
  *  - without room a frame is held and nothing is received, so that the medium holds the samples back, or it is dropped
  *    and counted: the policy;
- *  - a MOTOR_COMMAND whose sample was, or may have been, received more than PORT_STALE_MS ago is dropped and counted,
- *    whatever the policy;
+ *  - a MOTOR_COMMAND or CORRECTION whose sample was, or may have been, received more than PORT_STALE_MS ago is dropped
+ *    and counted, whatever the policy;
  *  - when no sample comes the estimator is told each LOOP_IDLE_MS, so that its torque fades;
  *  - a lost link is tried again with a bounded back-off, and leaves the estimator as it was;
  *  - wait() is called within LOOP_BATCH frames, also under full load.
@@ -47,7 +47,7 @@ typedef struct loop_totals {
     uint64_t samples;  /* samples completed, each of which was one estimator step */
     uint64_t held;     /* frames that found no room at first and were kept */
     uint64_t dropped;  /* frames that found no room and were dropped */
-    uint64_t stale;    /* MOTOR_COMMANDs that were too old to be sent */
+    uint64_t stale;    /* MOTOR_COMMANDs and CORRECTIONs that were too old to be sent */
     uint64_t outages;  /* times that the link was lost */
 } loop_totals_t;
 

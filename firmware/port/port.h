@@ -30,8 +30,8 @@ typedef struct port {
     enum port_result (*receive)(void *self, lever_frame_t *frame);
 
     /* Queues a frame behind all before it, whole or not at all. PORT_NOTHING: what then happens to the frame is the
-     * policy of the loop. A port whose queue may hold a MOTOR_COMMAND back for longer than PORT_STALE_MS drops it
-     * there. */
+     * policy of the loop. A port whose queue may hold a MOTOR_COMMAND or CORRECTION back for longer than
+     * PORT_STALE_MS drops it there. */
     enum port_result (*send)(void *self, const lever_frame_t *frame);
 
     /* Waits until timeout_ms [ms] have passed (negative: for ever) or, if for_frame, receive() may have something; it
@@ -51,10 +51,13 @@ typedef struct port {
 } port_t;
 
 enum port_limits {
-    PORT_STALE_MS = 20 /* a MOTOR_COMMAND is not sent when its sample was received longer ago [ms] */
+    PORT_STALE_MS = 20 /* no MOTOR_COMMAND or CORRECTION is sent whose sample was received longer ago [ms] */
 };
 
-/* Identifiers (can/messages.h) that a receive filter must let through: the inputs, and IDENTITY, by which the estimator
+/* Of an identifier (can/messages.h), whether such a frame is worthless then: what acts on lever or rotor. */
+#define PORT_GOES_STALE(id) (((id) == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) || ((id) == (uint32_t)MESSAGE_CORRECTION_ID))
+
+/* Identifiers that a receive filter must let through: the inputs, and IDENTITY, by which the estimator
  * notices another one on its bus. */
 #define PORT_INPUTS                                                                                                    \
     {MESSAGE_LEVER_SAMPLE_ID, MESSAGE_BASE_SAMPLE_ID, MESSAGE_GRIP_SAMPLE_ID, MESSAGE_COMMAND_ID, MESSAGE_IDENTITY_ID}

@@ -13,6 +13,7 @@ KEEP: dict[str, codec.Value] = {
     "preload": "keep",
     "estimator": "keep",
     "adaptation": "keep",
+    "mitigation": "keep",
     "dither_rms": math.inf,
 }
 """A COMMAND that changes nothing; infinity saturates at the value that keeps the dither."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 COUNTS = {"lost": 1 << 16, "corrupt": 1 << 16, "late": 1 << 16, "restarts": 1 << 8}
 """What the estimator counts in LINK_HEALTH and HEALTH, and where it wraps."""
 
-_ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH")
+_ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH", "STABILITY")
 
 
 def columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]]:

@@ -41,7 +41,7 @@ class Identity:
 
     @property
     def choices(self) -> dict[str, str]:
-        """Of model, preload, estimator, adaptation; empty when they are not said yet."""
+        """Of CHOICES; empty when they are not said yet."""
         numbers = {what: self._number(what) for what in CHOICES}
         return {
             what: enum_names(f"lever_{what}").get(number, str(number))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -13,6 +14,8 @@ from .logs import LogError, Recording
 
 INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")
 """What the estimator takes."""
+LATE = 10.0
+"""[s] by which frames may be recorded out of order: so long after the end of a part it is complete."""
 
 _KEPT_BEFORE_SAMPLES = 1000  # commands that a recording may have long before its first sample
 _WORDS = {
@@ -36,13 +39,17 @@ def why_refused(corrupt: int, late: int) -> str:
 class Traffic:
     """Picks the frames; the counts are of what has been read so far."""
 
-    def __init__(self, recording: Recording, channel: str | None = None) -> None:
-        """`channel`: the bus with the samples; by default the only one that has any."""
+    def __init__(
+        self, recording: Recording, channel: str | None = None, start: float = 0.0, length: float = float("inf")
+    ) -> None:
+        """`channel`: the bus with the samples; by default the only one that has any. `start` and `length` [s] of
+        recorded time say which part is read; COMMAND frames before it belong to it."""
         self.recording = recording
+        self._start, self._end = start or -math.inf, start + length  # a clock that was set back belongs to the whole
         self.channel = channel
         """Name of the bus, once it is known."""
         self.frames = 0
-        """All frames in the recording."""
+        """All frames in the part."""
         self.others = dict.fromkeys(_WORDS, 0)
         """Frames that are neither for nor from the estimator, by kind."""
         self.corrupt_answers = 0
@@ -62,8 +69,7 @@ class Traffic:
     def chunks(self) -> Iterator[Frames]:
         """The estimator's frames, inputs and recorded answers, in recorded order. Raises LogError without a sample."""
         waiting: list[Frames] = []
-        for frames in self.recording.chunks():
-            self._count(frames)
+        for frames in self._part():
             if self._bus is None:
                 self._find_bus(frames)
             if self._bus is not None:
@@ -82,11 +88,23 @@ class Traffic:
         """What was left out, in words, an entry for each kind that occurred."""
         return [f"{count:,} {_WORDS[kind]}" for kind, count in self.others.items() if count]
 
-    def _count(self, frames: Frames) -> None:
-        if self.frames == 0:
-            self.first_us = int(frames["time_us"][0])
-        self.frames += len(frames)
-        self.last_us = int(frames["time_us"][-1])
+    def _part(self) -> Iterator[Frames]:
+        """The frames of the part, counted, and commands before it."""
+        beginning: int | None = None
+        for frames in self.recording.chunks():
+            beginning = int(frames["time_us"][0]) if beginning is None else beginning
+            since = (frames["time_us"] - beginning) * 1e-6
+            inside = (since >= self._start) & (since < self._end)
+            if inside.any():
+                times = frames["time_us"][inside]
+                self.first_us = self.first_us if self.frames else int(times[0])
+                self.last_us = int(times[-1])
+                self.frames += len(times)
+            before = (since < self._start) & (frames["id"] == self._command) & (frames["flags"] == 0)
+            chosen = inside | before
+            yield frames if chosen.all() else frames[chosen]
+            if since[-1] > self._end + LATE:
+                return
 
     def _find_bus(self, frames: Frames) -> None:
         names = self.recording.buses.names()

@@ -59,15 +59,16 @@ def run(args: argparse.Namespace) -> int:
     from ..files import write_text
     from ..provenance import provenance
     from ..signals.mapping import as_toml
-    from ..signals.plots import KINDS, write
+    from ..signals.plots import KINDS, OTHER, write
     from ..signals.proposal import propose
     from ..tables import print_tables
 
     start, length = check_part(args)
+    read = [args.log, *([args.dbc] if args.dbc else [])]
     if args.out is not None and args.out.suffix.lower() not in KINDS:
         raise LeverError(f"cannot write {args.out}: plots are {', '.join(KINDS)}; --toml FILE writes the mapping")
     for path in (args.toml, args.out, args.json):
-        check_not_input(path, [args.log, *([args.dbc] if args.dbc else [])])
+        check_not_input(path, read)
     signals = _signals(args, start, length)
     mapping, proposed = propose(signals, args.log)
     mapping = replace(mapping, time=args.time)
@@ -75,16 +76,16 @@ def run(args: argparse.Namespace) -> int:
     others = [signal for signal in signals if signal.name not in inputs]
     changing = [signal for signal in others if signal.changes()]
     rows = [_row("", signal) for signal in changing]
-    print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json)
+    print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json, inputs=read)
     if len(changing) < len(others):
         layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
     print(*layout.command_lines(_command(args, mapping, proposed), layout.terminal_width()), sep="\n")
-    origin = provenance([args.log, *([args.dbc] if args.dbc else [])])
+    origin = provenance(read)
     if args.toml is not None:
         write_text(args.toml, origin.comment() + as_toml(mapping))
     if args.out is not None:
         shown = [(each.key, each.signal) for each in proposed]
-        write(args.out, shown + [("other", each) for each in changing], Path(args.log).name, origin)
+        write(args.out, shown + [(OTHER, each) for each in changing], Path(args.log).name, origin)
     if written := [str(path) for path in (args.toml, args.out) if path is not None]:
         layout.say(f"Written: {', '.join(written)}")
     return 0

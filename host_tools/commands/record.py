@@ -15,7 +15,7 @@ from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_optio
 from ..errors import LeverError
 from ..layout import say
 from ..tables import Row, Tables, add_json_option
-from .signal_options import add_signal_options
+from .signal_options import add_signal_options, input_files
 
 if TYPE_CHECKING:
     from ..can.recorder import Recorder
@@ -28,7 +28,7 @@ lever.dbc, damaged ones by their CRC. Ctrl-C ends the recording. With --dbc and 
 mapped are shown at the end, with their rates and what is missing.
 
 Until it has ended the log is called FILE.partial. A file that keeps that name is incomplete: the disk was full, or the
-bus failed.
+bus failed. FILE.provenance.json says by which version it was recorded, when and how, and has the SHA-256 of FILE.
 """
 _EPILOG = """\
 examples:
@@ -54,6 +54,8 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from ..can.recorder import Recorder
+    from ..files import write_text
+    from ..provenance import provenance
     from ..tables import print_tables
 
     out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))
@@ -73,7 +75,9 @@ def run(args: argparse.Namespace) -> int:
             recorder.run(ended, line.show)
         finally:
             line.end()
-    print_tables({"recorded": _rows(recorder), **_mapped(out, reading)}, args.json)
+    inputs = input_files(args)
+    print_tables({"recorded": _rows(recorder), **_mapped(out, reading)}, args.json, inputs=inputs)
+    write_text(out.with_name(f"{out.name}.provenance.json"), provenance(inputs).with_outputs([out]).text())
     say(f"{out}: {_summary(recorder)}")
     return 0
 

@@ -11,7 +11,7 @@ from ..files import check_not_input
 from ..formats import add_format_option, chosen_formats
 from ..layout import say
 from ..tables import Row, Tables, add_json_option
-from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading, input_files
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_aircraft, chosen_reading, input_files
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +39,7 @@ lever.dbc (IDENTITY says so), they are compared with the new ones, signal by sig
 
 {MAP_HELP}
 The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
-choice (model, preload, estimator, adaptation) that is made here. sample_period is that of mapped signals.
+choice (model, preload, estimator, adaptation, mitigation) that is made here. sample_period is that of mapped signals.
 """
 _EPILOG = """\
 examples:
@@ -69,7 +69,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--channel", metavar="NAME", help="the bus with the samples (default: the only one that has any)"
     )
-    for what in ("model", "preload", "estimator", "adaptation"):
+    for what in ("model", "preload", "estimator", "adaptation", "mitigation"):
         parser.add_argument(f"--{what}", help=f"choose the {what}, whatever the log says (`lever settings` lists them)")
     parser.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
     parser.add_argument(
@@ -78,6 +78,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         action="append",
         default=[],
         help="set one value; may be repeated, the last counts",
+    )
+    parser.add_argument(
+        "--aircraft",
+        metavar="AIRCRAFT",
+        help="watch the margin to collective bounce with this helicopter: one of `lever aircraft`, changed by "
+        ",KEY=VALUE as there, or a file that it writes",
     )
     add_signal_options(parser)
     add_format_option(parser, ("csv", "mf4"))
@@ -97,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     options = _options(args, args.logs[0], chosen_formats(args))
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
-    print_tables(_tables(summary), args.json)
+    print_tables(_tables(summary), args.json, inputs=[*args.logs, *input_files(args)])
     say(summary["verdict"])
     if args.out is not None:
         say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
@@ -120,7 +126,7 @@ def _run_each(args: argparse.Namespace) -> int:
     formats = chosen_formats(args)
     with Progress("replay") as progress:
         replays = replay_each(args.logs, lambda log: _options(args, log, formats), args.out, progress.show)
-    print_tables({"logs": rows_of(replays)}, args.json)
+    print_tables({"logs": rows_of(replays)}, args.json, inputs=[*args.logs, *input_files(args)])
     if args.out is not None:
         written = write(replays, args.out, input_files(args))
         say(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
@@ -141,6 +147,7 @@ def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Opti
     return Options(
         *(make_config(assignments), chosen_here, args.channel, reading, *check_part(args)),
         formats=formats,
+        aircraft=None if args.aircraft is None else chosen_aircraft(args.aircraft),
         inputs=input_files(args),
     )
 

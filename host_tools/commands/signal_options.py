@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import importlib.metadata
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import LeverError
 
 if TYPE_CHECKING:
+    from ..firmware.aircraft import AircraftResponse
     from ..signals.reading import Reading
 
+AIRCRAFT = "lever_cdkf.aircraft"
+"""Entry point group with one function, which makes the response of an aircraft by its name and what is changed."""
 MAP_HELP = """\
 Signals of other messages: --dbc FILE describes them, and --map says which is what.
   --map theta=LEVER.Angle z_ddot=IMU.AccZ tau_m=MOTOR.Torque
@@ -17,7 +22,7 @@ The inputs are theta, theta_dot, z_ddot, tau_m and grip_force; z_ddot and one of
 file of columns (.csv, .parquet, .mat, .npz, .mf4 with signals) a column is mapped, without --dbc; time=COLUMN names the
 time where it is not called so. The unit is that of the database or the header; where there is none, it is guessed, and
 the guess is told. Gravity is recognised and subtracted. To say these by hand, append ,unit=deg ,factor=0.01
-,offset=-0.3 ,sign=-1 ,gravity=included (or none) ,delay=0.004 [s] ,channel=can1.
+,offset=-2 deg ,sign=-1 ,gravity=included (or none) ,delay=4 ms ,channel=can1 (quoted, where it has a blank).
 In place of KEY=SIGNAL, a .toml file holds the same, and how messages are protected (E2E); `lever map` proposes one.
 """
 
@@ -59,9 +64,22 @@ def check_part(args: argparse.Namespace) -> tuple[float, float]:
 
 
 def input_files(args: argparse.Namespace) -> list[str]:
-    """The files that the options name: settings, database, mappings."""
-    named = [getattr(args, "settings", None), args.dbc]
+    """The files that the options name: settings, database, mappings, aircraft."""
+    aircraft = getattr(args, "aircraft", None)
+    named = [getattr(args, "settings", None), args.dbc, *([aircraft] if aircraft and Path(aircraft).is_file() else [])]
     return [path for path in named if path is not None] + [each for each in args.map if each.lower().endswith(".toml")]
+
+
+def chosen_aircraft(text: str) -> AircraftResponse:
+    """The response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft. Raises LeverError."""
+    from ..firmware.aircraft import read_response
+
+    name, *changes = text.split(",")
+    entries = sorted(importlib.metadata.entry_points(group=AIRCRAFT))
+    if not entries or (Path(text).is_file() and not text.lower().endswith(".toml")):
+        return read_response(text)
+    response: AircraftResponse = entries[0].load()(name, changes)
+    return response
 
 
 def chosen_reading(args: argparse.Namespace, log: str) -> Reading | None:

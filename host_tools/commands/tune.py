@@ -189,8 +189,9 @@ def _conclude(
         tables = {"calibration": [_calibration_row(entry) for entry in calibration.entries], **tables}
     changed = sum(entry.after != entry.before for entry in tuned) + len(calibration.assignments)
     verdict = validation.verdict(fits, changed)
-    origin = provenance([*args.log, *input_files(args)])
-    print_tables(tables, args.json)
+    inputs = [*args.log, *input_files(args)]
+    origin = provenance(inputs)
+    print_tables(tables, args.json, inputs=inputs)
     say(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
     if args.page is not None:
         from ..tune.tune_page import build

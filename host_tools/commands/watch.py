@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options
 from ..errors import LeverError
 from ..extras import require
-from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_reading
+from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_aircraft, chosen_reading
 
 if TYPE_CHECKING:
     from ..firmware.config import Config
@@ -99,6 +99,11 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", metavar="NAME", help="simulate a scenario of `lever sim --list` or a .toml file")
     add_bus_options(parser)
     add_signal_options(parser)
+    parser.add_argument(
+        "--aircraft",
+        metavar="AIRCRAFT",
+        help="with mapped signals: watch the margin to collective bounce, as `lever replay` does",
+    )
 
 
 def run_monitor(args: argparse.Namespace) -> int:
@@ -142,13 +147,14 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
         what = "nothing to watch" if not given else f"{' and '.join(given)} at once"
         raise LeverError(f"{what}: give a LOG, --scenario NAME, or --interface and --channel of a bus, one of them")
     settings = getattr(args, "settings", None)
+    aircraft = None if args.aircraft is None else chosen_aircraft(args.aircraft)
     if args.scenario is not None:
         from ..watch.sources import simulated
 
         if settings is not None:
             raise LeverError("--settings goes with a bus or a log; a scenario has its own settings")
-        if args.map or args.dbc:
-            raise LeverError("--dbc and --map go with a bus or a log; a scenario speaks lever.dbc")
+        if args.map or args.dbc or aircraft is not None:
+            raise LeverError("--dbc, --map and --aircraft go with a bus or a log; a scenario speaks lever.dbc")
         return simulated(args.scenario)
 
     from ..firmware.settings_file import make_config, read_assignments
@@ -158,7 +164,7 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
     if args.log is not None and (reading := chosen_reading(args, args.log)) is not None:
         from ..watch.mapped import MappedLogSource
 
-        return MappedLogSource(args.log, reading, config), config
+        return MappedLogSource(args.log, reading, config, aircraft), config
     if args.map or args.dbc:
         from ..signals.mapping import read_mapping
         from ..signals.online import Online
@@ -169,7 +175,9 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
         online = Online(read_mapping(args.map), args.dbc, args.clock)
         check_others_can_be_heard(args.interface)
         options = chosen_options(args, fd=online.fd)
-        return MappedBusSource(args.interface, args.channel, online, config, options), config
+        return MappedBusSource(args.interface, args.channel, online, config, options, aircraft), config
+    if aircraft is not None:
+        raise LeverError("--aircraft goes with --map: an estimator on the bus has its own (`lever_can --aircraft`)")
     if args.log is not None:
         return LogSource(args.log, args.channel, part=check_part(args)), config
     check_others_can_be_heard(args.interface)

@@ -14,17 +14,18 @@ from ..firmware.estimator import fault_names
 from ..firmware.library import enum_names
 from ..firmware.quantities import quantities, recorded_name
 from ..results.feedthrough import FEEDTHROUGH
-from ..results.trace import ESTIMATED, HEALTH, MEASURED, quantity_fields
+from ..results.trace import ESTIMATED, HEALTH, MEASURED, STABILITY, quantity_fields
 
 MEASUREMENT, ESTIMATE, RECORDED, TRUTH = "measurement", "estimate", "recorded", "truth"
 """Kinds of columns; recorded are the estimates of the firmware that ran when a log was recorded."""
-TEXT = ("mode", "faults", "mode_recorded")
+TEXT = ("mode", "faults", "mode_recorded", "bounce")
 """Columns of the trace whose numbers stand for words."""
 
 _DERIVED = {  # unit and comment of fields that are not in lever.dbc (fields.py)
     "nis": ("1", "Normalised innovation squared of theta and theta_dot."),
     "faults": ("", "Faults since the last HEALTH."),
 }
+_STABILITY_NAMES = {"frequency": "bounce_frequency"}
 _TRUTH = (  # column, unit, comment
     ("theta_true_rad", "rad", "Lever angle from the floor."),
     ("theta_dot_true_rad_s", "rad/s", "Lever rate."),
@@ -70,7 +71,9 @@ def columns(names: Iterable[str], model: str) -> list[Column]:
 
 def words(column: str, number: int) -> str:
     """What a number of one of the columns TEXT stands for: "run"; "excitation, torque"."""
-    return ", ".join(fault_names(number)) if column == "faults" else enum_names("lever_mode").get(number, "")
+    if column == "faults":
+        return ", ".join(fault_names(number))
+    return enum_names("lever_bounce" if column == "bounce" else "lever_mode").get(number, "")
 
 
 def as_words(column: str, values: FloatArray) -> list[str | None]:
@@ -101,6 +104,8 @@ def _known(model: str) -> Iterator[Column]:
     yield from (*estimates, *health)
     for source, message, field in FEEDTHROUGH:
         yield _of_message(source, f"feedthrough_{field}", message, field, held=True)
+    for source, message, field in STABILITY:
+        yield _of_message(source, _STABILITY_NAMES.get(field, field), message, field, held=True)
     yield _of_message("dither_N_m", "dither", "MOTOR_COMMAND", "dither")
     for source, unit, comment in _TRUTH:
         name = source[: source.index("_true")]

@@ -1,7 +1,10 @@
-"""What an estimator is given of the helicopter, to tell how near collective bounce is."""
+"""What an estimator is given of the helicopter, to tell how near collective bounce is; and as a file, which lever_can
+reads as well (firmware/port/linux/aircraft.h says what is in it)."""
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
@@ -10,7 +13,7 @@ from .library import ffi, lib
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-WARNING, ALARM = 3.0, 1.5
+WARNING, ALARM = 4.5, 3.0
 """Gain margins below which there is a warning and an alarm, where nothing else is said [dB]."""
 
 
@@ -28,6 +31,15 @@ class Stability(NamedTuple):
     frequency: float
     """At which it becomes unstable [Hz]."""
     frequency_sigma: float
+
+
+class Correction(NamedTuple):
+    """lever_correction_t: what mitigation adds to the lever's angle where that becomes collective pitch."""
+
+    angle: float
+    """[rad]"""
+    weight: float
+    """Of the fade that is in it: 0 passive, 1 all of it."""
 
 
 class AircraftResponse:
@@ -57,3 +69,63 @@ class AircraftResponse:
             self.pointer.real[i], self.pointer.imaginary[i] = value.real, value.imag
         self.pointer.gain_sigma, self.pointer.phase_sigma = gain_sigma, phase_sigma
         self.pointer.warning, self.pointer.alarm = warning, alarm
+
+    @property
+    def warning(self) -> float:
+        """[dB]"""
+        return round(float(self.pointer.warning), 6)
+
+    @property
+    def alarm(self) -> float:
+        """[dB]"""
+        return round(float(self.pointer.alarm), 6)
+
+    def text(self) -> str:
+        """The content of its file."""
+        at = self.pointer
+        lines = ["# frequency [Hz], real and imaginary part of z_ddot over the lever's angle [(m/s^2)/rad]"]
+        lines += [f"{at.frequency[i]:.6g}  {at.real[i]:.6g}  {at.imaginary[i]:.6g}" for i in range(at.count)]
+        lines += [f"{name} = {getattr(at, name):.6g}  # {unit}" for name, unit in _NUMBERS.items()]
+        return "\n".join(lines) + "\n"
+
+
+def read_response(path: str) -> AircraftResponse:
+    """The response of an aircraft in a file. Raises LeverError."""
+    try:
+        content = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise LeverError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
+    points: list[list[float]] = []
+    numbers: dict[str, float] = {}
+    for place, line in enumerate(content.split("\n"), start=1):
+        text = line.partition("#")[0].strip()
+        name, equals, value = (part.strip() for part in text.partition("="))
+        cells = [_number(cell) for cell in (value if equals else text).split()]
+        if text and (
+            len(cells) != (1 if equals else 3) or (equals and name not in _NUMBERS) or any(map(math.isnan, cells))
+        ):
+            raise LeverError(
+                f"{path}:{place}: neither {', '.join(_NUMBERS)} = number, nor frequency, real and imaginary part"
+            )
+        if equals:
+            numbers[name] = cells[0]
+        elif text:
+            points.append(cells)
+    if lacking := [name for name in ("gain_sigma", "phase_sigma") if name not in numbers]:
+        raise LeverError(f"{path}: how well is it known? It needs a line {lacking[0]} = number")
+    try:
+        return AircraftResponse([each[0] for each in points], [complex(*each[1:]) for each in points], **numbers)
+    except LeverError as error:
+        raise LeverError(f"{path}: {error}") from None
+
+
+_NUMBERS = {"gain_sigma": "[1]", "phase_sigma": "[rad]", "warning": "[dB]", "alarm": "[dB]"}
+
+
+def _number(text: str) -> float:
+    """NaN for what is none."""
+    try:
+        number = float(text)
+    except ValueError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan

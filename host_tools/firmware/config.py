@@ -12,7 +12,7 @@ from ..errors import SettingsError
 from ..near_names import did_you_mean
 from .library import enum_names, ffi, lib
 
-CHOICES = ("model", "preload", "estimator", "adaptation")
+CHOICES = ("model", "preload", "estimator", "adaptation", "mitigation")
 """What is chosen by name and not by number; the names are those of the façade's enums."""
 
 
@@ -105,10 +105,10 @@ def model_parameters(model: str) -> tuple[Parameter, ...]:
 class Config:
     """A configuration that the firmware accepts.
 
-    The choices are names of enum_names("lever_model"), "lever_preload", "lever_estimator" and "lever_adaptation";
-    `settings` go by name, in the units of settings_table(). What is not given is as in the firmware's defaults: model
-    "lever", preload "trim", estimator "dual", adaptation "robbins_monro". Raises SettingsError: one line that names
-    key, unit and range.
+    The choices are names of enum_names("lever_model"), "lever_preload", "lever_estimator", "lever_adaptation" and
+    "lever_mitigation"; `settings` go by name, in the units of settings_table(). What is not given is as in the
+    firmware's defaults: model "lever", preload "trim", estimator "dual", adaptation "robbins_monro", mitigation "none".
+    Raises SettingsError: one line that names key, unit and range.
     """
 
     def __init__(
@@ -118,11 +118,13 @@ class Config:
         estimator: str | None = None,
         adaptation: str | None = None,
         settings: Mapping[str, float] | None = None,
+        *,
+        mitigation: str | None = None,
     ) -> None:
         self.pointer: Any = ffi.new("lever_config_t *")
         """For calls of `lib`; valid as long as this object. Checked here, so leave it as it is."""
         lib.lever_config_default(self.pointer)
-        for what, name in zip(CHOICES, (model, preload, estimator, adaptation), strict=True):
+        for what, name in zip(CHOICES, (model, preload, estimator, adaptation, mitigation), strict=True):
             if name is not None:
                 setattr(self.pointer, what, choice_value(f"lever_{what}", what, name))
         for name, value in (settings or {}).items():
@@ -140,7 +142,7 @@ class Config:
 
     @property
     def choices(self) -> dict[str, str]:
-        """Names of model, preload, estimator and adaptation."""
+        """Names of model, preload, estimator, adaptation and mitigation."""
         return {what: enum_names(f"lever_{what}")[getattr(self.pointer, what)] for what in CHOICES}
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
-from .aircraft import AircraftResponse, Stability
+from .aircraft import AircraftResponse, Correction, Stability
 from .config import CHOICES, Config, choice_value
 from .library import enum_names, ffi, lib, load, struct_dtype
 
@@ -101,7 +101,7 @@ def health_of(pointer: Any) -> Health:
 
 
 def make_command(request: str = "none", dither_rms: float | None = None, **choices: str | None) -> Any:
-    """A lever_command_t *; None keeps a choice (model, preload, estimator, adaptation) or the dither as it is."""
+    """A lever_command_t *; None keeps a choice (of CHOICES) or the dither as it is."""
     command = ffi.new("lever_command_t *", {"dither_rms": lib.LEVER_KEEP if dither_rms is None else dither_rms})
     command.request = choice_value("lever_request", "request", request)
     for what in CHOICES:
@@ -125,6 +125,7 @@ class Estimator:
         self._feedthrough = ffi.new("lever_feedthrough_t *")
         self._health = ffi.new("lever_health_t *")
         self._stability = ffi.new("lever_stability_t *")
+        self._correction = ffi.new("lever_correction_t *")
         self._aircraft: AircraftResponse | None = None  # which the instance reads
         self._received = ffi.new("lever_frame_t *")
         self._received_data = ffi.buffer(self._received.data)
@@ -160,6 +161,7 @@ class Estimator:
         preload: str | None = None,
         estimator: str | None = None,
         adaptation: str | None = None,
+        mitigation: str | None = None,
         dither_rms: float | None = None,
     ) -> None:
         """Carries out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
@@ -167,9 +169,8 @@ class Estimator:
         dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque fades out a second
         of sample time after the last command: repeat one. Raises LeverError.
         """
-        command = make_command(
-            request, dither_rms, model=model, preload=preload, estimator=estimator, adaptation=adaptation
-        )
+        choices = zip(CHOICES, (model, preload, estimator, adaptation, mitigation), strict=True)
+        command = make_command(request, dither_rms, **dict(choices))
         if not lib.lever_command(self.pointer, command):
             raise LeverError(f"the firmware refused the command {request!r}, dither_rms = {dither_rms} N m")
 
@@ -206,6 +207,11 @@ class Estimator:
         lib.lever_stability(self.pointer, self._stability)
         values = {name: getattr(self._stability, name) for name in Stability._fields}
         return Stability(**values | {"state": _BOUNCE[values["state"]]})
+
+    def correction(self) -> Correction:
+        """What mitigation adds to the lever's angle, until the next sample."""
+        lib.lever_correction(self.pointer, self._correction)
+        return Correction(self._correction.angle, self._correction.weight)
 
     def health(self) -> Health:
         """Mode, faults and counts after the last sample."""

@@ -13,9 +13,10 @@ from ..arrays import FloatArray
 from ..can import fields
 from ..can.bulk import RECORDED, SLOTS, Rows
 from ..can.fields import COUNTS
+from ..firmware.library import enum_names
 from ..firmware.quantities import recorded_name
 from ..results.feedthrough import FEEDTHROUGH
-from ..results.trace import ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
+from ..results.trace import ESTIMATED, HEALTH, MEASURED, STABILITY, Trace, quantity_fields
 from .timeline import Timeline
 
 Continued = Callable[[str, FloatArray], FloatArray]
@@ -25,9 +26,14 @@ Continued = Callable[[str, FloatArray], FloatArray]
 class Columns:
     """Keeps what goes on from piece to piece: time, held counts."""
 
-    def __init__(self, timeline: Timeline, model: str, with_recorded: bool) -> None:
+    def __init__(
+        self, timeline: Timeline, model: str, with_recorded: bool, watched: bool, absent: tuple[str, ...] = ()
+    ) -> None:
+        """`watched`: whether the estimator knows the aircraft; `absent`: faults that say only that an input is missing
+        which the mapping does not have."""
         self._timeline = timeline
-        self._fields = (*quantity_fields(model), *FEEDTHROUGH, *HEALTH)
+        self._absent = sum(bit for bit, name in enum_names("lever_fault").items() if name in absent)
+        self._fields = (*quantity_fields(model), *FEEDTHROUGH, *HEALTH, *(STABILITY if watched else ()))
         self._with_recorded = with_recorded
         self._compared = (*ESTIMATED, *quantity_fields(model), *(entry for entry in HEALTH if entry[0] == "mode"))
         self._counts = dict.fromkeys(COUNTS, 0)
@@ -42,6 +48,7 @@ class Columns:
             trace[column] = decoded.at_samples(message, field)
         for column, message, field in self._fields:
             trace[column] = decoded.held(message, field, self._unwrapped if field in COUNTS else None)
+        trace["faults"] = _without(trace["faults"], self._absent)
         trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
         if self._with_recorded:
             recorded = _Decoded(rows, recorded=True)
@@ -59,6 +66,12 @@ class Columns:
         if finite.any():
             self._counts[name] = int(values[finite][-1])
         return values
+
+
+def _without(faults: FloatArray, bits: int) -> FloatArray:
+    """Masks without some bits; NaN stays."""
+    known = np.isfinite(faults)
+    return np.where(known, (np.where(known, faults, 0.0).astype(np.int64) & ~bits).astype(np.float64), np.nan)
 
 
 class _Decoded:

@@ -20,7 +20,7 @@ class Commands:
     def __init__(self, choices: Mapping[str, str], chosen: Mapping[str, str]) -> None:
         """`choices` of the estimator at the start; `chosen` are those that no COMMAND may change."""
         self.choices = dict(choices)
-        """Of the estimator now: model, preload, estimator, adaptation."""
+        """Of the estimator now."""
         self.count = 0
         self.changed = 0
         """Those of which a choice was left out, because the user has chosen otherwise."""

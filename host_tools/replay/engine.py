@@ -19,10 +19,12 @@ from ..can.traffic import Traffic
 from ..exports.signal_files import calendar
 from ..extras import missing
 from ..files import Outputs, write_text
+from ..firmware.aircraft import AircraftResponse
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
 from ..provenance import printable, provenance
 from ..report import write_page
+from ..results.faults import OPTIONAL
 from ..results.summary import SCHEMA, ReplaySummary, of
 from ..results.trace import Trace
 from ..signals.reading import Reading
@@ -62,6 +64,8 @@ class Options:
     length: float = float("inf")
     formats: Sequence[str] = ("csv",)
     """Of the signals, of formats.FORMATS."""
+    aircraft: AircraftResponse | None = None
+    """Whose margin to collective bounce is watched."""
     inputs: Sequence[str | Path] = ()
     """Files beside the logs that all this is from: settings, database, mapping."""
 
@@ -79,7 +83,7 @@ def replay(
     logs = list(logs)
     traffic: Traffic | MappedTraffic
     if options.reading is None:
-        traffic = Traffic(Recording(logs), options.channel)
+        traffic = Traffic(Recording(logs), options.channel, options.start, options.length)
     else:
         traffic = MappedTraffic(logs, options.reading, progress)
         options = replace(options, config=traffic.at_its_rate(options.config))
@@ -104,7 +108,9 @@ class _Replay:
 
     def __init__(self, traffic: Traffic | MappedTraffic, options: Options, folder: Folder | None) -> None:
         self._traffic, self._options, self._folder = traffic, options, folder
-        self._feeder = Feeder(Estimator(options.config))
+        estimator = Estimator(options.config)
+        estimator.watch(options.aircraft)
+        self._feeder = Feeder(estimator)
         self._commands = Commands(options.config.choices, options.chosen)
         self._repeats = Repeats()
         self._timeline = Timeline(options.config.settings["sample_period"])
@@ -119,8 +125,7 @@ class _Replay:
     def run(self, progress: Progress | None) -> None:
         """All of the recording."""
         recording = self._traffic.recording
-        for chunk in self._traffic.chunks():
-            frames = self._part(chunk)
+        for frames in self._traffic.chunks():
             self._repeats.add(frames)
             self._identify(frames)
             for fed, rows in self._feeder.feed(self._commands.applied(frames)):
@@ -130,16 +135,6 @@ class _Replay:
             if progress is not None:
                 progress(recording.done, recording.size)
         self._take(self._feeder.flush(), last=True)
-
-    def _part(self, frames: Frames) -> Frames:
-        """Those between start and end; of a mapped log it is taken already."""
-        start, length = self._options.start, self._options.length
-        if self._options.reading is not None or (start == 0.0 and length == float("inf")):
-            return frames
-        since = (frames["time_us"] - self._traffic.first_us) * 1e-6
-        wanted = (since >= start) | (frames["id"] == codec.message("COMMAND").frame_id)
-        part: Frames = frames[wanted & (since < start + length)]
-        return part
 
     def _identify(self, frames: Frames) -> None:
         """Which contract the recorded estimator speaks, by its first IDENTITY that says so."""
@@ -189,7 +184,14 @@ class _Replay:
             self._sinks.append(self._comparison)
         if self._folder is not None:
             self._sinks.append(self.kept)
-        return Columns(self._timeline, self.model, with_recorded)
+        watched = self._options.aircraft is not None
+        return Columns(self._timeline, self.model, with_recorded, watched, self._absent())
+
+    def _absent(self) -> tuple[str, ...]:
+        """Faults of inputs that the mapping does not have."""
+        if not isinstance(self._traffic, MappedTraffic):
+            return ()
+        return tuple(fault for fault, key in OPTIONAL.items() if key not in self._traffic.loaded.inputs)
 
     # --- what comes of it ---------------------------------------------------------------------------------------------
 
@@ -202,6 +204,7 @@ class _Replay:
             "estimator": self._estimator(),
             "samples": self._timeline.clocks.samples,
             **self.figures.summary(self._feeder.estimator.health()),
+            "stability": self._stability(),
             "comparison": compared,
         }
         summary["passed"] = not failure(summary)
@@ -211,6 +214,13 @@ class _Replay:
     def _estimator(self) -> dict[str, Any]:
         choices = self._commands.choices | {"model": self.model}
         return {**choices, "settings": self._options.config.settings}
+
+    def _stability(self) -> dict[str, Any] | None:
+        """None without an aircraft."""
+        aircraft = self._options.aircraft
+        if aircraft is None:
+            return None
+        return {**self.figures.bounce.summary(), "warning_db": aircraft.warning, "alarm_db": aircraft.alarm}
 
     def _recording(self) -> dict[str, Any]:
         traffic, clocks = self._traffic, self._timeline.clocks

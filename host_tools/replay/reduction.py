@@ -43,6 +43,8 @@ def _rules(name: str) -> tuple[Reduce, ...]:
     """What a stretch, or a pair of stretches, leaves of a column."""
     if name == "faults":
         return (_any_bit,)
+    if name == "bounce":
+        return (_greatest,)
     return (_least, _greatest) if name.startswith(_DENSE) else (_first,)
 
 

@@ -21,19 +21,25 @@ from ..provenance import with_provenance
 
 if TYPE_CHECKING:
     from ..results.summary import Summary
+    from .page import Story
     from .run import Run
 
 
-def write_report(trace: Mapping[str, NDArray[Any]], summary: Summary | None, path: str | os.PathLike[str]) -> None:
+def write_report(
+    trace: Mapping[str, NDArray[Any]],
+    summary: Summary | None,
+    path: str | os.PathLike[str],
+    story: Story | None = None,
+) -> None:
     """Writes the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
     of summary.json, where there is one. Raises LeverError when `path` cannot be written."""
     from .run import Run  # here, so that importing this package stays quick
 
-    write_page(Run(trace, summary), path)
+    write_page(Run(trace, summary), path, story)
 
 
-def write_page(run: Run, path: str | os.PathLike[str]) -> None:
+def write_page(run: Run, path: str | os.PathLike[str], story: Story | None = None) -> None:
     """write_report() of a run that may have kept less than a whole trace."""
     from .page import build
 
-    write_text(path, with_provenance(build(run), run.summary.provenance if run.summary else None))
+    write_text(path, with_provenance(build(run, story), run.summary.provenance if run.summary else None))

@@ -68,7 +68,8 @@ def feedthrough_caption(run: Run) -> str:
         "The same at one time, as a Bode diagram: magnitude and phase, and below the measured coherence of floor and "
         "lever over the whole run. Where that is low, noise, torque or the pilot's own movement move the lever, and "
         "there is little to learn from the floor. Between 2 and 8 Hz the shaded band is ±2σ, as the estimator sends "
-        "it; it contains what the parameters leave open, not what the model cannot do. Drag the slider through the run."
+        "it; it contains what the parameters leave open, not what the model cannot do."
+        '<span class="screen"> Drag the slider through the run.</span>'
     ]
     if (accuracy := transfer.accuracy(run)) is not None:
         sentences.append(

@@ -9,7 +9,6 @@
     responsive: true, displaylogo: false, showSendToCloud: false, displayModeBar: touch || small ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"]
   };
-  const FLATTER = 0.8; // charts on paper
   const charts = Array.from(document.querySelectorAll(".chart"));
   const chosen = new Map(); // chart: which of its choices
   let figures = {};
@@ -49,6 +48,10 @@
     const merged = Object.assign(common, own);
     for (const key of Object.keys(merged).filter((name) => /^[xy]axis/.test(name))) {
       merged[key] = Object.assign({}, axis, own[key], { title: Object.assign({}, axis.title, own[key].title) });
+      if (small && key.startsWith("x") && merged[key].title.text) { // a title that is too long is folded
+        merged[key].title.text = merged[key].title.text.replace(/^(?=.{36})(.{18,36}?) /, "$1<br>");
+        merged[key].automargin = true;
+      }
     }
     return coloured(merged);
   }
@@ -56,7 +59,6 @@
   function draw(chart) {
     const figure = figures[chart.id];
     const drawn = layout(figure);
-    drawn.height *= root.classList.contains("paper") ? FLATTER : 1;
     chart.style.height = drawn.height + "px";
     Plotly.react(chart, coloured(figure.data), drawn, OPTIONS);
     if (chosen.has(chart)) { choose(chart, chosen.get(chart)); }
@@ -135,6 +137,9 @@
     root.classList.toggle("paper", begins);
     if (begins) { opened = Array.from(document.querySelectorAll("details:not([open])")); }
     opened.forEach((each) => { each.open = begins; });
+    for (const table of document.querySelectorAll("table")) { // one that is too wide for the paper becomes smaller
+      table.style.zoom = begins ? Math.min(1, table.parentElement.clientWidth / table.offsetWidth) : "";
+    }
     charts.forEach(draw);
   }
 

@@ -2,9 +2,10 @@
 
 import html
 from importlib.resources import files
+from typing import NamedTuple
 
 from . import captions, summary_html
-from .charts import comparison, health, signals, tracking, transfer
+from .charts import comparison, health, signals, stability, tracking, transfer
 from .document import document
 from .figure import Figure, Spec
 from .run import Run
@@ -49,16 +50,28 @@ class Page:
         return document(f"Lever CDKF: {self.title}", body, self.figures, style)
 
 
-def build(run: Run) -> str:
+class Story(NamedTuple):
+    """A picture that is no chart of the run, in front of those that are."""
+
+    title: str
+    figure: Figure
+    caption: str
+    """HTML"""
+
+
+def build(run: Run, story: Story | None = None) -> str:
     """The whole page."""
     scenario = run.simulated.scenario if run.simulated else None
     title = (
         (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.get("logs", ())) or "recorded run"
     )
     page = Page(title, _subtitle(run), "lever sim" if run.simulated else "lever replay")
+    if story is not None:
+        page.section("story", "Bounce", story.title, page.figure("figure-story", story.figure, story.caption))
     _estimates(page, run)
     _explained(page, run)
     _comparison(page, run)
+    _stability(page, run)
     _transfer(page, run)
     _signals(page, run)
     _health(page, run)
@@ -132,6 +145,24 @@ def _comparison(page: Page, run: Run) -> None:
     )
 
 
+def _stability(page: Page, run: Run) -> None:
+    known = run.replayed.stability if run.replayed else None
+    limits = (known.warning_db, known.alarm_db) if known else ()
+    page.section(
+        "stability",
+        "Margin",
+        "Margin to collective bounce",
+        page.figure(
+            "figure-stability",
+            stability.margin(run, limits),
+            "By how much the loop through arm, lever and rotor may grow until it is unstable, with a band of ±2σ; at "
+            "0 dB it is. Dotted lines are that limit and those of warning and alarm, bars at the foot the times of "
+            "these. Below, the frequency at which it would begin. There is nothing where the estimate does not carry "
+            "it.",
+        ),
+    )
+
+
 def _transfer(page: Page, run: Run) -> None:
     maps = transfer.maps(run)
     meaning = (
@@ -169,7 +200,7 @@ def _signals(page: Page, run: Run) -> None:
             "figure-detail",
             signals.detail(run),
             "Angle and rate of the lever in detail: grey dots are the samples of the sensors, the blue line is the "
-            "estimate. The buttons choose the moment.",
+            'estimate.<span class="screen"> The buttons choose the moment.</span>',
         ),
         page.figure(
             "figure-motion",

@@ -12,6 +12,9 @@ from ..firmware.library import enum_names
 WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mismatch", "calibration", "hands_off")
 """Faults that tell the user not to trust the estimates. Others, such as change, tell what the estimator is doing."""
 
+OPTIONAL = {"theta_dot": "theta_dot", "torque": "tau_m"}
+"""Inputs that a recording may lack, by the fault that says so."""
+
 LITTLE = 0.02
 """Share of the judged time, below which a fault is a passing one."""
 

@@ -30,6 +30,7 @@ class Estimator:
     preload: str
     estimator: str
     adaptation: str
+    mitigation: str
     settings: dict[str, float]
 
 
@@ -184,6 +185,20 @@ class Comparison:
     in_words: str
 
 
+@dataclass(frozen=True)
+class Stability:
+    """How near collective bounce was, with an aircraft."""
+
+    states_s: dict[str, float]
+    """Seconds in each state of enum lever_bounce."""
+    least_margin_db: float | None
+    its_sigma_db: float | None
+    at_s: float | None
+    warning_db: float
+    """Limits of the gain margin."""
+    alarm_db: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReplaySummary(Summary):
     """Of `lever replay`."""
@@ -196,6 +211,8 @@ class ReplaySummary(Summary):
     """Of the judged time with any of faults.WARNINGS of those; None where nothing is judged."""
     estimates: dict[str, Estimate]
     comparison: Comparison | None
+    stability: Stability | None = None
+    """None without an aircraft."""
 
 
 # --- to and from JSON ------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ Trace = dict[str, FloatArray]
 CONVERGED_AFTER = 15.0
 """Time [s] from which on estimates are judged, unless a scenario says otherwise."""
 
-WHOLE = ("mode", "faults", "lost", "corrupt", "late", "restarts")
+WHOLE = ("mode", "faults", "lost", "corrupt", "late", "restarts", "bounce")
 """Columns of whole numbers."""
 _ROWS_AT_ONCE = 1 << 13  # that are made into text
 
@@ -52,6 +52,17 @@ HEALTH = (
     ("restarts", "HEALTH", "restarts"),
     ("excitation_rad_s", "HEALTH", "excitation"),
 )
+
+
+STABILITY = (
+    ("bounce", "STABILITY", "bounce"),
+    ("gain_margin_dB", "STABILITY", "gain_margin"),
+    ("gain_margin_sigma_dB", "STABILITY", "gain_margin_sigma"),
+    ("modulus", "STABILITY", "modulus"),
+    ("modulus_sigma", "STABILITY", "modulus_sigma"),
+    ("bounce_frequency_Hz", "STABILITY", "frequency"),
+)
+"""Only where the estimator knows the aircraft."""
 
 
 def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:

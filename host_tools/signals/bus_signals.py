@@ -37,7 +37,7 @@ _CHECKS: dict[int, Callable[[bytearray, Any], bool]] = {
 def load_database(path: str | Path) -> Database:
     """A DBC, or what else cantools reads. Raises LeverError."""
     try:
-        loaded = cantools.database.load_file(path, strict=False)
+        loaded = cantools.database.load_file(path, strict=False, encoding=_encoding(Path(path)))
     except OSError as error:
         raise LeverError(f"cannot read {path}: {error.strerror}") from None
     except Exception as error:  # each format has its own
@@ -45,6 +45,17 @@ def load_database(path: str | Path) -> Database:
     if not isinstance(loaded, Database) or not loaded.messages:
         raise LeverError(f"{path}: it describes no CAN message")
     return loaded
+
+
+def _encoding(path: Path) -> str | None:
+    """Of a DBC, which does not say it: UTF-8 where it is that, else what cantools takes for its format."""
+    if path.suffix.lower() != ".dbc":
+        return None
+    try:
+        path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError:
+        return None
+    return "utf-8"
 
 
 def find(database: Database, name: str, where: str) -> tuple[Message, Field]:

@@ -11,7 +11,7 @@ from ..errors import LeverError
 from ..firmware.config import Config
 from ..firmware.estimator import run_samples
 from .arrays import columns_of, signals_by_input
-from .inputs import samples_of, understood
+from .inputs import recorded_samples, understood
 from .mapping import Source
 from .recorded import Signal
 from .resample import at_period
@@ -55,7 +55,7 @@ def estimate(
         )
     _check_units(signals)
     sources = {key: Source(signal.name, signal.unit or KINDS[key][1]) for key, signal in signals.items()}
-    taken, notes = samples_of({key: understood(key, sources[key], signal) for key, signal in signals.items()})
+    taken, notes = recorded_samples({key: understood(key, sources[key], signal) for key, signal in signals.items()})
     config = at_period(config or Config(), taken.period)
     return Result(config, taken.time_us, run_samples(config, taken.arrays()), tuple(notes))
 

@@ -104,6 +104,20 @@ def _scale(key: str, source: Source, signal: Signal, notes: list[str]) -> tuple[
     return unit, scale
 
 
+def recorded_samples(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[Samples, list[str]]:
+    """samples_of() a recording, in which every sensor moves. Raises LeverError for one that never does."""
+    still = {key: each for key, each in inputs.items() if not each.signal.changes()}
+    for key, each in still.items():
+        if key != "tau_m":
+            level = f"{level_in(each.signal.values):.4g} {KINDS[key][1]}"
+            raise LeverError(
+                f"{key} = {each.signal.name}: it is {level} throughout, so it is no measurement: map another signal, "
+                "or another part of the recording"
+            )
+    samples, notes = samples_of(inputs, clock)
+    return samples, [*(f"{key} = {each.signal.name}: it never changes" for key, each in still.items()), *notes]
+
+
 def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[Samples, list[str]]:
     """The samples of all inputs, and notes for the user. Raises LeverError."""
     samples = sample({key: each.signal for key, each in inputs.items()}, clock)

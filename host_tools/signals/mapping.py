@@ -2,7 +2,7 @@
 
     theta=LEVER_POSITION.Angle                              what the database or the header says, gravity by its looks
     z_ddot=IMU.AccZ,unit=g,sign=-1,gravity=included         said by hand
-    theta=Angle,factor=0.0017,offset=-0.2,channel=can1,delay=0.004
+    theta=Angle,factor=0.0017,offset=-2 deg,channel=can1,delay=4 ms
 
 or the same as TOML, a table for each input, and one for each message with E2E protection:
 
@@ -27,6 +27,7 @@ from typing import Any
 
 from ..errors import LeverError
 from ..near_names import did_you_mean
+from ..units import split
 from .units import INPUTS, KINDS, factor
 
 if sys.version_info >= (3, 11):
@@ -49,7 +50,7 @@ class Source:
     factor: float | None = None
     """Instead of a unit: value times this, plus offset, is in the firmware's unit."""
     offset: float = 0.0
-    """Added to the values in the firmware's unit."""
+    """Added to the values [the firmware's unit]."""
     sign: int | None = None
     """1 or -1; None: 1, but -1 for an acceleration whose gravity points down."""
     gravity: str = "auto"
@@ -180,9 +181,9 @@ def _source(key: str, table: Any) -> Source:
     names = [each.name for each in fields(Source)]
     if unknown := sorted(set(table) - set(names)):
         raise LeverError(f"{where}: unknown {', '.join(unknown)}; it may have message, {', '.join(names)}")
-    for name in ("factor", "offset", "delay"):
+    for name, kind in (("factor", None), ("offset", key.strip()), ("delay", "time")):
         if name in table:
-            table[name] = _number(where, name, table[name])
+            table[name] = _quantity(where, name, table[name], kind)
     if "sign" in table:
         if str(table["sign"]).strip() not in ("1", "+1", "-1"):
             raise LeverError(f"{where}: sign = {table['sign']}; it may be 1 or -1")
@@ -207,14 +208,14 @@ def _check(where: str, key: str, source: Source) -> None:
         raise LeverError(f"{where}: delay = {source.delay:g} s is more than a second: it is in seconds")
 
 
-def _number(where: str, name: str, value: Any) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number) or isinstance(value, bool):
-        raise LeverError(f"{where}: {name} = {value}; it must be a number")
-    return number
+def _quantity(where: str, name: str, value: Any, kind: str | None) -> float:
+    """A number, or one with a unit of KINDS[kind], in SI. Raises LeverError."""
+    number, unit = split(str(value)) or ("nan", "")
+    scale = 1.0 if not unit else None if kind is None else factor(kind, unit)
+    if scale is None or not math.isfinite(float(number)) or isinstance(value, bool):
+        what = "" if kind is None else f", in {KINDS[kind][1]} or with a unit of {KINDS[kind][0]}"
+        raise LeverError(f"{where}: {name} = {value}; it must be a number{what}")
+    return float(number) * scale
 
 
 def _protection(name: str, table: Any) -> Protection:

@@ -19,7 +19,11 @@ from .recorded import Signal
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _POINTS = 600
-_WIDTH, _HEIGHT = 640, 90
+OTHER = "other"
+"""Heading of what is no input."""
+_WIDTH, _HEIGHT, _MARGIN, _BELOW = 640, 116, 84, 26
+"""Of a plot in the page, with the room left of it for values and below it for times."""
+_TICKS = 5
 
 
 def sparkline(signal: Signal, width: int) -> str:
@@ -71,37 +75,64 @@ def _extremes(signal: Signal) -> str:
 
 
 def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
-    figures = []
-    for heading, signal in signals:
-        caption = f"<b>{html.escape(heading)}</b> {html.escape(signal.name)}: {html.escape(_extremes(signal))}"
-        figures.append(f"<figure><figcaption>{caption}</figcaption>{_svg(signal)}</figure>")
+    figures, links = [], []
+    begin = min((float(each.time[0]) for _, each in signals if len(each.time)), default=0.0)
+    end = max((float(each.time[-1]) for _, each in signals if len(each.time)), default=1.0)
+    for number, (heading, signal) in enumerate(signals):
+        name = html.escape(signal.name)
+        caption = f"<b>{html.escape(heading)}</b> {name}: {html.escape(_extremes(signal))}"
+        figures.append(f'<figure id="s{number}"><figcaption>{caption}</figcaption>{_svg(signal, begin, end)}</figure>')
+        links.append(f'<a href="#s{number}">{f"<b>{html.escape(heading)}</b> " if heading != OTHER else ""}{name}</a>')
     style = (
         ":root{color-scheme:light dark}body{font:15px/1.4 system-ui,sans-serif;max-width:84rem;margin:1rem auto;"
         "padding:0 1rem}main{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,28rem),1fr));"
         "gap:1rem 2rem}figure{margin:0;break-inside:avoid}figcaption{overflow-wrap:anywhere}"
-        "svg{width:100%;height:auto;border:1px solid #8886}"
+        "nav{display:flex;flex-wrap:wrap;gap:.2rem 1rem;margin:0 0 1rem}figure:target{outline:2px solid #2a6fdb}"
+        "svg{width:100%;height:auto;font-size:15px;fill:currentColor}"
         "path{fill:none;stroke:#2a6fdb;stroke-width:1.2;vector-effect:non-scaling-stroke}"
+        "path.axis{stroke:#8888}"
     )
-    seconds = max((float(np.ptp(each.time)) for _, each in signals if len(each.time)), default=0.0)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width"><style>{style}</style>'
-        f"<h1>{html.escape(title)}</h1><p>{seconds:.4g} s</p><main>{''.join(figures)}</main></html>\n"
+        f"<h1>{html.escape(title)}</h1><nav>{''.join(links)}</nav><main>{''.join(figures)}</main></html>\n"
     )
 
 
-def _svg(signal: Signal) -> str:
+def _svg(signal: Signal, begin: float, end: float) -> str:
+    """Over the time of all, from `begin` to `end` [s], which is counted from `begin`."""
     time, values = _parts(signal, _points(signal, _POINTS))
     present = values[np.isfinite(values)]
     low, span = (float(present.min()), float(np.ptp(present)) or 1.0) if len(present) else (0.0, 1.0)
-    last = float(time[-1]) if len(time) else 1.0
+    first = float(signal.time[0]) - begin if len(signal.time) else 0.0
+    bottom, scale = _HEIGHT - _BELOW, (_WIDTH - _MARGIN - 20) / max(end - begin, 1e-9)
     path, pen = [], "M"
     for at, value in zip(time.tolist(), values.tolist(), strict=True):
         if math.isfinite(value):
-            height = _HEIGHT * (0.95 - 0.9 * (value - low) / span)
-            path.append(f"{pen}{_WIDTH * at / last:.1f} {height:.1f}")
+            height = bottom * (0.93 - 0.8 * (value - low) / span)
+            path.append(f"{pen}{_MARGIN + scale * (first + at):.1f} {height:.1f}")
         pen = "L" if math.isfinite(value) else "M"
-    return f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img"><path d="{"".join(path)}"/></svg>'
+    axis, texts = [f"M{_MARGIN} 0V{bottom}H{_WIDTH}"], []
+    for tick in ticks(end - begin):
+        x = _MARGIN + scale * tick
+        axis.append(f"M{x:.1f} {bottom}v4")
+        unit = "\u202fs" if tick else ""
+        texts.append(f'<text x="{x:.1f}" y="{_HEIGHT - 6}" text-anchor="middle">{tick:g}{unit}</text>')
+    for value, share in ((low, 0.93), (low + span, 0.13)):
+        y = bottom * share + 5
+        texts.append(f'<text x="{_MARGIN - 6}" y="{y:.1f}" text-anchor="end">{value:.3g}</text>')
+    return (
+        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img"><path class="axis" d="{"".join(axis)}"/>'
+        f'<path d="{"".join(path)}"/>{"".join(texts)}</svg>'
+    )
+
+
+def ticks(span: float) -> list[float]:
+    """Round times from 0 to `span` [s], at most six of them."""
+    least = max(span, 1e-9) / _TICKS
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least * (1.0 - 1e-9))
+    return [float(f"{step * k:.6g}") for k in range(int(1.001 * span / step) + 1)]
 
 
 def _picture(signals: Sequence[tuple[str, Signal]], title: str) -> Any:

@@ -8,6 +8,7 @@ rate that is its slope, a lever moves with its base, and what stands still or co
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,9 +20,17 @@ from ..units import GRAVITY
 from .mapping import Mapping, Source
 from .recorded import Signal
 from .slope import STEP, slope_likeness, together
-from .units import INPUTS, fitting, is_unit
+from .units import INPUTS, factor, fitting, is_unit
 
 _UNIT_FITS, _NO_UNIT, _UNIT_DOES_NOT = 4.0, 2.0, -8.0
+_UNIT_OF_TORQUE = 7.0
+"""There are many angles, but few torques: with this unit an odd name is enough, and words can only speak against."""
+_GREATEST_TORQUE = 100.0
+"""[N m] that a hand can hold against."""
+_SAME_MESSAGE = 2.0
+"""For what comes with the angle of the lever."""
+_CLEAR = 1.0
+"""By how much a torque has to be better than the next."""
 _IS_SLOPE = 4.0
 _MOVES_WITH_BASE = 4.0
 """Times the coherence with the acceleration, 0 to 1."""
@@ -45,33 +54,41 @@ def _weights(text: str) -> dict[str, float]:
 
 _WORDS = {
     "theta": _weights(
-        "4: theta, 2: angle ang winkel angular, 1.5: pos position deflection displacement travel, "
-        "-4: rate vel velocity speed omega gyro acc accel acceleration, -5: dot"
+        "4: theta, 2: angle angular winkel, 1.5: position posn pos deflection displacement travel stellung auslenkung "
+        "debattement, 1: rot ag, -4: rate vel velocity speed omega gyro acceleration accel vitesse geschwindigkeit "
+        "drehrate drehzahl beschleunigung, -5: dot"
     ),
     "theta_dot": _weights(
-        "3: rate vel velocity omega dot, 2: speed gyro, 1: angular theta, -3: acc accel acceleration"
+        "3: rate velocity omega dot drehrate geschwindigkeit vitesse, 2: speed gyro, 1: angular theta, "
+        "-3: acceleration accel beschleunigung"
     ),
     "z_ddot": _weights(
-        "4: nz az zdd, 3: acc accel acceleration ddot beschleunigung, 2.5: z vert vertical heave, 2: down up, "
-        "1.5: normal, 1: load base floor cabin, -3: x y long lat lateral longitudinal, -4: ax ay nx ny, "
-        "-2: angular rot rotor engine"
+        "4: nz az zdd, 3: acceleration acc accel ddot beschleunigung, 2.5: z vertical vertikal verticale heave, "
+        "2: down up gamma, 1.5: normal, 1: load base floor cabin cockpit seat boden sitz kabine plancher siege cabine, "
+        "-3: x y long lat lateral longitudinal, -4: ax ay nx ny, -2: angular rot rotor engine"
     ),
-    "tau_m": _weights("3: torque trq tau, 2: moment mom motor mot, 1.5: actuator act, -4: engine rotor shaft"),
-    "grip_force": _weights("3: force frc kraft grip, 2: hand handle, 1: pilot"),
+    "tau_m": _weights(
+        "3: torque tq tau drehmoment couple, 2: moment motor moteur, 1.5: actuator antrieb verin servo, "
+        "-4: engine rotor mast gearbox mgb tail triebwerk getriebe, -1: shaft"
+    ),
+    "grip_force": _weights("3: force kraft effort grip poignee griff, 2: hand handle, 1: pilot"),
 }
-"""Words in names, and how much they speak for an input or against it."""
+"""English, German and French words of names, and how much they speak for an input or against it."""
 _LEVER_WORDS = _weights(
-    "3: collective coll, 2.5: inceptor incep, 2: lever lvr, 1: stick grip, "
-    "-1: pitch seat raw att, -2: roll steering elevation trim, -3: cyclic cyc yaw azimuth rotor wheel engine, "
-    "-4: pedal ped heading"
+    "3: collective kollektiv collectif, 2.5: inceptor incptr, 2: lever hebel levier manche, 1.5: col, 1: stick grip, "
+    "-1: pitch seat raw att, -2: roll steering elevation, -3: cyclic yaw azimuth rotor wheel engine nick gier, "
+    "-4: pedal heading"
 )
 """The same for all inputs that are the lever's."""
 _NOT_MEASURED = _weights(
-    "-2: cmd command target ref setpoint demand, -3: max min limit err error temp, "
-    "-6: counter cnt crc checksum status valid state estimate sigma"
+    "2: feedback fbk fb measured, 0: val value sig signal, -2: command cmd target ref setpoint demand soll consigne, "
+    "-3: max min limit err error temp, -6: counter cnt crc checksum status valid state estimate sigma"
 )
 """The same for all."""
 _PARTS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")
+_COMPOUND = 5
+"""Letters from which on a word is recognised inside another: the parts of Motormoment, Hebelwinkel."""
+_CONSONANTS = re.compile(r"[^aeiou]{3,}")
 
 
 @dataclass(frozen=True)
@@ -92,10 +109,11 @@ def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candid
     chosen: dict[str, Candidate] = {}
     for key in INPUTS:
         taken = {each.signal.name for each in chosen.values()}
-        for each in _best(candidates, key):
-            if each.score >= _LEAST[key] and each.signal.name not in taken and _goes_with(each, chosen):
-                chosen[key] = each
-                break
+        if "theta" in chosen:
+            candidates = _with_company(candidates, chosen["theta"].signal, key)
+        best = [each for each in _best(candidates, key) if each.signal.name not in taken and _goes_with(each, chosen)]
+        if best and best[0].score >= _LEAST[key] and _is_clear(key, best):
+            chosen[key] = best[0]
     if "z_ddot" not in chosen or not chosen.keys() & {"theta", "theta_dot"}:
         lacking = "an acceleration of the base" if chosen.keys() & {"theta", "theta_dot"} else "the angle of a lever"
         raise LeverError(f"{where}: no signal looks like {lacking}: map it by hand, with --map KEY=SIGNAL")
@@ -110,6 +128,11 @@ def _goes_with(each: Candidate, chosen: dict[str, Candidate]) -> bool:
     return abs(slope_likeness(chosen["theta"].signal, each.signal)) > 0.5
 
 
+def _is_clear(key: str, best: Sequence[Candidate]) -> bool:
+    """Whether no other torque may be meant as well."""
+    return key != "tau_m" or len(best) == 1 or best[0].score - best[1].score >= _CLEAR
+
+
 def _source(each: Candidate, chosen: dict[str, Candidate]) -> Source:
     turned = each.key == "theta_dot" and "theta" in chosen
     turned = turned and slope_likeness(chosen["theta"].signal, each.signal) < 0.0
@@ -117,32 +140,60 @@ def _source(each: Candidate, chosen: dict[str, Candidate]) -> Source:
 
 
 def words_of(name: str) -> set[str]:
-    """The words of a name: lever, angle, deg of LeverAngle_deg."""
-    return {part.lower() for part in _PARTS.findall(name)}
+    """The words of a name: lever, angle, deg of LeverAngle_deg; without accents."""
+    plain = "".join(letter for letter in unicodedata.normalize("NFKD", name) if not unicodedata.combining(letter))
+    return {part.lower() for part in _PARTS.findall(plain)}
 
 
 def _candidate(key: str, signal: Signal) -> Candidate:
     tables = [_WORDS[key], _NOT_MEASURED, *([] if key == "z_ddot" else [_LEVER_WORDS])]
     message, _, name = signal.name.rpartition(".")
-    own, elsewhere = words_of(name), words_of(f"{message} {signal.words}")
-    score = sum(_sum(each, own) + _ELSEWHERE * _sum(each, elsewhere - own) for each in tables)
-    speaking = sorted(word for word in own if _sum(tables[0], [word]) > 0.0)
+    own = words_of(name)
+    around = words_of(message) - own
+    prose = words_of(signal.words) - own - around
+    score = _by_unit(key, signal)
+    says_itself = key == "tau_m" and score == _UNIT_OF_TORQUE
+    for table in tables:
+        weights = [_weight(table, word) for word in own] + [_ELSEWHERE * _weight(table, word) for word in around]
+        weights += [_ELSEWHERE * table.get(word, 0.0) for word in prose]
+        score += sum(min(weight, 0.0) if says_itself and table is tables[0] else weight for weight in weights)
+    speaking = sorted(word for word in own if _weight(tables[0], word) > 0.0)
     why = [f"named {' '.join(speaking)}"] if speaking else []
     if key in fitting(signal.unit):
-        score += _UNIT_FITS
         why.append(f"in {signal.unit}")
-    elif not signal.unit:
-        score += _NO_UNIT
-    elif is_unit(signal.unit) or signal.unit == "%":
-        score += _UNIT_DOES_NOT
     if key == "z_ddot" and (level := _gravity(signal.values)):
         score += _HAS_GRAVITY
         why.append(f"rests at {level:.3g}, which is gravity")
     return Candidate(key, signal, score, tuple(why))
 
 
-def _sum(weights: dict[str, float], words: Iterable[str]) -> float:
-    return sum(weights.get(word, 0.0) for word in words)
+def _by_unit(key: str, signal: Signal) -> float:
+    scale = factor(key, signal.unit)
+    if scale is None:
+        return _NO_UNIT if not signal.unit else _UNIT_DOES_NOT * (is_unit(signal.unit) or signal.unit == "%")
+    if key != "tau_m":
+        return _UNIT_FITS
+    return _UNIT_OF_TORQUE if scale * np.nanmax(np.abs(signal.values)) < _GREATEST_TORQUE else _UNIT_DOES_NOT
+
+
+def _weight(weights: dict[str, float], word: str) -> float:
+    """Of a word of a name: as it is, made of several, or shortened (lvr, trq, pos)."""
+    if word in weights:
+        return weights[word]
+    inside = [known for known in weights if len(known) >= _COMPOUND and known in word]
+    if inside:
+        parts = [known for known in inside if not any(known in other and known != other for other in inside)]
+        return sum(weights[known] for known in parts)
+    full = [known for known in weights if _shortens(word, known)]
+    return weights[min(full, key=len)] if full else 0.0
+
+
+def _shortens(word: str, known: str) -> bool:
+    """Whether a word is the beginning of another, or some of its consonants in their order."""
+    if len(word) < 3 or len(known) < _COMPOUND or word[0] != known[0]:
+        return False
+    letters = iter(known)
+    return known.startswith(word) or (_CONSONANTS.fullmatch(word) is not None and all(each in letters for each in word))
 
 
 # --- what values look like -------------------------------------------------------------------------------------------
@@ -191,6 +242,14 @@ def _with_movement(candidates: list[Candidate]) -> list[Candidate]:
                 words = f"moves with {base[0].signal.name} (coherence {share:.2f})" if share > 0.3 else ""
                 gains[key, each.signal.name] = _MOVES_WITH_BASE * share, words
     return _gained(candidates, gains)
+
+
+def _with_company(candidates: list[Candidate], angle: Signal, key: str) -> list[Candidate]:
+    """What is in the angle's own message gains."""
+    message, _, _ = angle.name.rpartition(".")
+    beside = [each for each in candidates if each.key == key and message and each.signal.name.startswith(f"{message}.")]
+    words = f"in the message of {angle.name}"
+    return _gained(candidates, {(key, each.signal.name): (_SAME_MESSAGE, words) for each in beside})
 
 
 def _gained(candidates: list[Candidate], gains: dict[tuple[str, str], tuple[float, str]]) -> list[Candidate]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..can.logs import Recording
+from ..can.traffic import LATE
 from ..errors import LeverError
 from ..near_names import near_names
 from .bus_signals import BusSignals, Counts, find, load_database
-from .inputs import Input, samples_of, understood
+from .inputs import Input, recorded_samples, understood
 from .mapping import Mapping, Source
 from .own import own_mapping
 from .recorded import Signal
@@ -48,7 +50,7 @@ class Loaded:
     paths: list[str]
     buses: list[str]
     frames: int
-    """Of the log, or rows of the file."""
+    """Of the part of the log, or rows of that of the file."""
     used: int
     """Frames of mapped messages."""
     counts: dict[str, Counts] = field(default_factory=dict)
@@ -103,7 +105,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
         buses.add(bus)
         named = Source(**{**asdict(source), "signal": f"{message.name}.{signal.name}", "channel": bus})
         inputs[key] = understood(key, named, decoded)
-    samples, notes = samples_of(inputs, reading.clock)
+    samples, notes = recorded_samples(inputs, reading.clock)
     unprotected = sum(counts.frames for name, counts in reader.counts.items() if name not in mapping.protected)
     used = sum(counts.frames for counts in reader.counts.values())
     return Loaded(
@@ -121,8 +123,8 @@ def _of_table(path: str, reading: Reading) -> Loaded:
     for key, source in mapping.sources.items():
         signal = column(columns, source.signal, path).between(start, start + reading.length)
         inputs[key] = understood(key, source, signal)
-    samples, notes = samples_of(inputs, reading.clock)
-    rows = max(len(each.time) for each in columns)
+    samples, notes = recorded_samples(inputs, reading.clock)
+    rows = max(len(each.signal.time) for each in inputs.values())
     return Loaded(samples, inputs, notes, [path], [], rows, 0)
 
 
@@ -164,18 +166,20 @@ def _check_there(path: str) -> None:
 
 
 def _collect(reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None) -> int:
-    """Hands the frames of a part to the reader; returns how many the recording has, up to its end."""
-    frames, first_us = 0, 0
+    """Hands the frames of a part to the reader; returns how many there are."""
+    frames = 0
+    first_us: int | None = None
     for chunk in recording.chunks():
-        first_us = first_us if frames else int(chunk["time_us"][0])
-        frames += len(chunk)
+        first_us = int(chunk["time_us"][0]) if first_us is None else first_us
         since = (chunk["time_us"] - first_us) * 1e-6
-        reader.add(chunk[(since >= start) & (since < start + length)], recording)
+        part = chunk[(since >= (start or -math.inf)) & (since < start + length)]
+        frames += len(part)
+        reader.add(part, recording)
         if progress is not None:
             progress(recording.done, recording.size)
-        if since[-1] > start + length + _SLACK:
+        if since[-1] > start + length + LATE:
             break
-    if reader.fd:
+    if reader.fd and first_us is not None:
         first = first_us + round(1e6 * start)
         for path in recording.paths:
             reader.add_fd(path, first, first + round(1e6 * min(length, _EVER)))
@@ -183,7 +187,6 @@ def _collect(reader: BusSignals, recording: Recording, start: float, length: flo
 
 
 _EVER = 1e9  # [s]
-_SLACK = 10.0  # [s] that recorded time may go back
 
 
 def column(columns: Sequence[Signal], name: str, where: str) -> Signal:

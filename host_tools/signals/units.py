@@ -36,10 +36,10 @@ _FACTORS["angular rate"] = {f"{angle}/s": factor for angle, factor in _FACTORS["
 _FACTORS["angular rate"] |= {"rpm": 2.0 * math.pi / 60.0, "deg/min": _DEGREE / 60.0}
 
 _SPELLINGS = (
-    (r"[\s\[\](){}·*._]|\^|⋅", ""),
+    (r"[\s\[\](){}·*._]|\^|⋅|(?<=[a-z])-(?=[a-z])", ""),
     (r"²", "2"),
     (r"µ|μ|micro", "u"),
-    (r"°|º|degrees?|degs", "deg"),
+    (r"°|º|degrees?|degs|degrés?|\bgrad\b", "deg"),
     (r"radians?|rads", "rad"),
     (r"milli", "m"),
     (r"seconds?|secs?", "s"),

@@ -43,6 +43,7 @@ _RANGE = 1000.0  # greatest factor by which a noise is changed
 _ROUNDS = 12
 _CONVERGED = 0.05  # standard deviations
 _CONTRADICTED = 3.0  # likewise
+_NOTHING = 1e-6  # likewise: a value at the end of its range, where the fit leaves 1e-17
 
 
 @dataclass(frozen=True)
@@ -295,7 +296,7 @@ class _Fit:
                 name,
                 self._settings[name],
                 self._settings[f"{name}_sigma"],
-                float(f"{at[i]:.4g}"),
+                float(f"{at[i]:.4g}") if abs(at[i]) > _NOTHING * sigma[i] else 0.0,
                 float(f"{sigma[i]:.2g}"),
                 white,
             )

@@ -38,8 +38,8 @@ class Likelihood:
     def __post_init__(self) -> None:
         """Raises LeverError for a recording that is too short."""
         duration = self.recording.duration + self.recording.period  # n samples last n periods
-        if duration < SHORTEST:
-            raise LeverError(f"too short to tune on: {duration:.1f} s of samples; at least {SHORTEST:.0f} s are needed")
+        if duration < SHORTEST - 0.5 * self.recording.period:
+            raise LeverError(f"too short to tune on: {duration:.5g} s of samples; at least {SHORTEST:g} s are needed")
         time, begin = self.recording.time, min(START, START_SHARE * duration)
         split = begin + (1.0 - self.held_out) * (duration - begin)
         self.tuned_on: Array = (time >= begin) & (time < split)

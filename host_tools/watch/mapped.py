@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..can.bulk import Buses, Feeder, Frames
+from ..firmware.aircraft import AircraftResponse
 from ..firmware.config import Config
 from ..firmware.estimator import FRAME_SAMPLE, Estimator
 from ..signals.online import Online
@@ -18,11 +19,12 @@ from .sources import BusSource, LogSource
 class MappedLog:
     """A PlayedLog: a mapped log with the estimator's answers."""
 
-    def __init__(self, path: str, reading: Reading, config: Config) -> None:
+    def __init__(self, path: str, reading: Reading, config: Config, aircraft: AircraftResponse | None) -> None:
         """Reads all of it. Raises LeverError."""
         self.buses = Buses()
         self._traffic = MappedTraffic([path], reading)
         self._estimator = Estimator(self._traffic.at_its_rate(config))
+        self._estimator.watch(aircraft)
         self.damaged, self.ends_early = self._traffic.recording.damaged, self._traffic.recording.ends_early
 
     def chunks(self) -> Iterator[Frames]:
@@ -37,8 +39,8 @@ class MappedLog:
 class MappedLogSource(LogSource):
     """A recorded log, or a file of columns."""
 
-    def __init__(self, path: str, reading: Reading, config: Config) -> None:
-        super().__init__(path, None, MappedLog(path, reading, config))
+    def __init__(self, path: str, reading: Reading, config: Config, aircraft: AircraftResponse | None = None) -> None:
+        super().__init__(path, None, MappedLog(path, reading, config, aircraft))
 
 
 class MappedBusSource(BusSource):
@@ -53,9 +55,10 @@ class MappedBusSource(BusSource):
         online: Online,
         config: Config,
         options: Mapping[str, Any] | None = None,
+        aircraft: AircraftResponse | None = None,
     ) -> None:
         """Opens the bus. Raises LeverError."""
-        self._online = online
+        self._online, self._aircraft = online, aircraft
         self._config = config
         self._estimator: Estimator | None = None
         super().__init__(interface, channel, options)
@@ -74,6 +77,7 @@ class MappedBusSource(BusSource):
         if self._estimator is None:
             assert self._online.period is not None  # it is known before the first frame
             self._estimator = Estimator(at_period(self._config, self._online.period))
+            self._estimator.watch(self._aircraft)
         self._put((identifier, data))
         if self._estimator.on_frame(identifier, data) == FRAME_SAMPLE:
             self._estimator.step()

@@ -14,7 +14,7 @@ from .sources import LogSource, Source
 
 _SPAN = 30.0
 """[s] that trends are shown over."""
-_LEAST_WIDTH, _PIPE_WIDTH = 80, 100
+_LEAST_WIDTH, _PIPE_WIDTH = panels.ESTIMATES_WIDTH, 100
 
 
 def print_once(source: Source, listen: float) -> Picture:
@@ -32,7 +32,7 @@ def print_once(source: Source, listen: float) -> Picture:
         Rule("estimates", align="left"),
         panels.estimates(picture, _SPAN, console.width),
         Rule("feedthrough", align="left"),
-        panels.feedthrough(picture),
+        panels.feedthrough(picture, console.width),
         Rule("health", align="left"),
         panels.health(picture, source),
         Rule("messages", align="left"),

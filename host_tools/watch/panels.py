@@ -27,7 +27,7 @@ _COLUMNS: tuple[tuple[JustifyMethod, int], ...] = (
     *(("left", 6), ("right", 6), ("right", 9)),
 )
 _SCALE_WIDTH = 7
-_FEEDTHROUGH_WIDTH = 15
+_FEEDTHROUGH_WIDTH, _FREQUENCY_WIDTH = 15, 7
 ESTIMATES_WIDTH = sum(width + 1 for _, width in _COLUMNS)
 """Of estimates() without its sparkline."""
 
@@ -83,13 +83,10 @@ def estimates(picture: Picture, span: float, width: int, lines: int = 1) -> Tabl
     return table
 
 
-def feedthrough(picture: Picture) -> Table:
-    """θ/z̈ of the estimate by frequency, with sigma, and the measured coherence of the two."""
-    table = Table.grid(padding=(0, 1), pad_edge=False)
-    table.add_column(width=_FEEDTHROUGH_WIDTH, no_wrap=True)
+def feedthrough(picture: Picture, width: int) -> Table:
+    """θ/z̈ of the estimate by frequency, with sigma, and the measured coherence of the two: a column a frequency, or a
+    row where these are more than `width` [characters]."""
     entries = picture.feedthrough()
-    for _ in entries:
-        table.add_column(justify="right", width=7, no_wrap=True)
     measured = picture.coherence()
     rows: list[tuple[str, list[str]]] = [
         ("gain [deg s²/m]", [_number(math.degrees(abs(entry.response)), 3) for entry in entries]),
@@ -98,9 +95,22 @@ def feedthrough(picture: Picture) -> Table:
         ("± σ [deg]", [_number(math.degrees(entry.phase_sigma), 2) for entry in entries]),
         ("coherence", [_number(_at(measured, entry.frequency), 2) for entry in entries]),
     ]
-    table.add_row(*(Text(title, style="dim") for title in ("", *(f"{entry.frequency} Hz" for entry in entries))))
-    for title, cells in rows:
-        table.add_row(Text(title, style="bold"), *cells)
+    rows.insert(0, ("", [f"{entry.frequency} Hz" for entry in entries]))
+    if _FEEDTHROUGH_WIDTH + len(entries) * (_FREQUENCY_WIDTH + 1) > width:
+        first, *others = zip(*([title, *cells] for title, cells in rows), strict=True)
+        return _grid([max(len(name) for name, *_ in others), *map(len, first[1:])], first, others)
+    first, *others = ((title, *cells) for title, cells in rows)
+    return _grid([_FEEDTHROUGH_WIDTH, *(_FREQUENCY_WIDTH for _ in entries)], first, others)
+
+
+def _grid(widths: Sequence[int], head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Columns of figures; the first one names the rows."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    for column, width in enumerate(widths):
+        table.add_column(justify="right" if column else "left", width=width, no_wrap=True)
+    table.add_row(*(Text(title, style="dim") for title in head))
+    for name, *cells in rows:
+        table.add_row(Text(name, style="bold"), *cells)
     return table
 
 
@@ -154,6 +164,8 @@ def health(picture: Picture, source: Source) -> Table:
     dither = f"{picture.dither():.3f} N m rms" if picture.dither() > 0.0 else "off"
     table.add_row("dither", f"{dither}, asked {asked:g}" if asked else dither)
     table.add_row("mean NIS", f"{_number(picture.nis())} (expected 2)")
+    if (near := status.bounce(picture)) is not None:
+        table.add_row("bounce", Text(near[1], style=_COLOURS[near[0]]))
     table.add_row("theta", f"{_number(math.degrees(picture.theta()))} deg")
     if picture.is_fresh("PLATFORM_HEALTH"):
         errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]

@@ -143,6 +143,7 @@ class State:
             "condition": text,
             "mode": picture.mode,
             "faults": status.faults(picture),
+            "bounce": status.bounce(picture),
             "silence": picture.silence(),
             "counts": {name: picture.counts[name] for name in COUNTS},
             "firmware": picture.identity.version,

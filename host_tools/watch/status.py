@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from ..firmware.library import enum_names
 from .picture import Picture
 
 MODES = {
@@ -68,10 +71,29 @@ def condition(picture: Picture) -> tuple[str, str]:
     mode = picture.mode
     if mode is None:
         return "watch", "the estimator is there; no HEALTH from it yet"
+    near = bounce(picture)
+    if near is not None and near[0] != "good":
+        return near[0], f"collective bounce, {near[1]}"
     level = {"run": "good", "fault": "bad"}.get(mode, "watch")
     if level == "good" and (present := faults(picture)):
         return "watch", f"{mode}, but: {'; '.join(present)}"
     return level, f"{mode}: the estimator {MODES.get(mode, 'is in a mode that this program does not know')}"
+
+
+def bounce(picture: Picture) -> tuple[str, str] | None:
+    """How near collective bounce is, as condition(); None from an estimator that does not know the aircraft."""
+    state = picture.field("STABILITY", "bounce")
+    if math.isnan(state):
+        return None
+    name = enum_names("lever_bounce")[int(state)]
+    margin, sigma, frequency = (
+        picture.field("STABILITY", field) for field in ("gain_margin", "gain_margin_sigma", "frequency")
+    )
+    level = {"warning": "watch", "alarm": "bad"}.get(name, "good")
+    if math.isnan(margin):
+        return level, f"{name}: the margin is not known"
+    at = "" if math.isnan(frequency) else f" at {frequency:.1f} Hz"
+    return level, f"{name}: gain margin {margin:.1f} ± {sigma:.1f} dB{at}"
 
 
 def faults(picture: Picture) -> list[str]:

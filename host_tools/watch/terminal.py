@@ -99,7 +99,7 @@ class Monitor(App[None]):
         spare -= self._lines["condition"].size.height + (_FEEDTHROUGH if self._panels["feedthrough"].display else 0)
         lines = min(max(1 + spare // estimates, 1), _TALLEST)
         tables["estimates"].update(panels.estimates(picture, self.span, width, lines))
-        tables["feedthrough"].update(panels.feedthrough(picture))
+        tables["feedthrough"].update(panels.feedthrough(picture, self.size.width))
         tables["health"].update(health)
         tables["messages"].update(messages)
 

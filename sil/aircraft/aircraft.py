@@ -18,26 +18,19 @@ Science and Technology 36, 2014.) Signs: a cabin that accelerates upwards leaves
 at low frequency the loop is a negative feedback; the arm beyond its own frequency, the delay and the actuator turn it
 round.
 
-The pitch follows gearing * delta(t - delay) as a first-order actuator with limits of rate and travel.
+The pitch follows gearing * (delta + correction)(t - delay) as a first-order actuator with limits of rate and travel.
+The correction is what the estimator has put out correction_delay and a sample period earlier.
 """
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 
-from ..toml_tables import Place, ScenarioError, quantity, read, read_quantity, text, whole
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from ..toml_tables import Place, ScenarioError, Shelf, parse, quantity, read, read_quantity, text, whole
 
 Z_DOT, BETA, BETA_DOT = range(3)
 """Places in the state of the airframe [m/s, rad, rad/s]."""
@@ -59,6 +52,7 @@ class Aircraft:
     mass: float = quantity("kg", above=0.0)
     lift_deficiency: float = quantity("1", 0.7, above=0.0, greatest=1.0)
     delay: float = quantity("s", 0.020, least=0.0, greatest=0.2)
+    correction_delay: float = quantity("s", 0.0, least=0.0, greatest=0.2)
     actuator_bandwidth: float = quantity("Hz", 8.0, above=0.0)
     actuator_rate: float = quantity("rad/s", np.radians(100.0), above=0.0)
     actuator_travel: float = quantity("rad", np.radians(8.0), above=0.0)
@@ -93,29 +87,14 @@ class Aircraft:
         return response
 
 
-def names() -> list[str]:
-    """The aircraft that come with the package."""
-    folder = files(__package__)
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+SHELF = Shelf("aircraft", __package__)
+names = SHELF.names
 
 
 def load(name_or_path: str, **changes: Any) -> Aircraft:
     """The aircraft of that name, or in the file of that path (ending in .toml), with some of its keys changed: values
     as they stand in such a file. Raises ScenarioError."""
-    if name_or_path.endswith(".toml"):
-        if not Path(name_or_path).is_file():
-            raise ScenarioError(f"{name_or_path}: no such file")
-        content = Path(name_or_path).read_bytes()
-    elif name_or_path in names():
-        content = (files(__package__) / f"{name_or_path}.toml").read_bytes()
-    else:
-        raise ScenarioError(
-            f"no aircraft {name_or_path!r}; there are {', '.join(names())}, or give a path to a .toml file"
-        )
-    try:
-        values = tomllib.loads(content.decode("utf-8"))
-    except ValueError as error:  # also of text that is not UTF-8
-        raise ScenarioError(f"{name_or_path}: not TOML: {error}") from None
+    values = parse(SHELF.content(name_or_path), name_or_path)
     aircraft: Aircraft = read(Aircraft, values | changes, Place(name_or_path))
     return aircraft
 

@@ -8,11 +8,13 @@ period, so that the acceleration up to the next sample follows from lever angles
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 
-from .aircraft import Coupled
+from .aircraft import Aircraft, Coupled
 
 LONGEST_SUBSTEP = 1e-3
 """[s]; at 4 Hz the first-order hold of the pitch is then right to 5e-5."""
@@ -24,44 +26,92 @@ class Flight:
     def __init__(self, coupled: Coupled, period: float, gust: FloatArray) -> None:
         """`gust`: vertical force over mass [m/s^2] at the samples, which are `period` [s] apart, no more than the
         aircraft's delay."""
-        aircraft = coupled.aircraft
-        self._count = math.ceil(period / LONGEST_SUBSTEP - 1e-6)
-        step = period / self._count
-        self._transition, self._begin, self._end = first_order_hold(*aircraft.matrices()[:2], step)
-        self._output, self._feedthrough = (matrix[0] for matrix in aircraft.matrices()[2:])
-        self._approach = 1.0 - math.exp(-step * 2.0 * math.pi * aircraft.actuator_bandwidth)
-        self._most, self._travel = aircraft.actuator_rate * step, aircraft.actuator_travel
-        self._gearing, self._delay, self._gust = coupled.gearing, aircraft.delay / period, gust
-        self._state, self._pitch = np.zeros(len(self._transition)), 0.0
-        self._lever = [0.0]
-        self.z_ddot = float(self._feedthrough @ (0.0, gust[0]))
+        self.constants = constants = Constants.of(coupled.aircraft, period)
+        self.gearing, self.gust = coupled.gearing, gust
+        self._force = gust.tolist()
+        self._state, self._pitch = [0.0] * len(constants.step), 0.0
+        self._correction: list[float] = []
+        self._lever: list[float] = []
+        self.z_ddot = dot(constants.output, (*self._state, 0.0, self._force[0]))
         """Of the cabin at this sample [m/s^2]."""
 
-    def advance(self, delta: float) -> float:
-        """z_ddot at the next sample [m/s^2]; `delta`: angle of the lever, less what corrects it, at this one [rad]."""
-        now = len(self._lever) - 1
-        self._lever[now] = delta
-        for substep in range(self._count):
-            part = np.array((substep, substep + 1)) / self._count
-            gust = self._gust[now] + part * (self._gust[now + 1] - self._gust[now])
+    def advance(self, delta: float, correction: float = 0.0) -> float:
+        """z_ddot at the next sample [m/s^2]; `delta`: angle of the lever about its trim at this one [rad];
+        `correction`: what is put out now to be added to that angle [rad], which takes a sample period and the
+        aircraft's correction_delay."""
+        now, constants = len(self._lever), self.constants
+        late = constants.correction_delay
+        self._correction.append(correction)
+        self._lever.append(delta + (self._correction[now - late] if now >= late else 0.0))
+        gust, rise = self._force[now], self._force[now + 1] - self._force[now]
+        for substep in range(constants.substeps):
+            begin, end = substep / constants.substeps, (substep + 1.0) / constants.substeps
             before = self._pitch
-            command = self._gearing * self._delayed(now + float(part.mean()) - self._delay)
-            change = self._approach * (command - before)
-            pitch = before + min(max(change, -self._most), self._most)
-            self._pitch = min(max(pitch, -self._travel), self._travel)
-            self._state = (
-                self._transition @ self._state + self._begin @ (before, gust[0]) + self._end @ (self._pitch, gust[1])
-            )
-        self._lever.append(delta)
-        self.z_ddot = float(self._output @ self._state + self._feedthrough @ (self._pitch, self._gust[now + 1]))
+            command = self.gearing * self._delayed(now + 0.5 * (begin + end) - constants.delay)
+            change = limited(constants.approach * (command - before), constants.most_change)
+            self._pitch = limited(before + change, constants.travel)
+            ends = (*self._state, before, gust + begin * rise, self._pitch, gust + end * rise)
+            self._state = [dot(row, ends) for row in constants.step]
+        self.z_ddot = dot(constants.output, (*self._state, self._pitch, self._force[now + 1]))
         return self.z_ddot
 
     def _delayed(self, time: float) -> float:
-        """The lever's angle at `time` [samples], which is past; 0 before the start."""
-        if time <= 0.0:
-            return self._lever[0] if time == 0.0 else 0.0
+        """The corrected angle of the lever at `time` [samples], which is past; 0 before the start."""
+        if time < 0.0:
+            return 0.0
         whole = int(time)
         return self._lever[whole] + (time - whole) * (self._lever[whole + 1] - self._lever[whole])
+
+
+@dataclass(frozen=True)
+class Constants:
+    """What advances an aircraft by a substep; fast/c/aircraft.h takes the same."""
+
+    substeps: int
+    """In a sample period."""
+    step: list[list[float]]
+    """(3, 7): of the state, pitch and gust where it begins, and those where it ends."""
+    output: list[float]
+    """z_ddot of state, pitch and gust."""
+    approach: float
+    """Share of its way that the actuator goes, without limits."""
+    most_change: float
+    """Of the pitch [rad]."""
+    travel: float
+    """[rad]"""
+    delay: float
+    """[sample periods]"""
+    correction_delay: int
+    """Until a correction is added to the lever's angle [sample periods]."""
+
+    @classmethod
+    def of(cls, aircraft: Aircraft, period: float) -> Constants:
+        substeps = math.ceil(period / LONGEST_SUBSTEP - 1e-6)
+        step = period / substeps
+        a, b, c, d = aircraft.matrices()
+        return cls(
+            substeps,
+            np.hstack(first_order_hold(a, b, step)).tolist(),
+            np.hstack((c, d))[0].tolist(),
+            1.0 - math.exp(-step * 2.0 * math.pi * aircraft.actuator_bandwidth),
+            aircraft.actuator_rate * step,
+            aircraft.actuator_travel,
+            aircraft.delay / period,
+            1 + round(aircraft.correction_delay / period),
+        )
+
+
+def dot(row: Sequence[float], values: Sequence[float]) -> float:
+    """The inner product, summed in order, as C does."""
+    total = 0.0
+    for factor, value in zip(row, values, strict=True):
+        total += factor * value
+    return total
+
+
+def limited(value: float, most: float) -> float:
+    """Within -most and most."""
+    return min(max(value, -most), most)
 
 
 def first_order_hold(a: FloatArray, b: FloatArray, step: float) -> tuple[FloatArray, FloatArray, FloatArray]:

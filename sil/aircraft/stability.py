@@ -42,9 +42,9 @@ class Margins:
         return float(20.0 * np.log10(self.gain))
 
 
-def margins(loop: Response) -> Margins:
-    """The margins of L."""
-    frequency = np.geomspace(*BAND, _POINTS)
+def margins(loop: Response, band: tuple[float, float] = BAND) -> Margins:
+    """The margins of L in a band [Hz]."""
+    frequency = np.geomspace(*band, _POINTS)
     response = loop(_on_axis(frequency))
     crossing, height = _crossings(loop, frequency, response)
     worst = int(np.argmax(height)) if len(height) else -1

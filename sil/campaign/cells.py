@@ -15,6 +15,7 @@ from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, parameters
 from numpy.typing import NDArray
 
+from ..study.figures.maps import Scale
 from .axis import Axis
 from .chunks import Plan
 from .summary import table
@@ -24,45 +25,13 @@ BINS = 8
 
 
 @dataclass(frozen=True)
-class Scale:
-    """An axis of the map."""
-
-    label: str
-    """With its unit."""
-    values: tuple[float | str, ...]
-    """Of its cells; the middle of a bin."""
-    is_log: bool = False
-
-    @property
-    def position(self) -> Array:
-        """Of the cells, evenly spaced where the scale is even; names stand at 0, 1, 2 …"""
-        if self.is_named:
-            return np.arange(len(self.values), dtype=np.float64)
-        numbers = np.array(self.values, dtype=np.float64)
-        return np.log(numbers) if self.is_log else numbers
-
-    @property
-    def is_named(self) -> bool:
-        """Whether its values are names."""
-        return any(isinstance(value, str) for value in self.values)
-
-    def shown(self, most: int) -> list[int]:
-        """Indices of values that are written at the axis."""
-        return list(range(0, len(self.values), math.ceil(len(self.values) / most)))
-
-    def value(self, position: float) -> float:
-        """What is at a position; infinities stay."""
-        return float(np.exp(position)) if self.is_log else position
-
-
-@dataclass(frozen=True)
 class Runs:
     """The runs of an estimator in a cell."""
 
     error: Array
-    """(n,) the largest rms error of what is judged; infinite for failed runs."""
+    """(n,) the largest rms error of what is judged; infinite for runs that failed or diverged."""
     coverage: Array
-    """(n, q) share of the time with the truth within ±2σ, of each; 0 for failed runs, NaN where no σ is stated."""
+    """(n, q) share of the time with the truth within ±2σ, of each; 0 for these, NaN where no σ is stated."""
     nees: Array
     settled: Array
     """[s]; infinite: never."""
@@ -159,9 +128,10 @@ def _runs(
         return values
 
     errors = np.max(np.stack([numbers(f"rms_{name}") for name in judged]), axis=0)
+    diverged = failed | ~np.isfinite(errors)  # also where the estimates' squares are beyond double precision
     covered = np.stack([numbers(f"coverage_{name}") for name in judged], axis=-1)
     settled_s = np.where(np.isnan(numbers("settled_s")), np.inf, numbers("settled_s"))
-    covered[failed] = 0.0
+    covered[diverged] = 0.0
     place = [
         _cell(rows[key].to_numpy(), scale) if key else np.zeros(rows.num_rows, dtype=np.int64)
         for key, scale in zip(keys, scales, strict=True)
@@ -175,7 +145,7 @@ def _runs(
             yield (
                 (at[0], at[1], at[2]),
                 Runs(
-                    np.where(failed, np.inf, errors)[part],
+                    np.where(diverged, np.inf, errors)[part],
                     covered[part],
                     numbers("nees")[part],
                     settled_s[part],

@@ -21,8 +21,11 @@ FREQUENCY = 3  # where the natural frequency stands among the five
 WITHIN = 0.05  # of the natural frequency: settled
 
 
+_MOST = 1e100  # of an estimate, beyond which squares overflow soon
+
+
 class BrokenDownError(ValueError):
-    """An estimator whose values are no longer finite."""
+    """An estimator whose values are no longer finite, or soon will not be."""
 
 
 def names(model: str) -> tuple[str, ...]:
@@ -35,22 +38,25 @@ def of_run(flight: Flight, track: Track, run: int) -> Figures:
     """Of run `run` of a track, whose truth is that of `flight`. Raises BrokenDownError."""
     counted = flight.judged
     values = track.values[run]
-    broken = ~np.isfinite(values).all(axis=1)
+    broken = ~(np.abs(values) < _MOST).all(axis=1)
     if broken.any():
-        raise BrokenDownError(f"estimates are not finite from {flight.time[broken.argmax()]:g} s on")
+        raise BrokenDownError(
+            f"estimates are not finite, or above {_MOST:g}, from {flight.time[broken.argmax()]:g} s on"
+        )
     truth, sigma = flight.truth, track.sigma[run]
     with np.errstate(invalid="ignore"):
         relative = values / truth - 1.0
         covered = np.abs(values - truth) <= 2.0 * sigma
     figures: Figures = {}
     for index, name in enumerate(each.key for each in quantities(flight.scenario.config.choices["model"])):
-        error, share = relative[counted, index], covered[counted, index]
-        figures[f"rms_{name}"] = _finite(np.sqrt(np.mean(np.square(error))))
-        figures[f"bias_{name}"] = _finite(np.mean(error))
-        known = len(share) and np.isfinite(sigma[:, index]).all() and np.isfinite(truth[:, index]).all()
-        figures[f"coverage_{name}"] = float(np.mean(share)) if known else None
+        known = counted & np.isfinite(truth[:, index])
+        error, is_known = relative[known, index], bool(known.any())
+        figures[f"rms_{name}"] = float(np.sqrt(np.mean(np.square(error)))) if is_known else None
+        figures[f"bias_{name}"] = float(np.mean(error)) if is_known else None
+        is_stated = is_known and np.isfinite(sigma[:, index]).all()
+        figures[f"coverage_{name}"] = float(np.mean(covered[known, index])) if is_stated else None
     figures["nees"] = _nees(flight, track, run)
-    figures["nis"] = None if track.nis is None else _finite(np.nanmean(track.nis[run][counted]))
+    figures["nis"] = None if track.nis is None else _mean_known(track.nis[run][counted])
     times = times_to(relative[:, FREQUENCY], flight.time, flight.scenario.changes(), WITHIN)
     figures["settled_s"] = None if None in times else max(time for time in times if time is not None)
     figures["flagged"] = None if track.flagged is None else _finite(np.mean(track.flagged[run][counted]))
@@ -70,6 +76,11 @@ def _nees(flight: Flight, track: Track, run: int) -> float | None:
     except np.linalg.LinAlgError:
         return None
     return _finite(np.mean(squares))
+
+
+def _mean_known(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.mean(known)) if len(known) else None
 
 
 def _finite(value: float | np.floating) -> float | None:

@@ -11,7 +11,7 @@ from lever_cdkf.host_tools.arrays import Array, BoolArray
 from lever_cdkf.host_tools.firmware import quantities
 from numpy.typing import NDArray
 
-from ..fast.closed_loop import Loop
+from ..fast.closed_loop import Loop, available
 from ..run.summary import judged_samples
 from ..scenarios import inputs as scenario_inputs
 from ..scenarios.inputs import Inputs
@@ -70,8 +70,10 @@ def _measured(scenario: Scenario, inputs: Inputs, loop: Loop) -> dict[str, Array
         readings = scenario_inputs.readings(scenario, inputs, name)
         values = readings.sensor.measure(signal, scenario.period, scenario.stream(name))
         columns[name] = values if readings.corruption is None else readings.corruption.of(values)
-        columns[name][inputs.missing["lever_frame"]] = np.nan
-    return columns | {"z_ddot": inputs.base}
+        if name != "z_ddot":
+            columns[name][inputs.missing["lever_frame"]] = np.nan
+    columns.setdefault("z_ddot", inputs.base)
+    return {name: available(name, values) for name, values in columns.items()}
 
 
 def beside(flights: Sequence[Flight], name: str) -> Array:

@@ -8,11 +8,14 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import write_text
 from lever_cdkf.host_tools.provenance import Provenance, with_provenance
 from lever_cdkf.host_tools.tables import Row
 
-from . import map_page, map_svg
+from ..study.figures import printed
+from ..study.figures.maps import MapFigure
+from . import map_figures, map_page, spec
 from .border import Border, borders
 from .cells import Map, read
 from .chunks import Plan
@@ -23,15 +26,29 @@ FILES = ("map.html", "map.svg", "border.csv")
 
 def write(plan: Plan, folder: Path, origin: Provenance | None = None) -> tuple[str, ...]:
     """Writes the files of a campaign whose last axis has numbers; returns their names. Raises LeverError."""
-    if not plan.spec.vary or not plan.spec.vary[-1].is_number:
+    if not _has_map(plan):
         return ()
     cells = read(plan, folder)
     edge = list(borders(cells, plan.spec.failure))
-    page = map_page.build(plan, cells, edge, rows(cells, edge), by_estimator(plan, folder))
+    figures = map_figures.figures(cells, edge)
+    page = map_page.build(plan, cells, figures, rows(cells, edge), by_estimator(plan, folder))
     write_text(folder / FILES[0], with_provenance(page, origin))
-    write_text(folder / FILES[1], map_svg.build(cells, edge))
+    write_text(folder / FILES[1], printed.render(figures[0], "svg", "double", origin).decode())
     write_text(folder / FILES[2], _csv(cells, edge))
     return FILES
+
+
+def figures(folder: Path) -> list[MapFigure]:
+    """The maps of the campaign whose files a folder holds. Raises LeverError."""
+    plan = Plan(spec.saved(folder))
+    if not _has_map(plan):
+        raise LeverError(f"{folder}: the last axis of the campaign has no numbers, so there is no map")
+    cells = read(plan, folder)
+    return map_figures.figures(cells, list(borders(cells, plan.spec.failure)))
+
+
+def _has_map(plan: Plan) -> bool:
+    return bool(plan.spec.vary) and plan.spec.vary[-1].is_number
 
 
 def rows(cells: Map, edge: Sequence[Border]) -> list[Row]:

@@ -10,14 +10,13 @@ from __future__ import annotations
 import importlib.util
 import logging
 import queue
-import signal
 import socket
 import time as clock
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +33,12 @@ Show = Callable[[int, int, str], None]
 
 _AHEAD = 3  # chunks for each thread of the workers, so that none waits for the client
 _MOST_LOST = 10  # chunks, after which something is wrong with all
+_ALONE = ", alone"  # of a task's key
 _CONNECT = 10.0  # [s]
+_KEPT_MEMORY = str(1 << 28)
+"""[bytes] up to which a worker's arrays come from memory that it has already. Dask has it given back after each of
+them, and getting it again takes a quarter of a run's time."""
+_ENVIRONMENT = {"MALLOC_TRIM_THRESHOLD_": _KEPT_MEMORY, "MALLOC_MMAP_THRESHOLD_": _KEPT_MEMORY}
 _GONE = "the scheduler is gone; what is finished is kept: repeat the command with --resume when there is one again"
 
 
@@ -47,16 +51,24 @@ class Session:
     seconds: float = 0.0
     """Processor time that workers took for them."""
     lost: list[Chunk] = field(default_factory=list)
-    """Chunks that killed every worker that tried them."""
+    """Chunks that killed every worker that tried them, alone at last."""
 
 
 def run(plan: Plan, folder: Path, client: Client, show: Show) -> Session:
     """Makes the chunks whose files are not there yet. Raises LeverError."""
     done = plan.done(folder)
-    todo = (number for number in range(plan.count) if number not in done)
+    todo = (plan.chunk(number) for number in range(plan.count) if number not in done)
     session, before = Session(), sum(plan.runs(plan.chunk(number)) for number in done)
     start, total = clock.monotonic(), plan.spec.runs
-    for chunk, result in _results(client, plan, folder, todo, lambda: show(before + session.runs, total, "")):
+
+    def progress() -> None:
+        left = ""
+        if session.runs:
+            seconds = (clock.monotonic() - start) * (total - before - session.runs) / session.runs
+            left = f"{_time(seconds)} left"
+        show(before + session.runs, total, left)
+
+    for chunk, result in _results(client, plan, folder, todo, progress):
         if isinstance(result, Exception):
             session.lost.append(chunk)
             if len(session.lost) >= _MOST_LOST:
@@ -65,36 +77,44 @@ def run(plan: Plan, folder: Path, client: Client, show: Show) -> Session:
         rows, seconds = result
         session.runs += rows
         session.seconds += seconds
-        left = (clock.monotonic() - start) * (total - before - session.runs) / session.runs
-        show(before + session.runs, total, f"{_time(left)} left")
+        progress()
     return session
 
 
 def _results(
-    client: Client, plan: Plan, folder: Path, todo: Iterator[int], tick: Callable[[], None]
+    client: Client, plan: Plan, folder: Path, todo: Iterator[Chunk], tick: Callable[[], None]
 ) -> Iterator[tuple[Chunk, tuple[int, float] | Exception]]:
-    """Of each chunk, when it is finished: rows and processor time, or how it killed the workers. Raises LeverError."""
+    """Of each chunk, when it is finished: rows and processor time, or how it killed the workers. Raises LeverError.
+
+    Dask blames what kills a worker on all chunks that this worker was given. So these are tried again one by one, and
+    only what kills the workers then is given up.
+    """
     from distributed import KilledWorker
 
     finished: queue.Queue[Future] = queue.Queue()
-    running: dict[str, Chunk] = {}
+    running: dict[str, tuple[Chunk, Future]] = {}
+    suspects: deque[Chunk] = deque()
+    most = _AHEAD * max(1, sum(client.nthreads().values()))
 
-    def submit(count: int) -> None:
-        for number in islice(todo, count):
-            chunk = plan.chunk(number)
-            future = client.submit(work, plan, chunk, folder, key=chunk.name(plan.fingerprint), pure=True)
-            running[future.key] = chunk
-            kept[future.key] = future
-            future.add_done_callback(finished.put)
+    def submit(chunk: Chunk, key: str) -> None:
+        future = client.submit(work, plan, chunk, folder, key=key, pure=True)
+        running[key] = chunk, future
+        future.add_done_callback(finished.put)
 
-    kept: dict[str, Future] = {}
-    submit(_AHEAD * max(1, sum(client.nthreads().values())))
+    def fill() -> None:
+        """Gives the workers what they can do side by side, or one suspect."""
+        while len(running) < most and len(suspects) < _MOST_LOST and (chunk := next(todo, None)):
+            submit(chunk, chunk.name(plan.fingerprint))
+        if suspects and not running:
+            chunk = suspects.popleft()
+            submit(chunk, chunk.name(plan.fingerprint) + _ALONE)
+
+    fill()
     while running:
         future = _next(client, finished, tick)
         if future is None:
             continue
-        chunk = running.pop(future.key)
-        del kept[future.key]
+        chunk, key = running.pop(future.key)[0], future.key
         try:
             error = future.exception()
             result = future.result() if error is None else error
@@ -102,9 +122,12 @@ def _results(
             raise LeverError(_GONE) from None
         if error is not None and not isinstance(error, KilledWorker):
             raise LeverError(f"flights {chunk.first} to {chunk.end - 1}: {_line(error)}") from error
-        yield chunk, result
         del future
-        submit(1)
+        if error is None or key.endswith(_ALONE):
+            yield chunk, result
+        else:
+            suspects.append(chunk)
+        fill()
 
 
 def _next(client: Client, finished: queue.Queue[Future], tick: Callable[[], None]) -> Future | None:
@@ -173,11 +196,9 @@ def connected(address: str | None, workers: int) -> Iterator[Client]:
             yield client
         return
     options: dict[str, Any] = {"dashboard_address": "127.0.0.1:0", "memory_limit": 0, "threads_per_worker": 1}
-    with dask.config.set({"distributed.logging.distributed": "critical"}):
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # is passed on: workers leave Ctrl-C to us
-        try:
+    settings = {"distributed.logging.distributed": "critical", "distributed.nanny.pre-spawn-environ": _ENVIRONMENT}
+    with dask.config.set(settings):
+        with interrupts.masked():
             cluster = LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         with cluster, Client(cluster) as client:
             yield client

@@ -8,27 +8,45 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import sys
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from lever_cdkf.host_tools.files import write_text
+
+from ..run.summary import judged_samples
 from ..scenarios import scenario as scenarios
 from ..scenarios.scenario import Scenario
-from ..toml_tables import Place, ScenarioError, choice, item, quantity, read, table, tables, text, whole
+from ..toml_tables import (
+    Place,
+    ScenarioError,
+    Shelf,
+    choice,
+    file_of,
+    item,
+    parse,
+    quantity,
+    read,
+    table,
+    tables,
+    text,
+    whole,
+)
 from .axis import Axis, Written, read_axis
 from .entrants import ENTRANTS
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+SHELF = Shelf("spec", __package__, "specs")
+names = SHELF.names
 
+FILE = "spec.json"
+"""In the folder of a campaign: its spec, and the scenario of that."""
 DESIGNS = ("grid", "latin_hypercube", "random")
 MOST_RUNS = 10**10
 _MOST_HYPERCUBE = 10**7  # points, of which each process keeps a permutation an axis
+_SPREAD = 50  # points of the design at which a flight is sought that can be, where none at the ends of axes can
 
 
 def _read_estimators(values: Any, place: Place) -> tuple[str, ...]:
@@ -74,8 +92,12 @@ class Spec:
 
     name: str = ""
     file: str = ""
+    written: bytes = b""
+    """What the file holds."""
     content: bytes = b""
     """Of the scenario file, so that a worker on another machine needs no copy."""
+    doubts: tuple[str, ...] = ()
+    """Why runs at an end of an axis will fail; empty when all can be done that were looked at."""
     title: str = text()
     description: str = text("")
     scenario: str = text()
@@ -102,10 +124,20 @@ class Spec:
         doubled = sorted({key for key in keys if keys.count(key) > 1})
         if doubled:
             raise ValueError(f"{doubled[0]} is set twice")
+        labels = [axis.label for axis in self.vary]
+        for label in labels:
+            if labels.count(label) > 1:
+                raise ValueError(f"vary: two axes have the name {label!r}")
         for axis in self.vary:
             axis.check(gridded)
         if self.runs > MOST_RUNS:
             raise ValueError(f"{self.runs} runs are more than {MOST_RUNS}")
+
+    @property
+    def scenario_file(self) -> str:
+        """Its name, or its path from where the command is called."""
+        is_path = self.scenario.endswith(".toml")
+        return str(Path(self.file).parent / self.scenario) if is_path else self.scenario
 
     @property
     def size(self) -> int:
@@ -124,10 +156,27 @@ class Spec:
 
     @property
     def first(self) -> Scenario:
-        """The first flight."""
+        """A flight that can be. Raises ScenarioError when none can, as far as was looked."""
+        refused: list[ScenarioError] = []
+        for values in (*self.ends(), *self._spread()):
+            try:
+                return self.flight(values, self.seed)
+            except ScenarioError as error:  # noqa: PERF203
+                refused.append(error)
+        raise refused[0]
+
+    def ends(self) -> Iterator[dict[str, Written]]:
+        """All axes at their first value, and each in turn at its last."""
+        first = {key: value for axis in self.vary for key, value in axis.at(0.0).items()}
+        yield first
+        for axis in self.vary:
+            yield first | axis.at(1.0)
+
+    def _spread(self) -> Iterator[dict[str, Written]]:
         from .design import point
 
-        return self.flight(point(self, 0), self.seed)
+        for number in sorted({round(part * (self.size - 1)) for part in np.linspace(0.0, 1.0, _SPREAD)}):
+            yield point(self, number)
 
     @property
     def samples(self) -> int:
@@ -146,7 +195,37 @@ class Spec:
     def flight(self, point: Mapping[str, Written], seed: int) -> Scenario:
         """The scenario at a point, without its limits, which nobody asks for. Raises ScenarioError."""
         overrides = ["limits={}", *self.overrides(point), f"seed={seed}"]
-        return scenarios.from_toml(self.content, self.scenario, overrides)
+        try:
+            flight = scenarios.from_toml(self.content, self.scenario, overrides)
+        except ScenarioError as error:
+            raise self._error(str(error).removeprefix(f"{file_of(self.scenario)}: ")) from None
+        looks = self.every / flight.period
+        if abs(looks - round(looks)) > 1e-6:
+            raise self._error(f"every: {self.every:g} s is no multiple of the sample period of {flight.period:g} s")
+        if not judged_samples(flight, np.arange(0.0, flight.duration, self.every)).any():
+            raise self._error(
+                f"duration: in {flight.duration:g} s no estimate is judged: one every {self.every:g} s is, from "
+                f"converged_after on, which is {flight.converged_after:g} s"
+            )
+        return flight
+
+    def _error(self, said: str) -> ScenarioError:
+        """An error of the scenario, with the place in the spec that has set what is wrong."""
+        where = said.removeprefix("--set ").partition(": ")[0].partition("=")[0].replace("[", ".").replace("]", "")
+        for key, place in self._places():
+            nested = f"{where}.".startswith(f"{key}.") or key.startswith(f"{where}.") or "." not in key
+            parts = key.removeprefix(f"{where}.").split(".")
+            if nested and any(re.search(rf"\b{re.escape(part)}\b", said) for part in parts):
+                return place.error(said.removeprefix("--set "))
+        return Place(self.file, "" if where == "every" else f"scenario {self.scenario}").error(said)
+
+    def _places(self) -> Iterator[tuple[str, Place]]:
+        """What is set, by its dotted key, and where."""
+        for index, axis in enumerate(self.vary):
+            place = Place(self.file).at("vary").at(index)
+            yield axis.key, place
+            yield from ((key, place.at("also")) for key in axis.also)
+        yield from ((key, Place(self.file).at("set")) for key in self.set)
 
     @property
     def hashed(self) -> str:
@@ -159,48 +238,57 @@ class Spec:
         return hashlib.sha256(written + b"\0" + self.content).hexdigest()
 
 
-def names() -> list[str]:
-    """The specs that come with the package."""
-    return sorted(entry.name.removesuffix(".toml") for entry in _shipped().iterdir() if entry.name.endswith(".toml"))
-
-
-def _shipped() -> Any:
-    return files(__package__) / "specs"
-
-
 def load(name_or_path: str) -> Spec:
     """The spec of that name, or in the file of that path (ending in .toml). Raises ScenarioError."""
-    if name_or_path.endswith(".toml"):
-        path, file = Path(name_or_path), name_or_path
-        if not path.is_file():
-            raise ScenarioError(f"{file}: no such file")
-        content, name, folder = path.read_bytes(), path.stem, path.parent
-    elif name_or_path in names():
-        name, file, folder = name_or_path, f"{name_or_path}.toml", Path()
-        content = (_shipped() / file).read_bytes()
-    else:
-        raise ScenarioError(f"no spec {name_or_path!r}; there are {', '.join(names())}, or give a path to a .toml file")
+    file = file_of(name_or_path)
+    spec = restored(SHELF.content(name_or_path), b"", file)
     try:
-        values = tomllib.loads(content.decode("utf-8"))
-    except ValueError as error:
-        raise ScenarioError(f"{file}: not TOML: {error}") from None
-    spec = dataclasses.replace(read(Spec, values, Place(file)), name=name, file=file)
-    spec = dataclasses.replace(spec, content=scenarios.content_of(spec.scenario, folder))
-    _check(spec)
-    return spec
+        content = scenarios.SHELF.content(spec.scenario_file)
+    except ScenarioError as error:
+        raise Place(file, "scenario").error(str(error)) from None
+    spec = dataclasses.replace(spec, content=content)
+    return dataclasses.replace(spec, doubts=tuple(_doubts(spec)))
 
 
-def _check(spec: Spec) -> None:
-    """Raises ScenarioError for a scenario that cannot be at the first or last value of an axis."""
-    middle = {key: value for axis in spec.vary for key, value in axis.at(0.0).items()}
-    model = None
-    for axis in spec.vary or (None,):
-        for position in (0.0, 1.0) if axis else (0.0,):
-            moved = axis.at(position) if axis else {}
-            flight = spec.flight(middle | moved, spec.seed)
-            if model not in (None, flight.config.choices["model"]):
-                raise ScenarioError(f"{spec.file}: vary: all runs need one estimator.model; make a spec of each")
-            model = flight.config.choices["model"]
-    for name in spec.estimators:
-        if reason := ENTRANTS[name].unfit(flight):
-            raise ScenarioError(f"{spec.file}: estimators: {name} {reason}")
+def restored(written: bytes, content: bytes, file: str) -> Spec:
+    """The spec that a file holds, with its scenario. Raises ScenarioError."""
+    spec: Spec = read(Spec, parse(written, file), Place(file))
+    return dataclasses.replace(spec, name=Path(file).stem, file=file, written=written, content=content)
+
+
+def save(spec: Spec, folder: Path) -> None:
+    """Puts the spec into the folder of its files, so that these can be read without it. Raises LeverError."""
+    kept = {"file": spec.file, "spec": spec.written.decode(), "scenario": spec.content.decode()}
+    write_text(folder / FILE, json.dumps(kept, indent=2, ensure_ascii=False) + "\n")
+
+
+def saved(folder: Path) -> Spec:
+    """The spec that was put there. Raises LeverError."""
+    try:
+        kept = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        return restored(kept["spec"].encode(), kept["scenario"].encode(), kept["file"])
+    except (OSError, ValueError, LookupError, AttributeError, TypeError):
+        raise ScenarioError(f"{folder}: is not the folder of a campaign: it has no {FILE} that can be read") from None
+
+
+def _doubts(spec: Spec) -> list[str]:
+    """Why runs at an end of an axis cannot be. Raises ScenarioError when none can, of all or of an estimator."""
+    model = spec.first.config.choices["model"]
+    doubts: dict[str, None] = {}
+    unfit = dict.fromkeys(spec.estimators, 0)
+    flights = []
+    for values in spec.ends():
+        try:
+            flights.append(spec.flight(values, spec.seed))
+        except ScenarioError as error:  # noqa: PERF203
+            doubts[str(error)] = None
+    for flight in flights:
+        if model != flight.config.choices["model"]:
+            raise ScenarioError(f"{spec.file}: vary: all runs need one estimator.model; make a spec of each")
+        for name in spec.estimators:
+            if reason := ENTRANTS[name].unfit(flight):
+                unfit[name] += 1
+                doubts[f"{spec.file}: estimators: {name} {reason}"] = None
+                if unfit[name] == len(flights):
+                    raise ScenarioError(f"{spec.file}: estimators: {name} {reason}")
+    return list(doubts)

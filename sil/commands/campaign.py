@@ -27,6 +27,7 @@ several seeds and several estimators on the same simulated flights, on as many p
 is an estimator in a flight. Writes into DIR
 
   *.parquet      a row for each run: errors, coverage, consistency, settling, or why it failed
+  spec.json      the spec and its scenario, so that DIR can be read without them
   summary.json   runs, failed, real_time_factor_per_core, …
   map.html       maps over the design, with the border where tracking fails; map.svg and border.csv are of it, too
 
@@ -90,7 +91,13 @@ def run(args: argparse.Namespace) -> int:
     if args.workers is not None and (args.workers < 1 or args.scheduler is not None):
         raise LeverError("--workers: must be at least 1, and does not go with --scheduler")
     plan, folder = Plan(chosen), args.out.resolve()
-    session = _run(plan, folder, args)
+    for doubt in chosen.doubts:
+        print(f"lever: campaign: some runs will fail: {doubt}", file=sys.stderr)
+    try:
+        session = _run(plan, folder, args)
+    except KeyboardInterrupt:
+        print("lever: campaign: interrupted; what is finished is kept: go on with --resume", file=sys.stderr)
+        raise
     return _finish(plan, folder, session, args)
 
 
@@ -98,16 +105,19 @@ def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
     from lever_cdkf.host_tools.files import make_folder
     from lever_cdkf.host_tools.progress import Progress
 
+    from ..campaign import spec
     from ..campaign.session import Session, connected, dashboard, run
 
     make_folder(folder)
     done = len(plan.done(folder))
     if done and not args.resume:
         raise LeverError(f"{args.out} holds {done} of the {plan.count} chunks of this campaign: add --resume")
+    spec.save(plan.spec, folder)
     if done == plan.count:
         return Session()
     with connected(args.scheduler, args.workers or os.cpu_count() or 1) as client, Progress("campaign") as progress:
-        print(f"{plan.spec.runs} runs in {plan.count} chunks; dashboard: {dashboard(client)}", flush=True)
+        work = f"{_count(plan.spec.runs, 'run')} in {_count(plan.count, 'chunk')}"
+        print(f"{work}; dashboard: {dashboard(client)}", flush=True)
         return run(plan, folder, client, progress.show)
 
 
@@ -127,18 +137,28 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
     found = summary.build(plan, folder, session) | {"provenance": asdict(origin)}
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)
     write_text(folder / summary.FILE, json.dumps(found, indent=2, allow_nan=False) + "\n")
-    for row in summary.errors(folder):
+    errors = summary.errors(folder)
+    for row in errors:
         alone = shlex.join(["lever", "campaign", args.spec, "--run", str(row["run"])])
         say(f"failed: {row['estimator']}, seed {row['seed']}: {row['error']}; alone: {alone}")
+    if found["failed"] > len(errors):
+        say(f"failed: {found['failed'] - len(errors)} more: the rows with an error")
     factor = found["real_time_factor_per_core"]
-    say(f"{found['runs']} runs, {found['failed']} failed" + (f", {factor:g} × real time a core." if factor else "."))
-    written = [*maps.write(plan, folder, origin), summary.FILE, f"{plan.count - len(session.lost)} Parquet files"]
+    speed = f", {factor:g} × real time a core." if factor else "."
+    say(f"{_count(found['runs'], 'run')}, {found['failed']} failed{speed}")
+    chunks = _count(len(list(folder.glob("*.parquet"))), "Parquet file")
+    written = [*maps.write(plan, folder, origin), summary.FILE, chunks]
     say(f"Written to {args.out}: {', '.join(written)}")
     if session.lost:
         flights = ", ".join(f"{chunk.first} to {chunk.end - 1}" for chunk in session.lost)
-        print(f"lever: campaign: flights {flights} killed the workers that tried them", file=sys.stderr)
+        missing = _count(plan.spec.runs - found["runs"], "run")
+        print(f"lever: campaign: {missing} missing: flights {flights} killed their workers", file=sys.stderr)
         return 1
     return 0
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _one(chosen: Spec, args: argparse.Namespace) -> int:
@@ -154,11 +174,11 @@ def _one(chosen: Spec, args: argparse.Namespace) -> int:
     flight, place = divmod(args.number, len(chosen.estimators))
     row = list(rows(chosen, range(flight, flight + 1)))[place]
     print_tables({f"run {args.number}": [{"column": name, "value": value} for name, value in row.items()]}, args.json)
-    overrides = chosen.overrides(design.point(chosen, flight // chosen.seeds))
+    overrides = ["limits={}", *chosen.overrides(design.point(chosen, flight // chosen.seeds))]
     if row["estimator"] in FIRMWARE:
         overrides.append(f"estimator.estimator={row['estimator']}")
     settings = [part for override in overrides for part in ("--set", override)]
     say("The same flight with the firmware in it, and a report:")
-    command = shlex.join(["lever", "sim", chosen.scenario, "--seed", str(row["seed"]), *settings, "--out", "DIR"])
+    command = shlex.join(["lever", "sim", chosen.scenario_file, "--seed", str(row["seed"]), *settings, "--out", "DIR"])
     print(*command_lines(command, terminal_width()), sep="\n")
     return 1 if row.get("error") else 0

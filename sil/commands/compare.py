@@ -70,7 +70,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "--quick", action="store_true", help=f"a few cases, {_QUICK_SEEDS} runs of {_QUICK_DURATION:g} s: a preview"
     )
     compare.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one a core)")
-    compare.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    compare.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     add_json_option(compare)
     compare.set_defaults(run=run)
 

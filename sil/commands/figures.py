@@ -12,9 +12,10 @@ from lever_cdkf.host_tools.layout import say
 _PAGE, _CAPTIONS, _PROVENANCE = "figures.html", "captions.md", "provenance.json"
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from ..study.figures.description import Figure
+    from ..study.figures.maps import MapFigure
 
 _DESCRIPTION = """\
 Computes the paper's figures for this system from simulated runs of the firmware, and writes into DIR
@@ -32,6 +33,7 @@ examples:
   lever figures --list
   lever figures --out out/figures
   lever figures --only bode grip --seed 7
+  lever figures --campaign out/quick                       beside the maps of this campaign
 """
 
 
@@ -40,6 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "figures", help="make the paper's figures for this system", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument(
+        "-o",
         "--out",
         metavar="DIR",
         type=Path,
@@ -55,6 +58,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         choices=("single", "double"),
         default="single",
         help="one column of a journal (88 mm) or two (180 mm); default: %(default)s",
+    )
+    parser.add_argument(
+        "--campaign", metavar="DIR", type=Path, help="also the maps of the campaign in this folder of `lever campaign`"
     )
     parser.add_argument("--list", action="store_true", help="print the names of all figures")
 
@@ -74,9 +80,21 @@ def run(args: argparse.Namespace) -> int:
 
     if args.list:
         return _list()
-    written = _make(chosen(args.only), args.seed, args.width, args.out)
+    maps = _maps(args.campaign)
+    written = _make(chosen(args.only, list(maps)), maps, args)
     say(f"Written to {args.out}: {', '.join(written)}")
     return 0
+
+
+def _maps(folder: Path | None) -> dict[str, MapFigure]:
+    """Of a campaign, by name. Raises LeverError."""
+    if folder is None:
+        return {}
+    require("campaign")
+
+    from ..campaign.maps import figures
+
+    return {figure.name: figure for figure in figures(folder)}
 
 
 def _list() -> int:
@@ -88,7 +106,7 @@ def _list() -> int:
     return 0
 
 
-def _make(names: Sequence[str], seed: int, width: str, folder: Path) -> list[str]:
+def _make(names: Sequence[str], maps: Mapping[str, MapFigure], args: argparse.Namespace) -> list[str]:
     """Makes the figures and writes the files, all or none; returns their names. Raises LeverError."""
     from lever_cdkf.host_tools.exports import pictures
     from lever_cdkf.host_tools.files import Outputs, writing
@@ -99,7 +117,7 @@ def _make(names: Sequence[str], seed: int, width: str, folder: Path) -> list[str
     from ..study.figures.catalogue import FIGURES
     from ..study.figures.runs import Extent
 
-    figures: list[Figure] = []
+    figures: list[Figure | MapFigure] = []
     files: list[str] = []
     origin = provenance()
 
@@ -109,13 +127,13 @@ def _make(names: Sequence[str], seed: int, width: str, folder: Path) -> list[str
         with writing(path):
             path.write_bytes(content)
 
-    with Outputs(folder) as outputs, Progress("figures") as progress:
+    with Outputs(args.out) as outputs, Progress("figures") as progress:
         for done, name in enumerate(names):
             progress.show(done, len(names))
-            figure = FIGURES[name](seed, Extent())
+            figure = maps[name] if name in maps else FIGURES[name](args.seed, Extent())
             figures.append(figure)
             for kind in pictures.KINDS:
-                keep(f"{name}.{kind}", printed.render(figure, kind, width, origin))
+                keep(f"{name}.{kind}", printed.render(figure, kind, args.width, origin))
             keep(f"{name}.csv", data.table(figure).encode())
         keep(_PAGE, with_provenance(figures_page.build(figures), origin).encode())
         keep(_CAPTIONS, _captions(figures).encode())
@@ -124,6 +142,6 @@ def _make(names: Sequence[str], seed: int, width: str, folder: Path) -> list[str
     return files
 
 
-def _captions(figures: Sequence[Figure]) -> str:
+def _captions(figures: Sequence[Figure | MapFigure]) -> str:
     parts = (f"## {figure.title} ({figure.name}.png)\n\n{figure.caption}\n" for figure in figures)
     return "\n".join(parts)

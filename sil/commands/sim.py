@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from lever_cdkf.host_tools.tables import Row, Tables, add_json_option
 
 if TYPE_CHECKING:
     import can
+    from lever_cdkf.host_tools.report.page import Story
 
     from ..run.runner import Result
     from ..scenarios.scenario import Scenario
@@ -90,7 +91,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     what.add_argument("scenario", nargs="?", metavar="SCENARIO", help="a name of --list, or the path of a .toml file")
     what.add_argument("--list", action="store_true", help="print the scenarios that come with the package")
     add_bus_options(sim)
-    sim.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    sim.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     sim.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
     )
@@ -111,9 +112,10 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     demo = subparsers.add_parser(
         "demo",
         help="simulate a tiring, then startled pilot and write a report",
-        description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled.",
+        description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled. In "
+        "front of its report are two flights of one who relaxes, with mitigation of collective bounce and without.",
     )
-    demo.add_argument("--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
+    demo.add_argument("-o", "--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
     add_format_option(demo, ("csv",))
     add_json_option(demo)
     demo.set_defaults(run=run_demo, realtime=False, settings=None)
@@ -196,9 +198,10 @@ def run_demo(args: argparse.Namespace) -> int:
     """`lever demo`."""
     require("report")
 
+    from ..bounce.story import tell
     from ..scenarios.scenario import load
 
-    return _simulate(load(_DEMO), "lever", "lever", {}, args)
+    return _simulate(load(_DEMO), "lever", "lever", {}, args, tell)
 
 
 def _list(json_file: str | None) -> int:
@@ -220,6 +223,7 @@ def _simulate(
     channel: str,
     bus_options: Mapping[str, Any],
     args: argparse.Namespace,
+    story: Callable[[], Story] | None = None,
 ) -> int:
     from lever_cdkf.host_tools.progress import Progress
     from lever_cdkf.host_tools.tables import print_tables
@@ -241,6 +245,7 @@ def _simulate(
             progress=progress.show,
             formats=formats,
             inputs=inputs,
+            story=story,
         )
     print_tables(_tables(result), args.json)
     say(result.summary.verdict)

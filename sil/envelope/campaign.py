@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -11,9 +10,10 @@ import numpy as np
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.firmware.config import Config
 
+from ..judged import result as judged
 from . import firmware, pilots, plant
-from .condition import ClosedLoop, Condition, Limit
-from .measure import FIGURES, Excerpt, Outcome, Values, excerpt
+from .condition import ClosedLoop, Condition
+from .measure import FIGURES, Excerpt, Outcome, excerpt
 from .motions import Motion, Recording, lanes, truth
 from .sensors import measured
 
@@ -42,33 +42,12 @@ class Job(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(judged.Result):
     """A condition and what was measured."""
 
+    known = FIGURES
     condition: Condition
-    values: Mapping[str, Values]
-    """Figures, one value a run; empty when it could not be run."""
     excerpt: Excerpt | None = None
-    problem: str = ""
-    """Why it could not be run."""
-
-    def of(self, limit: Limit) -> float:
-        """What is held against a limit; NaN without runs."""
-        if limit.figure not in self.values:
-            return math.nan
-        figure, values = FIGURES[limit.figure], self.values[limit.figure]
-        if limit.over == "median":
-            return float(np.median(values))
-        return figure.worst(values) if limit.over == "worst" else figure.pool(values)
-
-    @property
-    def ok(self) -> bool:
-        """Whether the limits hold, or those that do instead."""
-        if self.problem:
-            return False
-        condition = self.condition
-        held = (all(limit.holds(self.of(limit)) for limit in group) for group in (condition.limits, condition.unless))
-        return next(held) or (bool(condition.unless) and next(held))
 
 
 def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: int, show: Show) -> list[Result]:
@@ -119,7 +98,7 @@ def _result(
     outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""))
     outcomes[row.name] = outcome
     with np.errstate(all="ignore"):  # an estimate that is not finite is no warning but a figure that keeps no limit
-        return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt(outcome))
+        return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt=excerpt(outcome))
 
 
 def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recording | None]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ..judged.result import Limit
 from .motions import Motion
 from .sensors import Sensors
 
@@ -12,27 +13,6 @@ Interval = tuple[float, float]
 
 REPORTED = ("f_n rms", "f_n covered", "zeta rms", "zeta covered", "flagged")
 """Figures of every condition whose pilot has a natural frequency."""
-
-
-@dataclass(frozen=True)
-class Limit:
-    """What a figure of measure.FIGURES may be."""
-
-    figure: str
-    most: float | None = None
-    least: float | None = None
-    over: str = "all"
-    """Of the runs: "all" pooled, "median" or "worst"."""
-
-    def holds(self, value: float) -> bool:
-        """Whether a value keeps it; NaN does not."""
-        return (self.most is None or value <= self.most) and (self.least is None or value >= self.least)
-
-    def __str__(self) -> str:
-        if self.most is None and self.least is None:
-            return ""
-        bound = f"≤ {self.most:g}" if self.least is None else f"≥ {self.least:g}"
-        return bound if self.over == "all" else f"{self.over} {bound}"
 
 
 @dataclass(frozen=True)

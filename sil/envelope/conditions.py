@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .condition import ClosedLoop, Condition, Limit
+from ..judged.result import Limit
+from .condition import ClosedLoop, Condition
 from .motions import EVENT, Motion
 from .sensors import Fault, Sensors
 

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
 
 import numpy as np
 from lever_cdkf.host_tools.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.host_tools.report.page import Page
-from lever_cdkf.host_tools.report.summary_html import table
-from lever_cdkf.host_tools.tables import Row
 
+from ..judged import judged_page
 from .campaign import Result
-from .measure import FIGURES, FLAGS, Excerpt
-from .table import MISSED, figures, lines, state
-
-_STYLE = """
-.missed { color: var(--bad); }
-#table :is(td, th):nth-child(3) { text-align: left; white-space: normal; }
-@media (min-width: 1100px) {
-  :root:not(.paper) .condition { display: grid; grid-template-columns: minmax(0, 1fr) auto; gap: 2rem; }
-}
-"""
+from .measure import FLAGS, Excerpt
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
@@ -33,45 +22,8 @@ def build(results: Sequence[Result], seeds: int) -> str:
         "was worst.",
         "lever envelope",
     )
-    page.section("table", "Table", "Measured values against their limits", _table(lines(results)), _legend(results))
-    for result in results:
-        name, chart = result.condition.name, None if result.excerpt is None else _chart(result.excerpt, result)
-        title = f"{html.escape(result.condition.title)}: {state(result)}"
-        parts = page.figure(f"chart-{name}", chart, ""), _table(figures(result))
-        page.section(name, name, title, f'<div class="condition">{"".join(parts)}</div>')
-    return page.html(_verdict(results), _STYLE)
-
-
-def _verdict(results: Sequence[Result]) -> str:
-    judged = [result for result in results if result.condition.limits]
-    missed = [f'<a href="#{each.condition.name}">{each.condition.name}</a>' for each in judged if not each.ok]
-    return (
-        f'<p class="verdict {"bad" if missed else "good"}">{len(judged) - len(missed)} of {len(judged)} conditions '
-        f"hold.{' Missed: ' + ', '.join(missed) + '.' if missed else ''}</p>"
-    )
-
-
-def _table(rows: Sequence[Row]) -> str:
-    return table([html.escape(column) for column in rows[0]], (_cells(row) for row in rows))
-
-
-def _cells(row: Row) -> list[str]:
-    """As HTML; a condition links to its section."""
-    cells = {column: html.escape(str(cell)) for column, cell in row.items()}
-    if cells.get("condition"):
-        cells["condition"] = f'<a href="#{cells["condition"]}">{cells["condition"]}</a>'
-    if cells.get("result") == MISSED:
-        cells["result"] = f'<strong class="missed">{MISSED}</strong>'
-    return list(cells.values())
-
-
-def _legend(results: Sequence[Result]) -> str:
-    used = dict.fromkeys(name for result in results for name in result.condition.figures)
-    rows = ([html.escape(name), html.escape(FIGURES[name].unit), html.escape(FIGURES[name].meaning)] for name in used)
-    return (
-        f"<details><summary>What the figures mean</summary>{table(('', 'unit', 'meaning'), rows)}"
-        f"<p>Flagged is any of {', '.join(FLAGS)}.</p></details>"
-    )
+    charts = [None if result.excerpt is None else _chart(result.excerpt, result) for result in results]
+    return judged_page.build(page, results, charts, f"Flagged is any of {', '.join(FLAGS)}.")
 
 
 def _chart(shown: Excerpt, result: Result) -> Figure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -13,6 +13,8 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.library import lib
 from numpy.typing import NDArray
 
+from ..judged import result as judged
+from ..judged.result import Values, largest, mean
 from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from .motions import Recording
 
@@ -70,10 +72,6 @@ class Outcome:
         """Where the firmware shows any of these faults."""
         shown: BoolArray = (self.track.faults & fault_mask(*names)) != 0
         return shown
-
-
-Values = FloatArray
-"""One for each run."""
 
 
 def _percent(true: BoolArray, axis: int | tuple[int, ...] = 0) -> Values:
@@ -216,57 +214,50 @@ def _pooled_rms(values: Values) -> float:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Figure(judged.Figure):
     """One way to measure an outcome."""
 
-    unit: str
-    meaning: str
-    compute: Callable[[Outcome], Values]
-    pool: Callable[[Values], float]
-    """All runs as one number."""
-    more_is_worse: bool = True
-
-    def worst(self, values: Values) -> float:
-        """Of all runs."""
-        return float(values.max() if self.more_is_worse else values.min())
+    compute: Callable[[Outcome], Values] = field(kw_only=True)
 
 
-def _mean(values: Values) -> float:
-    return float(np.mean(values))
-
-
-def _max(values: Values) -> float:
-    return float(np.max(values))
+def _figure(
+    unit: str,
+    meaning: str,
+    compute: Callable[[Outcome], Values],
+    pool: Callable[[Values], float],
+    more_is_worse: bool = True,
+) -> Figure:
+    return Figure(unit, meaning, pool, more_is_worse, compute=compute)
 
 
 def _figures() -> dict[str, Figure]:
     figures = {}
     for name in QUANTITIES:
         rms, ratio = partial(_rms, name), partial(_against, partial(_rms, name))
-        figures[f"{name} rms"] = Figure("%", f"rms error of {name}", rms, _pooled_rms)
-        figures[f"{name} covered"] = Figure(
-            "%", f"share of time with the true {name} within ±2σ", partial(_covered, name), _mean, False
+        figures[f"{name} rms"] = _figure("%", f"rms error of {name}", rms, _pooled_rms)
+        figures[f"{name} covered"] = _figure(
+            "%", f"share of time with the true {name} within ±2σ", partial(_covered, name), mean, False
         )
-        figures[f"{name} largest"] = Figure("σ", f"largest error of {name}", partial(_largest, name), _max)
-        figures[f"σ({name}) ratio"] = Figure(
-            "1", f"σ of {name} ÷ that of the reference", partial(_against, partial(_relative_sigma, name)), _mean
+        figures[f"{name} largest"] = _figure("σ", f"largest error of {name}", partial(_largest, name), largest)
+        figures[f"σ({name}) ratio"] = _figure(
+            "1", f"σ of {name} ÷ that of the reference", partial(_against, partial(_relative_sigma, name)), mean
         )
-        figures[f"{name} ratio"] = Figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
+        figures[f"{name} ratio"] = _figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
     return figures | {
-        "flagged": Figure("%", "share of time with a fault that forbids trust", partial(_share, FLAGS), _mean),
-        "mismatch": Figure("%", "share of time with MISMATCH", partial(_share, ("MISMATCH",)), _mean, False),
-        "running": Figure("%", "share of time in mode RUN", _running, _mean, False),
-        "settled": Figure("s", f"until f_n stays within {100 * WITHIN:g} %", _settled, _max),
-        "lag": Figure("s", "delay with which c_p is followed", _lag, _mean),
-        "to flag": Figure("s", "until a fault shows", partial(_until_flagged, FLAGS), _max),
-        "to HANDS_OFF": Figure("s", "until HANDS_OFF shows", partial(_until_flagged, ("HANDS_OFF",)), _max),
-        "back": Figure("s", "until flags are off and learning goes on", _back, _max),
-        "learnt at once": Figure("σ", "greatest change of a parameter in the event", partial(_learnt, 0.0), _max),
-        "learnt": Figure("σ", "the same from 0.5 s after its begin on", partial(_learnt, 0.5), _max),
-        "learnt late": Figure("σ", "the same from 2 s after its begin on", partial(_learnt, 2.0), _max),
-        "σ ratio": Figure("1", "widest relative σ of a parameter ÷ that of the reference", _sigma_ratio, _max),
-        "θ/z̈ rms": Figure("%", "complex rms error of theta/z_ddot over 2 to 8 Hz", _response_rms, _pooled_rms),
-        "θ/z̈ covered": Figure("%", "share of it whose gain and phase are within ±2σ", _response_covered, _mean, False),
+        "flagged": _figure("%", "share of time with a fault that forbids trust", partial(_share, FLAGS), mean),
+        "mismatch": _figure("%", "share of time with MISMATCH", partial(_share, ("MISMATCH",)), mean, False),
+        "running": _figure("%", "share of time in mode RUN", _running, mean, False),
+        "settled": _figure("s", f"until f_n stays within {100 * WITHIN:g} %", _settled, largest),
+        "lag": _figure("s", "delay with which c_p is followed", _lag, mean),
+        "to flag": _figure("s", "until a fault shows", partial(_until_flagged, FLAGS), largest),
+        "to HANDS_OFF": _figure("s", "until HANDS_OFF shows", partial(_until_flagged, ("HANDS_OFF",)), largest),
+        "back": _figure("s", "until flags are off and learning goes on", _back, largest),
+        "learnt at once": _figure("σ", "greatest change of a parameter in the event", partial(_learnt, 0.0), largest),
+        "learnt": _figure("σ", "the same from 0.5 s after its begin on", partial(_learnt, 0.5), largest),
+        "learnt late": _figure("σ", "the same from 2 s after its begin on", partial(_learnt, 2.0), largest),
+        "σ ratio": _figure("1", "widest relative σ of a parameter ÷ that of the reference", _sigma_ratio, largest),
+        "θ/z̈ rms": _figure("%", "complex rms error of theta/z_ddot over 2 to 8 Hz", _response_rms, _pooled_rms),
+        "θ/z̈ covered": _figure("%", "share of it whose gain and phase are within ±2σ", _response_covered, mean, False),
     }
 
 

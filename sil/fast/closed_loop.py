@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -13,19 +13,23 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.commander import Commander
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware import quantities
+from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
 from lever_cdkf.host_tools.firmware.estimator import Estimator, make_command
 from lever_cdkf.host_tools.firmware.library import ffi, struct_dtype
 from numpy.typing import NDArray
 
+from ..aircraft.flight import Flight
 from ..scenarios import inputs as scenario_inputs
 from ..scenarios.inputs import OF_LEVER, Inputs
 from ..scenarios.scenario import Scenario
-from . import plants
+from . import aircraft, plants
 from .library import Struct, lib
 
 STRIDE = 0.02
 """Time between two estimates that are kept [s]."""
 
+_MESSAGES = {"grip_force": "GRIP_SAMPLE", "z_ddot": "BASE_SAMPLE"}
+"""That carry what LEVER_SAMPLE does not."""
 _FRAMES_AT_ONCE = 1 << 17
 
 
@@ -58,8 +62,8 @@ class FastRun:
 def run(scenario: Scenario, through_frames: bool = False, stride: float = STRIDE) -> FastRun:
     """Runs a scenario against a fresh instance of the firmware, by structs, or through CAN frames with E2E protection.
 
-    By structs values keep their single precision; frames round them as on a bus. Raises LeverError, also for a pilot
-    whose plant the C does not have.
+    By structs values keep their single precision; frames round them as on a bus. What is beyond the range of a frame is
+    not available either way. Raises LeverError, also for a pilot whose plant the C does not have.
     """
     inputs = scenario_inputs.prepare(scenario)
     every = max(1, round(stride / scenario.period))
@@ -86,8 +90,6 @@ class Loop:
         """`every`: of how many samples one has its estimate kept."""
         if not plants.has(inputs.truth):
             raise LeverError(f"a pilot of model {inputs.truth.model} runs in Python only: use run.runner.simulate()")
-        if scenario.aircraft is not None:
-            raise LeverError("a scenario with an aircraft runs in Python only: use run.runner.simulate()")
         self._scenario, self._inputs = scenario, inputs
         self._estimator = Estimator(scenario.config)
         self.struct = Struct("loop_t")
@@ -96,13 +98,19 @@ class Loop:
         loop.count, loop.period_us, loop.stride = count, round(scenario.period * 1e6), every
         loop.by_frames, loop.has_grip = by_frames, scenario.sensors.grip_force is not None
         loop.most_unanswered = 0xFFFFFFFF
-        plants.fill(self.struct, loop.plant, inputs.truth, scenario_inputs.conditions(scenario, inputs))
+        self.correction = np.zeros(count)
+        """Of the lever's angle, as put out [rad]; 0 without an aircraft."""
+        self.signals = {name: np.empty(count) for name in OF_LEVER if name != "grip_force" or loop.has_grip}
+        conditions, flight = scenario_inputs.conditions(scenario, inputs), scenario_inputs.flight(scenario, inputs)
+        if flight is not None:
+            self.signals["z_ddot"] = inputs.z_ddot
+            conditions = replace(conditions, z_ddot=self._fill_cabin(flight))
+        plants.fill(self.struct, loop.plant, inputs.truth, conditions)
         loop.plant.has_grip_force = loop.has_grip
-        names = OF_LEVER if loop.has_grip else OF_LEVER[:-1]
-        self.signals = {name: np.empty(count) for name in names}
-        for index, name in enumerate(names):
+        for name, signal in self.signals.items():
+            index = getattr(lib, f"LOOP_{name.upper()}")
             self._fill_sensor(loop.sensor[index], name)
-            loop.signal[index] = self.struct.doubles(self.signals[name])
+            loop.signal[index] = self.struct.doubles(signal)
         self._fill_columns()
         self._fill_commands()
         rows = (count - 1) // every + 1
@@ -111,12 +119,21 @@ class Loop:
         loop.estimate = self.struct.array("struct lever_estimate", self._estimates, self._estimates.dtype)
         loop.health = self.struct.array("struct lever_health", self._healths, self._healths.dtype)
 
+    def _fill_cabin(self, flight: Flight) -> FloatArray:
+        """A helicopter in hover; returns z_ddot as its pilot feels it, of which the first value is known."""
+        inputs, struct, cabin = self._inputs, self.struct, self.struct.pointer.cabin
+        felt = inputs.z_ddot.copy()
+        cabin.exists, cabin.period, cabin.rest = True, self._scenario.period, float(inputs.truth.rest[0])
+        cabin.outside, cabin.felt = plants.outside(inputs.truth), struct.doubles(felt)
+        aircraft.fill(struct, cabin.aircraft, flight, self.correction)
+        return felt
+
     def _fill_sensor(self, given: Any, name: str) -> None:
         readings = scenario_inputs.readings(self._scenario, self._inputs, name)
         given.gain = 1.0 + readings.sensor.gain_error
         given.whole, given.part = readings.sensor.lag(self._scenario.period)
         given.offset = self.struct.doubles(readings.offsets)
-        given.field = _field("GRIP_SAMPLE" if name == "grip_force" else "LEVER_SAMPLE", name)
+        given.field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
         if readings.corruption is not None:
             given.source = self.struct.array("int64_t", readings.corruption.source, np.int64)
             given.factor = self.struct.doubles(readings.corruption.factor)
@@ -126,6 +143,7 @@ class Loop:
         loop, inputs = self.struct.pointer, self._inputs
         loop.base, loop.torque = self.struct.doubles(inputs.base), self.struct.doubles(inputs.torque)
         loop.base_field, loop.torque_field = _field("BASE_SAMPLE", "z_ddot"), _field("MOTOR_COMMAND", "torque")
+        loop.correction_field = _field("CORRECTION", "correction")
         loop.no_lever, loop.no_base = (
             self.struct.array("uint8_t", inputs.missing[frame], np.uint8) for frame in ("lever_frame", "base_frame")
         )
@@ -141,6 +159,21 @@ class Loop:
             loop.command_frame = self.struct.keep(_command_frames(values))
         else:
             loop.command = self.struct.keep(_command_structs(values))
+
+    def watch(self, aircraft: AircraftResponse) -> NDArray[Any]:
+        """The firmware watches the loop with this aircraft; returns what is kept of that: lever_stability_t."""
+        self._estimator.watch(aircraft)
+        kept = np.zeros(len(self._healths), struct_dtype("lever_stability_t"))
+        self.struct.pointer.stability = self.struct.array("struct lever_stability", kept, kept.dtype)
+        return kept
+
+    def gear(self, gearing: FloatArray) -> None:
+        """Of an aircraft, at every sample [1], in place of that of the scenario."""
+        self.struct.pointer.cabin.aircraft.gearing = self.struct.doubles(gearing)
+
+    def give_time(self, time_us: NDArray[np.uint32]) -> None:
+        """Of all samples, by structs [us], in place of that which is."""
+        self.struct.pointer.time_us = self.struct.array("uint32_t", time_us, np.uint32)
 
     def advance(self, until: int) -> int:
         """Goes on to a sample; returns the one that it came to."""
@@ -164,8 +197,9 @@ class Loop:
 
     def check(self) -> None:
         """Raises LeverError when the firmware has refused a command."""
-        if self.struct.pointer.refused:
-            raise LeverError("the estimator refuses COMMAND")
+        loop = self.struct.pointer
+        if loop.refused:
+            raise LeverError(f"the estimator refuses COMMAND at {(loop.sample - 1) * self._scenario.period:g} s")
 
     @property
     def outputs(self) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -198,6 +232,15 @@ class Loop:
             mode=self._healths["mode"].copy(),
             recoveries=int(self._healths["recoveries"][-1]),
         )
+
+
+def available(name: str, values: FloatArray) -> FloatArray:
+    """Readings of the sensor `name`, NaN where they are beyond the range of their frame."""
+    field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
+    return np.where(np.abs(values / field["scale"]) < (field["mask"] >> 1) + 0.5, values, np.nan)
+
+
+_MESSAGES = {"grip_force": "GRIP_SAMPLE", "z_ddot": "BASE_SAMPLE"}
 
 
 @cache

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 
-from ..plants import hysteretic_plant, lever_plant, linear_plant, reflex_plant, two_dof_plant
+from ..plants import hysteretic_plant, lever_plant, linear_plant, mayo_plant, reflex_plant, two_dof_plant
 from ..plants.truth import Conditions, Truth
 from .library import Struct, lib
 
@@ -36,9 +36,15 @@ def move(truth: Truth, conditions: Conditions, command: FloatArray) -> tuple[Flo
     return signals[0], signals[1], signals[2]
 
 
+def outside(truth: Truth) -> float:
+    """Of the cabin's speed, what a pilot feels besides its acceleration [1/s]."""
+    return truth.hand.outside if isinstance(truth, mayo_plant.Mayo) else 0.0
+
+
 def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> None:
-    """Puts a truth at rest, and what acts on it, into a plant_t in a struct."""
-    if isinstance(truth, linear_plant.LinearTruth):
+    """Puts a truth at rest, and what acts on it, into a plant_t in a struct. Where z_ddot comes to be known on the way,
+    it is what is felt()."""
+    if isinstance(truth, linear_plant.LinearTruth) and conditions.ahead > 1:
         conditions = truth.felt(conditions)
     last = len(conditions.z_ddot) - 1
     plant.kind = getattr(lib, "PLANT_" + next(name for kind, name in _KINDS.items() if isinstance(truth, kind)))

@@ -20,13 +20,13 @@ from .loop import Progress, Recording
 
 
 def run(scenario: Scenario, channel: str = "lever", progress: Progress | None = None) -> Recording:
-    """Runs `scenario`; `channel` names the estimator in errors. A pilot whose plant the C does not have, and
-    an aircraft, run in Python.
+    """Runs `scenario`; `channel` names the estimator in errors. A pilot whose plant the C does not have runs in
+    Python.
 
     Raises NoAnswerError when the firmware falls silent, RefusedError when it refuses a COMMAND.
     """
     inputs = prepare(scenario)
-    if plants.has(inputs.truth) and scenario.aircraft is None:
+    if plants.has(inputs.truth):
         return _run_in_c(scenario, inputs, f"the firmware in this process, channel {channel!r}", progress)
     with LeverBus(channel, config=scenario.config) as bus:
         return loop.run(scenario, bus, progress=progress)

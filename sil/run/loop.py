@@ -28,7 +28,7 @@ from ..aircraft.flight import Flight
 from ..fast.closed_loop import Traffic
 from ..plants import sensors
 from ..plants.truth import Body
-from ..scenarios.inputs import Inputs, conditions, prepare, readings
+from ..scenarios.inputs import Inputs, conditions, flight, prepare, readings
 from ..scenarios.inputs import commands as commands_of
 from ..scenarios.scenario import Scenario
 from .buslog import Frames
@@ -42,6 +42,9 @@ FIRST_TIMEOUT = 2.0
 """Longest wait for the first one: the other process may still be starting."""
 MOST_UNANSWERED = 20
 """Samples without an answer in a row, after which the estimator is taken to be absent."""
+
+CORRECTION_HOLDS = 0.1
+"""Without a sample, a correction that is older [s] counts as none."""
 
 REST = 5.0
 """Sample time [s] after which nothing is left of an earlier torque: twenty time constants of the torque gate's rms."""
@@ -183,6 +186,9 @@ class _Link:
         self._identity = codec.message("IDENTITY").frame_id
         self._health = codec.message("HEALTH").frame_id
         self._torque = _signed_field("MOTOR_COMMAND", "torque")
+        self._correction = codec.message("CORRECTION").frame_id
+        self._angle = _signed_field("CORRECTION", "correction")
+        self._correction_time = codec.raw_field("CORRECTION", "time_low")
         self._motor_time = codec.raw_field("MOTOR_COMMAND", "time_low")
         self._estimate_time = codec.raw_field("STATE_ESTIMATE", "time_low")
         self._unanswered_in_a_row = 0
@@ -231,11 +237,12 @@ class _Link:
             )
         return None
 
-    def answer(self, sample: int) -> float:
-        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque it asks for."""
+    def answer(self, sample: int) -> tuple[float, float]:
+        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque that it asks for
+        and what it adds to the lever's angle."""
         time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
-        torque = 0.0
+        torque, correction = 0.0, 0.0
         self.has_health = False
         while (frame := self._take(sample, timeout)) is not None:
             identifier, data = frame
@@ -244,15 +251,18 @@ class _Link:
                     torque = self._torque(data)
                     if torque != 0.0 and self._must_rest and not sample:
                         raise _UnrestedError
+            elif identifier == self._correction:
+                if self._correction_time(data) == time_low:
+                    correction = self._angle(data)
             elif identifier == self._health:
                 self.has_health = True
             elif identifier == self._estimate:
                 if self._estimate_time(data) == time_low:
                     self._unanswered_in_a_row = 0
-                    return torque
+                    return torque, correction
                 self._tape.misplaced += 1
         self._miss(sample)
-        return torque
+        return torque, correction
 
     def _take(self, sample: int, timeout: float) -> tuple[int, bytes | bytearray] | None:
         """The next frame of the estimator, recorded; None when none comes in time."""
@@ -307,9 +317,9 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
     """The samples, one after the other."""
     scenario, inputs = tape.scenario, tape.inputs
     count = len(inputs.time)
-    flight = _flight(scenario, inputs)
+    cabin = flight(scenario, inputs)
     body = inputs.truth.body(conditions(scenario, inputs))
-    advance = _advance(body, flight, inputs.z_ddot)
+    advance = _advance(body, cabin, inputs.z_ddot)
     commands = commands_of(scenario, inputs.time)
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
@@ -318,9 +328,10 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
     measure = [_reader_of(tape, name) for name in ("theta", "theta_dot", "tau_m")]
     send_grip = _grip_sender(tape, link)
     no_lever, no_base = inputs.missing["lever_frame"].tolist(), inputs.missing["base_frame"].tolist()
-    read_base = inputs.base.tolist().__getitem__ if flight is None else _reader_of(tape, "z_ddot")
+    read_base = inputs.base.tolist().__getitem__ if cabin is None else _reader_of(tape, "z_ddot")
     period_us = round(scenario.period * 1e6)
-    command, own_torque, last = 0.0, inputs.torque.tolist(), count - 1
+    command, correction, answered, own_torque, last = 0.0, 0.0, 0, inputs.torque.tolist(), count - 1
+    holds = round(CORRECTION_HOLDS / scenario.period)
 
     for sample in range(count):
         thetas.append(body.theta)
@@ -335,9 +346,9 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
             send_grip(sample)
         if not no_base[sample]:
             send_base(sample, encode_base(sample, read_base(sample), sample * period_us))
-            command = link.answer(sample)
+            (command, correction), answered = link.answer(sample), sample
         if sample != last:
-            advance(sample, command + own_torque[sample])
+            advance(sample, command + own_torque[sample], correction if sample - answered <= holds else 0.0)
         if pace is not None:
             next(pace)
         if progress is not None and sample % _PROGRESS_EVERY == 0:
@@ -346,23 +357,14 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
         progress(count, count)
 
 
-def _flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
-    """The helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs` then."""
-    if scenario.aircraft is None:
-        return None
-    flight = Flight(scenario.aircraft, scenario.period, inputs.z_ddot.copy())
-    inputs.z_ddot[:] = np.nan
-    inputs.z_ddot[0] = flight.z_ddot
-    return flight
-
-
-def _advance(body: Body, flight: Flight | None, z_ddot: FloatArray) -> Callable[[int, float], None]:
-    """A function that takes lever and cabin from a sample to the next, with the torque [N m] held."""
+def _advance(body: Body, cabin: Flight | None, z_ddot: FloatArray) -> Callable[[int, float, float], None]:
+    """A function that takes lever and cabin from a sample to the next, with the torque [N m] held and what is added to
+    the lever's angle [rad]."""
     rest = body.theta
 
-    def advance(sample: int, torque: float) -> None:
-        if flight is not None:
-            z_ddot[sample + 1] = flight.advance(body.theta - rest)
+    def advance(sample: int, torque: float, correction: float) -> None:
+        if cabin is not None:
+            z_ddot[sample + 1] = cabin.advance(body.theta - rest, correction)
         body.advance(torque)
 
     return advance

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import can
 import numpy as np
@@ -25,6 +26,9 @@ from . import buslog, in_process, loop, summary
 from .buslog import Frames
 from .columns import columns_of, published
 from .loop import Progress
+
+if TYPE_CHECKING:
+    from lever_cdkf.host_tools.report.page import Story
 
 
 @dataclass(frozen=True)
@@ -46,11 +50,12 @@ def simulate(
     progress: Progress | None = None,
     formats: Sequence[str] = ("csv",),
     inputs: Sequence[str | Path] = (),
+    story: Callable[[], Story] | None = None,
 ) -> Result:
     """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
     it; with `out_dir` also writes bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra
     `report`) and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the
-    scenario is from.
+    scenario is from; `story` makes a first picture for the report.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
     files but for the wall times are the same either way. Raises LeverError.
@@ -68,7 +73,7 @@ def simulate(
     columns = columns_of(recording, frames)
     untimed = summary.build(recording, columns)
     if out_dir is not None:
-        files = _Files(out_dir, channel, formats, inputs)
+        files = _Files(out_dir, channel, formats, inputs, story)
         files.write(Result(columns, untimed, frames), published(recording, frames), start)
     return Result(columns, untimed.timed(clock.perf_counter() - start), frames)
 
@@ -81,6 +86,7 @@ class _Files:
     channel: str
     formats: Sequence[str]
     inputs: Sequence[str | Path]
+    story: Callable[[], Story] | None
 
     def write(self, result: Result, published: NDArray[np.bool_], start: float) -> None:
         """Writes the files; summary.json comes last, so that its wall time is of everything."""
@@ -101,6 +107,7 @@ class _Files:
             origin = origin.with_outputs(outputs.written("bus.log", FORMATS["csv"]))
             summary = replace(elapsed(), provenance=origin)
             if not missing("report"):
-                write_report(result.trace, summary, outputs.path("report.html"))
+                story = None if self.story is None else self.story()
+                write_report(result.trace, summary, outputs.path("report.html"), story)
             write_text(outputs.path("summary.json"), text(replace(elapsed(), provenance=origin)))
             outputs.finish()

@@ -13,6 +13,7 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.can.codec import Value
 from lever_cdkf.host_tools.can.commander import KEEP_ALIVE
 
+from ..aircraft.flight import Flight
 from ..plants import excitation, sensors
 from ..plants.truth import BLOCK, Conditions, Truth
 from .scenario import Scenario
@@ -90,6 +91,16 @@ def conditions(scenario: Scenario, inputs: Inputs) -> Conditions:
     )
 
 
+def flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
+    """The helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs` then."""
+    if scenario.aircraft is None:
+        return None
+    hovering = Flight(scenario.aircraft, scenario.period, inputs.z_ddot.copy())
+    inputs.z_ddot[:] = np.nan
+    inputs.z_ddot[0] = hovering.z_ddot
+    return hovering
+
+
 def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
     """Of the sensor of one of sensors.VALUES, which there must be."""
     sensor: sensors.Sensor = getattr(scenario.sensors, name)
@@ -102,10 +113,12 @@ def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
 
 def commands(scenario: Scenario, time: FloatArray) -> dict[int, Mapping[str, Value]]:
     """What to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the start,
-    the dither as it changes, and while it is on, one that keeps it alive."""
+    the dither as it changes, and while it or lever damping is on, one that keeps the torque alive."""
     changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
     sent: dict[int, Mapping[str, Value]] = {0: {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}}
     repetition = max(1, round(KEEP_ALIVE / scenario.period))
+    if "damping" in scenario.config.choices["mitigation"]:
+        sent = {sample: {} for sample in range(0, len(time), repetition)} | sent
     for (sample, rms), end in zip(changes.items(), [*changes, len(time)][1:], strict=True):
         sent[sample] = {**sent.get(sample, {}), "dither_rms": rms}
         if rms > 0.0:

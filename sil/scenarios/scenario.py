@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +22,7 @@ from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.host_tools.firmware.settings_file import setting_value
-from lever_cdkf.host_tools.near_names import did_you_mean, near_names
+from lever_cdkf.host_tools.near_names import near_names
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 from lever_cdkf.host_tools.units import UnitError
 
@@ -37,8 +35,11 @@ from ..toml_tables import (
     Place,
     Reader,
     ScenarioError,
+    Shelf,
     choice,
+    file_of,
     item,
+    parse,
     quantity,
     read,
     read_kind,
@@ -49,11 +50,6 @@ from ..toml_tables import (
     whole,
 )
 from . import random_streams
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +84,7 @@ class Estimator:
     preload: str | None = _one_of("lever_preload")
     estimator: str | None = _one_of("lever_estimator")
     adaptation: str | None = _one_of("lever_adaptation")
+    mitigation: str | None = _one_of("lever_mitigation")
 
 
 def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
@@ -240,10 +237,8 @@ class Scenario:
         return sorted((time, rms) for time, rms in events.items() if time < self.duration)
 
 
-def names() -> list[str]:
-    """The scenarios that come with the package."""
-    folder = files(__package__)
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+SHELF = Shelf("scenario", __package__)
+names = SHELF.names
 
 
 def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
@@ -251,42 +246,21 @@ def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
 
     Raises ScenarioError.
     """
-    return from_toml(content_of(name_or_path), name_or_path, overrides)
-
-
-def content_of(name_or_path: str, folder: Path | None = None) -> bytes:
-    """What the file of a scenario holds; a path is relative to `folder`. Raises ScenarioError."""
-    if name_or_path.endswith(".toml"):
-        path = (folder or Path()) / name_or_path
-        if not path.is_file():
-            raise ScenarioError(f"{path}: no such file")
-        return path.read_bytes()
-    if name_or_path in names():
-        return (files(__package__) / f"{name_or_path}.toml").read_bytes()
-    hint = did_you_mean(name_or_path, names(), f"there are {', '.join(names())}, or give a path to a .toml file")
-    raise ScenarioError(f"no scenario {name_or_path!r}; {hint}")
+    return from_toml(SHELF.content(name_or_path), name_or_path, overrides)
 
 
 def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
     """As load(), of what the file holds."""
-    is_path = name_or_path.endswith(".toml")
-    name, file = (Path(name_or_path).stem, name_or_path) if is_path else (name_or_path, f"{name_or_path}.toml")
+    file = file_of(name_or_path)
     try:
-        scenario = dataclasses.replace(_read(content, file, overrides), name=name, file=file)
+        values = parse(content, file)
+        for override in overrides:
+            _override(values, override)
+        scenario = dataclasses.replace(read(Scenario, values, Place(file)), name=Path(file).stem, file=file)
     except RecursionError:
         raise ScenarioError(f"{file}: its tables or lists, or those of --set, are nested too deeply") from None
     scenario.check()
     return scenario
-
-
-def _read(content: bytes, file: str, overrides: Iterable[str]) -> Scenario:
-    try:
-        values = tomllib.loads(content.decode("utf-8"))
-    except ValueError as error:  # also of text that is not UTF-8, and of a whole number with too many digits
-        raise ScenarioError(f"{file}: not TOML: {error}") from None
-    for override in overrides:
-        _override(values, override)
-    return read(Scenario, values, Place(file))
 
 
 def _override(values: dict[str, Any], override: str) -> None:
@@ -317,6 +291,6 @@ def _override(values: dict[str, Any], override: str) -> None:
 def _value(written: str) -> Any:
     """As TOML when it is TOML, otherwise a string, so that a shell needs no second quotes."""
     try:
-        return tomllib.loads(f"value = {written}")["value"]
-    except tomllib.TOMLDecodeError:
+        return parse(f"value = {written}".encode(), "")["value"]
+    except ScenarioError:
         return written.strip()

@@ -82,8 +82,11 @@ def sigma_ratio(deviations: Array, variances: Array) -> Array:
 
 
 def normalised_squares(deviations: Array, covariance: Array) -> Array:
-    """(B, T) eᵀ P⁻¹ e of errors (B, T, n) with stated covariances (B, T, n, n): NEES."""
-    squares: Array = np.einsum("bti,bti->bt", deviations, np.linalg.solve(covariance, deviations[..., None])[..., 0])
+    """(B, T) eᵀ P⁻¹ e of errors (B, T, n) with stated covariances (B, T, n, n): NEES; infinite for a singular one."""
+    regular = np.linalg.slogdet(covariance).sign != 0.0
+    invertible = np.where(regular[..., None, None], covariance, np.eye(covariance.shape[-1]))
+    squares: Array = np.einsum("bti,bti->bt", deviations, np.linalg.solve(invertible, deviations[..., None])[..., 0])
+    squares[~regular] = np.inf
     return squares
 
 

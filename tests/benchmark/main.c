@@ -97,7 +97,7 @@ int main(int argc, char **argv)
 {
     lever_config_t config;
     lever_command_t command = {(uint8_t)LEVER_REQUEST_NONE, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP,
-        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, 0.0f};
+        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, 0.0f};
     if (argc < 3) {
         give_up("SAMPLES ROUNDS [KEY=VALUE]...", "usage");
         return 2;

@@ -16,6 +16,7 @@ import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from lever_cdkf.host_tools.firmware.library import enum_names
 from lever_cdkf.host_tools.firmware.native import Config
 from lever_cdkf.sil.run.runner import Result, simulate
@@ -52,7 +53,7 @@ class PuppetBus(can.BusABC):
         elif msg.arbitration_id == codec.message("COMMAND").frame_id:
             result = next(self._results, "accepted")
             if result is not None:
-                choices = {"model": 0, "preload": 0, "estimator": 0, "adaptation": 0, "dither_rms": 0.0}
+                choices = {**dict.fromkeys(CHOICES, 0), "dither_rms": 0.0}
                 self._put("COMMAND_ACK", {"command_counter": msg.data[1] & 15, "result": result, **choices})
 
     def _put(self, name: str, values: dict[str, Any]) -> None:

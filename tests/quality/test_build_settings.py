@@ -27,7 +27,8 @@ int main(void)
 {
     lever_config_t config;
     lever_build_config(&config);
-    (void)printf("%d %d %d %d", config.model, config.preload, config.estimator, config.adaptation);
+    (void)printf("%d %d %d %d %d", config.model, config.preload, config.estimator, config.adaptation,
+        config.mitigation);
     for (unsigned i = 0u; i < sizeof config.settings / sizeof(float); i++) {
         (void)printf(" %.9g", (double)((const float *)(const void *)&config.settings)[i]);
     }
@@ -67,8 +68,8 @@ def test_a_build_starts_with_the_values_of_the_file(tmp_path: Path, build_dir: P
     )
     shown = tools.run([tmp_path / "show"]).stdout.split()
     pointer = config.pointer
-    assert shown[:4] == [str(getattr(pointer, what)) for what in ("model", "preload", "estimator", "adaptation")]
-    assert [single(float(value)) for value in shown[4:]] == [
+    assert shown[: len(CHOICES)] == [str(getattr(pointer, what)) for what in CHOICES]
+    assert [single(float(value)) for value in shown[len(CHOICES) :]] == [
         getattr(pointer.settings, row.name) for row in settings_table()
     ]
 

@@ -17,12 +17,12 @@ NOT_RUN = {
     r"wireshark -C": "needs a display",
     r"lever (live|monitor)(?!.*--once)": "runs until it is ended",
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
-    r"lever (compare --(out|quick|envelope)|envelope --json|figures --out)": "takes minutes",
+    r"lever (compare --(out|quick|envelope)|(envelope|bounce) --json|figures --out)": "takes minutes",
 }
 SHORTER = {
     r"--seeds \d+": "--seeds 1",
     r"(lever compare --(scenarios|models))": r"lever compare --duration 2 --scenarios step_up --\2",
-    r"(lever envelope --quick)": r"\1 --seeds 1",
+    r"(lever (envelope|bounce) --quick)": r"\1 --seeds 1",
     r"--start 60 --length 120": "--length 25",
     r"(lever sim sudden_grip|lever sim steady --seed 7) (--set)": r'\1 --set "limits={}" \2',
 }

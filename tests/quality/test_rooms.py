@@ -27,15 +27,23 @@ MAY_IMPORT = {
     "sil/oracle": {"models"},
     "sil/aircraft": set(),
     "sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
-    "sil/fast": {"scenarios", "plants", "firmware", "can"},
+    "sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
     "sil/run": {"fast", "scenarios", "plants", "aircraft", "firmware", "can", "results", "report", "watch", "exports"},
-    "sil/envelope": {"fast", "plants", "firmware", "models", "report"},
+    "sil/judged": {"report"},
+    "sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
+    "sil/bounce": {
+        *("judged", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
+        *("firmware", "models", "report"),
+    },
     "sil/study": {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
     "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
-    "sil/commands": {"campaign", "run", "scenarios", "study", "envelope", "firmware", "can", "report", "exports"},
+    "sil/commands": {
+        *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "aircraft"),
+        *("firmware", "can", "report", "exports"),
+    },
 }
 """By folder. What lies beside the folders is for all of its package, and imports nothing in them; sil may import
 that of host_tools too. Plants and oracle are what the firmware is compared with, and know neither it nor each other."""

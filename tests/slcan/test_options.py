@@ -108,6 +108,30 @@ def test_what_is_no_settings_file(content: bytes, said: str, program: str, tmp_p
     assert refused(program, "--can", "vcan0", "--set", 600 * "=") == "longer than 510 characters"
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("1.5 2 3 4\n", ":1: neither"),
+        ("1.5 2\n", ":1: neither"),
+        ("gain = 0.1\n", ":1: neither"),
+        ("gain_sigma = 0.1 0.2\n", ":1: neither"),
+        ("# none\n1.5 nan 2\n", ":2: neither"),
+        (25 * "1 2 3\n", ":25: neither"),
+        ("1 2 3\n2 3 4\n3 4 5\ngain_sigma = 0.1\n", ": how well is it known?"),
+    ],
+)
+def test_what_is_no_aircraft(content: str, said: str, program: str, tmp_path: Path) -> None:
+    path = tmp_path / "it.response"
+    path.write_text(content)
+    assert refused(program, "--pty", str(tmp_path / "link"), "--aircraft", str(path)).startswith(f"{path}{said}")
+
+
+def test_an_aircraft_that_the_estimator_does_not_take(program: str, tmp_path: Path) -> None:
+    path = tmp_path / "it.response"
+    path.write_text("3 2 3\n2 3 4\n3 4 5\ngain_sigma = 0.1\nphase_sigma = 0.1\n")
+    assert "frequencies or more that rise" in refused(program, "--pty", str(tmp_path / "link"), "--aircraft", str(path))
+
+
 @pytest.mark.parametrize("name", ["", "sixteen_letters_", "nosuchcan0"])
 def test_an_interface_that_cannot_be_opened_is_explained(name: str, program: str) -> None:
     done = subprocess.run([program, "--can", name], capture_output=True, text=True, check=False)

@@ -12,10 +12,33 @@ LEVER = str(Path(sys.executable).with_name("lever"))
 SHORTENED = ("--set=duration=4 s", "--set=converged_after=1 s", "--set=limits={}")
 
 
-def lever_sim(*options: str) -> str:
-    result = subprocess.run([LEVER, "sim", "steady", *SHORTENED, *options], capture_output=True, text=True)
+def lever(*arguments: str) -> str:
+    result = subprocess.run([LEVER, *arguments], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
     return result.stdout
+
+
+def lever_sim(*options: str) -> str:
+    return lever("sim", "steady", *SHORTENED, *options)
+
+
+def test_with_an_aircraft_the_margin_is_on_the_bus(build_dir: Path, tmp_path: Path) -> None:
+    """And is the one of a replay of the same log with the same file."""
+    link, settings, aircraft, out = (tmp_path / name for name in ("lever0", "settings", "uh60.response", "out"))
+    settings.write_text(lever_sim("--settings"))
+    lever("aircraft", "uh60_like", "gearing=0.5", "-o", str(aircraft))
+    options = ["--settings", str(settings), "--aircraft", str(aircraft)]
+    with rig.LeverCan(build_dir / "lever_can", str(link), options, tmp_path, "pty"):
+        lever_sim("--interface=slcan", f"--channel={link}", "--bus-option=timeout=0.01", f"--out={out}")
+    log = (out / "bus.log").read_text()
+    (out / "bus.log").write_text(log.replace(f" {link} ", " lever "))  # a name that is short enough for a bus
+    lever("replay", str(out / "bus.log"), *options, "-o", str(tmp_path / "again"))
+    sent, again = (
+        [line.split()[2] for line in (folder / "bus.log").read_text().splitlines() if " 21B#" in line]
+        for folder in (out, tmp_path / "again")
+    )
+    assert len(sent) > 50
+    assert sent == again
 
 
 def test_frames_and_estimates_are_those_of_a_run_in_one_process(build_dir: Path, tmp_path: Path) -> None:

@@ -173,6 +173,13 @@ static int run(const options_t *options)
         (void)fprintf(stderr, "lever_can: cannot start: %s\n", strerror(errno));
         return EXIT_BAD_INTERFACE;
     }
+    if (options->has_aircraft && !lever_aircraft(lever, &options->aircraft)) {
+        (void)fputs(
+            "lever_can: the response of the aircraft cannot be used: it needs 3 frequencies or more that rise from "
+            "above 0, sigmas from 0 to 1, and a warning not below the alarm\n",
+            stderr);
+        return EXIT_BAD_USAGE;
+    }
     if (!open_medium(&session, stop)) {
         print_reason(&session);
         close_medium(&session);

@@ -3,6 +3,7 @@
 #include "port/linux/options.h"
 
 #include "lever_build.h"
+#include "port/linux/aircraft.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -36,6 +37,9 @@ static const char help[] =
     "  --preload NAME       where the springs rest: fixed, or at a trim angle that is followed\n"
     "  --estimator NAME     how state and parameters are estimated together\n"
     "  --adaptation NAME    how the parameter noise is set\n"
+    "  --mitigation NAME    what is done against collective bounce\n"
+    "  --aircraft FILE      watch the margin to collective bounce with the response of this helicopter (STABILITY);\n"
+    "                       `lever aircraft` writes such a file, firmware/port/linux/aircraft.h says what is in it\n"
     "  --lock-step          time is that of the samples alone: for simulations that may pause; never beside a motor\n"
     "  --verbose            also print all settings, and every change of mode\n"
     "  --help, --version    print this, or the version, and exit\n"
@@ -70,6 +74,8 @@ static const struct option known[] = {
     {"preload", required_argument, NULL, '='},
     {"estimator", required_argument, NULL, '='},
     {"adaptation", required_argument, NULL, '='},
+    {"mitigation", required_argument, NULL, '='},
+    {"aircraft", required_argument, NULL, 'a'},
     {"lock-step", no_argument, NULL, 'k'},
     {"verbose", no_argument, NULL, 'v'},
     {"help", no_argument, NULL, 'h'},
@@ -83,18 +89,36 @@ static bool refuse(settings_error_t *error, const char *what, const char *which)
     return false;
 }
 
-static bool read_file(lever_config_t *config, const char *path, settings_error_t *error)
+static FILE *open_file(const char *path, settings_error_t *error)
 {
     FILE *file = fopen(path, "r");
-    bool good = false;
 
     if (file == NULL) {
         (void)snprintf(error->text, sizeof error->text, "%.200s: %s", path, strerror(errno));
-    } else {
-        good = settings_read(config, file, path, error);
+    }
+    return file;
+}
+
+static bool read_settings(lever_config_t *config, const char *path, settings_error_t *error)
+{
+    FILE *file = open_file(path, error);
+    const bool good = (file != NULL) && settings_read(config, file, path, error);
+
+    if (file != NULL) {
         (void)fclose(file);
     }
     return good;
+}
+
+static bool read_aircraft(options_t *options, const char *path, settings_error_t *error)
+{
+    FILE *file = open_file(path, error);
+
+    options->has_aircraft = (file != NULL) && aircraft_read(&options->aircraft, file, path, error);
+    if (file != NULL) {
+        (void)fclose(file);
+    }
+    return options->has_aircraft;
 }
 
 /* The last one counts, as with every option. */
@@ -122,7 +146,10 @@ static bool read_option(options_t *options, int option, const char *name, const 
         choose(options, OPTIONS_MEDIUM_SERIAL, argument);
         break;
     case 'f':
-        good = read_file(&options->config, argument, error);
+        good = read_settings(&options->config, argument, error);
+        break;
+    case 'a':
+        good = read_aircraft(options, argument, error);
         break;
     case 's':
         good = settings_assign(&options->config, argument, error);

@@ -24,6 +24,8 @@ typedef struct options {
     bool verbose;
     bool lock_step;        /* see loop.h */
     lever_config_t config; /* checked */
+    bool has_aircraft;
+    lever_aircraft_t aircraft; /* as it stands in its file */
 } options_t;
 
 /* Reads the command line. Options take effect in the order given, so a --set after --settings has the last word.

@@ -12,7 +12,7 @@
 #define BOM "\xEF\xBB\xBF"
 #define BLANK " \t"
 
-enum { BOM_BYTES = 3, LINE_BYTES = 510, CHOICE_VALUES = 4 };
+enum { BOM_BYTES = 3, LINE_BYTES = 510, CHOICE_VALUES = 6 };
 
 /* A line without its LF; what does not fit into the text is not kept, but counted. */
 typedef struct line {
@@ -51,6 +51,14 @@ static const choice_t choices[] = {
             [LEVER_ADAPTATION_ROBBINS_MONRO] = "robbins_monro",
             [LEVER_ADAPTATION_FORGETTING] = "forgetting"},
         offsetof(lever_config_t, adaptation)},
+    {"mitigation",
+        {[LEVER_MITIGATION_NONE] = "none",
+            [LEVER_MITIGATION_DAMPING] = "damping",
+            [LEVER_MITIGATION_CANCELLATION] = "cancellation",
+            [LEVER_MITIGATION_CANCELLATION_AND_DAMPING] = "cancellation_and_damping",
+            [LEVER_MITIGATION_NOTCH] = "notch",
+            [LEVER_MITIGATION_NOTCH_AND_DAMPING] = "notch_and_damping"},
+        offsetof(lever_config_t, mitigation)},
 };
 enum { CHOICES = sizeof choices / sizeof choices[0] };
 

@@ -1,6 +1,6 @@
 /* A configuration from text: from the command line, one `name = value` at a time, or from a file.
  *
- * Names are those of lever_settings.def, and the four choices model, preload, estimator and adaptation; the last of two
+ * Names are those of lever_settings.def, and the choices model, preload, estimator, adaptation and mitigation; the last of two
  * equal names counts. A number is in the unit of that table, or in the unit of lever_units.def that follows it. The grammar of a settings file, for all who read one (lever_can,
  * host_tools/firmware/settings_file.py, firmware/settings.cmake), in bytes:
  *

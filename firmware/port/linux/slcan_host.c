@@ -55,7 +55,7 @@ static enum port_result send_frame(void *self, const lever_frame_t *frame)
     const slcan_frame_t sent = {.frame = *frame};
     char text[SLCAN_LINE_BYTES];
 
-    if (((frame->id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && tty_is_slow(&host->tty)) ||
+    if ((PORT_GOES_STALE(frame->id) && tty_is_slow(&host->tty)) ||
         !tty_put(&host->tty, text, slcan_write_frame(&sent, SLCAN_NO_TIME, text))) {
         return PORT_NOTHING;
     }

@@ -61,7 +61,7 @@ static enum port_result send_frame(void *self, const lever_frame_t *frame)
     slcan_peer_t *peer = self;
     const slcan_frame_t sent = {.frame = *frame};
 
-    if ((frame->id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && tty_is_slow(&peer->tty)) {
+    if (PORT_GOES_STALE(frame->id) && tty_is_slow(&peer->tty)) {
         return PORT_NOTHING;
     }
     return slcan_send(&peer->slcan, &sent, clock_now_ms()) ? PORT_DONE : PORT_NOTHING;

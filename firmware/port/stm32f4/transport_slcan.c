@@ -64,13 +64,13 @@ enum port_result transport_receive(void *self, lever_frame_t *frame)
     return found ? PORT_DONE : PORT_NOTHING;
 }
 
-/* A MOTOR_COMMAND that would leave too late has no room. */
+/* What would leave too late has no room. */
 enum port_result transport_send(void *self, const lever_frame_t *frame)
 {
     const slcan_frame_t sent = {.frame = *frame};
 
     (void)self;
-    if ((frame->id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && (usart_waiting_ms() >= (uint32_t)PORT_STALE_MS)) {
+    if (PORT_GOES_STALE(frame->id) && (usart_waiting_ms() >= (uint32_t)PORT_STALE_MS)) {
         return PORT_NOTHING;
     }
     return slcan_send(&peer, &sent, tick_ms()) ? PORT_DONE : PORT_NOTHING;

@@ -151,20 +151,20 @@ def spectra(run: Run) -> Figure | None:
     """At which frequencies base and motor shake the lever."""
     base = run.first_name("z_ddot_true_m_s2", "z_ddot_measured_m_s2")
     torque = run.first_name("tau_m_true_N_m", "tau_m_measured_N_m")
-    if base is None or torque is None or run.samples < 16:
-        return None
-    titles = ("z̈ [m/s² per √Hz]", "τ<sub>m</sub> [N m per √Hz]")
-    rows = [axis(title, type="log", dtick=1, exponentformat="none") for title in titles]
-    figure = Figure(rows, frequency_axis(0.25, 50.0), 420, over_time=False)
-    for row, (column, name, colour) in enumerate(
-        ((base, "base acceleration z̈", "base"), (torque, "motor torque τ<sub>m</sub>", "torque"))
+    figure = Figure([], frequency_axis(0.25, 50.0), 70, over_time=False)
+    for column, name, title, colour in (
+        (base, "base acceleration z̈", "z̈ [m/s² per √Hz]", "base"),
+        (torque, "motor torque τ<sub>m</sub>", "τ<sub>m</sub> [N m per √Hz]", "torque"),
     ):
-        frequency, power = run.spectrum(column)
+        frequency, power = run.spectrum(column) if column and run.samples >= 16 else (np.zeros(0), np.zeros(0))
         shown = (frequency >= 0.25) & (frequency <= 50.0)
         amplitude = np.sqrt(power[shown])
         if amplitude.any():
-            figure.add(line(frequency[shown], _positive(amplitude), name, colour, row))
-            rows[row]["range"] = _decades(amplitude)
+            figure.add(line(frequency[shown], _positive(amplitude), name, colour, len(figure.rows)))
+            figure.rows.append(axis(title, type="log", dtick=1, exponentformat="none", range=_decades(amplitude)))
+            figure.height += 175
+    if not figure.rows:
+        return None
     _mark_natural_frequency(run, figure)
     return figure
 

@@ -139,6 +139,7 @@ function tellHealth(update) {
     ["choices", Object.values(update.choices).join(", ") || "–"],
     ["lever angle", `${written(update.theta, 4)} deg`],
   ];
+  if (update.bounce) lines.push(["collective bounce", update.bounce[1], update.bounce[0] !== "good"]);
   if (machine) {
     const errors = `TEC ${machine.transmit_errors}, REC ${machine.receive_errors}`;
     lines.push(["bus controller", `${errors}, off the bus ${machine.bus_offs} times`]);

@@ -10,6 +10,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#define CORRECTION_HOLDS_US 100000u
+#define IDLE_US 5000u      /* without a sample, after which the firmware is told so, as lever_idle() asks for */
 #define TIME_LOW_START 48u /* of the messages of an estimator that belong to a sample */
 #define TIME_LOW_MASK 0xFFFFu
 
@@ -54,17 +56,45 @@ static void note_signals(loop_t *loop)
     }
 }
 
+static double measured_base(const loop_t *loop)
+{
+    return loop->cabin.exists ? measured(loop, LOOP_Z_DDOT) : loop->base[loop->sample];
+}
+
 static bool has_command(const loop_t *loop)
 {
     return (loop->next_command < loop->commands) && (loop->command_sample[loop->next_command] == loop->sample);
 }
 
+/* Whether a frame can carry a value of so many steps of its field, as in the codec of host_tools; NaN does not fit. */
+static bool fits(const loop_field_t *field, double steps)
+{
+    const double most = (double)(field->mask >> 1u);
+    return (steps > (-most - 0.5)) && (steps < (most + 0.5));
+}
+
 /* --- by structs -------------------------------------------------------------------------------------------------- */
 
-static float single(double value, bool *valid)
+/* Not rounded as in a frame; but what does not fit into one is not available. */
+static float single(const loop_field_t *field, double value, bool *valid)
 {
-    *valid = !isnan(value);
+    *valid = fits(field, value / field->scale);
     return *valid ? (float)value : 0.0f;
+}
+
+/* There is no sample: as a port does. */
+static void idle(loop_t *loop, lever_t *lever)
+{
+    loop->idle_us += loop->period_us;
+    if (loop->idle_us >= IDLE_US) {
+        lever_idle(lever, loop->idle_us);
+        loop->idle_us = 0u;
+    }
+}
+
+static float reading_of(const loop_t *loop, enum loop_signal which, bool *valid)
+{
+    return single(&loop->sensor[which].field, measured(loop, which), valid);
 }
 
 static void step_by_struct(loop_t *loop, lever_t *lever)
@@ -75,20 +105,29 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
     }
     if (loop->no_base[loop->sample] == 0u) {
         lever_sample_t sample = {.time_us = loop->sample * loop->period_us};
-        if (loop->no_lever[loop->sample] == 0u) {
-            sample.theta = single(measured(loop, LOOP_THETA), &sample.theta_valid);
-            sample.theta_dot = single(measured(loop, LOOP_THETA_DOT), &sample.theta_dot_valid);
-            sample.tau_m = single(measured(loop, LOOP_TAU_M), &sample.tau_m_valid);
+        if (loop->time_us != NULL) {
+            sample.time_us = loop->time_us[loop->sample];
         }
-        sample.z_ddot = single(loop->base[loop->sample], &sample.z_ddot_valid);
+        if (loop->no_lever[loop->sample] == 0u) {
+            sample.theta = reading_of(loop, LOOP_THETA, &sample.theta_valid);
+            sample.theta_dot = reading_of(loop, LOOP_THETA_DOT, &sample.theta_dot_valid);
+            sample.tau_m = reading_of(loop, LOOP_TAU_M, &sample.tau_m_valid);
+        }
+        sample.z_ddot = single(&loop->base_field, measured_base(loop), &sample.z_ddot_valid);
         if (loop->has_grip) {
-            sample.grip_force = single(measured(loop, LOOP_GRIP_FORCE), &sample.grip_force_valid);
+            sample.grip_force = reading_of(loop, LOOP_GRIP_FORCE, &sample.grip_force_valid);
         }
         (void)lever_update(lever, &sample);
-        lever_health_t health;
-        lever_health(lever, &health);
-        loop->asked = (double)health.torque;
+        loop->idle_us = 0u;
+    } else {
+        idle(loop, lever);
     }
+    lever_health_t health;
+    lever_health(lever, &health);
+    loop->asked = (double)health.torque;
+    lever_correction_t correction;
+    lever_correction(lever, &correction);
+    loop->correction = (double)correction.angle;
 }
 
 /* --- by frames --------------------------------------------------------------------------------------------------- */
@@ -97,10 +136,9 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
  * precision, half to even; what does not fit is not available. */
 static uint64_t bits_of(const loop_field_t *field, double value)
 {
-    const double most = (double)(field->mask >> 1u);
     const double steps = value / field->scale;
     uint64_t bits = 0u;
-    if ((steps > (-most - 0.5)) && (steps < (most + 0.5))) {
+    if (fits(field, steps)) {
         const uint32_t count = (uint32_t)(int32_t)rint(steps) & field->mask;
         bits = ((uint64_t)count << field->start) | ((uint64_t)1u << field->valid);
     } else if (!isnan(value)) {
@@ -190,6 +228,7 @@ static void take_answer(loop_t *loop)
 {
     const uint32_t time_low = (loop->sample * loop->period_us) & TIME_LOW_MASK;
     double torque = 0.0;
+    double correction = 0.0;
     uint32_t count = 0u;
     bool answered = false;
     while ((count < loop->pending) && !answered) {
@@ -200,6 +239,8 @@ static void take_answer(loop_t *loop)
         const uint32_t id = loop->pending_id[count];
         if ((id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && is_own) {
             torque = value_of(&loop->torque_field, payload);
+        } else if ((id == (uint32_t)MESSAGE_CORRECTION_ID) && is_own) {
+            correction = value_of(&loop->correction_field, payload);
         } else if (id == (uint32_t)MESSAGE_STATE_ESTIMATE_ID) {
             answered = is_own;
             loop->misplaced += is_own ? 0u : 1u;
@@ -210,6 +251,7 @@ static void take_answer(loop_t *loop)
     }
     take(loop, count);
     loop->asked = torque;
+    loop->correction = correction;
     loop->unanswered += answered ? 0u : 1u;
     loop->unanswered_in_a_row = answered ? 0u : (loop->unanswered_in_a_row + 1u);
 }
@@ -232,9 +274,18 @@ static void step_by_frames(loop_t *loop, lever_t *lever)
     }
     if (loop->no_base[loop->sample] == 0u) {
         const uint64_t time_us = (uint64_t)(loop->sample * loop->period_us) << 32u;
-        const uint64_t payload = bits_of(&loop->base_field, loop->base[loop->sample]) | time_us;
+        const uint64_t payload = bits_of(&loop->base_field, measured_base(loop)) | time_us;
         send_payload(loop, lever, (uint32_t)MESSAGE_BASE_SAMPLE_ID, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, payload);
         take_answer(loop);
+    }
+}
+
+/* A correction that is too old counts as none. */
+static void age_correction(loop_t *loop)
+{
+    loop->silent_us = (loop->no_base[loop->sample] == 0u) ? 0u : (loop->silent_us + loop->period_us);
+    if (loop->silent_us > CORRECTION_HOLDS_US) {
+        loop->correction = 0.0;
     }
 }
 
@@ -246,6 +297,18 @@ static bool may_go_on(const loop_t *loop)
     return has_room && (loop->refused == 0u) && (loop->unanswered_in_a_row < loop->most_unanswered);
 }
 
+/* The cabin, to the next sample. */
+static void advance_cabin(loop_t *loop)
+{
+    loop_cabin_t *cabin = &loop->cabin;
+    double *z_ddot = loop->signal[LOOP_Z_DDOT];
+    const uint32_t now = loop->sample;
+    const double delta = loop->plant.theta - cabin->rest;
+    z_ddot[now + 1u] = aircraft_advance(&cabin->aircraft, now, delta, loop->correction);
+    cabin->speed += 0.5 * cabin->period * (z_ddot[now + 1u] + z_ddot[now]);
+    cabin->felt[now + 1u] = z_ddot[now + 1u] + (cabin->outside * cabin->speed);
+}
+
 uint32_t loop_advance(loop_t *loop, lever_t *lever, uint32_t until)
 {
     while ((loop->sample < until) && may_go_on(loop)) {
@@ -255,11 +318,18 @@ uint32_t loop_advance(loop_t *loop, lever_t *lever, uint32_t until)
         } else {
             step_by_struct(loop, lever);
         }
+        age_correction(loop);
         if ((loop->sample % loop->stride) == 0u) {
             lever_estimate(lever, &loop->estimate[loop->sample / loop->stride]);
             lever_health(lever, &loop->health[loop->sample / loop->stride]);
+            if (loop->stability != NULL) {
+                lever_stability(lever, &loop->stability[loop->sample / loop->stride]);
+            }
         }
         if ((loop->sample + 1u) < loop->count) {
+            if (loop->cabin.exists) {
+                advance_cabin(loop);
+            }
             plant_advance(&loop->plant, loop->sample, loop->asked + loop->torque[loop->sample]);
         }
         loop->sample++;

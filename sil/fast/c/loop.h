@@ -6,6 +6,7 @@
 #ifndef LOOP_H
 #define LOOP_H
 
+#include "aircraft.h"
 #include "plants.h"
 
 #include <stdbool.h>
@@ -16,8 +17,9 @@ struct lever_command;
 struct lever_estimate;
 struct lever_frame;
 struct lever_health;
+struct lever_stability;
 
-enum loop_signal { LOOP_THETA, LOOP_THETA_DOT, LOOP_TAU_M, LOOP_GRIP_FORCE, LOOP_SIGNALS };
+enum loop_signal { LOOP_THETA, LOOP_THETA_DOT, LOOP_TAU_M, LOOP_GRIP_FORCE, LOOP_Z_DDOT, LOOP_SIGNALS };
 
 enum loop_limits {
     LOOP_PENDING = 32, /* frames of the estimator that wait to be taken */
@@ -32,7 +34,7 @@ typedef struct loop_field {
     uint8_t valid; /* the bit that says whether it is valid */
 } loop_field_t;
 
-/* A sensor of a signal of the lever: gain * value, so much later, plus offset. */
+/* A sensor of a signal that depends on the run: gain * value, so much later, plus offset. */
 typedef struct loop_sensor {
     double gain;
     const double *offset;  /* a value a sample */
@@ -44,6 +46,17 @@ typedef struct loop_sensor {
     loop_field_t field;
 } loop_sensor_t;
 
+/* A cabin that the lever moves. */
+typedef struct loop_cabin {
+    bool exists; /* otherwise the base moves by itself */
+    aircraft_t aircraft;
+    double period;  /* between two samples [s] */
+    double rest;    /* angle of the lever at which the aircraft is trimmed [rad] */
+    double outside; /* of the cabin's speed, what is felt besides its acceleration [1/s]: sil/plants/mayo_plant.py */
+    double *felt;   /* z_ddot of the plant: as of the cabin, with that [m/s^2] */
+    double speed;   /* upwards; state [m/s] */
+} loop_cabin_t;
+
 typedef struct loop {
     /* given; arrays have a value for each sample */
     uint32_t count;     /* samples */
@@ -51,12 +64,15 @@ typedef struct loop {
     bool by_frames;     /* encoded, with E2E protection; otherwise by structs */
     bool has_grip;      /* there is a sensor of the grip force */
     plant_t plant;
+    loop_cabin_t cabin; /* with one signal[LOOP_Z_DDOT] has its first value */
     loop_sensor_t sensor[LOOP_SIGNALS];
-    const double *base; /* measured z_ddot [m/s^2]; NaN: marked invalid */
+    const double *base; /* measured z_ddot, without a cabin [m/s^2]; NaN: marked invalid */
     loop_field_t base_field;
     loop_field_t torque_field;               /* of MOTOR_COMMAND */
+    loop_field_t correction_field;           /* of CORRECTION */
     const uint8_t *no_lever;                 /* the frame is never sent */
     const uint8_t *no_base;                  /* likewise */
+    const uint32_t *time_us;                 /* by structs, of the samples; NULL: as they are */
     const double *torque;                    /* asked of the motor besides what the firmware asks for [N m] */
     uint32_t commands;                       /* before which samples there is a COMMAND, */
     const uint32_t *command_sample;          /* rising, */
@@ -69,7 +85,8 @@ typedef struct loop {
     double *signal[LOOP_SIGNALS]; /* the true values, at every sample */
     struct lever_estimate *estimate;
     struct lever_health *health;
-    uint16_t *frame_id; /* frames, both ways, in the order in which they are sent and taken, */
+    struct lever_stability *stability; /* NULL: not kept */
+    uint16_t *frame_id;                /* frames, both ways, in the order in which they are sent and taken, */
     uint32_t *frame_sample;
     uint8_t (*frame_data)[8];
     uint32_t frames;     /* and how many they are */
@@ -80,7 +97,10 @@ typedef struct loop {
     uint32_t sample;
     uint32_t next_command;
     uint32_t unanswered_in_a_row;
-    double asked; /* what the firmware asks of the motor [N m] */
+    uint32_t idle_us;   /* by structs: without a sample, since the firmware was told so */
+    uint32_t silent_us; /* without a sample */
+    double asked;       /* what the firmware asks of the motor [N m], */
+    double correction;  /* and adds to the lever's angle that the flight control computer reads [rad] */
     uint32_t pending;
     uint16_t pending_id[LOOP_PENDING];
     uint8_t pending_data[LOOP_PENDING][8];

@@ -6,5 +6,7 @@ the figures, `runs` is what they share.
 
     {catalogue → one module for each group of figures → {runs, description}, printed, figures_page, data → description}
 
+`maps` are figures of another kind, which `lever campaign` makes; those three take them, too.
+
 A new figure: a function like those, and a line in `catalogue.FIGURES`.
 """

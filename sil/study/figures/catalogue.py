@@ -26,13 +26,15 @@ FIGURES: Mapping[str, Make] = {
 """In the order of the page."""
 
 
-def chosen(names: Sequence[str]) -> list[str]:
-    """The names in the order of the page, all without any. Raises LeverError for one that does not exist."""
+def chosen(names: Sequence[str], more: Sequence[str] = ()) -> list[str]:
+    """The names in the order of the page, `more` of them last; all without any. Raises LeverError for one that does not
+    exist."""
+    known = [*FIGURES, *more]
     for name in names:
-        if name not in FIGURES:
-            hint = did_you_mean(name, FIGURES, f"there are {', '.join(FIGURES)}")
+        if name not in known:
+            hint = did_you_mean(name, known, f"there are {', '.join(known)}")
             raise LeverError(f"unknown figure {name!r}; {hint}")
-    return [name for name in FIGURES if name in names or not names]
+    return [name for name in known if name in names or not names]
 
 
 def summary(name: str) -> str:

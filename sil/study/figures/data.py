@@ -8,14 +8,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from . import maps
 from .description import Band, Figure, Surface, Trace
+from .maps import MapFigure
 
 COLUMNS = ("column", "chart", "series", "time_s", "frequency_Hz", "value", "low", "high")
 """Of the table: titles of column and chart, name of the curve; of a band low and high, of a surface the frequency."""
 
 
-def table(figure: Figure) -> str:
+def table(figure: Figure | MapFigure) -> str:
     """CSV, a row for each point."""
+    if isinstance(figure, MapFigure):
+        return maps.table(figure)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)

@@ -9,7 +9,9 @@ from lever_cdkf.host_tools.report import figure as chart
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.series import packed
 
+from . import maps
 from .description import LOOKS, Band, Column, Figure, Points, Surface, Trace
+from .maps import MapFigure
 from .typesetting import in_html, own_css
 
 _INCH, _ROOM = 130, 110  # [pixels] of a chart for an inch in print, and for legend and x axis
@@ -21,7 +23,7 @@ _SCENE_FONT = {"family": "sans-serif", "size": 12}  # in three dimensions no fon
 _LIFT = 1.01  # of a curve over the surface that it follows
 
 
-def build(figures: Sequence[Figure]) -> str:
+def build(figures: Sequence[Figure | MapFigure]) -> str:
     """The page; each figure can be linked to by its name, as in figures.html#bode."""
     page = Page(
         "Figures",
@@ -35,8 +37,10 @@ def build(figures: Sequence[Figure]) -> str:
     return page.html("", own_css())
 
 
-def _charts(page: Page, figure: Figure) -> str:
+def _charts(page: Page, figure: Figure | MapFigure) -> str:
     """Side by side where there is room for them."""
+    if isinstance(figure, MapFigure):
+        return page.figure(f"{figure.name}-0", maps.spec(figure), "")
     charts = [
         page.figure(f"{figure.name}-{index}", _spec(figure, column), in_html(column.title))
         for index, column in enumerate(figure.columns)

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 from lever_cdkf.host_tools.exports import pictures
 from lever_cdkf.host_tools.provenance import Provenance
 
+from . import maps
 from .description import LOOKS, Band, Column, Figure, Points, Surface, Trace
+from .maps import MapFigure
 from .typesetting import colours, in_mathtext
 
 if TYPE_CHECKING:
@@ -20,13 +22,17 @@ _DASHES = {"solid": "-", "dash": (0, (4, 1.8)), "dot": ":", "dashdot": "-."}
 _LEVELS = 18  # of a contour, at most
 
 
-def render(figure: Figure, kind: str = "png", width: str = "single", provenance: Provenance | None = None) -> bytes:
+def render(
+    figure: Figure | MapFigure, kind: str = "png", width: str = "single", provenance: Provenance | None = None
+) -> bytes:
     """The file, of pictures.KINDS, in one of pictures.WIDTHS; the same figure gives the same bytes."""
     return pictures.render(sheet(figure, width), kind, figure.title, provenance)
 
 
-def sheet(figure: Figure, width: str = "single") -> Sheet:
+def sheet(figure: Figure | MapFigure, width: str = "single") -> Sheet:
     """The figure laid out by matplotlib."""
+    if isinstance(figure, MapFigure):
+        return maps.sheet(figure, width)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Sheet
 

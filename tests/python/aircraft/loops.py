@@ -7,9 +7,10 @@ from lever_cdkf.host_tools.arrays import ComplexArray
 from lever_cdkf.host_tools.models.transfer import Transfer
 from lever_cdkf.sil.aircraft import stability
 from lever_cdkf.sil.aircraft.aircraft import Coupled
+from lever_cdkf.sil.aircraft.tabulated import Tabulated
 
 
-def loop_of(coupled: Coupled, transfer: Transfer, row: int) -> stability.Response:
+def loop_of(coupled: Coupled | Tabulated, transfer: Transfer, row: int) -> stability.Response:
     numerator, denominator = transfer.numerator[row], transfer.denominator[row]
 
     def loop(s: ComplexArray) -> ComplexArray:

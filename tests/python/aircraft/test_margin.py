@@ -96,7 +96,7 @@ def test_the_alarm_comes_before_the_vibration_grows() -> None:
     known, firmware = inputs.prepare(wanted), Estimator(wanted.config)
     z_ddot, flight = known.z_ddot, Flight(wanted.aircraft, wanted.period, known.z_ddot.copy())
     body = known.truth.body(inputs.conditions(wanted, known))
-    firmware.watch(table(wanted.aircraft, 0.05, 0.05))
+    firmware.watch(table(wanted.aircraft, 0.05, 0.05, warning=3.0, alarm=1.5))
     noise = np.random.default_rng(5).standard_normal((len(z_ddot), 4)) * (1e-3, 1e-2, 2e-3, 1e-2)
     rest, states, margins = body.theta, [], []
     z_ddot[0] = flight.z_ddot

@@ -7,7 +7,9 @@ import shlex
 from pathlib import Path
 
 import pytest
+from lever_cdkf.sil.campaign import chunks, spec
 from lever_cdkf.sil.campaign.chunks import Plan
+from lever_cdkf.sil.scenarios import scenario
 from python.conftest import Refused, Run
 
 
@@ -32,7 +34,7 @@ def test_a_campaign_that_is_done_is_only_summed_up(lever: Run, small_file: Path,
     assert "48 runs, 0 failed" in out
     summary = json.loads((done / "summary.json").read_text())
     assert {name: summary[name] for name in ("asked", "runs", "failed")} == {"asked": 48, "runs": 48, "failed": 0}
-    (rows,) = json.loads((done / "printed.json").read_text()).values()
+    rows, _ = json.loads((done / "printed.json").read_text()).values()
     assert [(row["estimator"], row["runs"]) for row in rows] == [("dual", 24), ("rls", 24)]
 
 
@@ -47,14 +49,63 @@ def test_the_speed_is_kept_when_nothing_is_left_to_do(lever: Run, small: Plan, s
 def test_a_run_alone_is_printed_with_the_command_that_shows_it(lever: Run, small_file: Path, tmp_path: Path) -> None:
     status, out, _ = lever("campaign", small_file, "--run", "14", "--json", tmp_path / "row.json")
     assert status == 0
-    (rows,) = json.loads((tmp_path / "row.json").read_text()).values()
+    rows, _ = json.loads((tmp_path / "row.json").read_text()).values()
     row = {each["column"]: each["value"] for each in rows}
     assert (row["run"], row["seed"], row["estimator"], row["estimator.adaptation"]) == (14, 8, "dual", "robbins_monro")
     command = shlex.split(out.strip().splitlines()[-1])
     assert command[:5] == ["lever", "sim", "steady", "--seed", "8"]
-    assert lever(*command[1:-1], tmp_path / "sim", "--set", "limits={}")[0] == 0
+    assert lever(*command[1:-1], tmp_path / "sim")[0] == 0
     quality = json.loads((tmp_path / "sim/summary.json").read_text())["parameters"]["m_p"]
     assert quality["rms_percent"] == pytest.approx(100.0 * row["rms_m_p"], rel=0.1)  # of ten times as many samples
+
+
+FAILING = """
+title = "failing"
+scenario = "own.toml"
+set = { duration = "1 s", converged_after = "0.4 s" }
+seeds = 12
+[[vary]]
+key = "settings.theta_noise"
+values = ["-1 mrad", "1 mrad"]
+"""
+
+
+@pytest.fixture
+def failing(tmp_path: Path) -> Path:
+    """Twelve runs that fail and twelve that do not, of a scenario beside the spec."""
+    folder = tmp_path / "specs"
+    folder.mkdir()
+    (folder / "own.toml").write_bytes(scenario.SHELF.content("steady"))
+    (folder / "failing.toml").write_text(FAILING)
+    return folder / "failing.toml"
+
+
+def test_failed_runs_are_told_some_of_them_and_how_many_more(lever: Run, failing: Path, tmp_path: Path) -> None:
+    plan = Plan(spec.load(str(failing)))
+    chunks.make(plan, plan.chunk(0), tmp_path)
+    status, out, err = lever("campaign", failing, "-o", tmp_path, "--resume")
+    assert status == 0
+    assert "vary[0]: settings: theta_noise = -0.001 is out of range" in err
+    assert "24 runs, 12 failed" in out
+    assert out.count("alone: lever campaign") == 5
+    assert "failed: 7 more" in out
+
+
+def test_the_command_of_a_run_finds_the_scenario_of_the_spec(lever: Run, failing: Path, tmp_path: Path) -> None:
+    status, out, _ = lever("campaign", failing, "--run", "12")
+    assert status == 0
+    command = shlex.split(out.strip().splitlines()[-1])
+    assert lever(*command[1:-1], tmp_path / "sim")[0] == 0
+
+
+def test_one_is_a_run_not_runs(lever: Run, tmp_path: Path) -> None:
+    one = tmp_path / "one.toml"
+    one.write_text('title = "one"\nscenario = "steady"\nset = { duration = "1 s", converged_after = "0.4 s" }\n')
+    plan = Plan(spec.load(str(one)))
+    chunks.make(plan, plan.chunk(0), tmp_path)
+    out = lever("campaign", one, "-o", tmp_path, "--resume")[1]
+    assert "\n1 run, 0 failed" in out
+    assert out.endswith("summary.json, 1 Parquet file\n")
 
 
 @pytest.mark.parametrize(

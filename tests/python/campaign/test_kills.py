@@ -18,6 +18,7 @@ from python.campaign.conftest import files
 
 pytestmark = pytest.mark.usefixtures("installed")
 
+INTERRUPTED = "lever: campaign: interrupted; what is finished is kept: go on with --resume\n"
 PATIENCE = 120.0  # [s] until something is given up that takes a second on an idle machine
 
 
@@ -30,10 +31,11 @@ def until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None
         time.sleep(0.01)
 
 
-def begin(*arguments: str | Path) -> subprocess.Popen[str]:
+def begin(*arguments: str | Path, start_new_session: bool = False) -> subprocess.Popen[str]:
     """`lever campaign`, started."""
     command = [sys.executable, "-m", "lever_cdkf.host_tools.cli", "campaign", *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=start_new_session)
 
 
 def workers(client: int) -> list[int]:
@@ -112,6 +114,16 @@ class TestKilled:
         assert files(tmp_path) == undisturbed
         assert {name: (tmp_path / name).stat().st_mtime_ns for name in kept} == written
         assert list(tmp_path.glob(".*")) == []
+
+    def test_ctrl_c_of_a_terminal(self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path) -> None:
+        client = begin(small_file, "-o", tmp_path, "--workers", "2", start_new_session=True)
+        until(lambda: len(files(tmp_path)) >= 2, client)
+        os.killpg(client.pid, signal.SIGINT)
+        _, err = client.communicate(timeout=PATIENCE)
+        assert (client.returncode, err) == (130, INTERRUPTED)
+        kept = files(tmp_path)
+        assert kept.items() <= undisturbed.items()
+        assert len(kept) < len(undisturbed)
 
     def test_the_scheduler(self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path) -> None:
         with cluster(tmp_path) as (address, scheduler):

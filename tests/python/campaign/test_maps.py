@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import dataclasses
 import math
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -11,10 +10,13 @@ from pathlib import Path
 import numpy as np
 import polars
 import pytest
-from lever_cdkf.sil.campaign import border, cells, chunks, maps
-from lever_cdkf.sil.campaign.cells import Map, Runs, Scale
+from lever_cdkf.sil.campaign import border, cells, chunks, maps, spec
+from lever_cdkf.sil.campaign.cells import Map, Runs
 from lever_cdkf.sil.campaign.chunks import Plan
 from lever_cdkf.sil.campaign.spec import Failure
+from lever_cdkf.sil.study.figures.maps import Scale
+from python.campaign.conftest import SMALL
+from python.conftest import Refused, Run
 
 NOISE = (0.01, 0.1, 1.0, 10.0)
 LIMITS = Failure(error=0.2, coverage=0.8)
@@ -96,11 +98,28 @@ def test_cells_are_what_polars_says(small: Plan, folder: Path) -> None:
                 assert covered[y, x] == pytest.approx(shares.mean(axis=0).min())
 
 
+def test_a_run_whose_error_is_no_number_has_diverged(small: Plan, folder: Path, tmp_path: Path) -> None:
+    """Estimates of 1e200 are finite, and their squares are not."""
+    for file in folder.glob("*.parquet"):
+        polars.read_parquet(file).with_columns(polars.lit(None, polars.Float64).alias("rms_c_p")).write_parquet(
+            tmp_path / file.name
+        )
+    found = cells.read(small, tmp_path)
+    for name in small.spec.estimators:
+        assert np.all(found.array(name, 0, cells.error) == np.inf)
+        assert np.all(found.array(name, 0, cells.coverage) == 0.0)
+
+
 @pytest.fixture(scope="session")
-def made_map(small: Plan, tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
-    """The same with the axes the other way round."""
-    plan = Plan(dataclasses.replace(small.spec, vary=small.spec.vary[::-1], seeds=1, chunk=6))
+def made_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
+    """The same with the axes the other way round, and one flight at each point."""
     place = tmp_path_factory.mktemp("map")
+    head, noise, adaptation = (
+        SMALL.replace("seeds = 4", "seeds = 1").replace("chunk = 1", "chunk = 6").split("[[vary]]")
+    )
+    (place / "swapped.toml").write_text(f"{head}[[vary]]{adaptation}[[vary]]{noise}")
+    plan = Plan(spec.load(str(place / "swapped.toml")))
+    (place / "swapped.toml").unlink()
     chunks.make(plan, plan.chunk(0), place)
     return plan, place
 
@@ -123,3 +142,38 @@ def test_files(made_map: tuple[Plan, Path]) -> None:
     before = {name: (place / name).read_bytes() for name in written}
     maps.write(plan, place)
     assert {name: (place / name).read_bytes() for name in written} == before
+
+
+def test_figures_of_a_campaign_are_made_from_its_folder_alone(
+    made_map: tuple[Plan, Path], lever: Run, tmp_path: Path
+) -> None:
+    plan, place = made_map
+    spec.save(plan.spec, place)
+    maps.write(plan, place)
+    names = ("map_error", "map_coverage")
+    assert lever("figures", "--campaign", place, "--only", *names, "--out", tmp_path)[0] == 0
+    written = {file.name for file in tmp_path.iterdir()}
+    assert written >= {f"{name}.{kind}" for name in names for kind in ("pdf", "svg", "png", "csv")}
+    assert 'id="map_error"' in (tmp_path / "figures.html").read_text()
+    told = list(csv.DictReader((tmp_path / "map_error.csv").read_text().splitlines()))
+    rows = polars.read_parquet(place / "*.parquet")
+    for row in rows.iter_rows(named=True):
+        where = {"chart": row["estimator"], "series": "", "estimator.adaptation": row["estimator.adaptation"]}
+        where["pilot.process_noise [rad/s/sqrt(s)]"] = f"{row['pilot.process_noise']}"
+        (cell,) = [each for each in told if where.items() <= each.items()]
+        worst = max(row["rms_m_p"], row["rms_c_p"], row["rms_k_p"])
+        assert float(cell["value"]) == pytest.approx(100.0 * worst)
+    lines = [[row["value"], row["low"], row["high"]] for row in told if row["series"] == "border"]
+    borders = csv.DictReader((place / "border.csv").read_text().splitlines())
+    at = "pilot.process_noise [rad/s/sqrt(s)]"
+    assert lines == [[row[at], row["low"], row["high"]] for row in borders]
+
+
+def test_what_is_no_folder_of_a_campaign_has_no_figures(refused: Refused, tmp_path: Path) -> None:
+    assert "is not the folder of a campaign" in refused("figures", "--campaign", tmp_path, "--out", tmp_path / "out")
+
+
+def test_a_line_beyond_the_map_runs_along_its_edge() -> None:
+    scale = Scale("noise", NOISE, is_log=True)
+    places = scale.place(np.array([-np.inf, 0.001, 0.1, np.inf]))
+    assert [scale.value(each) for each in places] == pytest.approx([0.01, 0.01, 0.1, 10.0])

@@ -40,9 +40,12 @@ def test_a_run_is_that_of_lever_sim(made: Made) -> None:
 SPIKES = 'sensors.theta.fault=[{kind="spikes", start="1 s", end="2 s", share="5 %", size="50 mrad"}]'
 
 
-@pytest.mark.parametrize("faults", [[], [SPIKES]])
-def test_what_was_measured_makes_the_firmware_say_the_same_to_the_bit(faults: list[str]) -> None:
-    steady = scenario.load("steady", ["duration=3 s", "converged_after=1 s", "limits={}", *faults])
+BEYOND = "pilot.process_noise=1e4 rad/s/sqrt(s)"  # what a frame can carry
+
+
+@pytest.mark.parametrize("changes", [[], [SPIKES], [BEYOND]])
+def test_what_was_measured_makes_the_firmware_say_the_same_to_the_bit(changes: list[str]) -> None:
+    steady = scenario.load("steady", ["duration=3 s", "converged_after=1 s", "limits={}", *changes])
     flight = simulate(steady, 0.1, measured=True)
     time_us = np.arange(3000) * 1000
     replayed = run_samples(steady.config, {"time_us": time_us, **flight.measured}, flight.at)
@@ -68,10 +71,25 @@ def test_figures_of_errors_that_are_known(made: Made) -> None:
     assert [found[f"coverage_{name}"] for name in ("m_p", "c_p", "k_p", "damping_ratio")] == [1.0, 0.0, 0.0, 1.0]
     assert found["nees"] == pytest.approx(np.sum((np.log1p(off[:3]) / sigma[:3]) ** 2))
     assert (found["nis"], found["settled_s"], found["flagged"]) == (2.0, 0.0, None)
-    broken = values.copy()
-    broken[5:] = np.nan
-    with pytest.raises(figures.BrokenDownError, match="not finite from 5 s on"):
-        figures.of_run(flight, dataclasses.replace(track, values=broken[None]), 0)
+    for wrong in (np.nan, -np.inf, 1e160):  # the square of the last overflows
+        broken = values.copy()
+        broken[5:] = wrong
+        with pytest.raises(figures.BrokenDownError, match="from 5 s on"):
+            figures.of_run(flight, dataclasses.replace(track, values=broken[None]), 0)
+
+
+def test_times_without_a_truth_are_not_judged(made: Made) -> None:
+    """As with hands off. By `lever sim`, too, error and coverage are of the others."""
+    flight = simulate(made(ONE).first, 1.0, measured=False)
+    truth = flight.truth.copy()
+    truth[15:, :3] = np.nan
+    values = flight.truth * 1.1
+    track = Track(values[None], 0.1 * flight.truth[None], np.log(values[None, :, :3]), None, None)
+    found = figures.of_run(dataclasses.replace(flight, truth=truth), track, 0)
+    assert (found["rms_m_p"], found["coverage_m_p"]) == (pytest.approx(0.1), 1.0)
+    truth[:] = np.nan
+    found = figures.of_run(dataclasses.replace(flight, truth=truth), track, 0)
+    assert (found["rms_m_p"], found["bias_m_p"], found["coverage_m_p"]) == (None, None, None)
 
 
 @pytest.mark.parametrize("name", ENTRANTS)
@@ -92,13 +110,15 @@ def test_rows_do_not_depend_on_how_flights_are_grouped(small: Plan) -> None:
 
 def test_a_run_that_cannot_be_is_a_row_with_its_error(made: Made, tmp_path: Path) -> None:
     text = '[[vary]]\nkey = "settings.theta_noise"\nvalues = ["1 mrad", "-1 mrad", "2 mrad"]\n'
+    text += '[[vary]]\nkey = "estimator.preload"\nvalues = ["trim", "fixed"]\n'
     plan = Plan(made('estimators = ["dual", "rls"]\n' + ONE.replace("20 s", "2 s").replace("8 s", "1 s") + text))
-    assert chunks.make(plan, Chunk(0, 3), tmp_path) == 6
-    rows = pq.read_table(tmp_path / Chunk(0, 3).name(plan.fingerprint)).to_pylist()
-    assert [row["error"] is not None for row in rows] == [False, False, True, True, False, False]
-    assert "theta_noise = -0.001 is out of range" in rows[2]["error"]
-    assert rows[2]["rms_m_p"] is None
-    assert (rows[2]["run"], rows[2]["seed"], rows[2]["settings.theta_noise"]) == (2, 2, -1.0)
+    assert chunks.make(plan, Chunk(0, 4), tmp_path) == 8
+    rows = pq.read_table(tmp_path / Chunk(0, 4).name(plan.fingerprint)).to_pylist()
+    assert [row["error"] is not None for row in rows] == [False, False, False, True, True, True, True, True]
+    assert rows[3]["error"].startswith("rls needs preload trim")
+    assert rows[4]["error"].startswith("ScenarioError: vary[0]: settings: theta_noise = -0.001 is out of range")
+    assert rows[4]["rms_m_p"] is None
+    assert (rows[4]["run"], rows[4]["seed"], rows[4]["settings.theta_noise"]) == (4, 3, -1.0)
 
 
 def test_chunks_cover_all_flights_once(small: Plan) -> None:

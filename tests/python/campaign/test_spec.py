@@ -16,6 +16,7 @@ Made = Callable[[str], Spec]
 HEAD = 'title = "made"\nscenario = "steady"\nset = { duration = "2 s", converged_after = "1 s" }\n'
 NOISE = '[[vary]]\nkey = "pilot.process_noise"\n'
 LOG = NOISE + 'range = ["0.01 rad/s/sqrt(s)", "1 rad/s/sqrt(s)"]\nscale = "log"\n'
+PROGRESS = NOISE.replace("process", "progress") + 'values = ["1 rad", "2 rad"]\n'
 THETA = '[[vary]]\nkey = "sensors.theta.noise"\nvalues = ["1 mrad", "2 mrad"]\n'
 
 
@@ -91,18 +92,53 @@ def test_the_hash_is_of_what_makes_rows(made: Made, tmp_path: Path) -> None:
         (HEAD + LOG.replace("0.01", "0") + "steps = 2\n", "above 0"),
         (HEAD + LOG + 'steps = 2\nalso = { "settings.theta_noise" = ["1 mrad"] }\n', "has 1 values and"),
         (HEAD + THETA + THETA, "sensors.theta.noise is set twice"),
-        (HEAD + NOISE + 'values = ["1 rad", "2 rad"]\n', "pilot.process_noise: '1 rad' has unit 'rad'"),
-        (HEAD + NOISE.replace("process", "progress") + 'values = ["1 rad", "2 rad"]\n', "unknown key 'progress_noise'"),
+        (
+            HEAD + NOISE + 'values = ["1 rad", "2 rad"]\n',
+            "made.toml: vary[0]: pilot.process_noise: '1 rad' has unit 'rad'",
+        ),
+        (HEAD + PROGRESS, "made.toml: vary[0]: pilot: unknown key 'progress_noise'"),
+        (HEAD + PROGRESS.replace("progress", "hand.progress"), "made.toml: vary[0]: pilot: unknown key 'hand'"),
+        (HEAD + PROGRESS.replace("pilot", "title"), "made.toml: vary[0]: title.progress_noise="),
+        (
+            HEAD + THETA + 'also = { "sensors.z_ddot.noise" = ["1 rad", "2 rad"] }\n',
+            "vary[0].also: sensors.z_ddot.noise: '1 rad'",
+        ),
+        (HEAD.replace("2 s", "2 m"), "made.toml: set: duration: '2 m' has unit 'm'"),
+        (
+            HEAD + THETA.replace('"1 mrad", "2 mrad"', '"-1 mrad", "-2 mrad"'),
+            "made.toml: vary[0]: sensors.theta.noise: '-1 mrad'",
+        ),
+        (HEAD.replace("2 s", "1 s"), "made.toml: set: duration: in 1 s no estimate is judged"),
+        (HEAD.replace(', converged_after = "1 s"', ""), "from converged_after on, which is 20 s"),
+        ('every = "3 s"\n' + HEAD, "in 2 s no estimate is judged: one every 3 s"),
+        ('every = "1.5 ms"\n' + HEAD, "made.toml: every: 0.0015 s is no multiple of the sample period of 0.001 s"),
+        (
+            HEAD + THETA + 'name = "noise"\n' + LOG + 'steps = 2\nname = "noise"\n',
+            "vary: two axes have the name 'noise'",
+        ),
         (HEAD + '[[vary]]\nkey = "estimator.model"\nvalues = ["lever", "linear_physical"]\n', "one estimator.model"),
         (HEAD.replace("steady", "sensor_dropout") + 'estimators = ["rls"]\n', "rls needs every sample"),
         (HEAD.replace("steady", "fixed_preload") + 'estimators = ["joint_ekf"]\n', "joint_ekf needs preload trim"),
     ],
 )
-def test_what_is_refused(text: str, says: str, made: Made) -> None:
+def test_what_is_refused(text: str, says: str, made: Made, tmp_path: Path) -> None:
     with pytest.raises(ScenarioError) as refused:
         made(text)
     assert says in str(refused.value)
-    assert "made.toml" in str(refused.value) or "stead" in str(refused.value)
+    assert str(refused.value).startswith(f"{tmp_path}/made.toml: ")
+
+
+def test_what_cannot_be_at_one_end_of_an_axis_is_said_and_left_to_its_runs(made: Made) -> None:
+    """Even at the first point, of which all else is taken."""
+    values = 'values = ["-1 mrad", "1 mrad"]\n'
+    refused = made(HEAD + THETA.replace('values = ["1 mrad", "2 mrad"]\n', values) + LOG + "steps = 2\n")
+    (doubt,) = refused.doubts
+    assert "made.toml: vary[0]: sensors.theta.noise: '-1 mrad' is out of range" in doubt
+    assert refused.first.sensors.theta.noise == pytest.approx(1e-3)
+    preload = '[[vary]]\nkey = "estimator.preload"\nvalues = ["trim", "fixed"]\n'
+    (doubt,) = made('estimators = ["dual", "rls"]\n' + HEAD + preload).doubts
+    assert "estimators: rls needs preload trim" in doubt
+    assert made(HEAD + THETA).doubts == ()
 
 
 @pytest.mark.parametrize("name", spec.names())

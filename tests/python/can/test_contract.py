@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from python.can.codec import DBC, MULTIPLEXED, Codec, data_id_base, is_quantity, limits, not_available, scaled
 
 
@@ -23,7 +24,7 @@ def test_the_version_is_what_identity_says(codec: Codec) -> None:
 def test_no_two_messages_have_the_same_data_id_with_the_same_counter() -> None:
     """Of a frame taken for another message the CRC is wrong then, whatever its counter is."""
     bases = [data_id_base(message) for message in DBC.messages]
-    assert len(set(bases)) == len(bases) == 16
+    assert len(set(bases)) == len(bases) == 17
     assert max(bases) + 15 <= 255
 
 
@@ -78,7 +79,7 @@ def test_scales_have_whole_reciprocals() -> None:
 
 
 def test_named_values_are_the_enums(codec: Codec) -> None:
-    choices = ("model", "preload", "estimator", "adaptation", "request", "mode", "bounce")
+    choices = (*CHOICES, "request", "mode", "bounce")
     enums = {name: codec.enum(f"lever_{name}") for name in choices}
     enums |= {name: codec.enum(f"message_{name}") for name in ("page", "result")}
     tested = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import re
 import signal
@@ -19,6 +20,7 @@ import pytest
 from can.interfaces import BACKENDS
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.can.recorder import Recorder
+from lever_cdkf.host_tools.provenance import sha256
 from processes import PATIENCE, full_disk
 from python.conftest import Refused, Session
 
@@ -80,7 +82,9 @@ def test_the_log_has_every_frame_and_can_be_replayed(
     with can.CanutilsLogReader(log) as reader:
         read = [(frame.arbitration_id, bytes(frame.data)) for frame in reader]
     assert read == [(frame.arbitration_id, bytes(frame.data)) for frame in sent]
-    assert [path.name for path in tmp_path.iterdir()] == ["a.log"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.log", "a.log.provenance.json"]
+    origin = json.loads((tmp_path / "a.log.provenance.json").read_text())
+    assert origin["outputs"] == {"a.log": sha256(log)}
     assert cli.main(["replay", str(log)]) == 0
     assert "reproduced bit for bit" in capsys.readouterr().out
 
@@ -177,7 +181,7 @@ def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
         output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     assert "a.log: 0 frames, 0 lost" in output
-    assert os.listdir(tmp_path) == ["a.log"]
+    assert sorted(os.listdir(tmp_path)) == ["a.log", "a.log.provenance.json"]
 
 
 @pytest.mark.parametrize("interface", ["lever", "virtual"])

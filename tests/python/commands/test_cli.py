@@ -18,6 +18,7 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.commands import dbc, settings
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import native_file
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from lever_cdkf.host_tools.firmware.native import settings_table
 from processes import LEVER as LEVER_SCRIPT
 from python.conftest import Refused
@@ -98,7 +99,7 @@ def test_settings_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         }
         numbers = f"{setting.default:.6g} {setting.least:.6g} {setting.greatest:.6g}"
         assert f"{setting.name} {setting.unit} {numbers} {setting.meaning}" in lines
-    assert list(rows) == ["model", "preload", "estimator", "adaptation"]
+    assert list(rows) == [*CHOICES]
     assert "preload trim one of fixed, trim" in lines
 
 
@@ -197,7 +198,7 @@ def test_bad_input_is_one_line(arguments: list[str], text: str, refused: Refused
         (LeverError("two\nlines"), 2, "lever: error: two lines\n"),
         (PermissionError(13, "Permission denied", "/x"), 2, "lever: error: [Errno 13] Permission denied: '/x'\n"),
         (can.CanInitializationError("no such interface"), 2, "lever: error: no such interface\n"),
-        (KeyboardInterrupt(), 130, ""),
+        (KeyboardInterrupt(), 130, "lever: interrupted\n"),
     ],
 )
 def test_errors_of_commands(

@@ -90,6 +90,7 @@ def packages(extras: dict[str, list[str]], extra: str) -> list[str]:
         ("mf4", "replay session.mf4"),
         ("mf4", "sim steady --out sim --format mf4"),
         ("report", "demo"),
+        ("report", "bounce --quick"),
         ("report", "envelope --quick"),
         ("report", "tune session.log --page page.html"),
         ("study", "compare --quick"),
@@ -126,7 +127,7 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
     """Files that need an extra are left out, and those of an earlier run do not stay."""
     (tmp_path / "sim").mkdir()
     (tmp_path / "sim/report.html").touch()
-    listings = ("--help", "settings", "dbc", "sim --list", "envelope --list", "sim steady --help")
+    listings = ("--help", "settings", "dbc", "sim --list", "bounce --list", "envelope --list", "sim steady --help")
     short = "--set duration=3s --set limits={} --out sim"
     lines = (
         *listings,

@@ -1,4 +1,4 @@
-"""Ctrl-C: always exit status 130 and silence, also where Python loses its KeyboardInterrupt or has hardly begun."""
+"""Ctrl-C: always exit status 130 and one line, also where Python loses its KeyboardInterrupt or has hardly begun."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from lever_cdkf.host_tools.files import Outputs
 from lever_cdkf.host_tools.progress import Progress
 
 Act = Callable[[Callable[[], None]], int]
+LINE = "lever: interrupted\n"
 
 
 def lost_in_a_deletion() -> None:
@@ -59,7 +60,7 @@ def act(monkeypatch: pytest.MonkeyPatch) -> Act:
 def test_a_lost_one_is_found_at_the_end(lose: Callable[[], None], act: Act, capfd: pytest.CaptureFixture[str]) -> None:
     before = signal.getsignal(signal.SIGINT), sys.unraisablehook
     assert act(lose) == 130
-    assert capfd.readouterr() == ("", "")
+    assert capfd.readouterr() == ("", LINE)
     assert (signal.getsignal(signal.SIGINT), sys.unraisablehook) == before
     assert act(lambda: None) == 0
 
@@ -101,11 +102,11 @@ def test_what_fails_after_a_lost_one_is_not_told(
         raise LeverError("half of it is not there")
 
     assert act(run) == 130
-    assert capfd.readouterr() == ("", "")
+    assert capfd.readouterr() == ("", LINE)
     interrupts.check()
 
 
-def test_it_is_silent_while_the_command_is_still_being_read() -> None:
+def test_it_is_heard_while_the_command_is_still_being_read() -> None:
     """Ctrl-C while `lever` imports what it needs."""
     program = (
         "import signal, sys\n"
@@ -117,7 +118,23 @@ def test_it_is_silent_while_the_command_is_still_being_read() -> None:
         "sys.exit(main())\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINE)
+
+
+def test_it_changes_nothing_once_all_is_done() -> None:
+    """Ctrl-C while Python ends: not a death by the signal (-2)."""
+    program = (
+        "import signal, sys\n"
+        "from lever_cdkf.host_tools.start import main\n"
+        "class Last:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
+        "sys.last = Last()\n"
+        "sys.argv = ['lever', 'dbc', '--path']\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith("lever.dbc\n")
 
 
 def test_it_stays_ignored_where_it_is() -> None:

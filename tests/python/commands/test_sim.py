@@ -31,7 +31,7 @@ def test_sim_writes_its_files_and_prints_its_tables(lever: Run, tmp_path: Path) 
     assert summary["verdict"] in out
     assert len((out_dir / "trace.csv").read_text().splitlines()) == 1001
     assert "<html" in (out_dir / "report.html").read_text()[:200]
-    title, run = json.loads(tables.read_text()).values()
+    title, run, _ = json.loads(tables.read_text()).values()
     assert [row["quantity"] for row in title] == list(summary["parameters"])
     assert run[0]["samples"] == 1000
 

@@ -23,7 +23,7 @@ from processes import LEVER
 
 Shown = Callable[..., str]
 COMMANDS = (
-    *("campaign", "compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
+    *("aircraft", "bounce", "campaign", "compare", "dbc", "demo", "envelope", "figures", "flash", "live", "map"),
     *("monitor", "qemu", "record", "replay", "settings", "sim", "tune"),
 )
 ROWS: list[Row] = [
@@ -95,12 +95,14 @@ def test_every_command_is_tried_here(shown: Shown) -> None:
         "campaign --list",
         "compare --list",
         "compare --envelope --list",
+        "bounce --list",
         "envelope --list",
         "figures --list",
         "settings",
         "dbc",
         "sim demo --set duration=6s --set converged_after=3s",
         "sim demo --set duration=6s --set converged_after=3s --seeds 2",
+        "bounce --only alarm fault_clock --seeds 1 --out {folder}",
         "envelope --only rest_20s base_stuck --seeds 1 --out {folder}",
         "compare --scenarios step_up --seeds 2 --duration 2",
         "compare --envelope --scenarios steady base_stuck --seeds 1 --estimators firmware",

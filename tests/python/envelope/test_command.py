@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware, table
-from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition, Limit
+from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware
+from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition
 from lever_cdkf.sil.envelope.measure import fault_mask
 from lever_cdkf.sil.envelope.motions import Motion
+from lever_cdkf.sil.judged import table
+from lever_cdkf.sil.judged.result import Limit
 from python.conftest import Refused
 
 QUICK = {

@@ -12,10 +12,12 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
+from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools import provenance as origin
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import native_file, shared_library
 from lever_cdkf.host_tools.provenance import provenance, with_provenance
+from python.conftest import Session
 
 
 def test_the_date_is_now_or_that_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,6 +79,13 @@ def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
     inside.mkdir(parents=True)
     monkeypatch.setattr(origin, "__file__", str(inside / "provenance.py"))
     assert asked() is None
+
+
+def test_rows_in_json_have_it(session: Session, tmp_path: Path) -> None:
+    assert cli.main(["replay", str(session.log), "--json", str(tmp_path / "rows.json")]) == 0
+    told = json.loads((tmp_path / "rows.json").read_text())["provenance"]
+    assert told["version"] == origin.version()
+    assert told["inputs"] == {str(session.log): origin.sha256(session.log)}
 
 
 def test_a_page_says_it_at_its_end() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -10,9 +11,14 @@ from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.can.commander import KEEP, Commander
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.native import run_samples
+from lever_cdkf.host_tools.firmware.native import lib, run_samples
 from lever_cdkf.sil import fast
+from lever_cdkf.sil.aircraft import aircraft
+from lever_cdkf.sil.aircraft.aircraft import Coupled
+from lever_cdkf.sil.aircraft.flight import Flight
+from lever_cdkf.sil.fast import aircraft as fast_aircraft
 from lever_cdkf.sil.fast import plants
+from lever_cdkf.sil.fast.library import Struct, lib
 from lever_cdkf.sil.run import in_process, loop
 from lever_cdkf.sil.scenarios import inputs, scenario
 from lever_cdkf.sil.scenarios.scenario import Scenario
@@ -35,12 +41,25 @@ def python_run(wanted: Scenario) -> loop.Recording:
         return loop.run(wanted, bus)
 
 
-@pytest.mark.parametrize("name", [name for name in scenario.names() if scenario.load(name).aircraft is None])
+@pytest.mark.parametrize("name", scenario.names())
 def test_the_lever_moves_as_in_python_whoever_holds_it(name: str) -> None:
     wanted = scenario.load(name, ["duration=3 s"])
     slow, quick = python_run(wanted), fast.run(wanted, through_frames=True, stride=wanted.period)
     assert np.abs(quick.theta - slow.theta).max() < SAME
     assert np.abs(quick.theta_dot - slow.theta_dot).max() < SAME
+
+
+@pytest.mark.parametrize("period", [1e-3, 2.5e-3])
+def test_an_aircraft_flies_as_in_python(period: float) -> None:
+    """To the bit, also at the actuator's limits and with a correction that comes late."""
+    craft = aircraft.load("puma_like", correction_delay="5 ms")
+    delta, correction, gust = np.random.default_rng(1).standard_normal((3, 400)).cumsum(axis=1) * 0.05
+    flight, struct, put_out = Flight(Coupled(craft, 0.6), period, gust), Struct("aircraft_t"), np.zeros(400)
+    fast_aircraft.fill(struct, struct.pointer, flight, put_out)
+    for sample in range(399):
+        given = float(delta[sample]), float(correction[sample])
+        assert lib.aircraft_advance(struct.pointer, sample, *given) == flight.advance(*given)
+    assert np.array_equal(put_out[:399], correction[:399])
 
 
 def test_sensors_that_are_late_and_wrong_read_as_in_python() -> None:
@@ -76,14 +95,37 @@ def test_by_structs_the_firmware_gets_what_the_sensors_read() -> None:
     assert np.array_equal(run.mode, expected["mode"])
 
 
-@pytest.mark.parametrize("name", ["steady", "grip_force", "sensor_dropout", "sensor_faults", "mayo_ectomorphic"])
-def test_a_run_in_process_has_the_frames_of_one_over_a_bus(name: str) -> None:
-    wanted = scenario.load(name, ["duration=6 s"])
+MITIGATED = ("aircraft.gearing=0.3 1", "estimator.mitigation=cancellation_and_damping")
+GAPS = 'sensors.dropout=[{what="base_frame", share="60 %", burst="150 ms", start="2 s"}]'
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        *((name, ()) for name in ("steady", "grip_force", "sensor_dropout", "sensor_faults", "mayo_ectomorphic")),
+        ("bounce", MITIGATED),
+        ("bounce", (*MITIGATED, "aircraft.correction_delay=5 ms", GAPS)),
+    ],
+)
+def test_a_run_in_process_has_the_frames_of_one_over_a_bus(name: str, overrides: Sequence[str]) -> None:
+    wanted = scenario.load(name, ["duration=6 s", *overrides])
     slow, quick = python_run(wanted), in_process.run(wanted)
     for column, expected in vars(slow.frames()).items():
         assert np.array_equal(vars(quick.frames())[column], expected)
     assert (quick.unanswered, quick.misplaced) == (slow.unanswered, slow.misplaced)
     assert quick.identity.settings_crc == wanted.config.settings_crc
+
+
+def test_what_is_beyond_the_range_of_a_frame_is_not_available_by_structs_either() -> None:
+    sensors = [
+        f"sensors.{name}.fault=[{{kind='spikes', start='1 s', share='20 %', size='{size}'}}]"
+        for name, size in (("theta", "4 rad"), ("theta_dot", "20 rad/s"), ("tau_m", "40 N m"), ("z_ddot", "40 m/s^2"))
+    ]
+    wanted = scenario.load("steady", ["duration=3 s", "limits={}", *sensors])
+    missing = lib.LEVER_FAULT_THETA | lib.LEVER_FAULT_THETA_DOT | lib.LEVER_FAULT_TORQUE
+    by_structs, by_frames = (fast.run(wanted, through_frames, stride=1e-3) for through_frames in (False, True))
+    assert np.array_equal(by_structs.faults & missing, by_frames.faults & missing)
+    assert all((by_structs.faults & fault).any() for fault in (missing, lib.LEVER_FAULT_BASE))
 
 
 LOSSY = 'sensors.dropout=[{what="base_frame", share="50 %", burst="20 ms", start="1 s"}]'

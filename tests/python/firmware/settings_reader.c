@@ -1,5 +1,5 @@
 /* lever_can's reader of settings files for test_settings_file.py. On standard input stand files one after the other, each behind
- * a line with its size in bytes. A line for each comes out: "bad REASON", or "good", the four choices and the bits of every
+ * a line with its size in bytes. A line for each comes out: "bad REASON", or "good", the choices and the bits of every
  * setting, which are the defaults where the file says nothing. */
 #define _POSIX_C_SOURCE 200809L
 
@@ -14,7 +14,8 @@ enum { FILE_BYTES = 1 << 16 };
 
 static void print_config(const lever_config_t *config)
 {
-    (void)printf("good %u %u %u %u", config->model, config->preload, config->estimator, config->adaptation);
+    (void)printf("good %u %u %u %u %u", config->model, config->preload, config->estimator, config->adaptation,
+        config->mitigation);
     for (uint32_t i = 0u; i < lever_setting_count(); i++) {
         uint32_t bits = 0u;
         (void)memcpy(&bits, (const uint8_t *)&config->settings + (i * sizeof bits), sizeof bits);

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
 from lever_cdkf.host_tools.firmware.native import Config, Setting, settings_table
 
@@ -84,7 +85,7 @@ def test_no_accepted_dither_band_is_empty() -> None:
     assert limits["dither_low"].greatest < limits["dither_high"].least
 
 
-@pytest.mark.parametrize("choice", ["model", "preload", "estimator", "adaptation"])
+@pytest.mark.parametrize("choice", CHOICES)
 def test_an_unknown_choice_is_refused_by_name(choice: str, config: Any) -> None:
     """Nor is LEVER_KEEP one, which is for commands."""
     for value in (len(enum_names(f"lever_{choice}")), lib.LEVER_KEEP):

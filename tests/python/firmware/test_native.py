@@ -21,7 +21,13 @@ from lever_cdkf.host_tools.firmware import native, quantities
 from lever_cdkf.host_tools.firmware.native import Config, Estimator, lib
 
 QUICK = Config(settings={"align_time": 0.05})
-DEFAULTS = {"model": "lever", "preload": "trim", "estimator": "dual", "adaptation": "robbins_monro"}
+DEFAULTS = {
+    "model": "lever",
+    "preload": "trim",
+    "estimator": "dual",
+    "adaptation": "robbins_monro",
+    "mitigation": "none",
+}
 
 
 def recording(count: int, seed: int = 0) -> dict[str, Any]:

@@ -38,6 +38,8 @@ def test_ctrl_c_leaves_nothing(session: Session, tmp_path: Path) -> None:
             time.sleep(0.02)
         assert not any((out / name).exists() for name in FILES)
         process.send_signal(signal.SIGINT)
+        assert process.stderr is not None
+        assert process.stderr.read().decode() == "lever: interrupted\n"
         assert process.wait(PATIENCE) == 130
     assert list(out.iterdir()) == []
 

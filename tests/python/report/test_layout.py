@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from lever_cdkf.host_tools.report import screenshot
+from lever_cdkf.host_tools.report.figure import Figure, axis, line
+from lever_cdkf.host_tools.report.page import Page
+from lever_cdkf.host_tools.report.summary_html import table
 from python.watch.browser import Browser
 
 pytestmark = pytest.mark.requires("|".join(screenshot.BROWSERS))
@@ -98,3 +102,38 @@ def test_on_paper_charts_are_whole_and_light(report: Path) -> None:
         browser.run("dispatchEvent(new Event('afterprint'))")
         assert browser.run("getComputedStyle(document.body).backgroundColor") == dark
         assert max(box["right"] - box["left"] for box in browser.run(BOXES % ".chart .main-svg")) > A4
+
+
+@pytest.fixture
+def wide(tmp_path: Path) -> Path:
+    """A page with a table of many columns, the last of them words, and a chart with a long title of its axis."""
+    page = Page("wide", "", "a test")
+    header = ["log", *(f"quantity_{index} [N m s/rad]" for index in range(14)), "problem"]
+    page.section("numbers", "Numbers", "Numbers", table(header, [["1.234 ± 0.056"] * 15 + ["no sample in it " * 4]]))
+    figure = Figure([axis("y")], axis("rms error ÷ that of the filter told the truth"), over_time=False)
+    figure.add(line(np.arange(3.0), np.arange(3.0), "it", "estimate"))
+    page.section("chart", "Chart", "Chart", page.figure("chart-wide", figure, ""))
+    (tmp_path / "wide.html").write_text(page.html(""), encoding="utf-8")
+    return tmp_path / "wide.html"
+
+
+def test_the_last_column_of_a_wide_table_is_on_the_paper(wide: Path) -> None:
+    with Browser(1400, 900) as browser:
+        browser.open(wide.as_uri())
+        width = browser.run(BOXES % "table")[0]["width"]
+        browser.run("dispatchEvent(new Event('beforeprint'))")
+        body = browser.run(BOXES % "body")[0]
+        assert browser.run(BOXES % "th:last-child")[0]["right"] <= body["right"] + 0.5
+        assert body["width"] <= A4 + 0.5
+        browser.run("dispatchEvent(new Event('afterprint'))")
+        assert browser.run(BOXES % "table")[0]["width"] == width
+
+
+def test_a_long_title_of_an_axis_is_whole_on_a_phone(wide: Path) -> None:
+    with Browser(390, 844, phone=True) as phone:
+        phone.open(wide.as_uri())
+        title = phone.run(BOXES % ".xtitle")[0]
+        chart = phone.run(BOXES % ".chart")[0]
+        assert title["left"] >= chart["left"]
+        assert title["right"] <= chart["right"]
+        assert title["bottom"] <= chart["bottom"]

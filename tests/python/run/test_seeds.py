@@ -117,7 +117,7 @@ def test_seeds_on_the_command_line(lever: Run, tmp_path: Path, monkeypatch: pyte
     assert "Limits missed: rms error of m_p" in out
     title, *others = json.loads(file.read_text())
     assert title.endswith("(2 seeds, 7 to 8)")
-    assert others == ["share of the judged time with each fault", "runs"]
+    assert others == ["share of the judged time with each fault", "runs", "provenance"]
     assert all(column in out for column in ("rms median [%]", "coverage [%]", "to 5 % median [s]"))
     alone = ("--seeds", "1", "--jobs", "2", "--set", "limits={}")
     assert lever(*STEADY, *alone)[0] == 0

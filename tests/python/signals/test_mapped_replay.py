@@ -10,7 +10,7 @@ import can
 import numpy as np
 import pytest
 from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.native import Config, run_samples
+from lever_cdkf.host_tools.firmware.native import Config, enum_names, run_samples
 from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
 
@@ -75,21 +75,31 @@ def test_what_the_estimator_warns_of_is_said(flight: Flight, tmp_path: Path) -> 
     verdict, shares, flagged = said("sound", flight.theta, flight.z_ddot)
     assert not {"theta", "base", "torque", "mismatch"} & shares.keys()
     assert flagged == shares.get("calibration", 0.0) < 0.3
-    verdict, shares, flagged = said("stuck", flight.theta, np.where(flight.time < 1.0, flight.z_ddot, flight.z_ddot[0]))
+    moving = flight.time < 1.0
+    verdict, shares, flagged = said("stuck", flight.theta, np.where(moving, flight.z_ddot, flight.z_ddot[0]))
     assert shares["base"] > 0.9
     assert flagged > 0.9
     assert "Do not trust the estimates while the estimator warns: base " in verdict
-    verdict, shares, flagged = said("frozen", np.full_like(flight.theta, flight.theta[0]), flight.z_ddot)
+    verdict, shares, flagged = said("frozen", np.where(moving, flight.theta, flight.theta[0]), flight.z_ddot)
     assert shares["theta"] > 0.9
 
 
 def test_the_same_as_a_log_of_lever_dbc_to_the_bit(folder: Path, tmp_path: Path) -> None:
-    """What the mapping feeds is in bus.log; replayed as it is, it gives the same trace."""
+    """What the mapping feeds is in bus.log; replayed as it is, it gives the same trace, but for one fault: that there
+    is no torque is none where the mapping says so."""
     replayed(tmp_path / "mapped", folder / "flight.log", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
     again = [line for line in (tmp_path / "mapped/bus.log").read_text().splitlines() if line.endswith("T")]
     (tmp_path / "own.log").write_text("\n".join(again) + "\n")
     replayed(tmp_path / "own", tmp_path / "own.log", "--set", "sample_period=0.002")
-    assert (tmp_path / "own/trace.csv").read_bytes() == (tmp_path / "mapped/trace.csv").read_bytes()
+    own, mapped = (
+        np.genfromtxt(tmp_path / each / "trace.csv", delimiter=",", names=True) for each in ("own", "mapped")
+    )
+    torque = next(bit for bit, name in enum_names("lever_fault").items() if name == "torque")
+    known = np.isfinite(own["faults"])
+    assert (own["faults"][known].astype(int) & torque).any()
+    np.testing.assert_array_equal(mapped["faults"][known], own["faults"][known].astype(int) & ~torque)
+    for column in set(own.dtype.names or ()) - {"faults"}:
+        np.testing.assert_array_equal(mapped[column], own[column])
 
 
 def test_angle_and_acceleration_are_enough(folder: Path, tmp_path: Path) -> None:
@@ -123,6 +133,9 @@ def test_a_part(folder: Path, tmp_path: Path) -> None:
     replayed(tmp_path / "all", folder / "flight.log", *arguments[:6])
     own = replayed(tmp_path / "own", tmp_path / "all/bus.log", "--set", "sample_period=0.002", *arguments[6:])
     assert own["samples"] == summary["samples"]
+    for part, left_out in ((summary, {"other_identifiers": pytest.approx(1.2 * 12500, abs=2)}), (own, {})):
+        assert part["recording"]["frames_left_out"] == left_out  # no frame beside the part
+        assert part["recording"]["duration_s"] == pytest.approx(25.0, abs=0.01)
 
 
 # --- how they are mapped ---------------------------------------------------------------------------------------------
@@ -142,7 +155,7 @@ unit = "°/s"
 signal = "AhrsAccel.AccVert"
 gravity = "included"
 sign = 1
-delay = 0.0
+delay = "0 ms"
 [protected.AhrsAccel]
 counter = "AccCounter"
 """
@@ -229,6 +242,12 @@ def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
         (("theta=LvrAngle,unit=furlong",), "furlong is no unit of angle"),
         (("theta=LvrAngle,sign=2",), "sign = 2; it may be 1 or -1"),
         (("theta=LvrAngle,delay=4",), "delay = 4 s is more than a second"),
+        (("theta=LvrAngle,delay=4 kg",), "delay = 4 kg; it must be a number, in s or with a unit of time"),
+        (("theta=LvrAngle,factor=4 deg",), "factor = 4 deg; it must be a number"),
+        (
+            ("theta=LvrAngle", "z_ddot=AccLong"),
+            "z_ddot = AhrsAccel.AccLong: it is 0.1961 m/s² throughout, so it is no measurement",
+        ),
         (("theta=LvrAngle,unit=rad",), "is it in degrees"),
         (("theta=LvrAngle,channel=can7",), "InceptorPosition (0x18fef1fe) is not on can7, but on 0"),
         (("nothing.toml",), "cannot read nothing.toml: No such file"),

@@ -55,6 +55,13 @@ def test_a_log_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert shown_frequency(capsys.readouterr().out) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
 
 
+def test_the_margin_of_an_aircraft(folder: Path, capsys: pytest.CaptureFixture[str], refused: Refused) -> None:
+    watched = ["monitor", "--once", str(folder / "flight.log"), "--aircraft", "uh60_like,gearing=0.5"]
+    assert cli.main([*watched, "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]) == 0
+    assert re.search(r"bounce +clear: gain margin \d+\.\d ± \d\.\d dB", capsys.readouterr().out)
+    assert "--aircraft goes with --map" in refused(*watched)
+
+
 def test_a_bus_gives_what_a_replay_of_its_log_gives(folder: Path, frames: list[can.Message], tmp_path: Path) -> None:
     """All but the first two seconds, in which units and rates are found out."""
     database = str(folder / "foreign.dbc")

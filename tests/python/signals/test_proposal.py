@@ -10,15 +10,16 @@ import cantools.database
 import pytest
 from cantools.database.can import Database
 from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.signals.bus_signals import load_database
 from python.conftest import Refused
-from python.signals.databases import AIRCRAFT, database
+from python.signals.databases import AIRCRAFT, WITH_TORQUE, WITHHELD, Aircraft, database
 from python.signals.flight import NATURAL_FREQUENCY, Flight, write_log
 from python.signals.test_mapped_replay import frequency, replayed
 
 
-def recorded(index: int, flight: Flight, folder: Path) -> tuple[Path, Path, dict[str, str]]:
+def recorded(aircraft: Aircraft, seed: int, flight: Flight, folder: Path) -> tuple[Path, Path, dict[str, str]]:
     """Log, database, and the truth."""
-    text, fields, truth = database(index, flight)
+    text, fields, truth = database(aircraft, seed, flight)
     loaded = cantools.database.load_string(text, strict=False)
     assert isinstance(loaded, Database)
     frames = []
@@ -38,12 +39,13 @@ def short(flight: Flight) -> Flight:
     return Flight(*(values[:3000] for values in (slow.time, slow.theta, slow.theta_dot, slow.z_ddot)))
 
 
-def test_at_least_eight_of_ten_are_right(short: Flight, tmp_path: Path) -> None:
+@pytest.mark.parametrize("fleet", [AIRCRAFT, WITH_TORQUE, WITHHELD], ids=["no torque", "torque", "withheld"])
+def test_at_least_eight_of_ten_are_right(fleet: list[Aircraft], short: Flight, tmp_path: Path) -> None:
     wrong = {}
-    for index in range(len(AIRCRAFT)):
+    for index, aircraft in enumerate(fleet):
         folder = tmp_path / str(index)
         folder.mkdir()
-        log, dbc, truth = recorded(index, short, folder)
+        log, dbc, truth = recorded(aircraft, 100 + index, short, folder)
         found = {}
         if cli.main(["map", str(log), "--dbc", str(dbc), "--json", str(folder / "map.json")]) == 0:
             rows = json.loads((folder / "map.json").read_text())["mapping"]
@@ -71,6 +73,14 @@ def test_columns_and_a_picture(folder: Path, tmp_path: Path, capsys: pytest.Capt
     assert cli.main(["map", str(folder / "columns.csv"), "-o", str(picture)]) == 0
     assert "--map 'theta=Lever angle' 'theta_dot=Lever rate' 'z_ddot=Vertical acc.'" in capsys.readouterr().out
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_database_in_utf_8_or_not(tmp_path: Path) -> None:
+    text = 'BU_: A\nBO_ 5 Lever: 8 A\n SG_ Angle : 0|16@1- (0.01,0) [0|0] "°" A\n'
+    for encoding in ("utf-8", "cp1252"):
+        (tmp_path / "it.dbc").write_bytes(text.encode(encoding))
+        (message,) = load_database(tmp_path / "it.dbc").messages
+        assert message.signals[0].unit == "°"
 
 
 def test_what_cannot_be_proposed(folder: Path, tmp_path: Path, refused: Refused) -> None:

@@ -572,7 +572,7 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     drawn = figures(Reader(page))
     assert {"linearised-lever", "bound-lever", "settling-step_up", "following-step_up"} <= drawn.keys()
     assert all(f'id="{key}"' in page for key in drawn)
-    assert len(json.loads(tables.read_text())) == 2
+    assert len(json.loads(tables.read_text())) == 3  # and provenance
     monkeypatch.setattr(interrupts, "worker_pool", None)  # not called for one process
     alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)

@@ -112,6 +112,11 @@ def test_a_filter_that_lies_about_its_sigma_is_found_out(claim: float) -> None:
     np.testing.assert_allclose(sigma_ratio, claim, rtol=0.1)
 
 
+def test_a_filter_that_states_a_singular_covariance_is_infinitely_wrong() -> None:
+    covariance = np.stack([np.eye(2), np.ones((2, 2))])[None]
+    np.testing.assert_array_equal(scores.normalised_squares(np.ones((1, 2, 2)), covariance), [[2.0, np.inf]])
+
+
 # --- convergence -----------------------------------------------------------------------------------------------------
 
 ELAPSED = np.arange(-2.0, 8.0)  # the change is at index 2

@@ -35,7 +35,7 @@ def address(process: subprocess.Popen[str]) -> str:
 
 def end(process: subprocess.Popen[str]) -> None:
     process.send_signal(signal.SIGINT)
-    assert process.communicate(timeout=PATIENCE)[1] == ""
+    assert process.communicate(timeout=PATIENCE)[1] == "lever: interrupted\n"
 
 
 def estimates(browser: Browser) -> dict[str, list[str]]:

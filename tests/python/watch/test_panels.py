@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import cmath
+import contextlib
+import io
 import math
 
 import pytest
+from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.firmware.library import ffi, lib
 from lever_cdkf.host_tools.watch import panels
 from lever_cdkf.host_tools.watch.picture import ERROR, Estimated, Picture
 from lever_cdkf.host_tools.watch.sources import Source
+from python.conftest import Session
 from python.watch.conftest import Flight
 from rich.table import Table
 from rich.text import Text
@@ -113,7 +117,7 @@ def test_the_feedthrough_is_in_degrees(flight: Flight) -> None:
     picture = Picture()
     for _ in range(20):
         picture.take(flight.frames(100), flight.sample * 1e-3)
-    table, entries = rows(panels.feedthrough(picture)), picture.feedthrough()
+    table, entries = rows(panels.feedthrough(picture, 80)), picture.feedthrough()
     expected = {
         "gain [deg s²/m]": [math.degrees(abs(entry.response)) for entry in entries],
         "phase [deg]": [math.degrees(cmath.phase(entry.response)) % 360.0 - 360.0 for entry in entries],
@@ -122,3 +126,15 @@ def test_the_feedthrough_is_in_degrees(flight: Flight) -> None:
     }
     for name, values in expected.items():
         assert [float(cell) for cell in table[name][0]] == pytest.approx(values, rel=0.05)
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_one_picture_is_cut_nowhere(width: int, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        assert cli.main(["monitor", "--once", str(session.log)]) == 0
+    lines = said.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    assert "…" not in said.getvalue()
+    assert "coherence" in said.getvalue()

@@ -497,7 +497,7 @@ def test_ends_cleanly_when_interrupted(number: int, start_lever: Callable[..., s
         r"simulation of steady: open http://127\.0\.0\.1:\d+/ \(Ctrl-C ends\)\n", process.stdout.readline()
     )
     process.send_signal(number)
-    assert process.communicate(timeout=PATIENCE) == ("", "")
+    assert process.communicate(timeout=PATIENCE) == ("", "lever: interrupted\n")
     assert process.returncode == 130
 
 

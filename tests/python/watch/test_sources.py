@@ -12,6 +12,7 @@ import can
 import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from lever_cdkf.host_tools.watch import sources
 from lever_cdkf.host_tools.watch.picture import ERROR, FOREIGN, Frame, Picture
 from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
@@ -115,7 +116,7 @@ def test_a_command_goes_out_protected_and_is_shown(other_end: can.BusABC, on_bus
     assert [values["counter"] for values in decoded] == [0, 1]
     assert [values["request"] for values in decoded] == [2, 0]
     assert [values["dither_rms"] for values in decoded] == [65.535, pytest.approx(0.3)]  # the first keeps it
-    assert all(values[what] == 15 for values in decoded for what in ("model", "preload", "estimator", "adaptation"))
+    assert all(values[what] == 15 for values in decoded for what in CHOICES)
     assert [identifier for identifier, _ in on_bus.drain()] == [0x120, 0x120]
 
 

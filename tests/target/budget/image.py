@@ -21,7 +21,7 @@ from lever_cdkf.host_tools.firmware.library import enum_names
 from lever_cdkf.host_tools.firmware.native import Config
 from numpy.typing import NDArray
 
-from .recording import Recording
+from .recording import MODELS, Recording
 
 SOURCE = Path(__file__).with_name("image")
 FIRMWARE = SOURCE.parents[3] / "firmware"
@@ -31,8 +31,9 @@ MACHINE = "netduinoplus2"
 SAMPLES_ADDRESS = 0x08040000
 TICKS_AN_INSTRUCTION = 8e-9 * 168e6
 ESTIMATORS = ("dual", "joint")
-FORMS = ("update", "tick")
-"""What is measured: lever_update() alone, or all that a sample takes from its frames to the last one of the answer."""
+FORMS = ("update", "tick", "bounce")
+"""What is measured: lever_update() alone; all that a sample takes from its frames to the last one of the answer;
+lever_update() of an instance that knows the aircraft, and cancels and damps."""
 CALLED_ONCE = ("lever_init", "lever_command", "lever_platform", "lever_estimate", "lever_health")
 
 _TOOLCHAIN_PACKAGES = "gcc-arm-none-eabi libnewlib-arm-none-eabi"
@@ -131,12 +132,24 @@ def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED, process
     return folder / "budget.elf"
 
 
-def arguments(recording: Recording, model: str, estimator: str) -> list[str]:
+def cases() -> list[tuple[str, str, str]]:
+    """Estimator, model and form of all that is measured."""
+    return [
+        (estimator, model, form)
+        for form in FORMS
+        for estimator in ESTIMATORS
+        for model in MODELS
+        if form != "bounce" or model == "lever"
+    ]
+
+
+def arguments(recording: Recording, model: str, estimator: str, form: str) -> list[str]:
     """The configuration as main.c reads it: what differs from the defaults."""
     config, default = recording.scenario.config, Config()
     numbers = {name: value for name, value in config.settings.items() if value != default.settings[name]}
     numbers["dither_rms"] = recording.dither_rms
-    choices = {**config.choices, "model": model, "estimator": estimator}
+    mitigation = "cancellation_and_damping" if form == "bounce" else "none"
+    choices = {**config.choices, "model": model, "estimator": estimator, "mitigation": mitigation}
     codes = {what: list(enum_names(f"lever_{what}").values()).index(name) for what, name in choices.items()}
     words = [f"{what}={code:x}" for what, code in codes.items()]
     return words + [f"{name}={struct.unpack('<I', struct.pack('<f', value))[0]:x}" for name, value in numbers.items()]
@@ -147,7 +160,7 @@ def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) 
     with tempfile.TemporaryDirectory(prefix="lever-budget-") as name:
         samples, output = Path(name) / "samples", Path(name) / "output"
         samples.write_bytes(recording.blob(form))
-        words = ["budget", str(output), form, *arguments(recording, model, estimator)]
+        words = ["budget", str(output), form, *arguments(recording, model, estimator, form)]
         semihosting = "enable=on,target=native," + ",".join(f"arg={word}" for word in words)
         command = ["qemu-system-arm", "-M", MACHINE, "-nographic", "-monitor", "none", "-serial", "none"]
         command += ["-icount", "shift=3,sleep=off", "-semihosting-config", semihosting, "-kernel", str(elf)]

@@ -13,8 +13,8 @@ from lever_cdkf.host_tools.firmware.library import enum_names
 from numpy.typing import NDArray
 
 from . import cycles, image, sizes, stack, trace
-from .image import ESTIMATORS, FORMS, Run
-from .recording import MODELS, Recording, record
+from .image import ESTIMATORS, Run
+from .recording import Recording, record
 
 START_UP_S = 2.0
 """Until then the estimator starts up: it aligns, the dither fades in, caution_time passes. Counted by itself."""
@@ -78,8 +78,7 @@ def facade(firmware: Path) -> list[str]:
 
 def run_all(elf: Path, tell: Tell = _silent) -> dict[Case, Run]:
     """The image in QEMU, over every case. Raises LeverError."""
-    cases = [(estimator, model, form) for form in FORMS for estimator in ESTIMATORS for model in MODELS]
-    runs = {}
+    cases, runs = image.cases(), {}
     for done, (estimator, model, form) in enumerate(cases):
         tell(done, len(cases), f"{estimator} {model} {form} in QEMU")
         runs[estimator, model, form] = image.run(elf, record(model), model, estimator, form)
@@ -102,13 +101,13 @@ def budget(elf: Path, firmware: Path, runs: dict[Case, Run], tell: Tell = _silen
 
 def _spent(elf: Path, runs: dict[Case, Run], tell: Tell) -> dict[str, Any]:
     """Instructions as QEMU counts them, cycles and floating-point operations by the trace."""
-    spent: dict[str, Any] = {"instructions": {"tick": {}}, "cycles": {"tick": {}}, "floating_point_operations": {}}
+    spent: dict[str, Any] = {"instructions": {}, "cycles": {}, "floating_point_operations": {}}
     for done, ((estimator, model, form), run) in enumerate(runs.items()):
         tell(done, len(runs), f"{estimator} {model} {form} in Unicorn")
         time = sample_times(record(model))
         traced = trace.trace(elf, record(model), model, estimator, form, 0, len(time) - 1)
         for what, counted in (("instructions", run.instructions), ("cycles", traced.cycles)):
-            place = spent[what]["tick"] if form == "tick" else spent[what]
+            place = spent[what] if form == "update" else spent[what].setdefault(form, {})
             place.setdefault(estimator, {})[model] = vars(Count.of(counted, run, time))
         if form == "update":
             place = spent["floating_point_operations"].setdefault(estimator, {})
@@ -171,7 +170,7 @@ def _stack(elf: Path, firmware: Path, runs: dict[Case, Run]) -> dict[str, Any]:
     chains = stack.worst_case(elf, facade(firmware))
     painted = {"lever_update": 0, "tick": 0, **dict.fromkeys(image.CALLED_ONCE, 0)}
     for (_, _, form), run in runs.items():
-        name = "lever_update" if form == "update" else "tick"
+        name = "tick" if form == "tick" else "lever_update"
         for function, found in ((name, int(run.stack.max())), *run.calls_stack.items()):
             painted[function] = max(painted[function], found)
     return {

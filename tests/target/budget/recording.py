@@ -41,8 +41,8 @@ class Recording:
     """[N m]"""
 
     def blob(self, form: str) -> bytes:
-        """What the image expects in flash, for "update" or "tick"."""
-        records = self.samples if form == "update" else self.frames
+        """What the image expects in flash, for one of FORMS."""
+        records = self.frames if form == "tick" else self.samples
         return struct.pack("<II", len(self.samples), records.dtype.itemsize) + records.tobytes()
 
     def without(self, gap_s: tuple[float, float]) -> Recording:

@@ -100,11 +100,15 @@ _BYTES = {
 
 def _spent(budget: dict[str, Any]) -> list[Row]:
     rows: list[Row] = []
-    for what, form in (("lever_update()", ""), ("whole tick", "tick")):
-        instructions, cycles = (budget[each][form] if form else budget[each] for each in ("instructions", "cycles"))
+    whats = {"update": "lever_update()", "tick": "whole tick", "bounce": "lever_update(), aircraft and mitigation"}
+    for form, what in whats.items():
+        is_update = form == "update"
+        instructions, cycles = (
+            budget[each] if is_update else budget[each][form] for each in ("instructions", "cycles")
+        )
         for estimator in image.ESTIMATORS:
             for model, entry in instructions[estimator].items():
-                operations = {} if form else budget["floating_point_operations"][estimator][model]
+                operations = budget["floating_point_operations"][estimator][model] if is_update else {}
                 rows.append(
                     {
                         "measured": what,

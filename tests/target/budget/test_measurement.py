@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import Built
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.config import Config
+from lever_cdkf.host_tools.firmware.config import CHOICES, Config
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
 from target.budget import image, measure, stack, trace
 from target.budget.recording import MODELS, record
@@ -27,7 +27,7 @@ def estimate_on_host(model: str, estimator: str) -> bytes:
     config = Config(**{**scenario.config.choices, "model": model, "estimator": estimator}, settings=scenario.settings)
     memory = ffi.new("lever_memory_t *")
     lever = lib.lever_init(memory, config.pointer)
-    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), lib.LEVER_KEEP)
+    keep = dict.fromkeys(CHOICES, lib.LEVER_KEEP)
     command = ffi.new("lever_command_t *", {**keep, "dither_rms": recording.dither_rms})
     assert lib.lever_command(lever, command)
     samples = ffi.from_buffer("lever_sample_t[]", recording.samples)

@@ -145,7 +145,7 @@ class Trace:
 def trace(elf: Path, recording: Recording, model: str, estimator: str, form: str, first: int, last: int) -> Trace:
     """Runs the image over samples 0 to `last` and follows those from `first` on, or what is measured before (LOOP,
     INIT). Raises LeverError."""
-    words = ["budget", "-", form, *arguments(recording, model, estimator), "paint=0"]
+    words = ["budget", "-", form, *arguments(recording, model, estimator, form), "paint=0"]
     return Trace(_code(elf), _Machine(elf, recording.blob(form), words).run(first, last))
 
 

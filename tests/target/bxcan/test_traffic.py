@@ -5,6 +5,7 @@ from __future__ import annotations
 import can
 import pytest
 from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from lever_cdkf.host_tools.firmware.native import lib
 from lever_cdkf.sil.run import loop
 from lever_cdkf.sil.scenarios import scenario
@@ -45,7 +46,7 @@ def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
 
 def dither(talk: Talk) -> None:
     """From now on a motor command goes out with every estimate."""
-    keep = dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep")
+    keep = dict.fromkeys(CHOICES, "keep")
     talk.tell(Frame(COMMAND, codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **keep})))
 
 

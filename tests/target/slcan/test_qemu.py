@@ -13,12 +13,13 @@ import pytest
 import serial
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.board import qemu
+from lever_cdkf.host_tools.firmware.config import CHOICES
 from vcan import rig
 
 QEMU = pytest.mark.requires(qemu.PROGRAM)
 RESET: dict[str, float | str | None] = {
     "request": "reset",
-    **dict.fromkeys(("model", "preload", "estimator", "adaptation"), "keep"),
+    **dict.fromkeys(CHOICES, "keep"),
     "dither_rms": 0.0,
 }
 LEVER = str(Path(sys.executable).with_name("lever"))

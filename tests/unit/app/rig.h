@@ -194,6 +194,7 @@ static inline lever_command_t command_none(void)
         .preload = (uint8_t)LEVER_KEEP,
         .estimator = (uint8_t)LEVER_KEEP,
         .adaptation = (uint8_t)LEVER_KEEP,
+        .mitigation = (uint8_t)LEVER_KEEP,
         .dither_rms = (float)LEVER_KEEP};
 }
 

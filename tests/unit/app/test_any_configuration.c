@@ -30,6 +30,7 @@ static void draw_config(uint32_t combination, double usual)
         config = config_of(combination % (uint32_t)COMBINATIONS);
         config.preload = (uint8_t)(choice % (uint32_t)LEVER_PRELOAD_COUNT);
         config.adaptation = (uint8_t)((choice / (uint32_t)LEVER_PRELOAD_COUNT) % (uint32_t)LEVER_ADAPTATION_COUNT);
+        config.mitigation = (uint8_t)(choice % (uint32_t)LEVER_MITIGATION_COUNT);
         for (uint32_t i = 0u; i < lever_setting_count(); i++) {
             value[i] = (random_unit(&source) < usual) ? value[i] : draw_setting(lever_setting(i));
         }
@@ -67,8 +68,11 @@ TEST(with_any_samples_it_stays_finite)
         for (uint32_t n = 0u; n < 250u; n++) {
             const lever_sample_t sample = draw_sample();
             (void)lever_update(lever, &sample);
+            lever_correction_t correction;
+            lever_correction(lever, &correction);
             assert_finite(estimate());
             TEST_ASSERT_TRUE(isfinite(health().excitation));
+            TEST_ASSERT_TRUE(fabsf(correction.angle) <= config.settings.correction_limit);
         }
     }
 }

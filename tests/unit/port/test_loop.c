@@ -155,7 +155,7 @@ TEST(without_room_a_frame_is_dropped_and_counted)
 }
 
 /* Linux sent one that was 2,999 ms old, after an outage. */
-TEST(only_a_motor_command_goes_stale)
+TEST(only_what_acts_goes_stale)
 {
     static const struct {
         uint32_t id;
@@ -167,6 +167,8 @@ TEST(only_a_motor_command_goes_stale)
         {MESSAGE_MOTOR_COMMAND_ID, 20001u, false, false},
         {MESSAGE_MOTOR_COMMAND_ID, 2999000u, false, false},
         {MESSAGE_MOTOR_COMMAND_ID, 2999000u, true, true},
+        {MESSAGE_CORRECTION_ID, 20000u, false, true},
+        {MESSAGE_CORRECTION_ID, 20001u, false, false},
         {MESSAGE_STATE_ESTIMATE_ID, 2999000u, false, true},
     };
 

@@ -1,6 +1,6 @@
 /* Runs the estimator over recorded samples and writes, for every sample, the time it took and the stack it used.
  *
- *     budget OUTPUT update|tick [model=N estimator=N preload=N adaptation=N] [SETTING=BITS …] [dither_rms=BITS]
+ *     budget OUTPUT update|tick|bounce [model=N estimator=N preload=N adaptation=N mitigation=N] [SETTING=BITS …] [dither_rms=BITS]
  *         [paint=0]
  *
  * All numbers are hexadecimal, those of settings and torque the bits of a float. The samples lie in flash, behind a
@@ -223,8 +223,9 @@ static void take_argument(char *word, lever_config_t *config, lever_command_t *c
     }
     *value = '\0';
     const uint32_t bits = (uint32_t)strtoul(value + 1, NULL, 16);
-    uint8_t *choices[] = {&config->model, &config->preload, &config->estimator, &config->adaptation};
-    static const char *const names[] = {"model", "preload", "estimator", "adaptation"};
+    uint8_t *choices[] = {
+        &config->model, &config->preload, &config->estimator, &config->adaptation, &config->mitigation};
+    static const char *const names[] = {"model", "preload", "estimator", "adaptation", "mitigation"};
     void *target = (strcmp(word, "dither_rms") == 0) ? (void *)&command->dither_rms : NULL;
     for (uint32_t i = 0u; i < lever_setting_count(); i++) {
         if (strcmp(word, lever_setting(i)->name) == 0) {
@@ -246,6 +247,19 @@ static void take_argument(char *word, lever_config_t *config, lever_command_t *c
     }
     (void)memcpy(target, &bits, sizeof bits);
 }
+
+/* Of a helicopter of the size of a UH-60, geared by 0.5. */
+static const lever_aircraft_t aircraft = {.count = 24u,
+    .frequency = {1.5f, 1.613f, 1.735f, 1.866f, 2.007f, 2.158f, 2.321f, 2.497f, 2.685f, 2.888f, 3.106f, 3.34f, 3.592f,
+        3.864f, 4.155f, 4.469f, 4.807f, 5.169f, 5.56f, 5.979f, 6.431f, 6.916f, 7.438f, 8.0f},
+    .real = {44.33f, 43.35f, 42.14f, 40.64f, 38.76f, 36.37f, 33.32f, 29.37f, 24.21f, 17.42f, 8.46f, -3.188f, -17.74f,
+        -34.37f, -50.28f, -60.96f, -62.94f, -56.81f, -46.28f, -34.98f, -24.92f, -16.74f, -10.39f, -5.602f},
+    .imaginary = {-27.12f, -29.94f, -32.99f, -36.32f, -39.95f, -43.92f, -48.23f, -52.89f, -57.81f, -62.81f, -67.42f,
+        -70.76f, -71.26f, -66.72f, -55.16f, -36.99f, -16.28f, 1.557f, 13.58f, 19.95f, 22.27f, 22.11f, 20.63f, 18.5f},
+    .gain_sigma = 0.05f,
+    .phase_sigma = 0.05f,
+    .warning = 3.0f,
+    .alarm = 1.5f};
 
 /* The instance as the arguments want it; measures the stack of the calls that are made once. */
 static lever_t *start(const lever_config_t *config, const lever_command_t *command, intro_t *intro)
@@ -285,7 +299,7 @@ int main(void)
     static char arguments[1024];
     lever_config_t config;
     lever_command_t command = {(uint8_t)LEVER_REQUEST_NONE, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP,
-        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, 0.0f};
+        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, 0.0f};
     SYST_RVR = SYST_MASK;
     SYST_CVR = 0u;
     SYST_CSR = SYST_ENABLE_FROM_PROCESSOR_CLOCK;
@@ -302,6 +316,9 @@ int main(void)
     intro_t intro = calibrate();
     lever_t *lever = start(&config, &command, &intro);
     semihosting_write(output, &intro, sizeof intro);
+    if (strcmp(what, "bounce") == 0) {
+        (void)lever_aircraft(lever, &aircraft);
+    }
     if (strcmp(what, "tick") == 0) {
         tick_all(lever, &command);
     } else {

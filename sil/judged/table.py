@@ -8,9 +8,7 @@ from typing import Any
 
 from lever_cdkf.host_tools.tables import Row
 
-from .campaign import Result
-from .condition import Limit
-from .measure import FIGURES
+from .result import Limit, Result
 
 HOLDS, MISSED, REPORTED = "holds", "MISSED", "reported"
 
@@ -39,7 +37,7 @@ def figures(result: Result) -> list[Row]:
 
 
 def _line(result: Result, name: str) -> Row:
-    figure, values = FIGURES[name], result.values[name]
+    figure, values = result.known[name], result.values[name]
     shown = {"all runs": figure.pool(values), "median": _median(values), "worst": figure.worst(values)}
     return {
         "figure": name,
@@ -88,24 +86,26 @@ def _row(result: Result) -> dict[str, Any]:
     return {
         "name": condition.name,
         "title": condition.title,
-        "measured": {_key(limit): _number(result.of(limit)) for limit in limits},
+        "measured": {_key(result, limit): _number(result.of(limit)) for limit in limits},
         "limit": {
-            _key(limit): f"{'or ' if limit in condition.unless else ''}{limit}" for limit in limits if str(limit)
+            _key(result, limit): f"{'or ' if limit in condition.unless else ''}{limit}"
+            for limit in limits
+            if str(limit)
         },
         "ok": result.ok,
         "problem": result.problem or None,
         "runs": max((len(values) for values in result.values.values()), default=0),
-        "figures": [_figure(name, values) for name, values in result.values.items()],
+        "figures": [_figure(result, name) for name in result.values],
     }
 
 
-def _key(limit: Limit) -> str:
+def _key(result: Result, limit: Limit) -> str:
     over = "" if limit.over == "all" else f", {limit.over}"
-    return f"{limit.figure}{over} [{FIGURES[limit.figure].unit}]"
+    return f"{limit.figure}{over} [{result.known[limit.figure].unit}]"
 
 
-def _figure(name: str, values: Any) -> dict[str, Any]:
-    figure = FIGURES[name]
+def _figure(result: Result, name: str) -> dict[str, Any]:
+    figure, values = result.known[name], result.values[name]
     return {
         "figure": name,
         "unit": figure.unit,

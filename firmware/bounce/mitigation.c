@@ -1,0 +1,205 @@
+#include "bounce/mitigation.h"
+
+#include "math/share.h"
+
+#include <math.h>
+#include <string.h>
+
+#define BAND_LOW 1.5f        /* [Hz] */
+#define BAND_HIGH 8.0f       /* [Hz] */
+#define OPENING_US 5.0e5f    /* [us] */
+#define CLOSING_US 7.0e4f    /* [us] */
+#define MEMORY 0.5f          /* of how the lever moves [s] */
+#define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
+#define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
+#define LIVELY 2.5e-5f       /* mean square of the rate from which on that can be told: (5 mrad/s)^2 */
+#define NOTCH_TURN_MOST 0.8f /* corner of the notch times a sample period, up to which it is stable */
+#define PERIOD_MOST 0.02f    /* of a filter's step [s] */
+#define LONGEST 0.1f         /* without a sample, until the filters begin anew [s] */
+
+bool mitigation_has_damping(uint8_t mitigation)
+{
+    return (mitigation == (uint8_t)LEVER_MITIGATION_DAMPING) ||
+           (mitigation == (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING) ||
+           (mitigation == (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING);
+}
+
+static bool has_notch(uint8_t mitigation)
+{
+    return (mitigation == (uint8_t)LEVER_MITIGATION_NOTCH) ||
+           (mitigation == (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING);
+}
+
+static bool has_correction(uint8_t mitigation)
+{
+    return mitigation > (uint8_t)LEVER_MITIGATION_DAMPING;
+}
+
+static float clamped(float value, float most)
+{
+    const float above = (value > most) ? most : value;
+    return (above < -most) ? -most : above;
+}
+
+/* --- gate --------------------------------------------------------------------------------------------------------- */
+
+static void fade(float *weight, bool on, float elapsed_us)
+{
+    const float next = *weight + (on ? (elapsed_us / OPENING_US) : -(elapsed_us / CLOSING_US));
+    const float above = (next > 0.0f) ? next : 0.0f;
+    *weight = (above < 1.0f) ? above : 1.0f;
+}
+
+static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)
+{
+    return (elapsed_us < time_us) ? (time_us - elapsed_us) : 0u;
+}
+
+/* Time has passed with all as it was; when the sensors have been away for too long by now, it has been fading since. */
+static void age(mitigation_t *mitigation, uint32_t elapsed_us)
+{
+    mitigation->sensed_left = left_of(mitigation->sensed_left, elapsed_us);
+    mitigation->open = mitigation->open && (mitigation->sensed_left != 0u);
+    if (!mitigation->open) {
+        fade(&mitigation->weight, false, (float)elapsed_us);
+        fade(&mitigation->damping_weight, false, (float)elapsed_us);
+    }
+}
+
+static void pass_gate(mitigation_t *mitigation, const mitigation_sample_t *sample)
+{
+    const bool sensed = sample->sensed && (sample->rated || !mitigation->rated);
+    age(mitigation, left_of(sample->elapsed_us, mitigation->counted));
+    mitigation->counted = 0u;
+    mitigation->rated = mitigation->rated || sample->rated;
+    if (sample->advances && sensed) {
+        mitigation->sensed_left = sample->silence_us + 1u;
+    }
+    mitigation->open = sample->advances && sample->permitted && (mitigation->sensed_left != 0u);
+    if (mitigation->open) {
+        const uint32_t period_us = (sample->elapsed_us < sample->silence_us) ? sample->elapsed_us : sample->silence_us;
+        const bool as_chosen =
+            has_correction(sample->mitigation) && (mitigation->notches == has_notch(sample->mitigation));
+        fade(&mitigation->weight, mitigation->explained && as_chosen, (float)period_us);
+        fade(&mitigation->damping_weight, mitigation_has_damping(sample->mitigation), (float)period_us);
+    }
+}
+
+void mitigation_idle(mitigation_t *mitigation, uint32_t elapsed_us)
+{
+    age(mitigation, elapsed_us);
+    mitigation->counted += (elapsed_us < (UINT32_MAX - mitigation->counted)) ? elapsed_us : 0u;
+}
+
+lever_correction_t mitigation_correction(const mitigation_t *mitigation)
+{
+    const lever_correction_t correction = {mitigation->weight * mitigation->correction, mitigation->weight};
+    return correction;
+}
+
+/* --- filters ------------------------------------------------------------------------------------------------------ */
+
+/* At the square root of both corners, where bounce is, it has no phase; everywhere it is within 90 degrees of the
+ * signal, so that torque against it takes energy from the lever. */
+static float pass_band(mitigation_band_t *band, float value, float period)
+{
+    const float share = (HIGH_PASS_TURN * BAND_HIGH) * period;
+    band->low_pass += ((share < 1.0f) ? share : 1.0f) * (value - band->low_pass);
+    band->level += ((HIGH_PASS_TURN * BAND_LOW) * period) * (band->low_pass - band->level);
+    return band->low_pass - band->level;
+}
+
+/* What a notch takes away, with gain 1 at its frequency; `turn`: that in radians a step. */
+static float pass_notch(mitigation_notch_t *notch, float value, float turn, float damping)
+{
+    const float bounded = (turn < NOTCH_TURN_MOST) ? turn : NOTCH_TURN_MOST;
+    notch->band_pass += bounded * ((value - notch->low_pass) - (damping * notch->band_pass));
+    notch->low_pass += bounded * notch->band_pass;
+    return damping * notch->band_pass;
+}
+
+/* Of the rate in the band, whether what the estimated arm makes of base and motor is there. Other motion does not count:
+ * it has nothing in common with that. */
+static void compare(mitigation_t *mitigation, float moved, float expected, float period)
+{
+    const float share = share_of(period, MEMORY);
+    mitigation->expected_square += share * ((expected * expected) - mitigation->expected_square);
+    mitigation->product += share * ((moved * expected) - mitigation->product);
+    if (mitigation->expected_square > LIVELY) {
+        const float least = mitigation->explained ? UNEXPLAINED : EXPLAINED;
+        mitigation->explained = (mitigation->product > (least * mitigation->expected_square));
+    }
+}
+
+/* --- a sample ----------------------------------------------------------------------------------------------------- */
+
+/* Begins with the base as it is now, and nothing known of how the lever moves. */
+static void start(mitigation_t *mitigation, float z_ddot)
+{
+    const mitigation_t none = {.rated = mitigation->rated, .sensed_left = mitigation->sensed_left, .started = true};
+    *mitigation = none;
+    involuntary_start(&mitigation->involuntary, z_ddot);
+}
+
+/* The angle to take away. */
+static float angle_of(
+    mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample, float period)
+{
+    float angle = 0.0f;
+    if (mitigation->notches) {
+        const float turn = sqrtf(sample->dynamics->stiffness) * period;
+        angle = pass_notch(&mitigation->notch, sample->theta, turn, 2.0f * settings->notch_damping_ratio);
+    } else {
+        angle = involuntary_angle(&mitigation->involuntary, settings->correction_delay);
+    }
+    return angle;
+}
+
+/* While nothing is corrected, the other of notch and cancellation may take over. */
+static void choose(mitigation_t *mitigation, const mitigation_sample_t *sample)
+{
+    if (mitigation->weight <= 0.0f) {
+        mitigation->notches = has_notch(sample->mitigation);
+        mitigation->notch.low_pass = sample->theta;
+        mitigation->notch.band_pass = 0.0f;
+    }
+}
+
+/* The motor's torque is that of the identification dither, and against the lever's rate. The arm takes it as if it were
+ * against the involuntary rate: so it is damped as the lever is, and the lever's own motion stays out of it. */
+static void advance(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample)
+{
+    const float period = (sample->step.period < PERIOD_MOST) ? sample->step.period : PERIOD_MOST;
+    model_step_t step = sample->step;
+    step.tau_m += sample->drive * (mitigation->expected_damping - mitigation->damping);
+    const bool stable = involuntary_step(
+        &mitigation->involuntary, sample->dynamics, sample->constants, &step, settings->cancellation_corner);
+    const float moved = pass_band(&mitigation->moved, sample->theta_dot, period);
+    const float expected = pass_band(&mitigation->expected, mitigation->involuntary.theta_dot, period);
+    compare(mitigation, moved, expected, period);
+    const float gain = mitigation->damping_weight * settings->damping_gain;
+    mitigation->damping = -clamped(gain * moved, settings->damping_limit);
+    mitigation->expected_damping = -clamped(gain * expected, settings->damping_limit);
+    choose(mitigation, sample);
+    if (stable) {
+        mitigation->correction = -clamped(angle_of(mitigation, settings, sample, period), settings->correction_limit);
+    } else {
+        mitigation->explained = false;
+    }
+}
+
+bool mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample)
+{
+    pass_gate(mitigation, sample);
+    if (!mitigation->started || (sample->step.period > LONGEST)) { /* then all has faded */
+        start(mitigation, sample->step.z_ddot);
+    } else if (sample->advances) {
+        advance(mitigation, settings, sample);
+    } else { /* no time has passed, and the torque gate is closed */
+        mitigation->damping = 0.0f;
+        mitigation->expected_damping = 0.0f;
+    }
+    mitigation->started = (sample->mitigation != (uint8_t)LEVER_MITIGATION_NONE) || (mitigation->weight > 0.0f) ||
+                          (mitigation->damping_weight > 0.0f);
+    return mitigation->started;
+}

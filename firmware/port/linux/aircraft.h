@@ -1,0 +1,24 @@
+/* The response of a helicopter from a text file, for lever_aircraft(). The same lines are read by
+ * host_tools/firmware/aircraft.py:
+ *
+ *     # z_ddot over the lever's angle
+ *     gain_sigma = 0.1       # how well the gain is known, relative to it [1]
+ *     phase_sigma = 0.1      # [rad]
+ *     warning = 3            # gain margin below which there is a warning [dB]; 3 without this line
+ *     alarm = 1.5            # and an alarm [dB]; 1.5 without this line
+ *     1.5  -12.1  4.2        # frequency [Hz], real and imaginary part [(m/s^2)/rad]; 3 to LEVER_AIRCRAFT_POINTS lines
+ */
+#ifndef LEVER_PORT_AIRCRAFT_H
+#define LEVER_PORT_AIRCRAFT_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "lever_cdkf.h"
+#include "port/linux/settings.h"
+
+/* Reads a whole file; `path` is only for the messages. False, with `error` filled in, when it holds no such response;
+ * whether the estimator takes it is for lever_aircraft() to say. */
+bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, settings_error_t *error);
+
+#endif

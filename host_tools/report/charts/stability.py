@@ -1,0 +1,48 @@
+"""How near the loop through arm, lever and rotor is to collective bounce, where the estimator knows the aircraft."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from ...firmware.library import enum_names
+from ..figure import Figure, Spec, axis, axis_range, band, line, time_axis
+from ..run import Run
+from ..series import spread_indices
+
+_POINTS = 1500
+_COLOURS = {"warning": "joint", "alarm": "fault"}
+
+
+def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
+    """Gain margin and critical frequency over time, with the times of warning and alarm; `limits` [dB] of these."""
+    gain, sigma, state = (run.column(name) for name in ("gain_margin_dB", "gain_margin_sigma_dB", "bounce"))
+    frequency = run.column("bounce_frequency_Hz")
+    if gain is None or sigma is None or state is None or frequency is None:
+        return None
+    chosen = spread_indices(len(run.time), _POINTS)
+    time, low, high = run.time[chosen], (gain - 2.0 * sigma)[chosen], (gain + 2.0 * sigma)[chosen]
+    settled = slice(len(chosen) // 10, None)
+    shown = axis_range([low[settled], high[settled], np.array((0.0, *limits))], slice(None))
+    rows = [axis("gain margin [dB]", range=shown, weight=2.0), axis("frequency [Hz]")]
+    figure = Figure(rows, time_axis(run.end), 400)
+    for name, colour in _COLOURS.items():
+        figure.add(*_stretches(time, state[chosen], name, colour, shown))
+    figure.add(*band(time, low, high, "margin ± 2σ", "estimate-band"))
+    figure.add(line(time, gain[chosen], "gain margin", "estimate", hovertemplate="%{y:.3g} dB<extra></extra>"))
+    figure.add(
+        line(time, frequency[chosen], "critical frequency", "violet", 1, hovertemplate="%{y:.3g} Hz<extra></extra>")
+    )
+    figure.level(0.0, *limits)
+    figure.mark(run.changes)
+    return figure
+
+
+def _stretches(time: Array, state: Array, name: str, colour: str, shown: list[float] | None) -> list[Spec]:
+    """Bars at the foot of the chart while it was so."""
+    number = next(number for number, each in enum_names("lever_bounce").items() if each == name)
+    if shown is None or not (state == number).any():
+        return []
+    foot = np.where(state == number, shown[0], np.nan)
+    hover: Spec = {"hovertemplate": f"{name}<extra></extra>", "connectgaps": False}
+    return [line(time, foot, name, colour, line_width=10, **hover)]

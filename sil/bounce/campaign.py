@@ -1,0 +1,66 @@
+"""Runs conditions: each with every aircraft and seed, a task each, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..judged import result as judged
+from ..run.seeds import in_processes
+from .conditions import CONDITIONS, Condition
+from .flights import AIRCRAFT
+from .measure import FIGURES, Excerpt, Measured
+
+Show = Callable[[int, int, str], None]
+"""Progress: done, total, what."""
+
+
+@dataclass(frozen=True)
+class Result(judged.Result):
+    """A condition and what was measured."""
+
+    known = FIGURES
+    condition: Condition
+    excerpt: Excerpt | None = None
+    shown: str = ""
+    """Which flight the excerpt is of."""
+
+
+class Task(NamedTuple):
+    """One condition, aircraft and pilot."""
+
+    condition: str
+    craft: str
+    seed: int
+
+    def __str__(self) -> str:
+        return self.condition
+
+
+def measure(task: Task) -> Measured:
+    """Flies it. Raises LeverError."""
+    return CONDITIONS[task.condition].measure(task.craft, task.seed)
+
+
+def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[Result]:
+    """The results of the rows, in their order: `seeds` pilots with each of the aircraft. Rows that measure the same
+    share the flights."""
+    flights = [(craft, seed) for craft in AIRCRAFT for seed in range(seeds)]
+    flown = list({row.measure: row.name for row in reversed(rows)}.items())
+    tasks = [Task(name, *flight) for _, name in flown for flight in flights]
+    found = in_processes(measure, tasks, os.cpu_count() or 1, show)
+    own = len(flights)
+    parts = {measured: found[own * i : own * (i + 1)] for i, (measured, _) in enumerate(flown)}
+    return [_result(row, flights, parts[row.measure]) for row in rows]
+
+
+def _result(row: Condition, flights: Sequence[tuple[str, int]], found: Sequence[Measured]) -> Result:
+    values = {name: np.array([each.figures[name] for each in found]) for name in row.figures}
+    first = row.figures[0]
+    worst = int(np.argmax(values[first] if FIGURES[first].more_is_worse else -values[first]))
+    craft, seed = flights[worst]
+    return Result(row, values, excerpt=found[worst].excerpt, shown=f"{craft}, pilot {seed}")

@@ -1,0 +1,289 @@
+"""What the firmware must show in flight, for each of three aircraft and many pilots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from ..judged.result import Limit
+from . import measure, pilots
+from .flights import Plan
+from .measure import FAULT, Measured
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A row of the table."""
+
+    name: str
+    title: str
+    measure: Callable[[str, int], Measured]
+    """Of an aircraft and the seed of a pilot."""
+    limits: tuple[Limit, ...] = ()
+    """All must hold; without any the row is reported only."""
+    also: tuple[str, ...] = ()
+    """Further figures, reported without a limit."""
+    unless: tuple[Limit, ...] = ()
+    quick: bool = False
+
+    @property
+    def figures(self) -> list[str]:
+        """All that are reported."""
+        return list(dict.fromkeys((*(limit.figure for limit in self.limits), *self.also)))
+
+
+def _most(figure: str, value: float, over: str = "all") -> Limit:
+    return Limit(figure, most=value, over=over)
+
+
+def _least(figure: str, value: float, over: str = "all") -> Limit:
+    return Limit(figure, least=value, over=over)
+
+
+_COVERED = _least("margin covered", 90.0)
+
+_ALARMS = (
+    Condition(
+        "alarm",
+        "c_p from 42 to 18 N s/m in 30 s, gearing 1.1 × critical in the end: alarm before the vibration doubles",
+        measure.relaxing,
+        (_least("alarm lead", 2.0, "worst"), _least("alarm lead", 4.0, "median")),
+        ("margin at the alarm",),
+        quick=True,
+    ),
+    Condition(
+        "baselines",
+        "the same flights: alarm before those of two detectors without a model",
+        measure.relaxing,
+        (_least("ahead of ROVER", 2.0, "worst"), _least("ahead of spectrum", 2.0, "worst")),
+        ("ROVER lead", "spectrum lead"),
+        quick=True,
+    ),
+    Condition(
+        "margin",
+        "the same flights: the gain margin",
+        measure.relaxing,
+        (_COVERED, _most("margin rms", 1.0)),
+        ("margin stated",),
+        quick=True,
+    ),
+    Condition(
+        "false_alarms",
+        "600 s each of pilots who drift, grip or move, gain margin 6 dB or more",
+        partial(measure.stable, duration=600.0),
+        (_most("false alarms", 0.0), _COVERED),
+        (
+            "flight time",
+            "ROVER level",
+            "spectrum level",
+            "ROVER false alarms",
+            "spectrum false alarms",
+            "margin stated",
+        ),
+    ),
+    Condition(
+        "false_alarms_short",
+        "the same, 67 s each",
+        partial(measure.stable, duration=67.0),
+        (_most("false alarms", 0.0),),
+        ("flight time", "ROVER false alarms", "spectrum false alarms"),
+        quick=True,
+    ),
+    Condition(
+        "false_alarms_3db",
+        "the same, gain margin 3 dB or more",
+        partial(measure.stable, duration=67.0, ratio=0.708),
+        (),
+        ("false alarms", "flight time", "ROVER false alarms", "spectrum false alarms"),
+    ),
+)
+
+CANCELLATION, DAMPING, BOTH, NOTCH = "cancellation", "damping", "cancellation_and_damping", "notch"
+MITIGATIONS = (CANCELLATION, DAMPING, BOTH, NOTCH, "notch_and_damping")
+
+
+def _limit(mitigation: str, title: str, *limits: Limit, suffix: str = "", **changes: Any) -> Condition:
+    return Condition(
+        f"limit_{mitigation}{suffix}",
+        f"largest gearing with {title}",
+        partial(measure.largest_gearing, mitigation=mitigation, **changes),
+        limits,
+        () if limits else ("gearing ÷ critical",),
+        quick=mitigation == CANCELLATION and bool(limits),
+    )
+
+
+_LIMITS = (
+    _limit("none", "no mitigation"),
+    _limit(CANCELLATION, "cancellation", _least("gearing ÷ critical", 4.5, "worst")),
+    _limit(BOTH, "cancellation and lever damping", _least("gearing ÷ critical", 6.0, "worst")),
+    _limit(DAMPING, "lever damping"),
+    _limit(NOTCH, "the notch"),
+    _limit("notch_and_damping", "notch and lever damping"),
+    _limit(CANCELLATION, "cancellation, gusts of 0.1 g", suffix="_0.1g", gust=0.1),
+    _limit(BOTH, "cancellation and lever damping, gusts of 0.1 g", suffix="_0.1g", gust=0.1),
+    _limit(CANCELLATION, "cancellation that comes 5 ms later", suffix="_5ms", correction_delay=5e-3),
+    _limit(CANCELLATION, "cancellation that comes 10 ms later", suffix="_10ms", correction_delay=10e-3),
+    _limit(
+        CANCELLATION,
+        "cancellation that comes 10 ms later, as the firmware knows",
+        suffix="_10ms_told",
+        correction_delay=10e-3,
+        told_delay=11e-3,
+    ),
+)
+
+
+def _cancelled(mitigation: str, *limits: Limit) -> Condition:
+    return Condition(
+        f"involuntary_{mitigation}",
+        f"involuntary part at twice the critical gearing, {mitigation.replace('_', ' ')}",
+        partial(measure.cancelled, mitigation=mitigation),
+        limits,
+        ("involuntary cancelled", "back after a grip"),
+        quick=bool(limits) and mitigation == CANCELLATION,
+    )
+
+
+_AWAY = (
+    _least("involuntary cancelled", 90.0, "median"),
+    _least("involuntary cancelled", 80.0, "worst"),
+    _most("back after a grip", 2.0, "worst"),
+)
+
+
+def _voluntary(mitigation: str, *limits: Limit, in_flight: bool = False) -> Condition:
+    where = "in the loop, gain margin 6 dB" if in_flight else "a cabin that only gusts shake"
+    return Condition(
+        f"voluntary_{mitigation}{'_in_flight' if in_flight else ''}",
+        f"the pilot's input at 0.5 Hz, {where}, {mitigation.replace('_', ' ')}",
+        partial(measure.voluntary, mitigation=mitigation, ratio=measure.STABLE if in_flight else 0.0),
+        limits,
+        ("gain changed", "phase changed"),
+        quick=bool(limits),
+    )
+
+
+_UNTOUCHED = (_most("gain changed", 1.0, "worst"), _most("phase changed", 2.0, "worst"))
+
+
+def _more(**tables: Any) -> Callable[[Plan], Plan]:
+    """With further tables of a scenario."""
+    return lambda plan: replace(plan, more={**plan.more, **tables})
+
+
+def _stuck_with(name: str, factor: float) -> Callable[[Plan], Plan]:
+    """The firmware takes a parameter for so many times what it is, and the others for what they are, and learns
+    nothing."""
+
+    def spoil(plan: Plan) -> Plan:
+        arm = pilots.arm(plan.seed, pilots.SLACK)
+        settings = {each: arm[each] * (factor if each == name else 1.0) for each in ("m_p", "c_p", "k_p")}
+        settings |= dict.fromkeys(("m_p_sigma", "c_p_sigma", "k_p_sigma"), 1e-3)
+        settings |= dict.fromkeys(("m_p_walk", "c_p_walk", "k_p_walk"), 0.0)
+        return _more(settings=settings, estimator={"adaptation": "fixed"})(plan)
+
+    return spoil
+
+
+def _held_by(pilot: Mapping[str, Any]) -> Callable[[Plan], Plan]:
+    """By one whose arm is another."""
+    return lambda plan: replace(plan, pilot={**pilot, "trim": plan.pilot["trim"]}, dither=_dither_of(pilot, plan))
+
+
+def _dither_of(pilot: Mapping[str, Any], plan: Plan) -> float:
+    return 0.0 if pilot["model"] == "hand" else plan.dither
+
+
+def _wrong(name: str, title: str, spoil: Callable[[Plan], Plan], quick: bool = False) -> Condition:
+    return Condition(
+        f"wrong_{name}",
+        f"{title}, gearing 0.7 × critical",
+        partial(measure.wrong, mitigations=MITIGATIONS, spoil=spoil),
+        (_most("destabilised", 0.0),),
+        ("vibration ÷ passive", "angle ÷ passive"),
+        quick=quick,
+    )
+
+
+def _left(name: str, title: str, spoil: Callable[[Plan], Plan]) -> Condition:
+    return Condition(
+        f"limit_{name}",
+        f"largest gearing with cancellation, {title}",
+        partial(measure.largest_gearing, mitigation=CANCELLATION, spoil=spoil),
+        also=("gearing ÷ critical",),
+    )
+
+
+_TRUNK = {"model": "two_dof", "m_p": "3.2 kg", "c_p": "30 N s/m", "k_p": "2100 N/m"}
+_SPOILT: tuple[tuple[str, str, Callable[[Plan], Plan]], ...] = (
+    *(
+        (f"{name}_{word}", f"{name} {sign} 30 %, and held there", _stuck_with(name, factor))
+        for name in ("m_p", "c_p", "k_p")
+        for word, sign, factor in (("high", "+", 1.3), ("low", "−", 0.7))
+    ),
+    ("mayo_ectomorphic", "Mayo's ectomorphic pilot", _held_by({"model": "hand", "somatotype": "ectomorphic"})),
+    ("mayo_mesomorphic", "Mayo's mesomorphic pilot", _held_by({"model": "hand", "somatotype": "mesomorphic"})),
+    ("two_dof", "arm on a trunk on a seat", _held_by(_TRUNK)),
+    ("base_late", "accelerometer 5 ms late", _more(sensors={"z_ddot": {"noise": "0.01 m/s^2", "delay": "5 ms"}})),
+    ("friction", "Coulomb friction of 0.3 N m", _more(lever={"lever_friction": "0.3 N m"})),
+)
+_WRONG = (
+    *(_wrong(name, title, spoil, quick=name == "k_p_low") for name, title, spoil in _SPOILT),
+    *(_left(name, title, spoil) for name, title, spoil in _SPOILT),
+)
+
+
+def _fault(name: str, title: str, spoil: Callable[[Plan], Plan], quick: bool = False) -> Condition:
+    return Condition(
+        f"fault_{name}",
+        f"{title} in mid-mitigation, twice the critical gearing",
+        partial(measure.faulty, mitigation=BOTH, spoil=spoil),
+        (_most("to zero", 0.1, "worst"), _most("jump", 0.2, "worst")),
+        quick=quick,
+    )
+
+
+def _sensor(what: str, noise: str, **fault: str) -> Callable[[Plan], Plan]:
+    return _more(sensors={what: {"noise": noise, "fault": [{**fault, "start": f"{FAULT} s"}]}})
+
+
+def _dropped(*what: str) -> Callable[[Plan], Plan]:
+    gone = [{"what": each, "share": "100 %", "start": f"{FAULT} s"} for each in what]
+    return _more(sensors={"dropout": gone})
+
+
+_FAULTS = (
+    _fault("base_invalid", "z̈ marked invalid", _dropped("z_ddot"), quick=True),
+    _fault("lever_invalid", "θ and θ̇ marked invalid", _dropped("theta", "theta_dot")),
+    _fault("lever_lost", "LEVER_SAMPLE lost", _dropped("lever_frame")),
+    _fault("sample_lost", "samples never come", _dropped("lever_frame", "base_frame"), quick=True),
+    _fault("clock", "the sample clock stands", lambda plan: replace(plan, clock_stops=FAULT), quick=True),
+    _fault("base_stuck", "z̈ stuck but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="stuck")),
+    _fault("base_zero", "z̈ zero but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="0 %")),
+    _fault("base_sign", "z̈ of the wrong sign", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="-100 %")),
+    _fault("theta_stuck", "θ stuck but “valid”", _sensor("theta", "1 mrad", kind="stuck")),
+)
+
+CONDITIONS = {
+    row.name: row
+    for row in (
+        *_ALARMS,
+        *_LIMITS,
+        _cancelled(CANCELLATION, *_AWAY),
+        _cancelled(BOTH),
+        _cancelled(NOTCH),
+        _voluntary(CANCELLATION, *_UNTOUCHED),
+        _voluntary(DAMPING),
+        _voluntary(BOTH),
+        _voluntary(NOTCH),
+        _voluntary(CANCELLATION, in_flight=True),
+        _voluntary(BOTH, in_flight=True),
+        _voluntary(NOTCH, in_flight=True),
+        *_WRONG,
+        *_FAULTS,
+    )
+}
+"""All by name, in the order of the table."""

@@ -1,0 +1,50 @@
+"""Two flights of one pilot who relaxes, with mitigation and without: the first picture of the demo's report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from lever_cdkf.host_tools.firmware.library import lib
+from lever_cdkf.host_tools.report.figure import Figure, axis, band, line, time_axis
+from lever_cdkf.host_tools.report.page import Story
+from lever_cdkf.host_tools.units import GRAVITY
+
+from . import pilots
+from .conditions import BOTH
+from .flights import STRIDE, Plan, fly
+from .measure import geared
+
+TITLE = "Seen coming, and stopped"
+CAPTION = (
+    "A pilot in a UH-60-like helicopter in gusts of 0.05 g relaxes: from 10 to 40 s the damping of his arm falls from "
+    "42 to 18 N s/m, and with it the gain margin of the loop through arm, lever and rotor. The same flight twice: "
+    "without mitigation it ends in a limit cycle, with cancellation and lever damping it goes on. The dotted line is "
+    "where the firmware raises its alarm; it knows the helicopter by a table of its response. Made by the same "
+    "simulation as <code>lever bounce</code>."
+)
+_BEYOND = 1.2  # gearing over critical in the end
+_MOST = 15.0  # [dB]
+
+
+def tell() -> Story:
+    """Margin, lever and cabin in both flights. Raises LeverError."""
+    plan = geared(Plan("uh60_like", 1, pilots.relaxing(1), 1.0), _BEYOND)
+    without, mitigated = fly(plan), fly(replace(plan, mitigation=BOTH))
+    rows = [axis("gain margin [dB]", range=[-5.0, _MOST]), axis("lever [°]"), axis("cabin [g]")]
+    figure = Figure(rows, time_axis(plan.duration), height=520)
+    time, said = mitigated.notes[::5], mitigated.stability[::5]
+    margin, sigma = (np.minimum(said[name], _MOST) for name in ("gain_margin", "gain_margin_sigma"))
+    figure.add(*band(time, margin - 2.0 * sigma, np.minimum(margin + 2.0 * sigma, _MOST), "±2σ", "estimate-band"))
+    true = np.minimum(mitigated.margins(5), _MOST)
+    figure.add(line(time, true, "margin without mitigation, truth", "truth", line_dash="dash", zorder=1))
+    figure.add(line(time, margin, "estimate", "estimate"))
+    for flown, name, colour in ((without, "without mitigation", "fault"), (mitigated, "with it", "good")):
+        angle, z_ddot = np.degrees(flown.theta - flown.theta[0]), flown.z_ddot / GRAVITY
+        figure.add(
+            line(time, angle[:: 5 * STRIDE], name, colour, 1), line(time, z_ddot[:: 5 * STRIDE], name, colour, 2)
+        )
+    figure.level(0.0)
+    alarms = mitigated.notes[mitigated.stability["state"] == lib.LEVER_BOUNCE_ALARM]
+    figure.mark(alarms[:1].tolist())
+    return Story(TITLE, figure, CAPTION)

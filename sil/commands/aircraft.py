@@ -1,0 +1,87 @@
+"""`lever aircraft`, and the aircraft of `lever replay --aircraft`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
+
+_DESCRIPTION = """\
+Prints the response of a helicopter to its collective lever, from 1.5 to 8 Hz, as a file for `lever_can --aircraft` and
+`lever replay --aircraft`: with it the estimator watches the gain margin to collective bounce. Without AIRCRAFT, lists
+those that there are.
+
+AIRCRAFT is one of them, or a .toml file with the keys of theirs. KEY=VALUE after it changes one (delay=30 ms), and says
+  gearing                  pitch of the blades over the lever's angle (default: 1)
+  gain_sigma, phase_sigma  how well the response is known [1, rad] (default: 0.05)
+  warning, alarm           gain margins below which there is one [dB] (default: 3, 1.5)
+
+A response that was measured or computed elsewhere is written by hand in the same form.
+"""
+_EPILOG = """\
+examples:
+  lever aircraft
+  lever aircraft uh60_like gearing=0.5 -o uh60.response
+  lever replay session.log --aircraft uh60.response -o out/session
+"""
+_SAID = {"gain_sigma": 0.05, "phase_sigma": 0.05}
+_LIMITS = ("warning", "alarm")
+_BAND, _POINTS = (1.5, 8.0), 24
+"""Of bounce [Hz]."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "aircraft",
+        help="the response of a helicopter, for the margin to bounce",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+    )
+    parser.add_argument("aircraft", nargs="?", metavar="AIRCRAFT", help="a name, or a .toml file")
+    parser.add_argument("changes", nargs="*", metavar="KEY=VALUE", help="what is other than there")
+    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write it into FILE")
+
+
+def run(args: argparse.Namespace) -> int:
+    from lever_cdkf.host_tools.files import write_text
+    from lever_cdkf.host_tools.provenance import provenance
+    from lever_cdkf.host_tools.tables import print_tables
+
+    from ..aircraft import aircraft
+
+    if args.aircraft is None:
+        print_tables({"aircraft": [{"name": name, "what": aircraft.load(name).title} for name in aircraft.names()]})
+        return 0
+    text = provenance().comment() + response(args.aircraft, args.changes).text()
+    if args.out is None:
+        print(text, end="")
+    else:
+        write_text(args.out, text)
+    return 0
+
+
+def response(name: str, changes: list[str]) -> AircraftResponse:
+    """Of an aircraft by its name or .toml file. Raises LeverError."""
+    import numpy as np
+    from lever_cdkf.host_tools.errors import LeverError
+    from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
+
+    from ..aircraft.aircraft import read_aircraft
+    from ..toml_tables import Place
+
+    given = {key.strip(): value.strip() for key, _, value in (change.partition("=") for change in changes)}
+    said: dict[str, float] = dict(_SAID)
+    for key in (*_SAID, *_LIMITS):
+        if key in given:
+            try:
+                said[key] = float(given.pop(key))
+            except ValueError:
+                raise LeverError(f"{key} must be a number") from None
+    gearing = given.pop("gearing", "1")
+    coupled = read_aircraft({"model": name, **given, "gearing": f"{gearing} 1"}, Place("aircraft"))
+    frequency = np.geomspace(*_BAND, _POINTS)
+    values = coupled.response(2j * np.pi * frequency.astype(np.complex128))
+    return AircraftResponse(frequency.tolist(), values.tolist(), **said)

@@ -1,0 +1,132 @@
+"""What `lever envelope` and `lever bounce` have in common: conditions, run for many seeds and held against limits."""
+
+from __future__ import annotations
+
+import argparse
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.extras import require
+from lever_cdkf.host_tools.files import make_folder, write_text
+from lever_cdkf.host_tools.layout import say
+
+from .names import check_names
+
+if TYPE_CHECKING:
+    from ..judged.result import Judged, Result
+
+Row = TypeVar("Row", bound="Judged")
+Show = Callable[[int, int, str], None]
+"""Progress: done, total, what."""
+
+
+class JudgedCommand(ABC, Generic[Row]):
+    """A sub-command of `lever`; what it needs is imported when it is."""
+
+    name: str
+    """Of the sub-command, and of the page without .html."""
+    about: str
+    description: str
+    epilog: str
+    each: str
+    """What a seed is."""
+    seeds = 20
+    quick_seeds = 3
+
+    @abstractmethod
+    def conditions(self) -> Mapping[str, Row]:
+        """All by name, in the order of the table."""
+
+    @abstractmethod
+    def measure(self, chosen: Sequence[Row], seeds: int, show: Show) -> Sequence[Result]:
+        """Their results, in order."""
+
+    @abstractmethod
+    def page(self, results: Sequence[Result], seeds: int) -> str:
+        """As HTML."""
+
+    def add_parser(self, subparsers: argparse._SubParsersAction[Any]) -> None:
+        """The command line."""
+        parser = subparsers.add_parser(self.name, help=self.about, description=self.description, epilog=self.epilog)
+        parser.add_argument("--list", action="store_true", help="print the conditions and their limits, and stop")
+        parser.add_argument(
+            "--quick", action="store_true", help=f"some conditions, {self.quick_seeds} {self.each} each"
+        )
+        parser.add_argument(
+            "--seeds", type=int, metavar="N", help=f"random {self.each} a condition (default: {self.seeds})"
+        )
+        parser.add_argument("--only", nargs="+", metavar="NAME", help="conditions of --list (default: all)")
+        parser.add_argument(
+            "-o",
+            "--out",
+            metavar="DIR",
+            type=Path,
+            default=Path(f"lever_{self.name}"),
+            help=f"folder for the page, {self.name}.html (default: %(default)s)",
+        )
+        parser.add_argument(
+            "--json", metavar="FILE", help='also write the rows to FILE: {"rows": [{"name", "measured", …}], …}'
+        )
+        parser.set_defaults(run=self.run)
+
+    def run(self, args: argparse.Namespace) -> int:
+        """The sub-command."""
+        from lever_cdkf.host_tools.progress import Progress
+        from lever_cdkf.host_tools.tables import print_tables
+
+        from ..judged import table
+
+        if args.list:
+            print_tables({"conditions": [_listed(condition) for condition in self.conditions().values()]}, args.json)
+            return 0
+        require("report")
+        chosen = self._chosen(args)
+        seeds = args.seeds if args.seeds is not None else self.quick_seeds if args.quick else self.seeds
+        if not 1 <= seeds <= 1000:
+            raise LeverError(f"--seeds {seeds}: must be from 1 to 1000")
+        make_folder(args.out)  # before a campaign that could then not be kept
+        with Progress(self.name) as progress:
+            results = self.measure(chosen, seeds, progress.show)
+        print_tables({f"{seeds} random {self.each} a condition": table.lines(results)})
+        missed = [result.condition.name for result in results if not result.ok]
+        judged = sum(bool(result.condition.limits) for result in results)
+        say(
+            f"{judged - len(missed)} of {judged} conditions hold."
+            + (f" Missed: {', '.join(missed)}." if missed else "")
+        )
+        self._write(args, results, seeds)
+        return 1 if missed else 0
+
+    def _write(self, args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
+        """The files that were asked for."""
+        import json
+        from dataclasses import asdict
+
+        from lever_cdkf.host_tools.provenance import provenance, with_provenance
+
+        from ..judged import table
+
+        origin = provenance()
+        if args.json is not None:
+            content = {"rows": table.rows(results), "provenance": asdict(origin)}
+            write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        write_text(args.out / f"{self.name}.html", with_provenance(self.page(results, seeds), origin))
+        say(f"Written to {args.out}: {self.name}.html")
+
+    def _chosen(self, args: argparse.Namespace) -> list[Row]:
+        """The conditions that were asked for. Raises LeverError for one that is not known."""
+        conditions = self.conditions()
+        check_names("condition", args.only or (), conditions, f"lever {self.name} --list")
+        if args.only:
+            return [conditions[name] for name in dict.fromkeys(args.only)]
+        return [condition for condition in conditions.values() if condition.quick or not args.quick]
+
+
+def _listed(condition: Judged) -> dict[str, str | bool]:
+    limits = ", ".join(f"{limit.figure} {limit}" for limit in condition.limits)
+    instead = ", ".join(f"{limit.figure} {limit}" for limit in condition.unless)
+    text = f"{limits}; or {instead}" if instead else limits or "reported only"
+    return {"name": condition.name, "quick": condition.quick, "title": condition.title, "must": text}

@@ -1,0 +1,62 @@
+"""An aircraft by its frequency response: read from a file, its margins, and the firmware's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.sil.aircraft import aircraft, stability
+from lever_cdkf.sil.aircraft.aircraft import Coupled
+from lever_cdkf.sil.aircraft.tabulated import Tabulated
+from lever_cdkf.sil.plants import lever_plant
+from python.aircraft.loops import loop_of
+from python.plants.motion import LEVER, TRIM, columns
+
+FREQUENCY = np.geomspace(1.0, 10.0, 60)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The response of a coupled aircraft, at 60 frequencies."""
+    response = Coupled(aircraft.load("puma_like"), 0.4).response(2j * np.pi * FREQUENCY.astype(np.complex128))
+    rows = (f"{f}, {z.real}, {z.imag}" for f, z in zip(FREQUENCY, response, strict=True))
+    path = tmp_path / "response.csv"
+    path.write_text("\n".join(("# of a flight test", "frequency_Hz, real, imaginary", *rows)), encoding="utf-8")
+    return path
+
+
+def test_its_margins_are_those_of_the_aircraft_it_is_of(file: Path) -> None:
+    tabulated, coupled = Tabulated.load(file), Coupled(aircraft.load("puma_like"), 0.4)
+    transfer = lever_plant.LeverTruth(LEVER, lever_plant.Truth(*columns(1, 2.5, 25.0, 1500.0, TRIM)), "trim").transfer(
+        np.array([0])
+    )
+    known, found = (stability.margins(loop_of(each, transfer, 0), tabulated.band) for each in (coupled, tabulated))
+    assert tabulated.band == pytest.approx((1.0, 10.0))
+    assert found.gain_db == pytest.approx(known.gain_db, abs=0.05)
+    assert found.frequency == pytest.approx(known.frequency, rel=2e-3)
+    assert found.modulus == pytest.approx(known.modulus, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("content", "error"),
+    [
+        ("f, re, im\n1, 2, 3\n2, 3\n", "line 3: must be three numbers"),
+        ("1, 2, 3\n2, 3, nan\n", "line 2: must be three numbers"),
+        ("1, 2, 3\n1, 3, 4\n", "line 2: the frequencies must rise"),
+        ("0, 2, 3\n1, 3, 4\n", "line 1: the frequencies must rise"),
+        ("1, 2, 3\n2, 3, 4\n", "2 frequencies; a response has at least 3"),
+        (b"\xff\xfe", "not text in UTF-8"),
+    ],
+)
+def test_what_is_no_response_is_refused(tmp_path: Path, content: str | bytes, error: str) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(LeverError, match=error):
+        Tabulated.load(path)
+
+
+def test_a_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(LeverError, match=r"none\.csv: No such file"):
+        Tabulated.load(tmp_path / "none.csv")

@@ -1,0 +1,124 @@
+"""The margin to collective bounce of a recorded log: in every file of a replay, and in the views of a bus."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.logs import Recording
+from lever_cdkf.host_tools.can.traffic import Traffic, read_samples
+from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse, read_response
+from lever_cdkf.host_tools.firmware.native import Config, Estimator
+from lever_cdkf.host_tools.watch import panels, status
+from lever_cdkf.host_tools.watch.picture import Picture
+from lever_cdkf.host_tools.watch.sources import LogSource
+from lever_cdkf.sil.commands.aircraft import response
+from python.conftest import Refused, Session
+from python.report.reading import figures, read
+
+CHANGED = "uh60_like,gearing=0.5,warning=30"
+
+
+@pytest.fixture(scope="module")
+def out(session: Session, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("watched") / "out"
+    arguments = ["--aircraft", CHANGED, "--format", "csv,mf4,mcap,parquet", "-o", str(folder)]
+    assert cli.main(["replay", str(session.log), *arguments]) == 0
+    return folder
+
+
+def test_the_margin_is_that_of_the_estimator_with_the_same_samples(session: Session, out: Path) -> None:
+    """But for its steps on the bus."""
+    estimator = Estimator(Config())
+    estimator.watch(response("uh60_like", ["gearing=0.5", "warning=30"]))
+    samples = read_samples(Traffic(Recording([session.log])))
+    for row in zip(*(samples[name] for name in ("time_us", "theta", "theta_dot", "tau_m", "z_ddot")), strict=True):
+        time_us, *values = (float(value) for value in row)
+        estimator.update(int(time_us), *(None if np.isnan(value) else value for value in values))
+    expected = estimator.stability()
+    trace = np.genfromtxt(out / "trace.csv", delimiter=",", names=True)
+    for column, value, step in (
+        ("gain_margin_dB", expected.gain_margin, 0.02),
+        ("gain_margin_sigma_dB", expected.gain_margin_sigma, 0.04),
+        ("modulus", expected.modulus, 0.01),
+        ("bounce_frequency_Hz", expected.frequency, 0.01),
+    ):
+        assert trace[column][-1] == pytest.approx(value, abs=step)
+
+
+def test_every_file_has_it(out: Path) -> None:
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["stability"]["warning_db"] == 30.0
+    assert summary["stability"]["states_s"]["warning"] > 1.0
+    assert "The gain margin to collective bounce was least at" in summary["verdict"]
+    assert set(pyarrow.parquet.read_table(out / "trace.parquet")["bounce"].to_pylist()) >= {"warning"}
+    assert "figure-stability" in figures(read(out / "report.html"))
+    assert cli.main(["replay", str(out / "trace.parquet"), "-o", str(out.parent / "again")]) == 0
+
+
+def test_without_an_aircraft_there_is_none(session: Session, tmp_path: Path) -> None:
+    assert cli.main(["replay", str(session.log), "-o", str(tmp_path)]) == 0
+    assert json.loads((tmp_path / "summary.json").read_text())["stability"] is None
+    assert "bounce" not in (tmp_path / "trace.csv").read_text().partition("\n")[0]
+
+
+def test_a_view_of_the_bus_shows_it(out: Path) -> None:
+    picture, source = Picture(), LogSource(str(out / "bus.log"), None)
+    source.read_into(picture)
+    level, text = status.condition(picture)
+    assert (level, text[:40]) == ("watch", "collective bounce, warning: gain margin ")
+    from rich.console import Console
+
+    console = Console(width=100)
+    with console.capture() as capture:
+        console.print(panels.health(picture, source))
+    assert "warning: gain margin" in capture.get()
+
+
+# --- aircraft as files -----------------------------------------------------------------------------------------------
+
+
+def test_a_file_holds_the_response(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "uh60.response"
+    assert cli.main(["aircraft", "uh60_like", "gearing=0.5", "alarm=1", "-o", str(path)]) == 0
+    written, kept = response("uh60_like", ["gearing=0.5", "alarm=1"]).pointer, read_response(str(path)).pointer
+    assert written.count == kept.count == 24
+    for name in ("frequency", "real", "imaginary"):
+        assert list(getattr(kept, name)) == pytest.approx(list(getattr(written, name)), rel=1e-5)
+    for name in ("gain_sigma", "phase_sigma", "warning", "alarm"):
+        assert getattr(kept, name) == pytest.approx(getattr(written, name))
+    assert cli.main(["aircraft"]) == 0
+    assert "puma_like" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("gain_sigma = 0.1\n1 2 3\n", "It needs a line phase_sigma = number"),
+        ("gain_sigma = 0.1\n1 2\n", ":2: neither"),
+        ("gain = 0.1\n", ":1: neither"),
+        ("gain_sigma = much\n", ":1: neither"),
+        ("gain_sigma = 0.1\nphase_sigma = 0.1\n1 2 3\n", "has 3 to 24 frequencies"),
+        ("gain_sigma = 0.1\nphase_sigma = 0.1\n1 2 3\n2 3 4\n2 3 4\n", "frequencies must rise"),
+    ],
+)
+def test_what_is_no_response(content: str, said: str, session: Session, tmp_path: Path, refused: Refused) -> None:
+    (tmp_path / "it.response").write_text(content)
+    assert said in refused("replay", session.log, "--aircraft", tmp_path / "it.response")
+
+
+def test_what_is_no_aircraft(session: Session, refused: Refused) -> None:
+    assert "no aircraft 'uh61'" in refused("replay", session.log, "--aircraft", "uh61")
+    assert "gain_sigma must be a number" in refused("replay", session.log, "--aircraft", "uh60_like,gain_sigma=x")
+
+
+def test_the_contract_has_a_word_for_each_state() -> None:
+    choices = codec.message("STABILITY").get_signal_by_name("bounce").choices
+    assert choices is not None
+    assert [str(word) for word in choices.values()] == ["unknown", "clear", "warning", "alarm"]
+    assert AircraftResponse([1.0, 2.0, 3.0], [1j] * 3, gain_sigma=0.0, phase_sigma=0.0).warning == 3.0

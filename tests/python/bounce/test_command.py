@@ -1,0 +1,60 @@
+"""`lever bounce`: a reduced part of the table in every test run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.sil.bounce import bounce_page, campaign, conditions
+from lever_cdkf.sil.bounce.conditions import CONDITIONS, Condition
+from lever_cdkf.sil.bounce.measure import FIGURES, Measured
+from lever_cdkf.sil.judged.result import Limit
+from python.conftest import Refused
+
+
+def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status = cli.main(
+        ["bounce", "--quick", "--seeds", "1", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]
+    )
+    printed = capsys.readouterr().out
+    rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
+    written = (tmp_path / "bounce.html").read_text(encoding="utf-8")
+    assert set(rows) == {name for name, row in CONDITIONS.items() if row.quick}
+    assert all(name in printed and f'id="{name}"' in written for name in rows)
+    assert {name: row["measured"] for name, row in rows.items() if not row["ok"]} == {}
+    assert status == 0
+
+
+def test_every_figure_is_one_that_is_known() -> None:
+    for row in CONDITIONS.values():
+        assert row.figures
+        assert set(row.figures) <= set(FIGURES)
+        assert row.measure.__call__
+
+
+def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
+    def measured(craft: str, seed: int) -> Measured:
+        return Measured({"alarm lead": float(len(craft) + 10 * seed)})
+
+    row = Condition("made_up", "title", measured, (Limit("alarm lead", least=10.0, over="worst"),))
+    monkeypatch.setattr(campaign, "CONDITIONS", {"made_up": row})
+    monkeypatch.setattr(campaign.os, "cpu_count", lambda: 1)
+    (result,) = campaign.run([row], 2, lambda *_: None)
+    assert sorted(result.values["alarm lead"].tolist()) == [9.0, 9.0, 10.0, 19.0, 19.0, 20.0]
+    assert not result.ok
+    assert result.shown == "uh60_like, pilot 0"
+    assert "MISSED" in bounce_page.build([result], 2)
+    assert np.isclose(result.of(row.limits[0]), 9.0)
+
+
+def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bounce", "--list"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in conditions.CONDITIONS)
+
+
+def test_bad_input_is_one_line(refused: Refused) -> None:
+    assert "did you mean alarm?" in refused("bounce", "--only", "alrm")

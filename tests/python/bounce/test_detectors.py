@@ -1,0 +1,53 @@
+"""The detectors that the alarm is compared with, on made-up oscillations."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.sil.bounce import detectors
+from lever_cdkf.sil.bounce.detectors import RATE, Watched
+
+TIME = np.arange(20 * RATE) / RATE
+ANSWER = cmath.rect(100.0, -1.2)
+"""z_ddot / delta [m/s^2 per rad]."""
+
+
+def oscillating(amplitude: float, frequency: float = 4.0, phase: float = 0.0) -> Watched:
+    """z_ddot [m/s^2], and a lever that makes it so but for a phase; noise of a hundredth."""
+
+    def sine(shift: float) -> FloatArray:
+        return np.sin(2.0 * math.pi * frequency * TIME + shift)
+
+    noise = np.random.default_rng(1).standard_normal((2, len(TIME))) * 0.01 * amplitude
+    lever = amplitude * (sine(phase - cmath.phase(ANSWER)) + noise[0]) * detectors.LEVER_UNIT
+    return Watched(lever, amplitude * (sine(0.0) + noise[1]))
+
+
+def test_rover_finds_the_amplitude_of_an_oscillation_of_the_coupling() -> None:
+    level = detectors.rover(oscillating(0.7), lambda s: ANSWER)
+    assert level[5 * RATE :].min() == pytest.approx(0.7, rel=0.15)
+    assert level[: round(0.3 * RATE)].max() == 0.0
+
+
+@pytest.mark.parametrize(("frequency", "phase"), [(1.0, 0.0), (4.0, 2.0), (4.0, -2.0), (4.0, math.pi)])
+def test_rover_does_not_take_other_oscillations_for_it(frequency: float, phase: float) -> None:
+    level = detectors.rover(oscillating(0.7, frequency, phase), lambda s: ANSWER)
+    assert level[5 * RATE :].max() < 0.1
+
+
+def test_the_spectrum_has_the_amplitude_of_an_oscillation() -> None:
+    level = detectors.spectrum(oscillating(0.7))
+    assert level[-1] == pytest.approx(0.7, rel=0.05)
+    risen = TIME[int(np.argmax(level > 0.7 * (1.0 - math.exp(-1.0))))]
+    assert risen == pytest.approx(detectors.MEMORY, rel=0.1)
+    assert detectors.spectrum(oscillating(0.7, 0.5))[-1] < 0.1
+
+
+def test_signals_are_watched_by_their_means() -> None:
+    watched = Watched.of(np.arange(1010.0), np.ones(1010), 1e-3)
+    assert len(watched.theta) == len(watched.z_ddot) == 50
+    assert watched.theta[:2].tolist() == [9.5, 29.5]

@@ -1,0 +1,50 @@
+"""The flights of `lever bounce` against stability.margins() and closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.firmware.library import lib
+from lever_cdkf.sil.aircraft import aircraft, stability
+from lever_cdkf.sil.aircraft.aircraft import Coupled
+from lever_cdkf.sil.bounce import flights, measure, pilots
+from lever_cdkf.sil.bounce.flights import AIRCRAFT, Plan
+from python.aircraft.loops import loop_of
+
+
+@pytest.mark.parametrize("craft", AIRCRAFT)
+def test_the_critical_gearing_is_that_of_the_margins(craft: str) -> None:
+    plan = Plan(craft, 3, pilots.relaxing(3), 1.0, duration=60.0)
+    transfer = flights.truth_of(plan).transfer(np.array([0, 1500, 2999]))
+    found = flights.critical_gearing(aircraft.load(craft), transfer)
+    loops = (loop_of(Coupled(aircraft.load(craft), 1.0), transfer, row) for row in range(3))
+    assert found == pytest.approx([stability.margins(loop).gain for loop in loops], rel=2e-3)  # 0.02 dB
+
+
+def test_a_gearing_goes_up_after_a_while() -> None:
+    plan = measure.raised(Plan("puma_like", 1, pilots.table(pilots.arm(1)), 1.0, duration=30.0), 3.0)
+    least = plan.gearing / 3.0
+    assert plan.gearings(np.array([0.0, 20.0, 22.5, 25.0])) == pytest.approx(least * np.array([0.5, 0.5, 1.75, 3.0]))
+    margins = flights.fly(plan).margins(50)
+    assert margins[0] == pytest.approx(20.0 * math.log10(2.0), abs=1e-3)
+    assert margins[-1] == pytest.approx(-20.0 * math.log10(3.0), abs=1e-3)
+
+
+def test_a_flight_is_quiet_or_a_limit_cycle() -> None:
+    """Without mitigation, on both sides of the critical gearing."""
+    plan = Plan("uh60_like", 2, pilots.table(pilots.arm(2, pilots.SLACK)), 1.0)
+    quiet, loud = (flights.fly(measure.raised(plan, ratio)) for ratio in (0.5, 1.5))
+    assert np.abs(quiet.z_ddot[40_000:]).max() < 3.0
+    assert np.abs(loud.z_ddot[40_000:]).max() > 5.0
+    assert not quiet.correction.any()
+
+
+def test_a_stopped_clock_is_one() -> None:
+    plan = Plan("uh60_like", 1, pilots.table(pilots.arm(1)), 0.2, duration=3.0, clock_stops=2.0)
+    flown = flights.fly(plan)
+    faults: FloatArray = flown.health["faults"]
+    assert not (faults[flown.notes < 2.0] & lib.LEVER_FAULT_CLOCK).any()
+    assert (faults[flown.notes > 2.1] & lib.LEVER_FAULT_CLOCK).all()

@@ -1,0 +1,86 @@
+"""Figures of maps: what is drawn where, in print, in a browser and as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from lever_cdkf.sil.study.figures import data, figures_page, maps, printed
+from lever_cdkf.sil.study.figures.maps import Chart, Line, MapFigure, Scale
+from numpy.typing import NDArray
+from PIL import Image
+from python.report.reading import figures, read
+
+NOISE = Scale("process noise [rad/s/sqrt(s)]", (0.01, 0.1, 1.0), is_log=True)
+NAMED = Scale("adaptation", ("fixed", "robbins_monro"))
+RATES = Scale("parameter rate [%/sqrt(s)]", (1.0, 3.0, 10.0, 30.0))
+VALUES = np.array(((10.0, 20.0, 30.0), (40.0, 50.0, np.nan)))
+BORDER = Line((0, 1), np.array((-np.inf, 0.3)), np.array((-np.inf, 0.2)), np.array((0.05, np.inf)))
+
+
+def made() -> MapFigure:
+    """Two estimators at four rates; the charts of each rate are brighter by one."""
+    rows = tuple(tuple(Chart(VALUES + column, BORDER) for column in range(4)) for _ in range(2))
+    return MapFigure(
+        "map", "Map", "what it is", "error [%]", (0.0, 60.0), False, ("dual", "joint"), RATES, NOISE, NAMED, rows
+    )
+
+
+@pytest.mark.parametrize("width", ["single", "double"])
+def test_no_label_lies_on_another(width: str) -> None:
+    sheet = printed.sheet(made(), width)
+    texts = list(sheet.texts)
+    for axes in sheet.axes:
+        texts += [axes.title, axes.xaxis.label, axes.yaxis.label]
+        texts += [text for tick in (*axes.xaxis.get_major_ticks(), *axes.yaxis.get_major_ticks())
+                  for text in (tick.label1, tick.label2)]  # fmt: skip
+    boxes = [text.get_window_extent() for text in texts if text.get_text() and text.get_visible()]
+    assert len(boxes) > 20
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+
+
+def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -> None:
+    figure = made()
+    pixels = np.asarray(Image.open(io.BytesIO(printed.render(figure, "png", "double"))).convert("RGB")).astype(int)
+    first = printed.sheet(figure, "double").axes[0]
+
+    def colour(x: float, y: float) -> NDArray[np.int64]:
+        across, up = first.transData.transform((x, y))
+        found: NDArray[np.int64] = pixels[round(len(pixels) - up), round(across)]
+        return found
+
+    for value, x, y in ((30.0, np.log(1.0), 0.3), (20.0, np.log(0.12), -0.3), (50.0, np.log(0.05), 1.3)):
+        wanted = 255.0 * np.array(mpl.colormaps["viridis_r"](value / 60.0)[:3])
+        assert np.abs(colour(x, y) - wanted).max() < 3.0, (value, colour(x, y), wanted)
+    assert (colour(np.log(1.0), 1.3) == 255).all()  # no value
+    assert np.abs(colour(np.log(0.3), 1.0) - (230, 60, 60)).max() < 12
+
+
+def test_the_page_has_every_value_and_the_line_inside_the_map(tmp_path: Path) -> None:
+    spec = maps.spec(made())
+    heats = [trace for trace in spec["data"] if trace["type"] == "heatmap"]
+    assert len(heats) == 8
+    assert heats[2]["z"] == [[12.0, 22.0, 32.0], [42.0, 52.0, None]]
+    assert (heats[2]["x"], heats[2]["y"]) == ([0.01, 0.1, 1.0], [0.0, 1.0])
+    lines = [trace for trace in spec["data"] if trace["type"] == "scatter"]
+    assert lines[1]["x"] == pytest.approx([0.01, 0.3])
+    assert lines[0]["x"] == pytest.approx([0.01, 0.2, 1.0, 0.05])
+    assert lines[0]["y"] == [0.0, 1.0, 1.0, 0.0]
+    (tmp_path / "page.html").write_text(figures_page.build([made()]), encoding="utf-8")
+    assert list(figures(read(tmp_path / "page.html"))) == ["map-0"]
+
+
+def test_the_table_has_cells_and_border() -> None:
+    rows = list(csv.DictReader(data.table(made()).splitlines()))
+    assert len(rows) == 8 * (6 + 2)
+    cells = [row for row in rows if row["chart"] == "joint" and row[RATES.label] == "3.0" and row["series"] == ""]
+    assert [row["value"] for row in cells] == ["11", "21", "31", "41", "51", ""]
+    border = [row for row in rows if row["series"] == "border"][:2]
+    assert [(row["adaptation"], row["value"], row["low"], row["high"]) for row in border] == [
+        ("fixed", "-inf", "-inf", "0.05"), ("robbins_monro", "0.3", "0.2", "inf"),
+    ]  # fmt: skip
