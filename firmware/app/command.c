@@ -21,7 +21,6 @@ static void carry_out(estimator_t *estimator, const lever_command_t *command)
     restart = choose(&setup->model, command->model) || restart;
     restart = choose(&setup->preload, command->preload) || restart;
     restart = choose(&setup->estimator, command->estimator) || restart;
-    (void)choose(&setup->mitigation, command->mitigation);
     if (choose(&setup->adaptation, command->adaptation)) {
         const adaptation_t adaptation = setup_adaptation(setup);
         adaptation_start(&adaptation, &estimator->cdkf);
@@ -40,8 +39,7 @@ bool estimator_command(estimator_t *estimator, const lever_command_t *command)
                        is_choice(command->model, (uint8_t)LEVER_MODEL_COUNT) &&
                        is_choice(command->preload, (uint8_t)LEVER_PRELOAD_COUNT) &&
                        is_choice(command->estimator, (uint8_t)LEVER_ESTIMATOR_COUNT) &&
-                       is_choice(command->adaptation, (uint8_t)LEVER_ADAPTATION_COUNT) &&
-                       is_choice(command->mitigation, (uint8_t)LEVER_MITIGATION_COUNT);
+                       is_choice(command->adaptation, (uint8_t)LEVER_ADAPTATION_COUNT);
     if (known) {
         carry_out(estimator, command);
     }

@@ -76,7 +76,6 @@ void estimator_init(estimator_t *estimator, const lever_config_t *config)
     setup->preload = config->preload;
     setup->estimator = config->estimator;
     setup->adaptation = config->adaptation;
-    setup->mitigation = config->mitigation;
     estimator_start_over(estimator);
 }
 

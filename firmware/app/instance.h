@@ -16,6 +16,7 @@
 /* The watch over the loop of arm, lever and rotor, and what is done about it. */
 typedef struct bounce {
     mitigation_t mitigation;
+    uint8_t chosen;                   /* enum lever_mitigation */
     bool mitigates;                   /* one is chosen, or still fades */
     const lever_aircraft_t *aircraft; /* NULL: none */
     margin_t margin;
@@ -41,7 +42,10 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample);
 /* Where something mitigates: renews correction and lever damping. */
 void instance_mitigate(lever_t *lever);
 
-void instance_drive(lever_t *lever);
+static inline void instance_drive(lever_t *lever)
+{
+    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &lever->to_gate);
+}
 
 /* With an aircraft: works the margin out, once a publish_period, but at most 25 times a second. */
 void instance_watch(lever_t *lever);

@@ -13,6 +13,12 @@
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
 
+static void choose_mitigation(bounce_t *bounce, uint8_t mitigation)
+{
+    bounce->chosen = (mitigation != (uint8_t)LEVER_KEEP) ? mitigation : bounce->chosen;
+    bounce->mitigates = bounce->mitigates || (bounce->chosen != (uint8_t)LEVER_MITIGATION_NONE);
+}
+
 lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
 {
     lever_t *lever = NULL;
@@ -23,7 +29,7 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
         const float rms_most = (s->torque_rms < s->torque_limit) ? s->torque_rms : s->torque_limit;
         (void)memset(lever, 0, sizeof *lever);
         estimator_init(&lever->estimator, config);
-        lever->bounce.mitigates = (config->mitigation != (uint8_t)LEVER_MITIGATION_NONE);
+        choose_mitigation(&lever->bounce, config->mitigation);
         dither_init(&lever->dither, s->dither_low, s->dither_high, s->sample_period, rms_most, s->dither_fade);
         torque_gate_init(&lever->gate, s);
         link_init(&lever->link, s);
@@ -98,7 +104,7 @@ void instance_mitigate(lever_t *lever)
         .theta = estimator_state(estimator, 0u),
         .theta_dot = estimator_state(estimator, 1u),
         .drive = lever->gate.gain,
-        .mitigation = setup->mitigation,
+        .mitigation = lever->bounce.chosen,
         .advances = to_gate->advances,
         .permitted = to_gate->permitted && ((faults & broken) == 0u),
         .sensed = ((faults & blind) == 0u),
@@ -109,11 +115,6 @@ void instance_mitigate(lever_t *lever)
     sample.step.z_ddot = estimator->last_z_ddot;
     sample.step.tau_m = lever->gate.torque;
     lever->bounce.mitigates = mitigation_step(mitigation, setup->settings, &sample);
-}
-
-void instance_drive(lever_t *lever)
-{
-    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &lever->to_gate);
 }
 
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample)
@@ -139,19 +140,18 @@ void lever_idle(lever_t *lever, uint32_t elapsed_us)
 bool instance_is_driving(const lever_t *lever)
 {
     return (lever->gate.torque != 0.0f) ||
-           (lever->gate.open &&
-               (dither_is_on(&lever->dither) || mitigation_has_damping(lever->estimator.setup.mitigation)));
+           (lever->gate.open && (dither_is_on(&lever->dither) || mitigation_has_damping(lever->bounce.chosen)));
 }
 
 /* --- commands ----------------------------------------------------------------------------------------------------- */
 
 /* Something that IDENTITY says. */
-static bool is_changed(const lever_t *lever, const setup_t *before, float rms_before)
+static bool is_changed(const lever_t *lever, const setup_t *before, uint8_t chosen_before, float rms_before)
 {
     const setup_t *setup = &lever->estimator.setup;
     return (setup->model != before->model) || (setup->preload != before->preload) ||
            (setup->estimator != before->estimator) || (setup->adaptation != before->adaptation) ||
-           (setup->mitigation != before->mitigation) || (lever->dither.target < rms_before) ||
+           (lever->bounce.chosen != chosen_before) || (lever->dither.target < rms_before) ||
            (lever->dither.target > rms_before);
 }
 
@@ -159,14 +159,16 @@ static bool is_changed(const lever_t *lever, const setup_t *before, float rms_be
 static bool carry_out(lever_t *lever, const lever_command_t *command)
 {
     const setup_t before = lever->estimator.setup;
+    const uint8_t chosen_before = lever->bounce.chosen;
     const float rms_before = lever->dither.target;
     const bool resets = (command->request == (uint8_t)LEVER_REQUEST_RESET);
-    const bool plausible = (command->dither_rms >= 0.0f) && (command->dither_rms <= DITHER_MOST);
+    const bool plausible =
+        (command->dither_rms >= 0.0f) && (command->dither_rms <= DITHER_MOST) &&
+        ((command->mitigation < (uint8_t)LEVER_MITIGATION_COUNT) || (command->mitigation == (uint8_t)LEVER_KEEP));
     const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
     if (known) {
         torque_gate_keep_alive(&lever->gate);
-        lever->bounce.mitigates =
-            lever->bounce.mitigates || (lever->estimator.setup.mitigation != (uint8_t)LEVER_MITIGATION_NONE);
+        choose_mitigation(&lever->bounce, command->mitigation);
         if (resets) {
             dither_reset(&lever->dither);
             lever->link.frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;
@@ -177,7 +179,7 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
         if (!permits_torque(lever)) {
             torque_gate_close(&lever->gate);
         }
-        if (is_changed(lever, &before, rms_before)) {
+        if (is_changed(lever, &before, chosen_before, rms_before)) {
             lever->link.pages |= (uint8_t)(1u << (uint32_t)MESSAGE_PAGE_CHOICES);
         }
     }

@@ -49,7 +49,7 @@ static bool encode_correction(lever_t *lever, lever_frame_t *frame)
     const message_correction_t message = {.correction = correction.angle,
         .weight = correction.weight,
         .time_low = low_16(lever->estimator.time_us),
-        .mitigation = lever->estimator.setup.mitigation,
+        .mitigation = lever->bounce.chosen,
         .valid = lever->bounce.mitigation.open};
     return message_correction_encode(frame, &message);
 }
@@ -63,7 +63,7 @@ static bool encode_command_ack(lever_t *lever, lever_frame_t *frame)
         .preload = setup->preload,
         .estimator = setup->estimator,
         .adaptation = setup->adaptation,
-        .mitigation = setup->mitigation,
+        .mitigation = lever->bounce.chosen,
         .dither_rms = lever->dither.target};
     return message_command_ack_encode(frame, &message);
 }
@@ -186,7 +186,7 @@ static bool encode_identity(lever_t *lever, lever_frame_t *frame)
         .preload = setup->preload,
         .estimator = setup->estimator,
         .adaptation = setup->adaptation,
-        .mitigation = setup->mitigation,
+        .mitigation = lever->bounce.chosen,
         .dither_rms = lever->dither.target};
     return message_identity_encode(frame, &message);
 }

@@ -20,7 +20,6 @@ typedef struct setup {
     uint8_t preload;    /* enum lever_preload */
     uint8_t estimator;  /* enum lever_estimator */
     uint8_t adaptation; /* enum lever_adaptation */
-    uint8_t mitigation; /* enum lever_mitigation */
 } setup_t;
 
 /* The model of an enum lever_model; NULL when there is none. */

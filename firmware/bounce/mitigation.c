@@ -17,17 +17,9 @@
 #define PERIOD_MOST 0.02f    /* of a filter's step [s] */
 #define LONGEST 0.1f         /* without a sample, until the filters begin anew [s] */
 
-bool mitigation_has_damping(uint8_t mitigation)
-{
-    return (mitigation == (uint8_t)LEVER_MITIGATION_DAMPING) ||
-           (mitigation == (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING) ||
-           (mitigation == (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING);
-}
-
 static bool has_notch(uint8_t mitigation)
 {
-    return (mitigation == (uint8_t)LEVER_MITIGATION_NOTCH) ||
-           (mitigation == (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING);
+    return mitigation >= (uint8_t)LEVER_MITIGATION_NOTCH;
 }
 
 static bool has_correction(uint8_t mitigation)

@@ -77,7 +77,10 @@ void mitigation_idle(mitigation_t *mitigation, uint32_t elapsed_us);
 /* What it says now. */
 lever_correction_t mitigation_correction(const mitigation_t *mitigation);
 
-/* Whether one of enum lever_mitigation has torque for the motor. */
-bool mitigation_has_damping(uint8_t mitigation);
+/* Whether one of enum lever_mitigation has torque for the motor: every other. */
+static inline bool mitigation_has_damping(uint8_t mitigation)
+{
+    return (mitigation & (uint8_t)LEVER_MITIGATION_DAMPING) != 0u;
+}
 
 #endif

@@ -122,7 +122,8 @@ class Flown:
     @property
     def corrected(self) -> FloatArray:
         """What the correction makes of the lever's angle, as it is used: a sample late [rad]."""
-        return self.theta + np.append(0.0, self.correction[:-1])
+        corrected: FloatArray = self.theta + np.append(0.0, self.correction[:-1])
+        return corrected
 
     def during(self, start: float, end: float) -> slice:
         """The samples between two times [s]."""

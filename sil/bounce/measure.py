@@ -19,7 +19,7 @@ from . import detectors, pilots
 from .detectors import Watched
 from .flights import STRIDE, Flown, Plan, critical_gearing, fly, truth_of
 
-Figures = Mapping[str, float]
+Figures = dict[str, float]
 
 BEYOND = 1.1
 """Gearing of the flights in which a pilot relaxes, over that which is critical in the end."""
@@ -268,7 +268,7 @@ def _back(flown: Flown) -> float:
     for begin in range(first, first + 10_000, 50):
         window = slice(begin, begin + 2000)
         if _share(residual[window], involuntary[window]) <= 0.2:
-            return (begin - first) * period
+            return float(begin - first) * period
     return math.inf
 
 

@@ -60,7 +60,7 @@ def figures(cells: Map, borders: Sequence[Border]) -> list[MapFigure]:
     """The error, and each other quantity that any estimator has."""
     panels = range(len(cells.panels.values))
     lines = {(name, panel): _line(cells, borders, name, panel) for name in cells.runs for panel in panels}
-    made = []
+    made: list[MapFigure] = []
     for each in _QUANTITIES:
         charts = tuple(
             tuple(Chart(_values(cells, each, name, panel), lines[name, panel]) for panel in panels)

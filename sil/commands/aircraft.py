@@ -17,9 +17,10 @@ those that there are.
 AIRCRAFT is one of them, or a .toml file with the keys of theirs. KEY=VALUE after it changes one (delay=30 ms), and says
   gearing                  pitch of the blades over the lever's angle (default: 1)
   gain_sigma, phase_sigma  how well the response is known [1, rad] (default: 0.05)
-  warning, alarm           gain margins below which there is one [dB] (default: 3, 1.5)
+  warning, alarm           gain margins below which there is one [dB] (default: 4.5, 3)
 
-A response that was measured or computed elsewhere is written by hand in the same form.
+A response that was measured or computed elsewhere, with gearing, is a .csv file of frequency [Hz], real and imaginary
+part of the cabin's acceleration over the lever's angle [(m/s^2)/rad].
 """
 _EPILOG = """\
 examples:
@@ -40,7 +41,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         description=_DESCRIPTION,
         epilog=_EPILOG,
     )
-    parser.add_argument("aircraft", nargs="?", metavar="AIRCRAFT", help="a name, or a .toml file")
+    parser.add_argument("aircraft", nargs="?", metavar="AIRCRAFT", help="a name, or a .toml or .csv file")
     parser.add_argument("changes", nargs="*", metavar="KEY=VALUE", help="what is other than there")
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write it into FILE")
 
@@ -64,12 +65,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def response(name: str, changes: list[str]) -> AircraftResponse:
-    """Of an aircraft by its name or .toml file. Raises LeverError."""
+    """Of an aircraft by its name or .toml file, or by its response in a .csv file. Raises LeverError."""
     import numpy as np
     from lever_cdkf.host_tools.errors import LeverError
     from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
 
-    from ..aircraft.aircraft import read_aircraft
+    from ..aircraft.aircraft import Coupled, read_aircraft
+    from ..aircraft.tabulated import Tabulated
     from ..toml_tables import Place
 
     given = {key.strip(): value.strip() for key, _, value in (change.partition("=") for change in changes)}
@@ -80,8 +82,16 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
                 said[key] = float(given.pop(key))
             except ValueError:
                 raise LeverError(f"{key} must be a number") from None
-    gearing = given.pop("gearing", "1")
-    coupled = read_aircraft({"model": name, **given, "gearing": f"{gearing} 1"}, Place("aircraft"))
+    coupled: Coupled | Tabulated
+    if name.endswith(".csv"):
+        if given:
+            raise LeverError(
+                f"{name}: a response has no {next(iter(given))}; it may have {', '.join((*_SAID, *_LIMITS))}"
+            )
+        coupled = Tabulated.load(name)
+    else:
+        gearing = given.pop("gearing", "1")
+        coupled = read_aircraft({"model": name, **given, "gearing": f"{gearing} 1"}, Place("aircraft"))
     frequency = np.geomspace(*_BAND, _POINTS)
     values = coupled.response(2j * np.pi * frequency.astype(np.complex128))
     return AircraftResponse(frequency.tolist(), values.tolist(), **said)

@@ -237,10 +237,7 @@ class Loop:
 def available(name: str, values: FloatArray) -> FloatArray:
     """Readings of the sensor `name`, NaN where they are beyond the range of their frame."""
     field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
-    return np.where(np.abs(values / field["scale"]) < (field["mask"] >> 1) + 0.5, values, np.nan)
-
-
-_MESSAGES = {"grip_force": "GRIP_SAMPLE", "z_ddot": "BASE_SAMPLE"}
+    return np.where(np.abs(values / field["scale"]) < 0.5 * field["mask"], values, np.nan)  # most steps and a half
 
 
 @cache

@@ -95,7 +95,9 @@ def draw_rows(count: int, folder: Path) -> None:
         runs = np.arange(chunk.first * len(names), chunk.end * len(names))
         flight = runs // len(names)
         point = flight // plan.spec.seeds
-        columns = {field.name: random.random(len(runs)) for field in schema if pa.types.is_floating(field.type)}
+        columns: dict[str, Any] = {
+            field.name: random.random(len(runs)) for field in schema if pa.types.is_floating(field.type)
+        }
         columns |= {key: np.array([points[each][key] for each in point]) for key in points[0]}
         columns |= {"run": runs, "point": point, "seed": flight + plan.spec.seed}
         columns |= {"estimator": np.array(names)[runs % len(names)], "error": np.full(len(runs), None)}

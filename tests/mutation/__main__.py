@@ -1,6 +1,6 @@
 """Says which mutants of the core the unit tests kill.
 
-    python tests/mutation BUILD [--random N] [--seed S] [--file PART] [--json FILE]
+    python tests/mutation BUILD [--random N] [--seed S] [--file PART] [--assertions] [--json FILE]
 
 BUILD is build/tests/mutation, made by the target `mutated`. Survivors are listed as they are found.
 """
@@ -13,12 +13,15 @@ import os
 import random
 import sys
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from mutation.equivalent import equivalents
 from mutation.killing import judged, measured
 from mutation.schemata import Mutant
+
+GOLDEN = Path(__file__).resolve().parents[1] / "quality/embedded/golden.txt"
 
 
 def main() -> int:
@@ -27,18 +30,23 @@ def main() -> int:
     parser.add_argument("--random", type=int, metavar="N", help="only so many")
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the choice (default: %(default)s)")
     parser.add_argument("--file", default="", help="only of these files: a part of their path")
+    parser.add_argument("--assertions", action="store_true", help="without the flights whose bits are kept")
     parser.add_argument("--least", type=float, default=0.0, metavar="PERCENT", help="exit 1 when fewer are killed")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every verdict")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     args = parser.parse_args()
     found = json.loads((args.build / "firmware/mutants.json").read_text())
-    mutants = [Mutant(**each) for each in found["mutants"] if args.file in each["path"]]
+    known = [Mutant(**each) for each in found["mutants"]]
+    same = equivalents(known)
+    mutants = [each for each in known if args.file in each.path and each.number not in same]
     if args.random:
         mutants = sorted(random.Random(args.seed).sample(mutants, args.random), key=lambda each: each.number)
         print(f"{args.random} mutants drawn with seed {args.seed}")
     start = time.monotonic()
     programs = [measured(args.build / "programs" / name) for name in (args.build / "programs.txt").read_text().split()]
     programs += [measured(args.build / "oracle", case) for case in sorted((args.build / "cases").glob("*.case"))]
+    if not args.assertions:  # the flights end at the first difference, mostly in the first of them
+        programs.append(replace(measured(args.build / "flights", GOLDEN), seconds=0.01, patience=1.2))
     verdicts = []
     for verdict in judged(mutants, programs, args.jobs):
         verdicts.append(verdict)
@@ -47,9 +55,10 @@ def main() -> int:
     killed = sum(bool(verdict.killer) for verdict in verdicts)
     share = 100 * killed / len(mutants)
     print(f"{killed} of {len(mutants)} mutants killed ({share:.1f} %) in {time.monotonic() - start:.0f} s")
-    print(f"{found['left_out']} more in constant expressions, which cannot be switched, were left out")
+    print(f"left out: {len(same)} that change nothing; {found['left_out']} in constant expressions, not to be switched")
     if args.json:
-        args.json.write_text(json.dumps([asdict(verdict) for verdict in verdicts]))
+        summary = {"valid": len(mutants), "killed": killed, "equivalent": len(same)}
+        args.json.write_text(json.dumps({**summary, "verdicts": [asdict(verdict) for verdict in verdicts]}))
     return 1 if share < args.least else 0
 
 

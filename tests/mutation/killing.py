@@ -30,13 +30,17 @@ class Program:
     """Evaluated that could have held a mutant."""
     reached: frozenset[int]
     """Mutant.guard of those."""
+    patience: float = PATIENCE
 
     @property
     def name(self) -> str:
         return self.command[-1].name
 
     def kills(self, mutant: Mutant) -> bool:
-        environment = {"MUTANT": str(mutant.number), "MUTANT_MOST": str(PATIENCE * self.expressions + GRACE)}
+        environment = {
+            "MUTANT": str(mutant.number),
+            "MUTANT_MOST": str(round(self.patience * self.expressions) + GRACE),
+        }
         return _run(self.command, environment) != 0
 
 

@@ -4,8 +4,8 @@
  *     # z_ddot over the lever's angle
  *     gain_sigma = 0.1       # how well the gain is known, relative to it [1]
  *     phase_sigma = 0.1      # [rad]
- *     warning = 3            # gain margin below which there is a warning [dB]; 3 without this line
- *     alarm = 1.5            # and an alarm [dB]; 1.5 without this line
+ *     warning = 4.5          # gain margin below which there is a warning [dB]; 4.5 without this line
+ *     alarm = 3              # and an alarm [dB]; 3 without this line
  *     1.5  -12.1  4.2        # frequency [Hz], real and imaginary part [(m/s^2)/rad]; 3 to LEVER_AIRCRAFT_POINTS lines
  */
 #ifndef LEVER_PORT_AIRCRAFT_H

@@ -112,7 +112,7 @@ uint32_t innovation_samples(const lever_frame_t *frames, uint32_t count, lever_s
     config->preload = setup->preload;
     config->estimator = setup->estimator;
     config->adaptation = setup->adaptation;
-    config->mitigation = setup->mitigation;
+    config->mitigation = lever->bounce.chosen;
     lever_health(lever, health);
     return taken;
 }

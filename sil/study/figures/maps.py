@@ -60,7 +60,7 @@ class Scale:
         """Of the cells, in positions."""
         at = self.position
         if len(at) == 1:
-            return at[0] + np.array([-0.5, 0.5])
+            return np.array([at[0] - 0.5, at[0] + 0.5])
         middle = 0.5 * (at[1:] + at[:-1])
         return np.concatenate(([2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]))
 
@@ -165,8 +165,14 @@ def sheet(figure: MapFigure, width: str = "single") -> Sheet:
 def _draw(place: Axes, figure: MapFigure, chart: Chart) -> Any:
     """Returns the colours, for their bar."""
     low, high = figure.limits
-    look = {"cmap": "viridis" if figure.more_is_better else "viridis_r", "vmin": low, "vmax": high}
-    colours = place.pcolormesh(figure.x.edges, figure.y.edges, np.ma.masked_invalid(chart.values), **look)
+    colours = place.pcolormesh(
+        figure.x.edges,
+        figure.y.edges,
+        np.ma.masked_invalid(chart.values),
+        cmap="viridis" if figure.more_is_better else "viridis_r",
+        vmin=low,
+        vmax=high,
+    )
     colours.set_edgecolor("face")  # no seams between the areas of a vector graphic
     place.grid(visible=False)
     if chart.line is not None:

@@ -10,6 +10,7 @@ from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.sil.aircraft import aircraft, stability
 from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.aircraft.tabulated import Tabulated
+from lever_cdkf.sil.commands.aircraft import response
 from lever_cdkf.sil.plants import lever_plant
 from python.aircraft.loops import loop_of
 from python.plants.motion import LEVER, TRIM, columns
@@ -60,3 +61,14 @@ def test_what_is_no_response_is_refused(tmp_path: Path, content: str | bytes, er
 def test_a_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(LeverError, match=r"none\.csv: No such file"):
         Tabulated.load(tmp_path / "none.csv")
+
+
+def test_its_response_is_one_for_the_firmware(file: Path) -> None:
+    pointer = response(str(file), ["gain_sigma=0.1"]).pointer
+    exact = Coupled(aircraft.load("puma_like"), 0.4).response(2j * np.pi * np.array(list(pointer.frequency)))
+    assert pointer.count == 24
+    assert pointer.gain_sigma == pytest.approx(0.1)
+    assert np.array(list(pointer.real)) == pytest.approx(exact.real, abs=0.005 * np.abs(exact).max())
+    assert np.array(list(pointer.imaginary)) == pytest.approx(exact.imag, abs=0.005 * np.abs(exact).max())
+    with pytest.raises(LeverError, match="a response has no gearing"):
+        response(str(file), ["gearing=0.5"])

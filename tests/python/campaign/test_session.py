@@ -59,7 +59,7 @@ class Client:
         kills = any(chunk.first in self.killers for _, chunk in given)
         for future, chunk in given:
             if kills:
-                future.error = KilledWorker(future.key, None, 3)  # type: ignore[arg-type]
+                future.error = KilledWorker(future.key, None, 3)
             future.rows = self.plan.runs(chunk)
             future.call(future)
         return bool(given)
@@ -79,7 +79,7 @@ def run(
         return finished.get_nowait()
 
     monkeypatch.setattr(session, "_next", following)
-    done = session.run(plan, folder, client, lambda *told: shown.append(told))  # type: ignore[arg-type]
+    done = session.run(plan, folder, client, lambda *told: shown.append(told))
     return done, client, shown
 
 

@@ -34,6 +34,12 @@ def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert set(rows) == QUICK
     for name, row in rows.items():
         assert row["measured"].keys() == row["limit"].keys()
+        of = {
+            (" " if over == "all runs" else f", {over} ").join((each["figure"], f"[{each['unit']}]")): each[over]
+            for each in row["figures"]
+            for over in ("all runs", "median", "worst")
+        }
+        assert row["measured"].items() <= of.items()
         assert name in printed
         assert f'id="chart-{name}"' in written
     assert {name: row["measured"] for name, row in rows.items() if not row["ok"]} == {}

@@ -18,7 +18,8 @@ from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.aircraft.flight import Flight
 from lever_cdkf.sil.fast import aircraft as fast_aircraft
 from lever_cdkf.sil.fast import plants
-from lever_cdkf.sil.fast.library import Struct, lib
+from lever_cdkf.sil.fast.library import Struct
+from lever_cdkf.sil.fast.library import lib as loop_lib
 from lever_cdkf.sil.run import in_process, loop
 from lever_cdkf.sil.scenarios import inputs, scenario
 from lever_cdkf.sil.scenarios.scenario import Scenario
@@ -58,7 +59,7 @@ def test_an_aircraft_flies_as_in_python(period: float) -> None:
     fast_aircraft.fill(struct, struct.pointer, flight, put_out)
     for sample in range(399):
         given = float(delta[sample]), float(correction[sample])
-        assert lib.aircraft_advance(struct.pointer, sample, *given) == flight.advance(*given)
+        assert loop_lib.aircraft_advance(struct.pointer, sample, *given) == flight.advance(*given)
     assert np.array_equal(put_out[:399], correction[:399])
 
 

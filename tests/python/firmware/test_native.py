@@ -17,7 +17,7 @@ import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.errors import LeverError, SettingsError
 from lever_cdkf.host_tools.files import LIBRARY_DIR, native_file
-from lever_cdkf.host_tools.firmware import native
+from lever_cdkf.host_tools.firmware import native, quantities
 from lever_cdkf.host_tools.firmware.native import Config, Estimator, lib
 
 QUICK = Config(settings={"align_time": 0.05})
@@ -80,6 +80,13 @@ def test_parameters_of_every_model_are_those_on_the_bus() -> None:
 
 
 # --- configuration ---------------------------------------------------------------------------------------------------
+
+
+def test_every_parameter_has_words_and_only_those_of_the_black_box_are_signed() -> None:
+    for model in native.enum_names("lever_model").values():
+        for each in quantities.parameters(model):
+            assert each.name != each.key
+            assert each.signed is (model == "linear_black_box")
 
 
 def test_choices_and_settings_reach_the_firmware() -> None:

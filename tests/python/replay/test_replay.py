@@ -170,9 +170,20 @@ def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
 
 
 def test_other_settings_give_other_estimates_and_are_compared(session: Session, tmp_path: Path) -> None:
-    summary = replayed(tmp_path / "out", session.log, "--set", "k_p_walk=0.2")
+    tables = tmp_path / "tables.json"
+    summary = replayed(tmp_path / "out", session.log, "--set", "k_p_walk=0.2", "--json", tables)
     told = summary["comparison"]
     assert told["identical"] is False
+    printed = {row["signal"]: row for row in json.loads(tables.read_text())["replayed minus recorded estimates"]}
+    names = {
+        "samples": "samples",
+        "mean difference": "bias",
+        "rms difference": "rms",
+        "rms in sigma [1]": "rms_in_sigma",
+    }
+    assert printed.keys() == told["signals"].keys()
+    for name, row in printed.items():
+        assert {key: row[key] for key in names} == {key: told["signals"][name][own] for key, own in names.items()}
     with (tmp_path / "out/trace.csv").open() as file:
         rows = list(csv.DictReader(file))
     columns = {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}

@@ -232,6 +232,9 @@ def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result)
     inside = [np.where(np.isfinite(c), c, np.nanmean(c)) for c in (result.trace[name] for name in COHERENT)]
     expected_frequency, expected = signal.coherence(*inside, 1000.0, nperseg=2000)
     np.testing.assert_allclose(coherence, np.interp(frequency, expected_frequency, expected), atol=0.02)
+    windows = len(inside[0]) // 1000 - 1
+    (chance,) = traces(page, "figure-slices", "95 % of chance alone")
+    np.testing.assert_allclose(unpack(chance["y"]), 1.0 - 0.05 ** (1.0 / (windows - 1)), rtol=1e-6)
     assert "complex error was" in "".join(page.text)
 
 

@@ -51,6 +51,14 @@ def test_samples_are_the_truth_but_for_the_sensors(short: Scenario) -> None:
     assert np.std(base - recording.inputs.z_ddot) == pytest.approx(0.01, rel=0.1)
 
 
+def test_the_cabin_of_a_helicopter_is_felt_from_the_first_sample_on() -> None:
+    bus = PuppetBus(always)
+    recording = loop.run(scenario.load("bounce", ["duration=0.2 s", "converged_after=0.1 s"]), bus)
+    base = [sample["z_ddot"] for sample in bus.decoded("BASE_SAMPLE")]
+    assert np.isfinite(recording.inputs.z_ddot).all()
+    np.testing.assert_allclose(base, recording.inputs.z_ddot, atol=0.06)  # six standard deviations of its noise
+
+
 def test_the_motor_turns_as_the_firmware_commands(short: Scenario) -> None:
     def push(sample: int) -> list[tuple[str, dict[str, Any]]]:
         motor = ("MOTOR_COMMAND", {"torque": -0.75, "dither": 0.0})

@@ -28,7 +28,7 @@ def summary(
     """One of a made-up run with one quantity."""
     return SimulationSummary(
         scenario=Scenario("made", "made", "", seed, 1e-3, 0.0, [0.0], {"m_p": 0.05, "coverage": 0.6}),
-        estimator=Estimator("lever", "trim", "dual", "annealing", {}),
+        estimator=Estimator("lever", "trim", "dual", "annealing", "none", {}),
         truth=Truth("lever"),
         parameters={"m_p": Quality(rms, 0.0, covered, [], times)},
         nis=Nis(mean=2.0 + 0.1 * seed, expected=2.0),

@@ -98,6 +98,15 @@ def test_units_of_parquet(columns: Columns, tmp_path: Path) -> None:
     assert [(each.name, each.unit) for each in read_table(str(tmp_path / "units.parquet"))] == [("a", "mrad")]
 
 
+def test_what_an_mf4_marks_invalid_is_missing(tmp_path: Path) -> None:
+    invalid = np.array([False, True, False, True])
+    with MDF(version="4.10") as file:
+        file.append([Channel(np.arange(4.0), 0.01 * np.arange(4.0), name="angle", invalidation_bits=invalid)])
+        file.save(tmp_path / "marked.mf4")
+    (angle,) = read_table(str(tmp_path / "marked.mf4"))
+    np.testing.assert_array_equal(angle.values, [0.0, np.nan, 2.0, np.nan])
+
+
 # --- text -------------------------------------------------------------------------------------------------------------
 
 TABLES = {

@@ -458,6 +458,24 @@ def test_claims_stand_in_table_and_page() -> None:
     assert [shape["x0"] for shape in shown["layout"]["shapes"]] == [1.0, 1.5]
 
 
+def test_a_line_of_the_table_has_every_figure_in_its_unit() -> None:
+    own = {"rms": (0.01, 0.02, 0.03, 0.004, 0.05), "linearised": (1.0, 1.1, 1.2, 1.3, 1.4)}
+    ends = {"bound": (2.0, 2.1, 2.2, 2.3, 2.4), "against": (0.5, 0.6, 0.7, 0.8, 0.9), "nees_low": 2.5, "nees_high": 3.5}
+    ((line,),) = table.tables(
+        [row("joint", 0.1, **own, **ends, linearised_error=(0.1, 0.5, 0.2, 0.0, 0.0))], []
+    ).values()
+    names = ("m_p", "c_p", "k_p", "natural_frequency", "damping_ratio")
+    expected = {f"{name} rms [%]": 100.0 * value for name, value in zip(names, own["rms"], strict=True)}
+    for title, values in (
+        ("linearised", own["linearised"]),
+        ("Cramér-Rao", ends["bound"]),
+        ("reference", ends["against"]),
+    ):
+        expected |= {f"{name} ÷ {title}": value for name, value in zip(names, values, strict=True)}  # type: ignore[arg-type]
+    assert {key: line[key] for key in expected} == pytest.approx(expected)
+    assert (line["± of these"], line["95 % band"]) == (0.5, "2.50-3.50")
+
+
 def test_a_chart_shows_each_estimator_in_each_case_with_its_standard_error() -> None:
     own = {"linearised": (2.0, 8.0, math.nan, 4.0, 4.0), "linearised_error": (0.1,) * 5, "bound": (3.0,) * 5}
     rows = [row("joint", 0.1, nees=3.2, nees_low=2.5, nees_high=3.5, **own), row("rls", 0.2, linearised=fives(1.0))]

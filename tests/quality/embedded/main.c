@@ -1,161 +1,318 @@
-/* Feeds a lively series of samples to the estimator and prints every estimate as hexadecimal bits, and every frame:
- * two builds that compute alike print alike. The samples come from single-precision arithmetic under the same compiler
- * flags.
+/* Flies the estimator through all that flight.h has, every model, estimator, preload and adaptation, random settings,
+ * and a bus on which everything happens. Two builds that compute alike print alike.
  *
- *     embedded SAMPLES
+ *     embedded digests    prints a line a run: its name and digest
+ *     embedded            before that a line each 100 samples: run, sample, mode, parameters as bits, digest until then
+ *     embedded FILE       compares with such lines; names what differs, and exits 1 at the first that does
  *
- * One run for each choice of preload and adaptation, and one for each model and estimator; a line is: run, sample,
- * mode, then the bits of the estimate. Then one run over the bus for each model and estimator, with an aircraft and a
- * mitigation; a line is: "bus", run, sample, then the frames that were sent. The last line says whether self_test() passed. */
+ * The digest is the CRC-32 of every estimate, health and torque, or of every frame. The last run is self_test(). */
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "can/e2e.h"
 #include "can/messages.h"
-#include "lever_cdkf.h"
+#include "flight.h"
+#include "port/embedded/crc32.h"
 #include "port/embedded/self_test.h"
 
-#define PERIOD 1.0e-3f         /* [s] */
-#define SAMPLES_A_COMMAND 500u /* the motor's torque needs one each second */
-#define DITHER 0.3f            /* [N m] */
+#define SAMPLES 2000u       /* of a run in which nothing happens */
+#define SCENE_SAMPLES 8500u /* of one with a scene */
+#define RANDOM_RUNS 24u
+#define EVERY 100u
 
-/* An arm and lever of 3.5 Hz and damping ratio 0.3 about a trim of 0.35 rad, shaken by the base and the motor. */
-typedef struct arm {
-    uint32_t random;
-    float base;   /* band-limited base acceleration [m/s^2] */
-    float torque; /* band-limited motor torque [N m] */
-    float angle;  /* about the trim [rad] */
-    float rate;   /* [rad/s] */
-} arm_t;
+static uint32_t digest;
+static bool prints_lines = true;
+static FILE *expected; /* NULL: prints */
+static char run_name[64];
 
-/* Uniform in [-1, 1): a linear congruential generator. */
-static float noise(arm_t *arm)
+/* --- output ------------------------------------------------------------------------------------------------------- */
+
+/* Lowest byte first, whatever the machine's order. */
+static void put_word(uint32_t word)
 {
-    arm->random = (1664525u * arm->random) + 1013904223u;
-    return ((float)(int32_t)(arm->random >> 8) / 8388608.0f) - 1.0f;
+    const uint8_t byte[4] = {(uint8_t)(word & 0xFFu), (uint8_t)((word >> 8u) & 0xFFu), (uint8_t)((word >> 16u) & 0xFFu),
+        (uint8_t)(word >> 24u)};
+    digest = crc32_update(digest, byte, 4u);
 }
 
-static lever_sample_t next_sample(arm_t *arm, uint32_t index)
+static uint32_t bits_of(float value)
 {
-    arm->base += 0.05f * ((20.0f * noise(arm)) - arm->base);
-    arm->torque += 0.05f * ((4.0f * noise(arm)) - arm->torque);
-    const float forcing = (-2.0f * arm->base) + (1.6f * arm->torque);
-    arm->rate += PERIOD * (forcing - (483.6f * arm->angle) - (13.2f * arm->rate));
-    arm->angle += PERIOD * arm->rate;
-
-    lever_sample_t sample;
-    (void)memset(&sample, 0, sizeof sample);
-    sample.time_us = index * 1000u;
-    sample.theta = 0.35f + arm->angle + (1.0e-3f * noise(arm));
-    sample.theta_dot = arm->rate + (1.0e-2f * noise(arm));
-    sample.tau_m = arm->torque;
-    sample.z_ddot = arm->base;
-    sample.theta_valid = (index % 97u) != 0u;
-    sample.theta_dot_valid = (index % 89u) != 0u;
-    sample.tau_m_valid = (index % 83u) != 0u;
-    sample.z_ddot_valid = (index % 79u) != 0u;
-    return sample;
-}
-
-static void print_bits(float value)
-{
-    uint32_t bits = 0u;
-    (void)memcpy(&bits, &value, sizeof bits);
-    (void)printf(" %08" PRIx32, bits);
-}
-
-static void print_estimate(const lever_estimate_t *estimate)
-{
-    print_bits(estimate->theta);
-    print_bits(estimate->theta_sigma);
-    print_bits(estimate->theta_dot);
-    print_bits(estimate->theta_dot_sigma);
-    for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
-        print_bits(estimate->parameter[i]);
-        print_bits(estimate->parameter_sigma[i]);
+    uint32_t bits = 0x7FC00000u; /* of every NaN */
+    if (!isnan(value)) {
+        (void)memcpy(&bits, &value, sizeof bits);
     }
-    print_bits(estimate->natural_frequency);
-    print_bits(estimate->natural_frequency_sigma);
-    print_bits(estimate->damping_ratio);
-    print_bits(estimate->damping_ratio_sigma);
-    print_bits(estimate->trim);
-    print_bits(estimate->nis);
-    (void)printf(" %u\n", estimate->nis_size);
+    return bits;
 }
+
+static void put_all(const float value[], uint32_t count)
+{
+    for (uint32_t i = 0u; i < count; i++) {
+        put_word(bits_of(value[i]));
+    }
+}
+
+static void put_frame(const lever_frame_t *frame)
+{
+    put_word(frame->id);
+    digest = crc32_update(digest, frame->data, frame->length);
+}
+
+static void print_line(uint32_t sample, enum lever_mode mode, const lever_estimate_t *e)
+{
+    if (prints_lines) {
+        (void)printf("%s %" PRIu32 " %u", run_name, sample, (unsigned int)mode);
+        for (uint32_t i = 0u; i < (uint32_t)LEVER_PARAMETERS; i++) {
+            (void)printf(" %08" PRIx32 " %08" PRIx32, bits_of(e->parameter[i]), bits_of(e->parameter_sigma[i]));
+        }
+        (void)printf(" %08" PRIx32 "\n", digest);
+    }
+}
+
+static void begin_run(const char *kind, const char *name)
+{
+    (void)snprintf(run_name, sizeof run_name, "%s.%s", kind, name);
+    digest = 0u;
+}
+
+static void end_run(void)
+{
+    char line[100];
+    char wanted[100] = "";
+    (void)snprintf(line, sizeof line, "%s %08" PRIx32 "\n", run_name, digest);
+    if (expected == NULL) {
+        (void)fputs(line, stdout);
+    } else if ((fgets(wanted, (int)sizeof wanted, expected) == NULL) || (strcmp(line, wanted) != 0)) {
+        (void)printf("expected %sgot %s", wanted, line);
+        exit(1);
+    } else {
+        /* as expected */
+    }
+}
+
+/* --- samples ------------------------------------------------------------------------------------------------------ */
 
 static lever_t *start(const lever_config_t *config)
 {
     static lever_memory_t memory;
     lever_t *lever = lever_init(&memory, config);
-
     if (lever == NULL) {
         (void)fprintf(stderr, "embedded: refused: %s\n", lever_config_check(config));
-        exit(1);
+        exit(2);
     }
     return lever;
 }
 
-static void run(const lever_config_t *config, uint32_t samples)
+static void put_estimate(const lever_t *lever, uint32_t sample, enum lever_mode mode)
 {
-    arm_t arm = {1u, 0.0f, 0.0f, 0.0f, 0.0f};
+    lever_estimate_t e;
+    lever_health_t health;
+    lever_estimate(lever, &e);
+    lever_health(lever, &health);
+    const float value[] = {e.theta, e.theta_sigma, e.theta_dot, e.theta_dot_sigma, e.natural_frequency,
+        e.natural_frequency_sigma, e.damping_ratio, e.damping_ratio_sigma, e.trim, e.nis, health.excitation,
+        health.torque};
+    put_all(value, (uint32_t)(sizeof value / sizeof value[0]));
+    put_all(e.parameter, LEVER_PARAMETERS);
+    put_all(e.parameter_sigma, LEVER_PARAMETERS);
+    put_all(e.parameter_correlation, LEVER_PARAMETERS);
+    put_word(e.time_us);
+    put_word(((uint32_t)mode << 8u) | e.nis_size);
+    put_word(health.faults);
+    put_word(health.samples ^ (health.lost << 8u) ^ (health.corrupt << 16u) ^ (health.late << 24u));
+    put_word((health.recoveries << 1u) | (health.gate_open ? 1u : 0u));
+    if ((sample % EVERY) == 0u) {
+        lever_feedthrough_t f;
+        lever_feedthrough(lever, 1.0f + (1.0e-3f * (float)sample), &f);
+        const float response[] = {f.real, f.imaginary, f.gain_sigma, f.phase_sigma, f.correlation};
+        put_all(response, (uint32_t)(sizeof response / sizeof response[0]));
+        print_line(sample, mode, &e);
+    }
+}
+
+static void fly(const char *kind, const lever_config_t *config, const scene_t *scene, uint32_t samples, uint32_t seed)
+{
+    const lever_command_t alive = {.model = (uint8_t)LEVER_KEEP,
+        .preload = (uint8_t)LEVER_KEEP,
+        .estimator = (uint8_t)LEVER_KEEP,
+        .adaptation = (uint8_t)LEVER_KEEP,
+        .dither_rms = 0.3f};
+    arm_t arm = arm_start(seed);
     lever_t *lever = start(config);
+    begin_run(kind, scene->name);
+    for (uint32_t ms = 0u; ms < samples; ms++) {
+        if (scene->happens != NULL) {
+            scene->happens(&arm, ms);
+        }
+        lever_sample_t sample = arm_sample(&arm, ms);
+        if ((ms % 900u) == 800u) {
+            (void)lever_command(lever, &alive);
+        }
+        if ((scene->spoils == NULL) || scene->spoils(&arm, ms, &sample)) {
+            const enum lever_mode mode = lever_update(lever, &sample);
+            put_estimate(lever, ms, mode);
+        }
+    }
+    end_run();
+}
 
-    for (uint32_t index = 0u; index < samples; index++) {
-        lever_estimate_t estimate;
-        const lever_sample_t sample = next_sample(&arm, index);
-        const enum lever_mode mode = lever_update(lever, &sample);
-        lever_estimate(lever, &estimate);
-        (void)printf("%u.%u.%u.%u %" PRIu32 " %u", config->model, config->estimator, config->preload,
-            config->adaptation, index, (unsigned int)mode);
-        print_estimate(&estimate);
+static void fly_choices(void)
+{
+    lever_config_t config;
+    char name[40];
+    const scene_t quiet = {name, NULL, NULL, scenes[0].spoils};
+    lever_config_default(&config);
+    for (config.model = 0u; config.model < (uint8_t)LEVER_MODEL_COUNT; config.model++) {
+        for (uint8_t choice = 0u; choice < 16u; choice++) {
+            config.estimator = choice / 8u;
+            config.preload = (choice / 4u) % 2u;
+            config.adaptation = choice % 4u;
+            (void)snprintf(
+                name, sizeof name, "%u.%u.%u.%u", config.model, config.estimator, config.preload, config.adaptation);
+            fly("choice", &config, &quiet, SAMPLES, 1u);
+        }
     }
 }
 
-static void send_command(lever_t *lever, uint32_t index)
+static void fly_scenes(void)
 {
-    const message_command_t command = {(uint8_t)LEVER_REQUEST_NONE, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP,
-        (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, (uint8_t)LEVER_KEEP, DITHER};
+    for (uint32_t i = 0u; i < scene_count; i++) {
+        lever_config_t config;
+        lever_config_default(&config);
+        if (scenes[i].configure != NULL) {
+            scenes[i].configure(&config);
+        }
+        fly("scene", &config, &scenes[i], SCENE_SAMPLES, i + 2u);
+    }
+}
+
+static void fly_random_settings(void)
+{
+    arm_t dice = arm_start(99u);
+    for (uint32_t i = 0u; i < RANDOM_RUNS; i++) {
+        lever_config_t config;
+        char name[40];
+        scene_t scene = scenes[arm_random(&dice, scene_count)];
+        lever_config_default(&config);
+        draw_settings(&config, &dice);
+        config.model = (uint8_t)arm_random(&dice, LEVER_MODEL_COUNT);
+        config.estimator = (uint8_t)arm_random(&dice, LEVER_ESTIMATOR_COUNT);
+        (void)snprintf(name, sizeof name, "%s.%" PRIu32, scene.name, i);
+        scene.name = name;
+        fly("random", &config, &scene, SAMPLES, i);
+    }
+}
+
+/* --- bus ---------------------------------------------------------------------------------------------------------- */
+
+typedef struct sender {
+    arm_t dice;
+    lever_t *lever;
+    bool rough; /* frames are lost, repeated, damaged */
+} sender_t;
+
+static void send(sender_t *sender, lever_frame_t *frame, enum message_data_id data_id, uint32_t counter)
+{
+    e2e_protect(frame, (uint8_t)data_id, (uint8_t)(counter & 15u));
+    const uint32_t fate = sender->rough ? arm_random(&sender->dice, 60u) : 60u;
+    uint32_t times = 1u;
+    if (fate == 0u) {
+        frame->data[arm_random(&sender->dice, 8u)] ^= (uint8_t)(1u << arm_random(&sender->dice, 8u));
+    } else if (fate == 1u) {
+        frame->length = (uint8_t)arm_random(&sender->dice, 8u);
+    } else if (fate == 2u) {
+        frame->id ^= 1u << arm_random(&sender->dice, 11u);
+    } else if (fate <= 4u) {
+        times = (fate - 3u) * 2u; /* lost, or twice */
+    } else {
+        /* as it is */
+    }
+    for (; times > 0u; times--) {
+        put_word((uint32_t)lever_on_frame(sender->lever, frame));
+    }
+}
+
+static void send_sample(sender_t *sender, const lever_sample_t *s, uint32_t counter)
+{
+    const message_lever_sample_t of_lever = {
+        s->theta, s->theta_dot, s->tau_m, s->theta_valid, s->theta_dot_valid, s->tau_m_valid};
+    const message_grip_sample_t of_grip = {s->grip_force, s->grip_force_valid};
+    const message_base_sample_t of_base = {s->time_us, s->z_ddot, s->z_ddot_valid};
     lever_frame_t frame;
-
-    if (message_command_encode(&frame, &command)) {
-        e2e_protect(&frame, (uint8_t)MESSAGE_COMMAND_DATA_ID, (uint8_t)((index / SAMPLES_A_COMMAND) % 16u));
-        (void)lever_on_frame(lever, &frame);
-    }
+    put_word(message_lever_sample_encode(&frame, &of_lever) ? 1u : 0u);
+    send(sender, &frame, MESSAGE_LEVER_SAMPLE_DATA_ID, counter);
+    put_word(message_grip_sample_encode(&frame, &of_grip) ? 1u : 0u);
+    send(sender, &frame, MESSAGE_GRIP_SAMPLE_DATA_ID, counter);
+    put_word(message_base_sample_encode(&frame, &of_base) ? 1u : 0u);
+    send(sender, &frame, MESSAGE_BASE_SAMPLE_DATA_ID, counter);
 }
 
-static void send_sample(lever_t *lever, const lever_sample_t *sample, uint32_t index)
+/* Keeps the torque alive, and now and then asks for something else, which may not exist. */
+static void send_command(sender_t *sender, uint32_t count)
 {
-    const message_lever_sample_t of_lever = {.theta = sample->theta,
-        .theta_dot = sample->theta_dot,
-        .tau_m = sample->tau_m,
-        .theta_valid = sample->theta_valid,
-        .theta_dot_valid = sample->theta_dot_valid,
-        .tau_m_valid = sample->tau_m_valid};
-    const message_base_sample_t of_base = {
-        .time_us = sample->time_us, .z_ddot = sample->z_ddot, .z_ddot_valid = sample->z_ddot_valid};
+    const uint8_t keep = (uint8_t)LEVER_KEEP;
+    message_command_t command = {(uint8_t)LEVER_REQUEST_NONE, keep, keep, keep, keep, keep, 0.3f};
     lever_frame_t frame;
-
-    if (message_lever_sample_encode(&frame, &of_lever)) {
-        e2e_protect(&frame, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, (uint8_t)(index % 16u));
-        (void)lever_on_frame(lever, &frame);
+    if (sender->rough) {
+        uint8_t *const choice[] = {
+            &command.request, &command.model, &command.preload, &command.estimator, &command.adaptation};
+        const uint32_t which = arm_random(&sender->dice, 16u);
+        command.dither_rms = (arm_random(&sender->dice, 4u) == 0u) ? 0.0f : (0.5f + (0.5f * arm_noise(&sender->dice)));
+        command.dither_rms = (arm_random(&sender->dice, 9u) == 0u) ? 70.0f : command.dither_rms;
+        if (which < 5u) {
+            *choice[which] = (uint8_t)arm_random(&sender->dice, 5u);
+        }
     }
-    if (message_base_sample_encode(&frame, &of_base)) {
-        e2e_protect(&frame, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, (uint8_t)(index % 16u));
-        (void)lever_on_frame(lever, &frame);
-    }
+    put_word(message_command_encode(&frame, &command) ? 1u : 0u);
+    send(sender, &frame, MESSAGE_COMMAND_DATA_ID, count);
 }
 
-static void print_frame(const lever_frame_t *frame)
+/* What else is on the bus, and in the machine. */
+static void disturb(sender_t *sender, uint32_t ms)
 {
-    (void)printf(" %03" PRIX32 "#", frame->id);
-    for (uint32_t i = 0u; i < frame->length; i++) {
-        (void)printf("%02X", frame->data[i]);
+    arm_t *dice = &sender->dice;
+    if (arm_random(dice, 800u) == 0u) {
+        const message_identity_t other = {.page = (uint8_t)arm_random(dice, MESSAGE_PAGE_COUNT)};
+        lever_frame_t frame;
+        put_word(message_identity_encode(&frame, &other) ? 1u : 0u);
+        send(sender, &frame, MESSAGE_IDENTITY_DATA_ID, ms);
+    }
+    if (arm_random(dice, 300u) == 0u) {
+        const lever_platform_t platform = {
+            .faults = (uint8_t)((arm_random(dice, 3u) == 0u) ? (1u << arm_random(dice, 8u)) : 0u),
+            .transmit_errors = (uint8_t)arm_random(dice, 256u),
+            .overruns = (uint16_t)arm_random(dice, 65536u)};
+        lever_platform(sender->lever, &platform);
+    }
+    if (arm_random(dice, 400u) == 0u) {
+        for (uint32_t i = arm_random(dice, 12u); i > 0u; i--) {
+            lever_idle(sender->lever, 5000u);
+            lever_frame_t frame;
+            while (lever_next_frame(sender->lever, &frame)) {
+                put_frame(&frame);
+            }
+        }
     }
 }
 
-static void run_bus(const lever_config_t *config, uint32_t samples)
+/* Values that a frame cannot hold, or hardly. */
+static void exceed(arm_t *dice, lever_sample_t *sample)
+{
+    float *const value[] = {&sample->theta, &sample->theta_dot, &sample->tau_m, &sample->z_ddot, &sample->grip_force};
+    static const float most[] = {3.2767f, 16.3835f, 32.767f, 32.767f, 655.34f};
+    const uint32_t which = arm_random(dice, 200u);
+    if (which < 5u) {
+        *value[which] = most[which] * (1.0f + (4.0e-5f * arm_noise(dice))) * ((arm_noise(dice) < 0.0f) ? -1.0f : 1.0f);
+    } else if (which < 10u) {
+        *value[which - 5u] = 1000.0f * most[which - 5u] * arm_noise(dice);
+    } else {
+        /* as it is */
+    }
+}
+
+static void talk(const char *name, const lever_config_t *config, bool rough, uint32_t samples, uint32_t seed)
 {
     static const lever_aircraft_t aircraft = {.count = 4u,
         .frequency = {1.5f, 3.0f, 4.5f, 8.0f},
@@ -166,54 +323,112 @@ static void run_bus(const lever_config_t *config, uint32_t samples)
         .warning = 3.0f,
         .alarm = 1.5f};
     const lever_platform_t platform = {.overruns = 1u};
-    arm_t arm = {1u, 0.0f, 0.0f, 0.0f, 0.0f};
-    lever_t *lever = start(config);
-
-    lever_platform(lever, &platform);
-    (void)lever_aircraft(lever, &aircraft);
-    for (uint32_t index = 0u; index < samples; index++) {
-        const lever_sample_t sample = next_sample(&arm, index);
+    arm_t arm = arm_start(seed);
+    sender_t sender = {arm_start(seed + 1000u), start(config), rough};
+    begin_run("bus", name);
+    lever_platform(sender.lever, &platform);
+    (void)lever_aircraft(sender.lever, &aircraft);
+    for (uint32_t ms = 0u; ms < samples; ms++) {
+        lever_sample_t sample = arm_sample(&arm, ms);
         lever_frame_t frame;
-
-        if ((index % SAMPLES_A_COMMAND) == 0u) {
-            send_command(lever, index);
+        sample.grip_force = arm.force;
+        sample.grip_force_valid = true;
+        if ((ms % 400u) == 0u) {
+            send_command(&sender, ms / 400u);
         }
-        send_sample(lever, &sample, index);
-        (void)lever_step(lever);
-        (void)printf("bus %u.%u %" PRIu32, config->model, config->estimator, index);
-        while (lever_next_frame(lever, &frame)) {
-            print_frame(&frame);
+        if (rough) {
+            disturb(&sender, ms);
+            exceed(&sender.dice, &sample);
         }
-        (void)printf("\n");
+        send_sample(&sender, &sample, ms);
+        const enum lever_mode mode = lever_step(sender.lever);
+        while (lever_next_frame(sender.lever, &frame)) {
+            put_frame(&frame);
+        }
+        if ((ms % EVERY) == 0u) {
+            lever_estimate_t e;
+            lever_estimate(sender.lever, &e);
+            print_line(ms, mode, &e);
+        }
     }
+    end_run();
+}
+
+static void talk_on_the_bus(void)
+{
+    lever_config_t config;
+    char name[40];
+    lever_config_default(&config);
+    for (uint32_t choice = 0u; choice < 8u; choice++) {
+        config.model = (uint8_t)(choice / 2u);
+        config.estimator = (uint8_t)(choice % 2u);
+        config.mitigation = (uint8_t)(1u + (choice % ((uint8_t)LEVER_MITIGATION_COUNT - 1u)));
+        (void)snprintf(name, sizeof name, "calm.%u.%u", config.model, config.estimator);
+        talk(name, &config, false, SAMPLES, choice);
+        (void)snprintf(name, sizeof name, "rough.%u.%u", config.model, config.estimator);
+        talk(name, &config, true, SCENE_SAMPLES, choice);
+    }
+}
+
+/* --- codec -------------------------------------------------------------------------------------------------------- */
+
+/* Random payloads, read and written again. */
+#define ROUND_TRIP(message, identifier)                                                                                \
+    begin_run("codec", #message);                                                                                      \
+    for (uint32_t round = 0u; round < 300u; round++) {                                                                 \
+        message_##message##_t read;                                                                                    \
+        lever_frame_t in = {.id = (identifier), .length = 8u};                                                         \
+        lever_frame_t out = {.id = 0u};                                                                                \
+        (void)memset(&read, 0, sizeof read);                                                                           \
+        for (uint32_t i = 0u; i < 8u; i++) {                                                                           \
+            in.data[i] = (uint8_t)((arm_random(&dice, 5u) == 0u) ? 0xFFu : arm_random(&dice, 256u));                   \
+        }                                                                                                              \
+        put_word(message_##message##_decode(&read, &in) ? 1u : 0u);                                                    \
+        put_word(message_##message##_encode(&out, &read) ? 1u : 0u);                                                   \
+        put_frame(&out);                                                                                               \
+    }                                                                                                                  \
+    end_run();
+
+static void go_round(void)
+{
+    arm_t dice = arm_start(7u);
+    ROUND_TRIP(lever_sample, MESSAGE_LEVER_SAMPLE_ID)
+    ROUND_TRIP(base_sample, MESSAGE_BASE_SAMPLE_ID)
+    ROUND_TRIP(grip_sample, MESSAGE_GRIP_SAMPLE_ID)
+    ROUND_TRIP(command, MESSAGE_COMMAND_ID)
+    ROUND_TRIP(state_estimate, MESSAGE_STATE_ESTIMATE_ID)
+    ROUND_TRIP(pilot_parameters, MESSAGE_PILOT_PARAMETERS_ID)
+    ROUND_TRIP(pilot_sigma, MESSAGE_PILOT_SIGMA_ID)
+    ROUND_TRIP(pilot_dynamics, MESSAGE_PILOT_DYNAMICS_ID)
+    ROUND_TRIP(feedthrough, MESSAGE_FEEDTHROUGH_ID)
+    ROUND_TRIP(stability, MESSAGE_STABILITY_ID)
+    ROUND_TRIP(health, MESSAGE_HEALTH_ID)
+    ROUND_TRIP(motor_command, MESSAGE_MOTOR_COMMAND_ID)
+    ROUND_TRIP(correction, MESSAGE_CORRECTION_ID)
+    ROUND_TRIP(platform_health, MESSAGE_PLATFORM_HEALTH_ID)
+    ROUND_TRIP(identity, MESSAGE_IDENTITY_ID)
+    ROUND_TRIP(command_ack, MESSAGE_COMMAND_ACK_ID)
+    ROUND_TRIP(link_health, MESSAGE_LINK_HEALTH_ID)
 }
 
 int main(int argc, char **argv)
 {
-    const uint32_t samples = (argc == 2) ? (uint32_t)strtoul(argv[1], NULL, 10) : 0u;
-    lever_config_t config;
-
-    lever_config_default(&config);
-    for (uint8_t preload = 0u; preload < (uint8_t)LEVER_PRELOAD_COUNT; preload++) {
-        for (uint8_t adaptation = 0u; adaptation < (uint8_t)LEVER_ADAPTATION_COUNT; adaptation++) {
-            config.preload = preload;
-            config.adaptation = adaptation;
-            run(&config, samples);
+    prints_lines = (argc < 2);
+    if ((argc == 2) && (strcmp(argv[1], "digests") != 0)) {
+        expected = fopen(argv[1], "r");
+        if (expected == NULL) {
+            (void)fprintf(stderr, "embedded: no %s\n", argv[1]);
+            return 2;
         }
     }
-    lever_config_default(&config);
-    const uint8_t estimators = (uint8_t)LEVER_ESTIMATOR_COUNT;
-    for (uint8_t choice = 0u; choice < (uint8_t)((uint8_t)LEVER_MODEL_COUNT * estimators); choice++) {
-        config.model = choice / estimators;
-        config.estimator = choice % estimators;
-        if (choice > 0u) {
-            run(&config, samples);
-        }
-        config.mitigation = (uint8_t)(1u + (choice % ((uint8_t)LEVER_MITIGATION_COUNT - 1u)));
-        run_bus(&config, samples);
-        config.mitigation = (uint8_t)LEVER_MITIGATION_NONE;
-    }
+    fly_choices(); /* short ones first: a change shows soon */
+    go_round();
+    fly_random_settings();
+    talk_on_the_bus();
+    fly_scenes();
     lever_memory_t memory;
-    (void)printf("self test %s\n", self_test(&memory) ? "passed" : "failed");
+    begin_run("self", "test");
+    put_word(self_test(&memory) ? 1u : 0u);
+    end_run();
     return 0;
 }

@@ -127,7 +127,7 @@ TEST(what_was_chosen_can_be_read_back)
     lever_command_t command = command_none();
     command.mitigation = (uint8_t)LEVER_MITIGATION_COUNT;
     TEST_ASSERT_FALSE(lever_command(lever, &command));
-    TEST_ASSERT_EQUAL_UINT8(LEVER_MITIGATION_NOTCH_AND_DAMPING, lever->estimator.setup.mitigation);
+    TEST_ASSERT_EQUAL_UINT8(LEVER_MITIGATION_NOTCH_AND_DAMPING, lever->bounce.chosen);
 }
 
 /* --- what ends it ------------------------------------------------------------------------------------------------- */

@@ -40,6 +40,12 @@ TEST(bounds_are_those_of_the_model_on_either_scale_or_the_guess_where_that_is_ou
             TEST_ASSERT_DOUBLE_WITHIN(3.0e-6 * fabs(greatest), least, parameter_at(i, (double)scaling.least[i]));
             TEST_ASSERT_DOUBLE_WITHIN(3.0e-6 * fabs(greatest), greatest, parameter_at(i, (double)scaling.greatest[i]));
         }
+        prior_t near = priors[scale]; /* less than a unit of w from the bounds */
+        near.guess[0] = plain.parameter[0].greatest * 0.9f;
+        near.sigma[0] = 4000.0f;
+        scaling_init(&scaling, &plain, &near);
+        TEST_ASSERT_DOUBLE_WITHIN(3.0e-6 * (double)fabsf(plain.parameter[0].greatest),
+            (double)plain.parameter[0].greatest, parameter_at(0u, (double)scaling.greatest[0]));
         prior_t outside = priors[scale];
         outside.guess[0] = plain.parameter[0].greatest * 1.1f;
         outside.guess[1] = plain.parameter[1].least * ((scale == 0u) ? 0.9f : 1.1f);

@@ -95,6 +95,13 @@ TEST(tiny_noise_adds_up_or_leaves_the_rest_as_it_is)
     }
 }
 
+TEST(no_noise_on_a_factor_of_zero_leaves_it)
+{
+    float s[4] = {0.0f, 0.0f, 0.0f, 2.0f};
+    factor_add_noise(s, 2u, 2u, 0u, 0.0f, NULL);
+    TEST_ASSERT_TRUE((s[0] == 0.0f) && (s[2] == 0.0f) && (s[3] == 2.0f));
+}
+
 /* --- conditioning on information ---------------------------------------------------------------------------------- */
 
 /* Information c^T c of `outputs` rows c [outputs x n] of noise 1, and what innovations nu say: c^T nu. */
@@ -187,4 +194,14 @@ TEST(a_precise_measurement_of_one_element_leaves_its_noise)
     condition(known, s, 2u, mean);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, 1.0e-6, (double)s[0]);
     TEST_ASSERT_TRUE(s[3] == 0.75f); /* the second, given the first, is known as before */
+}
+
+/* Information of rank two: of what its rounding leaves of the third pivot, a millionth of the information counts. */
+TEST(a_pivot_is_kept_above_the_rounding_of_its_information)
+{
+    float u[9] = {4.0e12f, 0.0f, 0.0f, NAN, 1.0e12f, 1.0e12f, NAN, NAN, 1.0e12f};
+    factor_reverse(u, 3u);
+    TEST_ASSERT_EQUAL_FLOAT(1.0e-6f, u[8]);
+    TEST_ASSERT_EQUAL_FLOAT(1.0e-3f, u[4]);
+    TEST_ASSERT_EQUAL_FLOAT(0.5e-6f, u[0]);
 }

@@ -1,10 +1,12 @@
 /* What every model keeps to at its limits: rest, heavy and negative damping, a lever that falls, a trunk that gives
  * way. What they compute otherwise is compared with the float64 oracle (tests/python/oracle). */
+#include "model/base_motion.h"
 #include "model/model.h"
 #include "random.h"
 #include "test.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { MODELS = 4, KINDS = 2 * MODELS, L = MODEL_PARAMETERS };
 
@@ -57,6 +59,7 @@ static double mean_change(const subject_t *subject)
         .x = {(float)(subject->theta - (double)subject->step.origin), (float)subject->theta_dot},
         .coefficients = coefficients};
     model_response_t response;
+    (void)memset(coefficients, 0xFF, sizeof coefficients); /* not a number: each model sets all of them */
     for (uint32_t k = 0u; k < (uint32_t)MODEL_POINTS; k++) {
         subject->model->prepare(&subject->constants, subject->p, &coefficients[k]);
     }
@@ -138,4 +141,27 @@ TEST(a_lever_that_falls_has_a_negative_stiffness)
     subject.step.trim_cosine = cosf(1.3f);
     subject.model->prepare(&subject.constants, subject.p, &coefficients);
     TEST_ASSERT_TRUE(subject.model->dynamics(&subject.constants, &subject.step, &coefficients).stiffness < 0.0f);
+}
+
+TEST(a_trim_beyond_78_degrees_is_taken_for_that)
+{
+    const model_constants_t constants = {.length = 0.5f};
+    const float cosine[] = {0.25f, 0.2f, 0.1f};
+    const float angle[] = {8.0f, 10.0f, 10.0f};
+    for (uint32_t k = 0u; k < 3u; k++) {
+        const model_step_t step = {.trim_cosine = cosine[k]};
+        TEST_ASSERT_EQUAL_FLOAT(angle[k], base_motion_angle(&constants, &step));
+    }
+}
+
+/* 0.1 Hz. */
+TEST(a_soft_seat_is_a_seat)
+{
+    const model_constants_t constants = {.length = 0.5f, .seat_stiffness = 0.4f};
+    model_step_t step = {.period = 0.01f, .z_ddot = -1.0f, .trim_cosine = 1.0f};
+    base_motion_t motion = {0.0f, 0.0f};
+    for (uint32_t k = 0u; k < 100u; k++) {
+        base_motion_step(&motion, &constants, &step);
+    }
+    TEST_ASSERT_FLOAT_WITHIN(0.005f, (1.0f - cosf(sqrtf(0.4f))) / 0.4f, motion.seat);
 }
