@@ -23,9 +23,10 @@
  *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent. Cost.
- * Every call is bounded; lever_update() is the expensive one: 2,460 instructions and 3,880 cycles on a Cortex-M4F on
+ * Every call is bounded; lever_update() is the expensive one: 2,490 instructions and 3,920 cycles on a Cortex-M4F on
  * average (lever model, as shipped), 7,300 instructions when the parameters learn (once a learn_period), 17,400 at the
- * first sample after a gap. 34 KiB of code, 1.69 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
+ * first sample after a gap; with an aircraft and a mitigation 3,370 on average, and 18,200 at a sample with a margin (25
+ * a second). 37 KiB of code, 1.79 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
 #ifndef LEVER_CDKF_H

@@ -35,6 +35,7 @@ _AHEAD = 3  # chunks for each thread of the workers, so that none waits for the 
 _MOST_LOST = 10  # chunks, after which something is wrong with all
 _ALONE = ", alone"  # of a task's key
 _CONNECT = 10.0  # [s]
+_NO_WORKERS = 300.0  # [s] that killed workers are given to start again
 _KEPT_MEMORY = str(1 << 28)
 """[bytes] up to which a worker's arrays come from memory that it has already. Dask has it given back after each of
 them, and getting it again takes a quarter of a run's time."""
@@ -110,10 +111,13 @@ def _results(
             submit(chunk, chunk.name(plan.fingerprint) + _ALONE)
 
     fill()
+    seen = clock.monotonic()  # workers
     while running:
         future = _next(client, finished, tick)
         if future is None:
+            seen = _seen(client, seen)
             continue
+        seen = clock.monotonic()
         chunk, key = running.pop(future.key)[0], future.key
         try:
             error = future.exception()
@@ -142,6 +146,16 @@ def _next(client: Client, finished: queue.Queue[Future], tick: Callable[[], None
     if future is None:
         tick()
     return future
+
+
+def _seen(client: Client, before: float) -> float:
+    """When there were workers last: now, or `before`. Raises LeverError when that is too long ago."""
+    now = clock.monotonic()
+    if client.nthreads():
+        return now
+    if now - before > _NO_WORKERS:
+        raise LeverError("all workers are gone; what is finished is kept: go on with --resume")
+    return before
 
 
 def dashboard(client: Client) -> str:
@@ -196,7 +210,11 @@ def connected(address: str | None, workers: int) -> Iterator[Client]:
             yield client
         return
     options: dict[str, Any] = {"dashboard_address": "127.0.0.1:0", "memory_limit": 0, "threads_per_worker": 1}
-    settings = {"distributed.logging.distributed": "critical", "distributed.nanny.pre-spawn-environ": _ENVIRONMENT}
+    settings = {
+        "distributed.logging.distributed": "critical",
+        "distributed.nanny.pre-spawn-environ": _ENVIRONMENT,
+        "distributed.deploy.lost-worker-timeout": f"{_NO_WORKERS:g} s",  # 15 s are too short for a busy machine
+    }
     with dask.config.set(settings):
         with interrupts.masked():
             cluster = LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)

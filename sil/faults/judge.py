@@ -78,7 +78,7 @@ def judge(must: Must, record: Record, plain: Record, truth: Mapping[str, FloatAr
     _judge_torque(must, record, begin, end, verdict)
     if must.unaffected:
         changed = np.count_nonzero(record.estimate.view(np.uint8) != plain.estimate.view(np.uint8))
-        verdict.hold("estimates changed", changed, 0)
+        verdict.hold("estimates changed", float(changed), 0)
     if must.flags:
         shown = (faults[begin:end] & fault_mask(*must.flags)) != 0
         verdict.hold("to flag", float(shown.argmax()) + 1 if shown.any() else math.inf, must.within)

@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
+from lever_cdkf.host_tools.can import codec
+
 from ..envelope.motions import Motion
 from . import bus, readings
 from .bus import Interval
@@ -160,7 +162,7 @@ def _late() -> Iterator[Row]:
     yield Row(
         "lever_stale",
         "LEVER_SAMPLE: old content, counter goes on",
-        Must(("THETA", "BASE"), 500, mode=("run", "coast")),
+        Must(("THETA", "BASE"), 1000, mode=("run", "coast")),
         bus.stale("LEVER_SAMPLE"),
     )
     yield Row(
@@ -182,8 +184,15 @@ def _other_senders() -> Iterator[Row]:
 
 
 def _commands() -> Iterator[Row]:
-    right = {"model": "lever", "preload": "trim", "estimator": "dual", "adaptation": "robbins_monro"}
-    models = [{"model": name} for name in ("lever", "linear_physical", "linear_black_box", "hand")]
+    right: dict[str, codec.Value] = {
+        "model": "lever",
+        "preload": "trim",
+        "estimator": "dual",
+        "adaptation": "robbins_monro",
+    }
+    models: list[dict[str, codec.Value]] = [
+        {"model": name} for name in ("lever", "linear_physical", "linear_black_box", "hand")
+    ]
     anew = Must(mode=("init", "align"), torque_ends=0.06, back=5.0, error=5.0)
     yield Row(
         "command_flood", "10 COMMANDs in each sample that change nothing", Must(unaffected=True),
@@ -191,7 +200,7 @@ def _commands() -> Iterator[Row]:
     )  # fmt: skip
     yield Row("model_switched", "COMMAND: another model in each sample", anew, bus.flood(models, right), quick=True)
     yield Row("reset_flood", "COMMAND: a reset in each sample", anew, bus.flood([{"request": "reset"}], right))
-    toggles = {
+    toggles: dict[str, tuple[list[dict[str, codec.Value]], Must]] = {
         "estimator_switched": ([{"estimator": "joint"}, {"estimator": "dual"}], anew),
         "preload_switched": ([{"preload": "fixed"}, {"preload": "trim"}], anew),
         "adaptation_switched": ([{"adaptation": "annealing"}, {"adaptation": "forgetting"}], Must()),

@@ -97,7 +97,7 @@ def test_named_values_are_the_enums(codec: Codec) -> None:
             assert signal.choices is not None
             assert {value: str(name) for value, name in signal.choices.items()} == expected, signal.name
             tested += 1
-    assert tested == 23
+    assert tested == 27
 
 
 def test_every_fault_has_its_named_bit(codec: Codec) -> None:

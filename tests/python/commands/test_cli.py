@@ -111,7 +111,7 @@ def test_settings_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert cli.main(["settings", "--settings", str(path), "--set", "c_p=50", "--json", str(rows)]) == 0
     lines = [line.split("  #")[0].rstrip() for line in capsys.readouterr().out.splitlines()]
     assert {"m_p = 3.5", "preload = fixed", "c_p = 50.0", "model = lever"} <= set(lines)
-    assert len(lines) == 4 + len(settings_table())
+    assert len(lines) == len(CHOICES) + len(settings_table())
     values = {row["name"]: row["value"] for row in json.loads(rows.read_text())["settings"]}
     assert lines == [f"{name} = {value}" for name, value in values.items()]
 

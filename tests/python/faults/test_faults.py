@@ -17,13 +17,8 @@ from lever_cdkf.sil.faults.flight import Pilot
 from lever_cdkf.sil.faults.rows import MOTION, ROWS, TIME
 from python.conftest import Refused
 
-SILENT = {"theta_gain_drift", "theta_dot_gain_half", "tau_m_sign", "tau_m_gain_double", "z_ddot_gain_double", "clock_1.1"}
-    "theta_gain_drift",
-    "theta_dot_gain_half",
-    "tau_m_sign",
-    "tau_m_gain_double",
-    "z_ddot_gain_double",
-    "clock_1.1",
+SILENT = {
+    *("theta_gain_drift", "theta_dot_gain_half", "tau_m_sign", "tau_m_gain_double", "z_ddot_gain_double", "clock_1.1"),
 }
 """Rows in which the firmware is known to be wrong for a second or more without a flag."""
 

@@ -40,7 +40,7 @@ def test_round_trip(tmp_path: Path) -> None:
 
 def test_form() -> None:
     lines = format_config(Config()).splitlines()
-    assert len(lines) == 4 + len(settings_table())
+    assert len(lines) == len(CHOICES) + len(settings_table())
     assert lines[1].split() == ["preload", "=", "trim", "#", "one", "of", "fixed,", "trim"]
     line = next(line for line in lines if line.startswith("theta_noise "))
     assert " ".join(line.split()) == "theta_noise = 0.001 # [rad] standard deviation of a theta sample"

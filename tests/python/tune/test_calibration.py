@@ -39,14 +39,6 @@ def test_it_is_found_wherever_the_search_starts(wrong: Recording, start: dict[st
         assert entry.verdict == "found"
 
 
-def test_an_unknown_torque_gain_makes_the_base_gain_as_uncertain(wrong: Recording) -> None:
-    """Torque and base give the pilot's scale twice: beside a torque gain of 7 %, the base's is not known better."""
-    likelihood = Likelihood(wrong, held_out=0.0)
-    known, unknown = (calibrate(likelihood, {"tau_m_gain_sigma": sigma}).entries[0].sigma for sigma in (0.0, 0.07))
-    assert known < 0.005
-    assert unknown == pytest.approx(math.hypot(known, 0.07), rel=0.2)
-
-
 @pytest.mark.parametrize(
     ("torque", "settings", "words"),
     [

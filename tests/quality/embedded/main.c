@@ -109,11 +109,13 @@ static void put_estimate(const lever_t *lever, uint32_t sample, enum lever_mode 
 {
     lever_estimate_t e;
     lever_health_t health;
+    lever_correction_t correction;
     lever_estimate(lever, &e);
     lever_health(lever, &health);
+    lever_correction(lever, &correction);
     const float value[] = {e.theta, e.theta_sigma, e.theta_dot, e.theta_dot_sigma, e.natural_frequency,
         e.natural_frequency_sigma, e.damping_ratio, e.damping_ratio_sigma, e.trim, e.nis, health.excitation,
-        health.torque};
+        health.torque, correction.angle, correction.weight};
     put_all(value, (uint32_t)(sizeof value / sizeof value[0]));
     put_all(e.parameter, LEVER_PARAMETERS);
     put_all(e.parameter_sigma, LEVER_PARAMETERS);
@@ -138,6 +140,7 @@ static void fly(const char *kind, const lever_config_t *config, const scene_t *s
         .preload = (uint8_t)LEVER_KEEP,
         .estimator = (uint8_t)LEVER_KEEP,
         .adaptation = (uint8_t)LEVER_KEEP,
+        .mitigation = (uint8_t)LEVER_KEEP,
         .dither_rms = 0.3f};
     arm_t arm = arm_start(seed);
     lever_t *lever = start(config);
@@ -169,6 +172,7 @@ static void fly_choices(void)
             config.estimator = choice / 8u;
             config.preload = (choice / 4u) % 2u;
             config.adaptation = choice % 4u;
+            config.mitigation = choice % (uint8_t)LEVER_MITIGATION_COUNT;
             (void)snprintf(
                 name, sizeof name, "%u.%u.%u.%u", config.model, config.estimator, config.preload, config.adaptation);
             fly("choice", &config, &quiet, SAMPLES, 1u);
@@ -199,6 +203,7 @@ static void fly_random_settings(void)
         draw_settings(&config, &dice);
         config.model = (uint8_t)arm_random(&dice, LEVER_MODEL_COUNT);
         config.estimator = (uint8_t)arm_random(&dice, LEVER_ESTIMATOR_COUNT);
+        config.mitigation = (uint8_t)arm_random(&dice, LEVER_MITIGATION_COUNT);
         (void)snprintf(name, sizeof name, "%s.%" PRIu32, scene.name, i);
         scene.name = name;
         fly("random", &config, &scene, SAMPLES, i);
@@ -256,13 +261,13 @@ static void send_command(sender_t *sender, uint32_t count)
     message_command_t command = {(uint8_t)LEVER_REQUEST_NONE, keep, keep, keep, keep, keep, 0.3f};
     lever_frame_t frame;
     if (sender->rough) {
-        uint8_t *const choice[] = {
-            &command.request, &command.model, &command.preload, &command.estimator, &command.adaptation};
+        uint8_t *const choice[] = {&command.request, &command.model, &command.preload, &command.estimator,
+            &command.adaptation, &command.mitigation};
         const uint32_t which = arm_random(&sender->dice, 16u);
         command.dither_rms = (arm_random(&sender->dice, 4u) == 0u) ? 0.0f : (0.5f + (0.5f * arm_noise(&sender->dice)));
         command.dither_rms = (arm_random(&sender->dice, 9u) == 0u) ? 70.0f : command.dither_rms;
-        if (which < 5u) {
-            *choice[which] = (uint8_t)arm_random(&sender->dice, 5u);
+        if (which < 6u) {
+            *choice[which] = (uint8_t)arm_random(&sender->dice, 7u);
         }
     }
     put_word(message_command_encode(&frame, &command) ? 1u : 0u);
@@ -314,7 +319,7 @@ static void exceed(arm_t *dice, lever_sample_t *sample)
 
 static void talk(const char *name, const lever_config_t *config, bool rough, uint32_t samples, uint32_t seed)
 {
-    static const lever_aircraft_t aircraft = {.count = 4u,
+    lever_aircraft_t aircraft = {.count = 4u,
         .frequency = {1.5f, 3.0f, 4.5f, 8.0f},
         .real = {24.0f, 18.0f, 9.0f, -3.0f},
         .imaginary = {-6.0f, -14.0f, -17.0f, -9.0f},
@@ -326,6 +331,10 @@ static void talk(const char *name, const lever_config_t *config, bool rough, uin
     arm_t arm = arm_start(seed);
     sender_t sender = {arm_start(seed + 1000u), start(config), rough};
     begin_run("bus", name);
+    for (uint32_t i = 0u; rough && (i < aircraft.count); i++) { /* nearer to the alarm, and beyond */
+        aircraft.real[i] *= 5.0f;
+        aircraft.imaginary[i] *= 5.0f;
+    }
     lever_platform(sender.lever, &platform);
     (void)lever_aircraft(sender.lever, &aircraft);
     for (uint32_t ms = 0u; ms < samples; ms++) {
@@ -362,7 +371,7 @@ static void talk_on_the_bus(void)
     for (uint32_t choice = 0u; choice < 8u; choice++) {
         config.model = (uint8_t)(choice / 2u);
         config.estimator = (uint8_t)(choice % 2u);
-        config.mitigation = (uint8_t)(1u + (choice % ((uint8_t)LEVER_MITIGATION_COUNT - 1u)));
+        config.mitigation = (uint8_t)(choice % (uint32_t)LEVER_MITIGATION_COUNT);
         (void)snprintf(name, sizeof name, "calm.%u.%u", config.model, config.estimator);
         talk(name, &config, false, SAMPLES, choice);
         (void)snprintf(name, sizeof name, "rough.%u.%u", config.model, config.estimator);
@@ -404,11 +413,11 @@ static void go_round(void)
     ROUND_TRIP(stability, MESSAGE_STABILITY_ID)
     ROUND_TRIP(health, MESSAGE_HEALTH_ID)
     ROUND_TRIP(motor_command, MESSAGE_MOTOR_COMMAND_ID)
-    ROUND_TRIP(correction, MESSAGE_CORRECTION_ID)
     ROUND_TRIP(platform_health, MESSAGE_PLATFORM_HEALTH_ID)
     ROUND_TRIP(identity, MESSAGE_IDENTITY_ID)
     ROUND_TRIP(command_ack, MESSAGE_COMMAND_ACK_ID)
     ROUND_TRIP(link_health, MESSAGE_LINK_HEALTH_ID)
+    ROUND_TRIP(correction, MESSAGE_CORRECTION_ID)
 }
 
 int main(int argc, char **argv)

@@ -45,7 +45,7 @@ def instructions(values: Values) -> str:
     pairs = [(estimator, model) for estimator in ESTIMATORS for model in MODELS]
     cases = {f"`lever_update()`, {estimator}, `{model}`": f"{estimator}.{model}" for estimator, model in pairs}
     cases |= {
-        f"the same with an aircraft and mitigation, {each}, `lever`": f"bounce.{each}.lever" for each in ESTIMATORS
+        f"`lever_update()` with aircraft and mitigation, {each}, `lever`": f"bounce.{each}.lever" for each in ESTIMATORS
     }
     cases |= {f"the whole turn for a sample, {each}, `lever`": f"tick.{each}.lever" for each in ESTIMATORS}
     lines += [_counts(what, case, values) for what, case in cases.items()]

@@ -46,7 +46,7 @@ def test_the_image_computes_what_the_host_computes(runs: Runs, estimator: str, m
     """To the bit, from samples and from frames."""
     fields = [name for name, _ in ffi.typeof("lever_estimate_t").fields]
     host = ffi.from_buffer("lever_estimate_t *", estimate_on_host(model, estimator))
-    for form in image.FORMS:
+    for form in (each for each in image.FORMS if (estimator, model, each) in runs):
         target = ffi.from_buffer("lever_estimate_t *", runs[estimator, model, form].estimate)
         for name in fields:
             values = [getattr(each, name) for each in (host, target)]
