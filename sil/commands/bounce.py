@@ -27,7 +27,7 @@ _EPILOG = """\
 examples:
   lever bounce --list
   lever bounce --quick                            some conditions, three pilots an aircraft
-  lever bounce --only alarm baselines --seeds 50
+  lever bounce --only alarm margin --seeds 50
   lever bounce --json bounce.json                 all conditions, 20 pilots an aircraft
 """
 
