@@ -76,8 +76,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             status = int(stop.code or 0)
         sys.stdout.flush()
         return status
-    except KeyboardInterrupt:
-        print(MESSAGE, file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(": ".join((MESSAGE, *map(str, stop.args))), file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # the reader, such as `head`, has what it wants; nothing is left to say at exit either
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -138,7 +138,8 @@ static places_t places_of(const loop_t *loop)
             if (height > highest) {
                 highest = height;
                 places.crosses = true;
-                places.crossing = (float)(i - 1u) + part;
+                const uint32_t from = i - 1u;
+                places.crossing = (float)from + part;
                 places.slope.real = value.real - before.real;
                 places.slope.imaginary = value.imaginary - before.imaginary;
             }

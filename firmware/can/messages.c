@@ -297,8 +297,9 @@ static const layout_t identity[MESSAGE_PAGE_COUNT] = {
 bool message_identity_encode(lever_frame_t *frame, const message_identity_t *message)
 {
     const uint32_t code[MESSAGE_PAGE_COUNT][PAGE_CODES] = {
-        {message->page, message->firmware_major, message->firmware_minor, message->firmware_patch, message->contract},
-        {message->page, message->settings_crc},
+        {message->page, message->firmware_major, message->firmware_minor, message->firmware_patch, message->contract,
+            0u},
+        {message->page, message->settings_crc, 0u, 0u, 0u, 0u},
         {message->page, message->model, message->preload, message->estimator, message->adaptation, message->mitigation},
     };
     const uint8_t page = message->page;
@@ -308,7 +309,7 @@ bool message_identity_encode(lever_frame_t *frame, const message_identity_t *mes
 
 bool message_identity_decode(message_identity_t *message, const lever_frame_t *frame)
 {
-    uint32_t code[PAGE_CODES] = {0u};
+    uint32_t code[PAGE_CODES] = {0u}; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
     float value[1] = {0.0f};
     const bool fits =
         layout_decode(code, value, &identity[MESSAGE_PAGE_SETTINGS], frame) && (code[0] < (uint32_t)MESSAGE_PAGE_COUNT);

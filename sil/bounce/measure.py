@@ -103,7 +103,8 @@ def _doubled(flown: Flown) -> float:
     loudness, notes = _loudness(flown), flown.notes
     steady = float(np.median(loudness[(notes > 2.0) & (notes < 10.0)]))
     lasts = round(2.0 / (notes[1] - notes[0]))
-    loud: BoolArray = np.lib.stride_tricks.sliding_window_view(loudness > LOUD * steady, lasts).all(axis=-1)
+    windows = np.lib.stride_tricks.sliding_window_view(loudness > LOUD * steady, lasts)
+    loud: BoolArray = np.logical_and.reduce(windows, axis=1)
     return min(_first(loud & (notes[: len(loud)] > 10.0), notes), float(notes[-1]))
 
 

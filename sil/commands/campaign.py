@@ -96,8 +96,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         session = _run(plan, folder, args)
     except KeyboardInterrupt:
-        print("lever: campaign: interrupted; what is finished is kept: go on with --resume", file=sys.stderr)
-        raise
+        raise KeyboardInterrupt("what is finished is kept; go on with --resume") from None
     return _finish(plan, folder, session, args)
 
 

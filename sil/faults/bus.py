@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from e2e.p02 import e2e_p02_protect
@@ -68,11 +69,13 @@ class Bus:
         sent = np.arange(0, count, KEEP_ALIVE)
         self.add_other("COMMAND", [data[i & 15] for i in range(len(sent))], sent + _PLACE["COMMAND"])
 
-    def add(self, frames: NDArray[np.void], order: FloatArray) -> None:
+    def add(self, frames: NDArray[np.void], order: NDArray[np.floating[Any]]) -> None:
         """Further frames."""
         self.frames, self.order = np.concatenate((self.frames, frames)), np.concatenate((self.order, order))
 
-    def add_other(self, identifier: str | Sequence[int], data: Sequence[bytes], order: FloatArray) -> None:
+    def add_other(
+        self, identifier: str | Sequence[int], data: Sequence[bytes], order: NDArray[np.floating[Any]]
+    ) -> None:
         """Frames with data of their own: of a message by name, or by their identifiers."""
         frames = np.zeros(len(data), FRAME)
         frames["kind"], frames["length"] = lib.CHANNEL_OTHER, 8

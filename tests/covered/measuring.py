@@ -129,7 +129,7 @@ def _with_python(build: Path, core: Sequence[Path], folder: Path) -> Path:
     _run([COMPILER, *COVERAGE[:1], "-shared", f"-Wl,-soname,{library.name}", *core, "-lm", "-o", library])
     environment = {"LEVER_CDKF_LIBRARY_DIR": str(folder), "CC": " ".join((COMPILER, *COVERAGE))}
     files = [str(ROOT / "tests/python" / name) for name in PYTHON]
-    command = [build / "venv/bin/python", "-m", "pytest", "-q", *files]
+    command: list[str | Path] = [build / "venv/bin/python", "-m", "pytest", "-q", *files]
     _run(command, LLVM_PROFILE_FILE=str(folder / "python-%m-%p.profraw"), **environment)
     return library
 

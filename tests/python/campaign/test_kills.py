@@ -18,7 +18,7 @@ from python.campaign.conftest import files
 
 pytestmark = pytest.mark.usefixtures("installed")
 
-INTERRUPTED = "lever: campaign: interrupted; what is finished is kept: go on with --resume\n"
+INTERRUPTED = "lever: interrupted: what is finished is kept; go on with --resume\n"
 PATIENCE = 120.0  # [s] until something is given up that takes a second on an idle machine
 
 

@@ -460,7 +460,12 @@ def test_claims_stand_in_table_and_page() -> None:
 
 def test_a_line_of_the_table_has_every_figure_in_its_unit() -> None:
     own = {"rms": (0.01, 0.02, 0.03, 0.004, 0.05), "linearised": (1.0, 1.1, 1.2, 1.3, 1.4)}
-    ends = {"bound": (2.0, 2.1, 2.2, 2.3, 2.4), "against": (0.5, 0.6, 0.7, 0.8, 0.9), "nees_low": 2.5, "nees_high": 3.5}
+    ends: dict[str, Any] = {
+        "bound": (2.0, 2.1, 2.2, 2.3, 2.4),
+        "against": (0.5, 0.6, 0.7, 0.8, 0.9),
+        "nees_low": 2.5,
+        "nees_high": 3.5,
+    }
     ((line,),) = table.tables(
         [row("joint", 0.1, **own, **ends, linearised_error=(0.1, 0.5, 0.2, 0.0, 0.0))], []
     ).values()
@@ -471,7 +476,7 @@ def test_a_line_of_the_table_has_every_figure_in_its_unit() -> None:
         ("Cramér-Rao", ends["bound"]),
         ("reference", ends["against"]),
     ):
-        expected |= {f"{name} ÷ {title}": value for name, value in zip(names, values, strict=True)}  # type: ignore[arg-type]
+        expected |= {f"{name} ÷ {title}": value for name, value in zip(names, values, strict=True)}
     assert {key: line[key] for key in expected} == pytest.approx(expected)
     assert (line["± of these"], line["95 % band"]) == (0.5, "2.50-3.50")
 
