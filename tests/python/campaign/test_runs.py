@@ -145,6 +145,16 @@ def test_what_is_done_is_what_is_whole(small: Plan, tmp_path: Path) -> None:
     assert small.done(tmp_path) == {2}
 
 
+def test_another_library_makes_another_campaign(small: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "other").write_bytes(b"another build")
+    monkeypatch.setattr(chunks, "native_file", lambda name: tmp_path / "other")
+    chunks._code.cache_clear()
+    try:
+        assert chunks.fingerprint(small.spec) != small.fingerprint
+    finally:
+        chunks._code.cache_clear()
+
+
 def test_another_campaign_in_the_folder_is_refused(small: Plan, tmp_path: Path) -> None:
     chunks.make(small, small.chunk(0), tmp_path)
     for other in (dataclasses.replace(small.spec, seeds=5), dataclasses.replace(small.spec, chunk=3)):

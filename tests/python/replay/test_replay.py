@@ -271,6 +271,7 @@ def test_a_sender_that_never_counts_fails_and_is_told_why(
     why = "no estimate was published: samples accepted: 1, frames refused: 11,998"
     assert shown.err == f"lever: replay: {why}\n"
     assert "11,998 repeated or out of sequence (does the sender count each message from 0 to 15?)." in shown.out
+    assert 'class="verdict bad"' in (out / "report.html").read_text()
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["passed"], summary["samples"], summary["late"]) == (False, 1, 11998)
     assert why in summary["verdict"]
@@ -279,6 +280,15 @@ def test_a_sender_that_never_counts_fails_and_is_told_why(
     )
     assert "refused" in header
     assert "11998" in row
+
+
+def test_it_says_when_the_recording_began(session: Session, tmp_path: Path) -> None:
+    (tmp_path / "may.log").write_text(
+        "".join(
+            f"({1.7e9 + float(line[1:].split(')')[0]):.6f}){line.partition(')')[2]}\n" for line in session.lines[:2000]
+        )
+    )
+    assert replayed(tmp_path / "out", tmp_path / "may.log")["recording"]["start"] == "2023-11-14 22:13:20 UTC"
 
 
 def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refused: Refused, tmp_path: Path) -> None:

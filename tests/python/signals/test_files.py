@@ -13,7 +13,7 @@ import pyarrow
 import pytest
 from asammdf import MDF
 from asammdf import Signal as Channel
-from lever_cdkf.host_tools.signals.tables import read_table
+from lever_cdkf.host_tools.signals.tables import is_table, read_table
 from pyarrow import parquet
 from python.conftest import Refused
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight
@@ -96,6 +96,15 @@ def test_units_of_parquet(columns: Columns, tmp_path: Path) -> None:
     table = pyarrow.table([columns["Time"], columns["LvrAng"]], schema=pyarrow.schema(fields))
     parquet.write_table(table, tmp_path / "units.parquet")
     assert [(each.name, each.unit) for each in read_table(str(tmp_path / "units.parquet"))] == [("a", "mrad")]
+
+
+def test_a_packed_table_is_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "flight.csv.gz"
+    with gzip.open(path, "wt") as file:
+        file.write("time,angle [deg]\n0.0,1.0\n0.1,2.0\n")
+    assert is_table(str(path))
+    (angle,) = read_table(str(path))
+    assert angle.values.tolist() == [1.0, 2.0]
 
 
 def test_what_an_mf4_marks_invalid_is_missing(tmp_path: Path) -> None:

@@ -48,6 +48,7 @@ def test_what_it_prints_says_before_and_after_with_units(tuned: Path) -> None:
     noise = {row["name"]: row for row in tables["settings"]}
     assert noise["theta_noise"]["unit"] == "rad"
     assert noise["theta_noise"]["before"] == 0.001
+    assert noise["theta_noise"]["verdict"] == "too large"
     assert noise["theta_noise"]["95 % from"] < noise["theta_noise"]["after"] < noise["theta_noise"]["to"]
     rows = {(row["part"], row["noise"]): row for row in tables["before and after"]}
     assert set(rows) == {(part, noise) for part in ("tuned on", "held out") for noise in ("as set", "estimated")}
