@@ -138,8 +138,7 @@ static places_t places_of(const loop_t *loop)
             if (height > highest) {
                 highest = height;
                 places.crosses = true;
-                const uint32_t from = i - 1u;
-                places.crossing = (float)from + part;
+                places.crossing = ((float)i - 1.0f) + part;
                 places.slope.real = value.real - before.real;
                 places.slope.imaginary = value.imaginary - before.imaginary;
             }

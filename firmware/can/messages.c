@@ -309,7 +309,7 @@ bool message_identity_encode(lever_frame_t *frame, const message_identity_t *mes
 
 bool message_identity_decode(message_identity_t *message, const lever_frame_t *frame)
 {
-    uint32_t code[PAGE_CODES] = {0u}; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    uint32_t code[PAGE_CODES] = {0u, 0u, 0u, 0u, 0u, 0u};
     float value[1] = {0.0f};
     const bool fits =
         layout_decode(code, value, &identity[MESSAGE_PAGE_SETTINGS], frame) && (code[0] < (uint32_t)MESSAGE_PAGE_COUNT);

@@ -64,8 +64,8 @@ class Run:
     """Frames sent."""
     init: int
     """Instructions of lever_init()."""
-    estimate: bytes
-    """lever_estimate_t after the last sample."""
+    said: bytes
+    """lever_estimate_t, lever_stability_t and lever_correction_t after the last sample, one behind the other."""
 
 
 def run_command(command: list[str], what: str, hint: str = "") -> str:
@@ -143,13 +143,17 @@ def cases() -> list[tuple[str, str, str]]:
     ]
 
 
+def mitigation(form: str) -> str:
+    """What a form measures."""
+    return "cancellation_and_damping" if form == "bounce" else "none"
+
+
 def arguments(recording: Recording, model: str, estimator: str, form: str) -> list[str]:
     """The configuration as main.c reads it: what differs from the defaults."""
     config, default = recording.scenario.config, Config()
     numbers = {name: value for name, value in config.settings.items() if value != default.settings[name]}
     numbers["dither_rms"] = recording.dither_rms
-    mitigation = "cancellation_and_damping" if form == "bounce" else "none"
-    choices = {**config.choices, "model": model, "estimator": estimator, "mitigation": mitigation}
+    choices = {**config.choices, "model": model, "estimator": estimator, "mitigation": mitigation(form)}
     codes = {what: list(enum_names(f"lever_{what}").values()).index(name) for what, name in choices.items()}
     words = [f"{what}={code:x}" for what, code in codes.items()]
     return words + [f"{name}={struct.unpack('<I', struct.pack('<f', value))[0]:x}" for name, value in numbers.items()]
@@ -171,12 +175,12 @@ def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) 
 
 def _read(data: bytes, count: int) -> Run:
     """What the image wrote. Raises LeverError when its own loop was not timed right, or something is missing."""
-    empty, calibration, rounds, *stacks, init, estimate_bytes = _INTRO.unpack_from(data)
+    empty, calibration, rounds, *stacks, init, said_bytes = _INTRO.unpack_from(data)
     looped = (calibration - empty) / TICKS_AN_INSTRUCTION
     if abs(looped - 2 * rounds) > 1.0:
         raise LeverError(f"QEMU's clock is off: a loop of {2 * rounds} instructions was timed as {looped:.1f}")
     end = _INTRO.size + count * _RECORD.itemsize
-    if len(data) != end + estimate_bytes:
+    if len(data) != end + said_bytes:
         raise LeverError(f"the image wrote {len(data)} bytes of results for {count} samples: it is not of this version")
     records = np.frombuffer(data[_INTRO.size : end], _RECORD)
     instructions = np.rint((records["ticks"].astype(np.int64) - empty) / TICKS_AN_INSTRUCTION)
@@ -189,6 +193,6 @@ def _read(data: bytes, count: int) -> Run:
         loop_measured=looped,
         calls_stack=once,
         init=round((init - empty) / TICKS_AN_INSTRUCTION),
-        estimate=data[end:],
+        said=data[end:],
         **whole,
     )

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import Built
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
 from lever_cdkf.host_tools.firmware.config import CHOICES, Config
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
 from target.budget import image, measure, stack, trace
@@ -17,16 +20,35 @@ from target.budget.recording import MODELS, record
 pytestmark = pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm")
 FAULTS = {name: bit for bit, name in enum_names("lever_fault").items()}
 Runs = dict[measure.Case, image.Run]
-CASES = [(estimator, model) for estimator in image.ESTIMATORS for model in MODELS]
 
 
-def estimate_on_host(model: str, estimator: str) -> bytes:
-    """lever_estimate_t after the last sample, from the library of this machine."""
+SAID = ("lever_estimate_t", "lever_stability_t", "lever_correction_t")
+
+
+def aircraft_of_image() -> AircraftResponse:
+    """As main.c has it."""
+    source = (image.SOURCE / "main.c").read_text(encoding="utf-8")
+    lists = {
+        name: re.search(rf"\.{name} = {{(.*?)}}", source, re.DOTALL) for name in ("frequency", "real", "imaginary")
+    }
+    numbers = {
+        name: [float(each) for each in re.findall(r"[-\d.]+", found[1])] for name, found in lists.items() if found
+    }
+    response = [complex(*each) for each in zip(numbers["real"], numbers["imaginary"], strict=True)]
+    return AircraftResponse(numbers["frequency"], response, gain_sigma=0.05, phase_sigma=0.05)
+
+
+def said_on_host(model: str, estimator: str, form: str) -> list[Any]:
+    """After the last sample, from the library of this machine."""
     recording = record(model)
     scenario = recording.scenario
-    config = Config(**{**scenario.config.choices, "model": model, "estimator": estimator}, settings=scenario.settings)
+    mitigation = image.mitigation(form)
+    choices = {**scenario.config.choices, "model": model, "estimator": estimator, "mitigation": mitigation}
+    config, aircraft = Config(**choices, settings=scenario.settings), aircraft_of_image()
     memory = ffi.new("lever_memory_t *")
     lever = lib.lever_init(memory, config.pointer)
+    if form == "bounce":
+        assert lib.lever_aircraft(lever, aircraft.pointer)
     keep = dict.fromkeys(CHOICES, lib.LEVER_KEEP)
     command = ffi.new("lever_command_t *", {**keep, "dither_rms": recording.dither_rms})
     assert lib.lever_command(lever, command)
@@ -36,34 +58,39 @@ def estimate_on_host(model: str, estimator: str) -> bytes:
         if i % 500 == 0:
             lib.lever_command(lever, command)  # as image/main.c does
         lib.lever_update(lever, samples + i)
-    estimate = ffi.new("lever_estimate_t *")
-    lib.lever_estimate(lever, estimate)
-    return bytes(ffi.buffer(estimate))
+    said = [ffi.new(f"{name} *") for name in SAID]
+    for ask, into in zip((lib.lever_estimate, lib.lever_stability, lib.lever_correction), said, strict=True):
+        ask(lever, into)
+    return said
 
 
-@pytest.mark.parametrize(("estimator", "model"), CASES)
-def test_the_image_computes_what_the_host_computes(runs: Runs, estimator: str, model: str) -> None:
-    """To the bit, from samples and from frames."""
-    fields = [name for name, _ in ffi.typeof("lever_estimate_t").fields]
-    host = ffi.from_buffer("lever_estimate_t *", estimate_on_host(model, estimator))
-    for form in (each for each in image.FORMS if (estimator, model, each) in runs):
-        target = ffi.from_buffer("lever_estimate_t *", runs[estimator, model, form].estimate)
-        for name in fields:
-            values = [getattr(each, name) for each in (host, target)]
-            if ffi.typeof("lever_estimate_t").fields[fields.index(name)][1].type.kind == "array":
-                values = [list(value) for value in values]
-            assert values[0] == values[1], (form, name)
+def fields(struct: Any) -> dict[str, Any]:
+    """Of a pointer to one, by name; arrays as lists."""
+    values = {name: getattr(struct, name) for name, _ in ffi.typeof(struct).item.fields}
+    return {name: list(value) if isinstance(value, ffi.CData) else value for name, value in values.items()}
+
+
+@pytest.mark.parametrize(("estimator", "model", "form"), image.cases())
+def test_the_image_computes_what_the_host_computes(runs: Runs, estimator: str, model: str, form: str) -> None:
+    """To the bit, from samples and from frames; with an aircraft and a mitigation, margin and correction, too."""
+    target, at = runs[estimator, model, form].said, 0
+    assert len(target) == sum(map(ffi.sizeof, SAID))
+    for name, host in zip(SAID, said_on_host(model, estimator, form), strict=True):
+        part = target[at : at + ffi.sizeof(name)]  # which the pointer does not keep alive
+        assert fields(ffi.from_buffer(f"{name} *", part)) == fields(host), name
+        at += len(part)
+    assert (runs[estimator, model, form].said[-8:] != bytes(8)) == (form == "bounce")
 
 
 def test_a_processor_without_fpu_computes_the_same(runs: Runs, built: Built) -> None:
     """And takes about twenty times the instructions: PORTING.md."""
     elf = built("target/soft_float/budget.elf", "build.budget")
     soft, hard = image.run(elf, record("lever"), "lever", "dual", "update"), runs["dual", "lever", "update"]
-    assert soft.estimate == hard.estimate
+    assert soft.said == hard.said
     assert 15.0 < soft.instructions.mean() / hard.instructions.mean() < 25.0
 
 
-@pytest.mark.parametrize(("estimator", "model"), CASES)
+@pytest.mark.parametrize(("estimator", "model"), [(each, model) for each in image.ESTIMATORS for model in MODELS])
 def test_the_recording_makes_the_estimator_work(runs: Runs, estimator: str, model: str) -> None:
     """It aligns, runs, learns from sample to sample, notices the change at 6 s, and publishes."""
     run, time = runs[estimator, model, "tick"], measure.sample_times(record(model))
@@ -175,4 +202,4 @@ def test_a_dearer_firmware_is_noticed(elf: Path, runs: Runs, built: Built) -> No
     assert run.stack.max() >= was.stack.max() + 1000
     deepest, before_that = (stack.worst_case(each, ["lever_update"])["lever_update"].bytes for each in (dearer, elf))
     assert deepest >= before_that + 1000
-    assert run.estimate == was.estimate
+    assert run.said == was.said

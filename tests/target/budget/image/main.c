@@ -48,7 +48,7 @@ typedef struct intro {
     uint32_t estimate_stack;
     uint32_t health_stack;
     uint32_t init_ticks;
-    uint32_t estimate_bytes; /* of the lever_estimate_t at the end */
+    uint32_t said_bytes; /* of the said_t at the end */
 } intro_t;
 
 typedef struct record {
@@ -58,6 +58,13 @@ typedef struct record {
     uint8_t mode;
     uint8_t frames; /* sent */
 } record_t;
+
+/* What the instance says after the last sample. */
+typedef struct said {
+    lever_estimate_t estimate;
+    lever_stability_t stability;
+    lever_correction_t correction;
+} said_t;
 
 /* A header_t, and behind it the samples: image.ld, and QEMU's loader. */
 extern const uint8_t samples_in_flash[];
@@ -290,7 +297,7 @@ static lever_t *start(const lever_config_t *config, const lever_command_t *comma
     paint_stack();
     lever_health(lever, &health);
     intro->health_stack = stack_used();
-    intro->estimate_bytes = sizeof estimate;
+    intro->said_bytes = sizeof(said_t);
     return lever;
 }
 
@@ -325,8 +332,10 @@ int main(void)
         update_all(lever, &command);
     }
     flush();
-    lever_estimate_t estimate;
-    lever_estimate(lever, &estimate);
-    semihosting_write(output, &estimate, sizeof estimate);
+    static said_t said;
+    lever_estimate(lever, &said.estimate);
+    lever_stability(lever, &said.stability);
+    lever_correction(lever, &said.correction);
+    semihosting_write(output, &said, sizeof said);
     return 0;
 }
