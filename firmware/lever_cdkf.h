@@ -286,8 +286,9 @@ typedef struct lever_stability {
  * must outlive the instance unchanged. Returns false, changing nothing, if it is not usable. */
 bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft);
 
-/* As of the last publish_period, or 40 ms where that is shorter; all but `state` is 0 before the first. A state is entered when the margin is below its
- * limit with a probability of 80 %, and left when it is above with that. ALARM stays while nothing better is known. */
+/* As of the last publish_period, or 40 ms where that is shorter; all but `state` is 0 before the first. A state is
+ * entered when the margin is below its limit with a probability of 80 %, and left when it is above with that. ALARM stays
+ * while nothing better is known. */
 void lever_stability(const lever_t *lever, lever_stability_t *stability);
 
 /* What mitigation adds to the lever's angle, until the next sample: pitch = gearing (theta - trim + angle). */
@@ -296,8 +297,8 @@ typedef struct lever_correction {
     float weight; /* of the fade: 0 passive, 1 all of it */
 } lever_correction_t;
 
-/* After the last sample, or lever_idle(). It fades in within a second, and is 0 within 100 ms after a sensor, the sample
- * clock or the samples have failed; whoever gets none for 100 ms takes 0. */
+/* After the last sample, or lever_idle(). It fades in within a second, and is 0 within 100 ms after a sensor, the
+ * sample clock or the samples have failed; whoever gets none for 100 ms takes 0. */
 void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
 /* --- names ------------------------------------------------------------------------------------------------------ */
@@ -411,9 +412,9 @@ enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *fram
 enum lever_mode lever_step(lever_t *lever);
 
 /* The next frame to send; false when there is none left. Fetch after lever_step(), after every frame taken or refused
- * (a COMMAND is answered) and after lever_idle(). MOTOR_COMMAND and CORRECTION come first. Every step ends with one STATE_ESTIMATE,
- * so who has received that has everything the step gives. Frames not fetched before the next step are replaced by newer
- * ones. */
+ * (a COMMAND is answered) and after lever_idle(). MOTOR_COMMAND and CORRECTION come first. Every step ends with one
+ * STATE_ESTIMATE, so who has received that has everything the step gives. Frames not fetched before the next step are
+ * replaced by newer ones. */
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 
 #ifdef __cplusplus

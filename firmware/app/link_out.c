@@ -1,15 +1,11 @@
 /* What each message to send says of an instance. */
 #include "app/instance.h"
 #include "app/link.h"
+#include "math/bounds.h"
 
 #include <math.h>
 
 /* --- shared by the messages --------------------------------------------------------------------------------------- */
-
-static bool is_finite(float value)
-{
-    return fabsf(value) <= 3.0e38f; /* NaN is not */
-}
 
 static bool are_finite(const float value[LEVER_PARAMETERS])
 {

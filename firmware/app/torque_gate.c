@@ -1,5 +1,7 @@
 #include "app/torque_gate.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -12,12 +14,6 @@
 #define MEMORY_PER_US 4.0e-6f /* 1 / that, in us */
 #define WINDOW 1.0f           /* of torque_rms [s] */
 #define ROOM 0.2f             /* part of square_most in which the amplitude falls, at least */
-
-static float clamped(float value, float most)
-{
-    const float above = (value > most) ? most : value;
-    return (above < -most) ? -most : above;
-}
 
 /* Room of the mean square below square_most in which the amplitude allowed falls from the limit to what may stay for
  * ever: wide enough that it falls no faster than torque_slew, and that the longest step leaves the mean square
@@ -110,8 +106,7 @@ static void drive(torque_gate_t *gate, float asked, uint32_t elapsed_us)
     const float slew = gate->slew * (float)step_us;
     const float gain = gate->gain + gate->open_step;
     gate->gain = (gain < 1.0f) ? gain : 1.0f;
-    const bool finite = (fabsf(asked) <= 3.0e38f);
-    const float wanted = finite ? clamped(gate->gain * asked, gate->limit) : 0.0f;
+    const float wanted = is_finite(asked) ? clamped(gate->gain * asked, gate->limit) : 0.0f;
     const float highest = gate->torque + slew;
     const float lowest = gate->torque - slew;
     const float below = (wanted < highest) ? wanted : highest;

@@ -1,6 +1,7 @@
 #include "bounce/margin.h"
 
 #include "filter/derived.h"
+#include "math/bounds.h"
 #include "math/exponential.h"
 #include "model/base_motion.h"
 
@@ -277,11 +278,6 @@ margin_t margin_of(const lever_aircraft_t *aircraft, const cdkf_t *cdkf, const m
         .frequency = frequency,
         .frequency_sigma = hypotenuse(sigma.second, 0.0f, by_phase)};
     return result;
-}
-
-static bool is_finite(float value)
-{
-    return fabsf(value) <= 3.0e38f; /* NaN is not */
 }
 
 bool margin_accepts(const lever_aircraft_t *aircraft)

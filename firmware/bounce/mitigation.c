@@ -1,5 +1,6 @@
 #include "bounce/mitigation.h"
 
+#include "math/bounds.h"
 #include "math/share.h"
 
 #include <math.h>
@@ -25,12 +26,6 @@ static bool has_notch(uint8_t mitigation)
 static bool has_correction(uint8_t mitigation)
 {
     return mitigation > (uint8_t)LEVER_MITIGATION_DAMPING;
-}
-
-static float clamped(float value, float most)
-{
-    const float above = (value > most) ? most : value;
-    return (above < -most) ? -most : above;
 }
 
 /* --- gate --------------------------------------------------------------------------------------------------------- */

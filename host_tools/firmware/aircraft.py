@@ -100,7 +100,7 @@ def read_response(path: str) -> AircraftResponse:
     for place, line in enumerate(content.split("\n"), start=1):
         text = line.partition("#")[0].strip()
         name, equals, value = (part.strip() for part in text.partition("="))
-        cells = [_number(cell) for cell in (value if equals else text).split()]
+        cells = [finite_number(cell) for cell in (value if equals else text).split()]
         if text and (
             len(cells) != (1 if equals else 3) or (equals and name not in _NUMBERS) or any(map(math.isnan, cells))
         ):
@@ -122,7 +122,7 @@ def read_response(path: str) -> AircraftResponse:
 _NUMBERS = {"gain_sigma": "[1]", "phase_sigma": "[rad]", "warning": "[dB]", "alarm": "[dB]"}
 
 
-def _number(text: str) -> float:
+def finite_number(text: str) -> float:
     """NaN for what is none."""
     try:
         number = float(text)

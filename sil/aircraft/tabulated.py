@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.firmware.aircraft import finite_number
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Tabulated:
             raise LeverError(f"{path}: {getattr(error, 'strerror', None) or 'not text in UTF-8'}") from None
         rows: list[list[float]] = []
         for number, line in enumerate(lines, 1):
-            cells = [_number(cell) for cell in line.split(",")]
+            cells = [finite_number(cell) for cell in line.split(",")]
             if line.startswith("#") or not line.strip() or (not rows and math.isnan(cells[0])):
                 continue
             if len(cells) != 3 or any(map(math.isnan, cells)):
@@ -63,12 +64,3 @@ class Tabulated:
     def at(self, frequency: FloatArray) -> ComplexArray:
         """At other frequencies [Hz], such as the 24 that the firmware takes."""
         return self.response(2j * np.pi * frequency.astype(np.complex128))
-
-
-def _number(cell: str) -> float:
-    """NaN for what is none."""
-    try:
-        number = float(cell)
-    except ValueError:
-        return math.nan
-    return number if math.isfinite(number) else math.nan

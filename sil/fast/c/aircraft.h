@@ -1,4 +1,4 @@
-/* The helicopter around the lever: sil/aircraft/flight.py, which is the reference, with the order of every operation. */
+/* The helicopter around the lever: sil/aircraft/flight.py, which is the reference, in the order of its operations. */
 #ifndef AIRCRAFT_H
 #define AIRCRAFT_H
 
@@ -27,8 +27,8 @@ typedef struct aircraft {
     double pitch; /* [rad] */
 } aircraft_t;
 
-/* z_ddot [m/s^2] at the sample after the one numbered `sample`, at which the lever's angle about its trim is `delta` [rad],
- * and `correction` [rad] is put out, which is added to that angle correction_delay later. */
+/* z_ddot [m/s^2] at the sample after the one numbered `sample`, at which the lever's angle about its trim is `delta`
+ * [rad], and `correction` [rad] is put out, which is added to that angle correction_delay later. */
 double aircraft_advance(aircraft_t *aircraft, uint32_t sample, double delta, double correction);
 
 #endif

@@ -1,5 +1,6 @@
 /* Rounding, exponential, logarithm, sine and cosine against libm in double: the error bounds and domains that their
  * headers state. */
+#include "math/bounds.h"
 #include "math/exponential.h"
 #include "math/rounding.h"
 #include "math/trigonometry.h"
@@ -144,4 +145,11 @@ TEST(tiny_angles_are_their_own_sine_and_the_small_variant_is_odd_and_even_to_the
         const sine_cosine_t minus = sine_cosine_small(-angle);
         TEST_ASSERT_TRUE((plus.sine == -minus.sine) && (plus.cosine == minus.cosine));
     }
+}
+
+TEST(neither_infinity_nor_nan_is_finite_and_a_value_beyond_its_bound_is_at_it)
+{
+    TEST_ASSERT_TRUE(is_finite(-3.0e38f) && is_finite(0.0f));
+    TEST_ASSERT_FALSE(is_finite(INFINITY) || is_finite(-INFINITY) || is_finite(NAN));
+    TEST_ASSERT_TRUE((clamped(2.0f, 1.5f) == 1.5f) && (clamped(-2.0f, 1.5f) == -1.5f) && (clamped(1.0f, 1.5f) == 1.0f));
 }
