@@ -10,7 +10,6 @@ import can
 import cantools
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.sil.run.runner import simulate
 from lever_cdkf.sil.scenarios import scenario
 from quality import tools
@@ -90,6 +89,5 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def simulated(folder: Path, seconds: float) -> Path:
     """A folder with the files of a run."""
     steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=2 s", "limits={}"])
-    with LeverBus("vcan0", config=steady.config) as bus:
-        simulate(steady, bus, folder, channel="vcan0")
+    simulate(steady, out_dir=folder, channel="vcan0")
     return folder
