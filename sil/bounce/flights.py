@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
-from lever_cdkf.host_tools.models.transfer import Transfer
 from lever_cdkf.host_tools.units import GRAVITY
 from numpy.typing import NDArray
 
 from ..aircraft import aircraft
-from ..aircraft.aircraft import Aircraft, Coupled
-from ..aircraft.stability import BAND
+from ..aircraft.aircraft import Coupled
+from ..aircraft.known import UNSURE, known
+from ..aircraft.stability import critical_gearing
 from ..envelope.motions import stream
 from ..fast.closed_loop import Loop
 from ..plants.truth import Truth
@@ -27,13 +27,8 @@ from ..toml_tables import Place, read
 AIRCRAFT = ("uh60_like", "puma_like", "bo105_like")
 STRIDE = 20
 """Samples between two notes of what the firmware says."""
-UNSURE = 0.05
-"""Standard deviation by which gain [1] and phase [rad] of the response that the firmware is given are wrong, as it is
-told."""
 RAISED = (20.0, 25.0)
 """When a gearing goes up that does so [s]: the firmware knows the pilot by then."""
-_TABLE = np.geomspace(1.5, 8.0, 24)
-_GRID = np.geomspace(*BAND, 500)
 
 
 @dataclass(frozen=True)
@@ -145,7 +140,7 @@ def fly(plan: Plan) -> Flown:
     assert scenario.aircraft is not None
     loop = Loop(scenario, inputs, by_frames=False, every=STRIDE)
     loop.gear(plan.gearings(inputs.time))
-    stability = loop.watch(known(scenario.aircraft, plan.seed))
+    stability = loop.watch(told(scenario.aircraft, plan.seed))
     if plan.clock_stops is not None:
         time = np.minimum(inputs.time, plan.clock_stops)
         loop.give_time(np.round(1e6 * time).astype(np.uint32))
@@ -165,31 +160,14 @@ def fly(plan: Plan) -> Flown:
     )
 
 
-def known(coupled: Coupled, seed: int) -> AircraftResponse:
+def told(coupled: Coupled, seed: int) -> AircraftResponse:
     """What the firmware is given of an aircraft: its response, off by what is stated."""
     gain, phase = UNSURE * stream(f"known {coupled.aircraft.title}", seed).standard_normal(2)
-    response = coupled.response(2j * np.pi * _TABLE.astype(np.complex128)) * (1.0 + gain) * np.exp(1j * phase)
-    return AircraftResponse(_TABLE.tolist(), response.tolist(), gain_sigma=UNSURE, phase_sigma=UNSURE)
+    off = (1.0 + gain) * np.exp(1j * phase)
+    return known(lambda s: coupled.response(s) * off)
 
 
 def truth_of(plan: Plan) -> Truth:
     """The pilot of a flight, at every STRIDE-th sample."""
     scenario = plan.scenario
     return scenario.truth(scenario.time()).at(slice(None, None, STRIDE))
-
-
-def critical_gearing(craft: Aircraft, transfer: Transfer) -> FloatArray:
-    """At which the loop becomes unstable, at each time of a pilot's transfer function [1]: stability.margins() for many
-    times at once, by the grid alone."""
-    loop = _response(craft) * transfer.response(_GRID)
-    below, above = loop.imag[:, :-1], loop.imag[:, 1:]
-    part = np.where(np.signbit(below) != np.signbit(above), below / (below - above + 1e-300), np.nan)
-    height = loop.real[:, :-1] + part * np.diff(loop.real, axis=1)
-    highest = np.max(np.where(np.isfinite(height), height, 0.0), axis=1)
-    critical: FloatArray = 1.0 / np.maximum(highest, 1e-9)
-    return critical
-
-
-@cache
-def _response(craft: Aircraft) -> ComplexArray:
-    return craft.response(2j * np.pi * _GRID.astype(np.complex128))

@@ -12,12 +12,13 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.library import lib
 
 from ..aircraft import aircraft
+from ..aircraft.stability import critical_gearing
 from ..fast import plants
 from ..judged.result import Figure, largest, least, mean
 from ..plants.truth import Conditions
 from . import detectors, pilots
 from .detectors import Watched
-from .flights import STRIDE, Flown, Plan, critical_gearing, fly, truth_of
+from .flights import STRIDE, Flown, Plan, fly, truth_of
 
 Figures = dict[str, float]
 

@@ -38,7 +38,7 @@ LATE_AND_WRONG = (
 
 
 def python_run(wanted: Scenario) -> loop.Recording:
-    with LeverBus(config=wanted.config) as bus:
+    with LeverBus(config=wanted.config, aircraft=wanted.known_aircraft) as bus:
         return loop.run(wanted, bus)
 
 

@@ -22,7 +22,7 @@ BROKEN = {
 @cache
 def result(name: str) -> runner.Result:
     wanted = scenario.load(name, [f"duration={BROKEN[name]}"] if name in BROKEN else [])
-    with LeverBus("lever", config=wanted.config) as bus:
+    with LeverBus("lever", config=wanted.config, aircraft=wanted.known_aircraft) as bus:
         return runner.simulate(wanted, bus)
 
 
