@@ -260,7 +260,7 @@ _FAULTS = (
     _fault("lever_lost", "LEVER_SAMPLE lost", _dropped("lever_frame")),
     _fault("sample_lost", "samples never come", _dropped("lever_frame", "base_frame"), quick=True),
     _fault("clock", "the sample clock stands", lambda plan: replace(plan, clock_stops=FAULT), quick=True),
-    _fault("base_stuck", "z̈ stuck but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="stuck")),
+    _fault("base_stuck", "z̈ stuck but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="stuck"), quick=True),
     _fault("base_zero", "z̈ zero but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="0 %")),
     _fault("base_sign", "z̈ of the wrong sign", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="-100 %")),
     _fault("theta_stuck", "θ stuck but “valid”", _sensor("theta", "1 mrad", kind="stuck")),
