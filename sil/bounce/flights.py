@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -55,6 +57,8 @@ class Plan:
     """Beyond a sample period [s]."""
     told_delay: float = 1e-3
     """What the firmware is told of that, with the sample period [s]."""
+    low_pass: float = 0.0
+    """Corner of a low-pass of the lever's angle, to compare with mitigation [Hz]; 0: none."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further tables of the scenario."""
     clock_stops: float | None = None
@@ -72,6 +76,7 @@ class Plan:
                 "model": self.craft,
                 "gearing": f"{self.gearing} 1",
                 "correction_delay": f"{self.correction_delay} s",
+                "lever_low_pass": f"{self.low_pass} Hz",
             },
             "base": [{"kind": "noise", "rms": f"{self.gust * GRAVITY} m/s^2", "low": "1 Hz", "high": "10 Hz"}],
         }
@@ -116,9 +121,9 @@ class Flown:
 
     @property
     def corrected(self) -> FloatArray:
-        """What the correction makes of the lever's angle, as it is used: a sample late [rad]."""
+        """What the correction, and a low-pass, make of the lever's angle, as it is used: a sample late [rad]."""
         corrected: FloatArray = self.theta + np.append(0.0, self.correction[:-1])
-        return corrected
+        return _low_passed(corrected, self.plan) if self.plan.low_pass else corrected
 
     def during(self, start: float, end: float) -> slice:
         """The samples between two times [s]."""
@@ -165,6 +170,12 @@ def told(coupled: Coupled, seed: int) -> AircraftResponse:
     gain, phase = UNSURE * stream(f"known {coupled.aircraft.title}", seed).standard_normal(2)
     off = (1.0 + gain) * np.exp(1j * phase)
     return known(lambda s: coupled.response(s) * off)
+
+
+def _low_passed(angle: FloatArray, plan: Plan) -> FloatArray:
+    """As aircraft/flight.py does it."""
+    share = 1.0 - math.exp(-2.0 * math.pi * plan.low_pass * plan.scenario.period)
+    return np.array(list(accumulate(angle.tolist(), lambda last, now: last + share * (now - last))))
 
 
 def truth_of(plan: Plan) -> Truth:
