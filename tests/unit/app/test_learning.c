@@ -189,3 +189,44 @@ TEST_EACH(3, a_new_grip_is_followed_with_what_is_measured)
         TEST_ASSERT_FLOAT_WITHIN(4.0f * after.natural_frequency_sigma, 3.637f, after.natural_frequency);
     }
 }
+
+/* Soon after one change another is followed, but not while it may be that nobody holds the lever any more: here the
+ * verdict is held at that. */
+/* R6 */
+TEST_EACH(2, a_change_soon_after_another_is_followed_unless_the_hands_may_be_off)
+{
+    learning_t *learning = &lever->estimator.learning;
+    start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    (void)run(10000u);
+    simulation.plant = plant_of_lever(3.2, 120.0, 4200.0);
+    (void)run(2000u);
+    const float first = learning->changed;
+    TEST_ASSERT_TRUE((first > 0.0f) && (first < 2.5f));
+    float last = first;
+    bool again = false;
+    simulation.plant = plant_of_lever(2.0, 30.0, 1000.0);
+    for (uint32_t ms = 0u; ms < 500u; ms++) {
+        if (test_round == 1u) {
+            learning->hands.residual = 0.6f * learning->hands.change;
+            learning->hands.idle = true;
+        }
+        (void)run(1u);
+        again = again || (learning->changed > last);
+        last = learning->changed;
+    }
+    TEST_ASSERT_EQUAL(test_round == 0u, again);
+}
+
+/* The lever rests at another angle after a grip; only where the trim is followed is that to be learnt anew. */
+TEST_EACH(LEVER_PRELOAD_COUNT, a_new_grip_moves_the_level_of_a_trim_that_is_followed)
+{
+    learning_t *learning = &lever->estimator.learning;
+    config = config_of(0u);
+    config.preload = (uint8_t)test_round;
+    start();
+    (void)run(5000u);
+    learning->gripping = 1.0e-3f;
+    learning->held_again = true;
+    (void)run(20u);
+    TEST_ASSERT_EQUAL(test_round == (uint32_t)LEVER_PRELOAD_TRIM, lever->estimator.cdkf.acting > (uint32_t)CDKF_STEP);
+}
