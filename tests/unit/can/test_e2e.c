@@ -1,5 +1,5 @@
-/* The state machine of E2E Profile 2, step by step, and what no frame can hold. tests/python/can compares with autosar-e2e
- * over random sequences, and with cantools. */
+/* The state machine of E2E Profile 2, step by step, and what no frame can hold. tests/python/can compares with
+ * autosar-e2e over random sequences, and with cantools. */
 #include "can/e2e.h"
 #include "can/messages.h"
 
