@@ -14,6 +14,7 @@ from ..results import nis, whiteness
 from ..results.faults import LITTLE, OPTIONAL, WARNINGS, FaultCounts
 from ..results.nis import Innovations, freedom
 from ..results.trace import CONVERGED_AFTER, MEASURED, Trace
+from . import proof
 from .reduction import Groups
 
 
@@ -134,6 +135,7 @@ def verdict(summary: dict[str, Any]) -> str:
     measured = summary["whiteness"]
     sentences = [
         *_troubles(summary),
+        proof.in_words(summary["snapshots"]),
         *_flags(summary),
         _bounce(summary["stability"]),
         _comparison(summary["comparison"]),
@@ -189,7 +191,7 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
         troubles += _protection(mapping)
     if recording["refused"]:
         why = why_refused(summary["corrupt"], summary["late"])
-        troubles.append(f"{recording['refused']:,} frames were refused: {why}.")
+        troubles.append(f"{recording['refused']:,} frames were refused{f': {why}' if why else ''}.")
     if recording["ends_early"]:
         troubles.append(f"The log is incomplete: {'; '.join(recording['ends_early'])}.")
     if recording["damaged_lines"]:

@@ -213,6 +213,8 @@ class ReplaySummary(Summary):
     comparison: Comparison | None
     stability: Stability | None = None
     """None without an aircraft."""
+    snapshots: dict[str, Any] | None = None
+    """Of the estimator's state in the log: replay.proof.Counts."""
 
 
 # --- to and from JSON ------------------------------------------------------------------------------------------------
