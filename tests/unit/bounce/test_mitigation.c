@@ -500,3 +500,18 @@ TEST(with_slow_samples_it_is_passive_in_time_too)
     }
     TEST_ASSERT_EQUAL_FLOAT(0.0f, now().weight);
 }
+
+/* A motor that no longer is to damp fades out before the mitigation is done. */
+TEST(damping_that_is_chosen_away_fades)
+{
+    sample.mitigation = (uint8_t)LEVER_MITIGATION_DAMPING;
+    run(3000u);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, mitigation.damping_weight);
+    sample.mitigation = (uint8_t)LEVER_MITIGATION_NONE;
+    run(35u);
+    TEST_ASSERT_TRUE(on);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.5f, mitigation.damping_weight);
+    run(36u);
+    TEST_ASSERT_FALSE(on);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, mitigation.damping);
+}
