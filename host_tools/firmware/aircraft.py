@@ -121,4 +121,3 @@ def read_response(path: str) -> AircraftResponse:
 
 
 _NUMBERS = {"gain_sigma": "[1]", "phase_sigma": "[rad]", "warning": "[dB]", "alarm": "[dB]"}
-
