@@ -28,7 +28,7 @@ def run(scenario: Scenario, channel: str = "lever", progress: Progress | None = 
     inputs = prepare(scenario)
     if plants.has(inputs.truth):
         return _run_in_c(scenario, inputs, f"the firmware in this process, channel {channel!r}", progress)
-    with LeverBus(channel, config=scenario.config) as bus:
+    with LeverBus(channel, config=scenario.config, aircraft=scenario.known_aircraft) as bus:
         return loop.run(scenario, bus, progress=progress)
 
 
@@ -36,6 +36,7 @@ def _run_in_c(scenario: Scenario, inputs: Inputs, where: str, progress: Progress
     count = len(inputs.time)
     run = closed_loop.Loop(scenario, inputs, by_frames=True, every=count)
     run.keep_frames()
+    run.watch(scenario.known_aircraft)
     given = run.struct.pointer
     given.most_unanswered = loop.MOST_UNANSWERED
     parts, done = [], 0
