@@ -145,7 +145,6 @@ TEST(a_reset_leaves_nothing_of_what_was)
 
 TEST(an_instance_in_memory_that_was_used_is_a_new_one)
 {
-    static lever_memory_t other_memory;
     lever_t *other = lever_init(&other_memory, &config);
     (void)memset(&memory, 0xA5, sizeof memory);
     start();
