@@ -8,7 +8,7 @@ between two snapshots is judged by itself.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -17,7 +17,9 @@ import numpy as np
 from ..can import codec, snapshots
 from ..can.bulk import Feeder, Frames
 from ..can.snapshots import Snapshot
+from ..firmware.config import CHOICES
 from ..firmware.estimator import Estimator, state_layout
+from ..firmware.library import enum_names, lib
 
 _LONGEST_US = 20_000_000
 """Two periods of the longest between snapshots: after that a snapshot that has begun does not end any more."""
@@ -25,6 +27,9 @@ _SILENT_US = 1_000_000
 """Without a frame of a snapshot for so long from the start on, there are none."""
 _SAMPLES_LATE = 8
 """Samples that a recorder may have seen before the SNAPSHOT of an earlier one."""
+
+
+OTHER_CHOICES = "other choices were made for the replay"
 
 
 @dataclass
@@ -49,11 +54,10 @@ class Counts:
 class Proof:
     """Sits between the frames of a log and an estimator that has taken none yet."""
 
-    def __init__(self, estimator: Estimator, another: Callable[[], Estimator], chosen: bool) -> None:
-        """`another` makes an estimator of the same configuration and aircraft; `chosen`: some of its choices are not
-        those of the log."""
-        self.counts = Counts(not_compared="choices were made on the command line" if chosen else None)
-        self._estimator, self._another = estimator, another
+    def __init__(self, estimator: Estimator, another: Callable[[], Estimator], chosen: Mapping[str, str]) -> None:
+        """`another` makes an estimator of the same configuration and aircraft; `chosen` are choices that stay."""
+        self.counts = Counts()
+        self._estimator, self._another, self._chosen = estimator, another, chosen
         self._held: Frames | None = None
         self._started = self._known = False
         self._first_us = 0
@@ -163,9 +167,24 @@ class Proof:
             self._known = True
             if snapshot.layout != state_layout():
                 self.counts.not_compared = "they are of another version of the firmware"
-            elif not self._another().restore(snapshot.state):
-                self.counts.not_compared = "they are of other settings, or only one of both has an aircraft"
+            else:
+                trial = self._another()
+                if not trial.restore(snapshot.state):
+                    self.counts.not_compared = "they are of other settings, or only one of both has an aircraft"
+                elif any(choices_of(trial)[what] != name for what, name in self._chosen.items()):
+                    self.counts.not_compared = OTHER_CHOICES
         return self.counts.not_compared is None
+
+
+def choices_of(estimator: Estimator) -> dict[str, str]:
+    """As they stand, by its answer to a COMMAND that keeps them; the estimator is of no other use then."""
+    keep = {what: float(lib.LEVER_KEEP) for what in CHOICES}
+    data = codec.encode("COMMAND", 0, {"request": 0, "dither_rms": 65.535, **keep})
+    estimator.on_frame(codec.message("COMMAND").frame_id, data)
+    answer = estimator.next_frame()
+    assert answer is not None
+    _, fields = codec.decode(*answer)
+    return {what: enum_names(f"lever_{what}")[int(fields[what])] for what in CHOICES}
 
 
 def in_words(summary: dict[str, Any] | None) -> str:

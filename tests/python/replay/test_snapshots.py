@@ -85,8 +85,9 @@ def test_one_flipped_bit_is_found(lines: list[str], tmp_path: Path) -> None:
     source = random.Random(2)
     before, _ = counts(lines, tmp_path)
     inputs = {codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")}
+    compared = next(place for place, line in enumerate(lines) if seconds(line) >= 5.0)  # the last whole snapshot's
     for _ in range(FLIPS):
-        place = source.randrange(len(lines) - 3000)
+        place = source.randrange(compared)
         spoilt = lines.copy()
         spoilt[place] = flipped(lines[place], source)
         found, summary = counts(spoilt, tmp_path)
@@ -131,9 +132,12 @@ def test_other_settings_and_choices_are_not_compared(lines: list[str], tmp_path:
     found, summary = counts(lines[4000:], tmp_path, config=Config(settings={"theta_noise": 0.01}))
     assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
     assert "of other settings" in summary["verdict"]
-    found, summary = counts(lines[4000:], tmp_path, chosen={"estimator": "joint"})
-    assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
-    assert "choices were made on the command line" in summary["verdict"]
+    for part in (lines, lines[4000:]):
+        other = {"config": Config(estimator="joint"), "chosen": {"estimator": "joint"}}
+        found, summary = counts(part, tmp_path, **other)
+        assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
+        assert "other choices were made for the replay" in summary["verdict"]
+    assert counts(lines[4000:], tmp_path, chosen={"estimator": "dual"})[0].equal > 0
 
 
 def test_choices_before_the_log_are_told(tmp_path: Path) -> None:

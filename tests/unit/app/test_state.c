@@ -1,9 +1,6 @@
 /* The state of an instance as bytes: all of it, the same again, and nothing that does harm. */
-#include "app/instance.h"
 #include "app/state.h"
 #include "frames.h"
-
-#include <stddef.h>
 
 enum { FIRST_ROW = 1 }; /* byte 0 says whether there is an aircraft */
 
@@ -31,62 +28,6 @@ TEST(its_rows_fill_it)
         bytes += state_row(i)->count * width_of(state_row(i));
     }
     TEST_ASSERT_EQUAL_UINT32(LEVER_STATE_BYTES, bytes);
-}
-
-#define LEAVE_OUT(member) (void)memset(&saved[offsetof(struct lever, member)], 1, sizeof((struct lever *)0)->member)
-
-/* A byte that no row has is one of what is listed here, or of no member at all. */
-TEST(every_member_is_saved_but_what_follows_from_the_configuration)
-{
-    static uint8_t saved[sizeof(struct lever)];
-    for (uint32_t i = 0u; i < state_row_count(); i++) {
-        const state_row_t *row = state_row(i);
-        for (uint32_t k = 0u; k < (uint32_t)row->count * row->size; k++) {
-            TEST_ASSERT_EQUAL_UINT8(0u, saved[row->offset + k]); /* once */
-            saved[row->offset + k] = 1u;
-        }
-    }
-    LEAVE_OUT(estimator.setup.settings);
-    LEAVE_OUT(estimator.setup.model_in_use);
-    LEAVE_OUT(estimator.setup.constants);
-    LEAVE_OUT(estimator.setup.base_scale);
-    LEAVE_OUT(estimator.setup.torque_scale);
-    LEAVE_OUT(estimator.cdkf.scaling);
-    LEAVE_OUT(dither.low);
-    LEAVE_OUT(dither.high);
-    LEAVE_OUT(dither.scale);
-    LEAVE_OUT(dither.rms_most);
-    LEAVE_OUT(dither.fade);
-    LEAVE_OUT(gate.limit);
-    LEAVE_OUT(gate.slew);
-    LEAVE_OUT(gate.open_step);
-    LEAVE_OUT(gate.square_most);
-    LEAVE_OUT(gate.sustained);
-    LEAVE_OUT(gate.amplitude_slope);
-    LEAVE_OUT(gate.period_us);
-    LEAVE_OUT(gate.silence_us);
-    LEAVE_OUT(link.lever_receiver.tolerance);
-    LEAVE_OUT(link.lever_receiver.data_id_base);
-    LEAVE_OUT(link.base_receiver.tolerance);
-    LEAVE_OUT(link.base_receiver.data_id_base);
-    LEAVE_OUT(link.grip_receiver.tolerance);
-    LEAVE_OUT(link.grip_receiver.data_id_base);
-    LEAVE_OUT(link.command_receiver.tolerance);
-    LEAVE_OUT(link.command_receiver.data_id_base);
-    LEAVE_OUT(link.has_sample); /* not between two samples */
-    LEAVE_OUT(link.sample);
-    LEAVE_OUT(link.period_us);
-    LEAVE_OUT(link.publish_us);
-    LEAVE_OUT(bounce.aircraft);
-#if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 11)
-    struct lever padding;
-    (void)memset(&padding, 0xFF, sizeof padding);
-    __builtin_clear_padding(&padding);
-    for (uint32_t i = 0u; i <= (uint32_t)offsetof(struct lever, has_platform); i++) {
-        const bool is_padding = (((const uint8_t *)&padding)[i] == 0u);
-        TEST_ASSERT_TRUE(is_padding || (saved[i] != 0u));
-    }
-#endif
 }
 
 /* Samples, commands, dither, mitigation and gaps, so that little is 0. */
