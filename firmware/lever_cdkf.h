@@ -422,7 +422,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1565 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1571 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);
@@ -459,7 +459,7 @@ typedef struct lever_recorder {
     uint32_t crc;        /* of what was sent of it */
 } lever_recorder_t;
 
-/* `period_us` of sample time from one snapshot to the next, 263 frames each (on 1 Mbit/s classic CAN 3 % of the
+/* `period_us` of sample time from one snapshot to the next, 264 frames each (on 1 Mbit/s classic CAN 3 % of the
  * bus at a second, 6 % at half a second). */
 void lever_recorder_init(lever_recorder_t *recorder, uint32_t period_us);
 

@@ -93,11 +93,14 @@ static const state_row_t rows[] = {
     BYTES(link.counter[0], link.counter[OUTPUT_STATE_ESTIMATE], COUNTER),
 
     WORDS(bounce.mitigation.involuntary.base.level, bounce.mitigation.counted),
+    BYTES(bounce.mitigation.theta.same, bounce.mitigation.samples, ANY_BYTE),
     FLAGS(bounce.mitigation.rated, bounce.mitigation.started),
     BYTES(bounce.chosen, bounce.chosen, (uint32_t)LEVER_MITIGATION_COUNT - 1u),
-    FLAGS(bounce.mitigates, bounce.mitigates),
-    WORDS(bounce.margin.gain, bounce.time_us),
     BYTES(bounce.state, bounce.state, (uint32_t)LEVER_BOUNCE_ALARM),
+    BYTES(bounce.same, bounce.same, (uint32_t)INSTANCE_SAME_THETA | (uint32_t)INSTANCE_SAME_Z_DDOT),
+    FLAGS(bounce.mitigates, bounce.mitigates),
+    WORDS(bounce.time_us, bounce.time_us),
+    WORDS(bounce.margin.gain, bounce.margin.frequency_sigma),
 
     BYTES(platform.faults, platform.bus_offs, ANY_BYTE),
     MEMBERS(platform.overruns, platform.dropped, 2u, ANY_HALF),

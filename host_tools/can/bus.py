@@ -29,6 +29,7 @@ from can import BusABC, CanInitializationError, CanOperationError, Message
 from can.typechecking import CanFilters
 
 from ..errors import LeverError
+from ..firmware.aircraft import AircraftResponse
 from ..firmware.config import Config
 from ..firmware.estimator import FRAME_SAMPLE, Estimator, Recorder
 from ..firmware.settings_file import make_config, read_assignments
@@ -37,7 +38,7 @@ from .codec import raw_field
 LOG = logging.getLogger("can.lever")
 
 _MEANINGLESS = {"single_handle", "bitrate", "timing", "fd"}  # python-can's tools and configuration files pass these
-_OPTIONS = "config, settings, snapshots, receive_own_messages, rx_queue_size, can_filters"
+_OPTIONS = "config, settings, aircraft, snapshots, receive_own_messages, rx_queue_size, can_filters"
 _NOBODY, _SEVERAL = 0, -1  # senders; no thread has these identifiers
 
 
@@ -55,6 +56,7 @@ class LeverBus(BusABC):
         *,
         config: Config | None = None,
         settings: Mapping[str, str | float] | str | os.PathLike[str] | None = None,
+        aircraft: AircraftResponse | None = None,
         snapshots: float | None = None,
         receive_own_messages: bool = False,
         rx_queue_size: int = 65536,
@@ -64,6 +66,7 @@ class LeverBus(BusABC):
         :param channel: a name for logs
         :param config: configuration of the firmware; its defaults if neither this nor `settings` is given
         :param settings: instead of `config`: settings and choices by name, or the path of a settings file
+        :param aircraft: the helicopter whose margin to collective bounce the firmware watches
         :param snapshots: [s] also send the state of the firmware so often, as SNAPSHOT
         :param receive_own_messages: also receive what is sent, before the answers to it
         :param rx_queue_size: most frames that wait to be received
@@ -77,6 +80,7 @@ class LeverBus(BusABC):
         if not isinstance(rx_queue_size, int) or rx_queue_size < 1:
             raise LeverBusError(f"rx_queue_size is {rx_queue_size!r}; it must be a number of frames, at least 1")
         self.estimator = Estimator(_configuration(config, settings))
+        self.estimator.watch(aircraft)
         self._recorder = None if snapshots is None else Recorder(self.estimator, snapshots)
         self.channel = str(channel)
         self.channel_info = f"lever firmware in this process, channel {self.channel!r}"

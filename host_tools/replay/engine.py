@@ -243,7 +243,7 @@ class _Replay:
         aircraft = self._options.aircraft
         if aircraft is None:
             return None
-        return {**self.figures.bounce.summary(), "warning_db": aircraft.warning, "alarm_db": aircraft.alarm}
+        return asdict(self.figures.bounce.summary(aircraft))
 
     def _recording(self) -> dict[str, Any]:
         traffic, clocks = self._traffic, self._timeline.clocks

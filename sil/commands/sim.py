@@ -52,7 +52,8 @@ and of faults the share of that time with each. Those that warn say that the est
 
 With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
 is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
-and lever_can with --lock-step; bus.log is the same to the byte but for the channel's name.
+the aircraft of a scenario that has one (`lever aircraft`, lever_can --aircraft), and lever_can with --lock-step;
+bus.log is the same to the byte but for the channel's name.
 """
 _EPILOG = """\
 examples:
@@ -276,7 +277,7 @@ def open_bus(
     if interface == "lever":
         from lever_cdkf.host_tools.can.bus import LeverBus
 
-        return LeverBus(channel, config=scenario.config, **(bus_options or {}))
+        return LeverBus(channel, config=scenario.config, aircraft=scenario.known_aircraft, **(bus_options or {}))
     return buses.open_bus(interface, channel, bus_options or {})
 
 
@@ -312,7 +313,11 @@ def _tables(result: Result) -> Tables:
         "wall time [s]": summary.wall_time_s,
         "firmware": summary.firmware.version,
     }
-    return {summary.scenario.title: rows, "run": [run_row]}
+    near: list[Row] = []
+    if summary.stability is not None:
+        near = [{"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}]
+        near[0] |= {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}
+    return {summary.scenario.title: rows, "run": [run_row], **({"collective bounce": near} if near else {})}
 
 
 def _times(times: Sequence[float | None]) -> str:

@@ -165,8 +165,9 @@ class Loop:
         else:
             loop.command = self.struct.keep(_command_structs(values))
 
-    def watch(self, aircraft: AircraftResponse) -> NDArray[Any]:
-        """The firmware watches the loop with this aircraft; returns what is kept of that: lever_stability_t."""
+    def watch(self, aircraft: AircraftResponse | None) -> NDArray[Any]:
+        """The firmware watches the loop with this aircraft, where there is one; returns what is kept of that:
+        lever_stability_t."""
         self._estimator.watch(aircraft)
         kept = np.zeros(len(self._healths), struct_dtype("lever_stability_t"))
         self.struct.pointer.stability = self.struct.array("struct lever_stability", kept, kept.dtype)

@@ -31,7 +31,7 @@ def run(
     if plants.has(inputs.truth):
         where = f"the firmware in this process, channel {channel!r}"
         return _run_in_c(scenario, inputs, where, progress, snapshots)
-    with LeverBus(channel, config=scenario.config, snapshots=snapshots) as bus:
+    with LeverBus(channel, config=scenario.config, aircraft=scenario.known_aircraft, snapshots=snapshots) as bus:
         return loop.run(scenario, bus, progress=progress)
 
 
@@ -41,6 +41,7 @@ def _run_in_c(
     count = len(inputs.time)
     run = closed_loop.Loop(scenario, inputs, by_frames=True, every=count)
     run.keep_frames()
+    run.watch(scenario.known_aircraft)
     if snapshots is not None:
         run.send_snapshots(snapshots)
     given = run.struct.pointer

@@ -69,7 +69,10 @@ def simulate(
         recording = in_process.run(scenario, channel, progress, snapshots)
     else:
         with ExitStack() as stack:
-            estimator = bus or stack.enter_context(LeverBus(channel, config=scenario.config, snapshots=snapshots))
+            config, aircraft = scenario.config, scenario.known_aircraft
+            estimator = bus or stack.enter_context(
+                LeverBus(channel, config=config, aircraft=aircraft, snapshots=snapshots)
+            )
             recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
     frames = recording.frames()
     columns = columns_of(recording, frames)

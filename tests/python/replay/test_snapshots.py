@@ -108,7 +108,7 @@ def test_what_is_lost_of_the_snapshots_themselves(lines: list[str], tmp_path: Pa
     """Without a part of its state a snapshot still says whether the replay is equal; without its end it does not."""
     of_snapshots = [place for place, line in enumerate(lines) if " 21D#" in line]
     without_data, without_end = (
-        [line for place, line in enumerate(lines) if place != of_snapshots[nth]] for nth in (263 + 5, 263 + 262)
+        [line for place, line in enumerate(lines) if place != of_snapshots[nth]] for nth in (264 + 5, 264 + 263)
     )
     assert counts(without_data, tmp_path)[0].equal == 11
     found, summary = counts(without_end, tmp_path)
