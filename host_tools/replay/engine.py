@@ -143,6 +143,7 @@ class _Replay:
         return estimator
 
     def _feed(self, frames: Frames, last: bool = False) -> None:
+        self._proof.first_us = self._traffic.first_us
         for piece, snapshot in self._proof.pieces(frames, last):
             for fed, rows in self._feeder.feed(piece):
                 if self._folder is not None:

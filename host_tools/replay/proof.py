@@ -60,7 +60,8 @@ class Proof:
         self._estimator, self._another, self._chosen = estimator, another, chosen
         self._held: Frames | None = None
         self._started = self._known = False
-        self._first_us = 0
+        self.first_us = 0
+        """Recorded time of the first frame of the log [us]."""
         self._base = codec.message("BASE_SAMPLE").frame_id
         self._time_of = codec.raw_field("BASE_SAMPLE", "time_us")
 
@@ -68,7 +69,6 @@ class Proof:
         """The frames to feed, in pieces; the estimator has the state of the snapshot, if there is one, after its piece.
         Some are held back until the next call, or the `last`."""
         held = frames if self._held is None else np.concatenate((self._held, frames))
-        self._first_us = int(held["time_us"][0]) if self._held is None and len(held) else self._first_us
         self._held = held
         found = snapshots.find(held)
         if not (self._started or last or self._may_start(held, found)):
@@ -88,7 +88,7 @@ class Proof:
             return
         if not self._is_comparable(snapshot):
             return
-        seconds = (recorded_us - self._first_us) * 1e-6
+        seconds = (recorded_us - self.first_us) * 1e-6
         if zlib.crc32(self._estimator.state()) == snapshot.digest:
             self.counts.equal += 1
             self.counts.last_equal_s = seconds
@@ -107,7 +107,8 @@ class Proof:
 
     def _may_start(self, held: Frames, found: list[Snapshot]) -> bool:
         """The first whole snapshot is there, or there will be none."""
-        span = int(held["time_us"][-1] - held["time_us"][0]) if len(held) else 0
+        samples = held["time_us"][held["id"] == self._base]  # a COMMAND may be of long before
+        span = abs(int(samples[-1] - samples[0])) if len(samples) else 0
         silent = not (held["id"] == codec.message(snapshots.NAME).frame_id).any()
         return any(each.state for each in found) or span > (_SILENT_US if silent else _LONGEST_US)
 
@@ -123,7 +124,7 @@ class Proof:
         """Frames before it belong to no snapshot that is still to come."""
         if found and not found[-1].ended:
             begin = found[-1].begin
-            if held["time_us"][-1] - held["time_us"][begin] < _LONGEST_US:
+            if abs(held["time_us"][-1] - held["time_us"][begin]) < _LONGEST_US:
                 place = places[-1]
                 return begin if place is None else place
         samples = np.flatnonzero(held["id"] == self._base)[-_SAMPLES_LATE:]
@@ -139,7 +140,7 @@ class Proof:
             for _ in Feeder(trial).feed(held[: place + 1]):
                 pass
             if zlib.crc32(trial.state()) != snapshot.digest and self._estimator.restore(snapshot.state):
-                self.counts.begun_at_s = (int(held["time_us"][place]) - self._first_us) * 1e-6
+                self.counts.begun_at_s = (int(held["time_us"][place]) - self.first_us) * 1e-6
                 self.counts.left_out = place + 1
                 self.counts.found += 1
                 return place + 1

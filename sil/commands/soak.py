@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.extras import require
 from lever_cdkf.host_tools.files import write_text
 from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
@@ -32,7 +33,7 @@ is wrong.
 _EPILOG = """\
 examples:
   lever soak --hours 0.5                      ten seconds
-  lever soak --json soak.json                 a day: ten minutes
+  lever soak --json soak.json -o soak.html    a day: ten minutes
 """
 
 
@@ -42,6 +43,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("--hours", type=float, default=24.0, metavar="H", help="simulated (default: 24)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default: 1)")
+    parser.add_argument("-o", "--out", metavar="FILE", help="also write a page with charts over the hours")
     parser.add_argument("--json", metavar="FILE", help='also write the hours to FILE: {"hours": [{"NEES [1]", …}], …}')
     parser.set_defaults(run=run)
 
@@ -51,11 +53,13 @@ def run(args: argparse.Namespace) -> int:
     import json
     from dataclasses import asdict
 
-    from lever_cdkf.host_tools.provenance import provenance
+    from lever_cdkf.host_tools.provenance import provenance, with_provenance
     from lever_cdkf.host_tools.tables import print_tables
 
-    from ..soak import soak
+    from ..soak import soak, soak_page
 
+    if args.out is not None:
+        require("report")
     if not (math.isfinite(args.hours) and 0.0 < args.hours <= 1000.0):
         raise LeverError(f"--hours {args.hours:g}: must be above 0, and at most 1000")
     with Progress("soak") as progress:
@@ -63,13 +67,16 @@ def run(args: argparse.Namespace) -> int:
     hours = [{"hour": i + 1, **part.sums.row(), "memory [MiB]": part.memory} for i, part in enumerate(result.parts)]
     total = {"hour": "all", **result.total.row(), "memory [MiB]": result.parts[-1].memory}
     print_tables({"hours": [*hours, total]})
-    say(_verdict(result))
+    say(verdict := _verdict(result))
     troubles = result.troubles()
     if args.json is not None:
         faults = dict(sorted(result.faults.items()))
         content = {"hours": hours, "total": total, "memory_growth_mib": result.growth, "faults": faults}
         content |= {"troubles": troubles, "provenance": asdict(provenance())}
         write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    if args.out is not None:
+        write_text(args.out, with_provenance(soak_page.build(result, [*hours, total], verdict), provenance()))
+        say(f"Written to {args.out}")
     if troubles:
         print(f"lever: soak: {'; '.join(troubles)}", file=sys.stderr)
     return 1 if troubles else 0

@@ -36,7 +36,7 @@ MAY_IMPORT = {
         *("firmware", "models", "report"),
     },
     "sil/faults": {"fast", "envelope", "firmware", "can"},
-    "sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware"},
+    "sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "sil/study": {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),

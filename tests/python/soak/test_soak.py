@@ -18,9 +18,11 @@ Content = dict[str, Any]
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> Content:
-    path = tmp_path_factory.mktemp("soak") / "soak.json"
-    assert cli.main(["soak", "--hours", "0.1667", "--json", str(path)]) == 0
+    folder = tmp_path_factory.mktemp("soak")
+    page, path = folder / "soak.html", folder / "soak.json"
+    assert cli.main(["soak", "--hours", "0.1667", "--json", str(path), "-o", str(page)]) == 0
     content: Content = json.loads(path.read_text())
+    assert "Consistency by the hour" in page.read_text()
     return content
 
 

@@ -7,6 +7,13 @@ enum { FIRST_ROW = 1 }; /* byte 0 says whether there is an aircraft */
 static uint8_t state[LEVER_STATE_BYTES];
 static lever_memory_t other_memory;
 static random_source_t source;
+static const lever_aircraft_t aircraft = {.count = 3u,
+    .frequency = {2.0f, 4.0f, 8.0f},
+    .real = {1.0f, 1.0f, 1.0f},
+    .gain_sigma = 0.1f,
+    .phase_sigma = 0.1f,
+    .warning = 6.0f,
+    .alarm = 3.0f};
 
 void setUp(void)
 {
@@ -108,13 +115,6 @@ static void assert_refused(lever_t *instance)
 
 TEST(other_settings_or_an_aircraft_on_one_side_are_refused)
 {
-    static const lever_aircraft_t aircraft = {.count = 3u,
-        .frequency = {2.0f, 4.0f, 8.0f},
-        .real = {1.0f, 1.0f, 1.0f},
-        .gain_sigma = 0.1f,
-        .phase_sigma = 0.1f,
-        .warning = 6.0f,
-        .alarm = 3.0f};
     start_bus();
     fly(50u);
     lever_state_save(lever, state);
@@ -180,6 +180,8 @@ TEST(any_bytes_that_are_accepted_break_nothing)
             }
         }
         lever_t *hurt = lever_init(&other_memory, &config);
+        state[0] = (uint8_t)(trial % 2u);
+        TEST_ASSERT_TRUE(lever_aircraft(hurt, (state[0] != 0u) ? &aircraft : NULL));
         TEST_ASSERT_TRUE(lever_state_restore(hurt, state));
         lever_t *mine = lever;
         lever = hurt;
