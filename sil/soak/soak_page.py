@@ -14,10 +14,11 @@ from .soak import QUANTITIES, Result
 
 _SEES = """\
 <p>NEES is e' P<sup>-1</sup> e / 3 of the logarithms of the three parameters, of the time without a flag. Their errors
-last for tens of seconds, and gains of sensors for a flight, so an hour holds some dozens of independent values, and its
-NEES scatters accordingly. It sees errors that are larger than what is stated, and, below 1, standard deviations that are
-too large. It does not see what is flagged; what is wrong for pilots and firmware alike (the plant here is the filter's
-model: <code>lever envelope</code> has another); nor an hour in which some errors are too large and others too small.</p>
+last for tens of seconds, and gains of sensors for a flight, so an hour holds some dozens of independent values, and
+its NEES scatters accordingly. It sees errors that are larger than what is stated, and, below 1, standard deviations
+that are too large. It does not see what is flagged; what is wrong for pilots and firmware alike (the plant here is
+the filter's model: <code>lever envelope</code> has another); nor an hour in which some errors are too large and
+others too small.</p>
 """
 
 
