@@ -92,4 +92,4 @@ def test_every_estimate_frame_is_the_hosts(
     differing = [pair for pair in zip(found, expected, strict=True) if pair[0] != pair[1]]
     assert not differing, f"{len(differing)} of {len(expected)} frames; the first: {differing[0]}"
     assert sum(name == "STATE_ESTIMATE" for _, name, _ in found) == SECONDS * 1000
-    assert len({data[4:] for _, name, data in found if name == "PILOT_PARAMETERS"}) > 15 * SECONDS, "nothing was learned"
+    assert len({data[4:] for _, name, data in found if name == "PILOT_PARAMETERS"}) > 15 * SECONDS, "nothing learned"
