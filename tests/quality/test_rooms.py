@@ -25,7 +25,7 @@ MAY_IMPORT = {
     "host_tools/commands": {"firmware", "board", "can", "replay", "tune", "watch", "signals"},
     "sil/plants": {"models"},
     "sil/oracle": {"models"},
-    "sil/aircraft": set(),
+    "sil/aircraft": {"firmware", "models"},
     "sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
     "sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
     "sil/run": {"fast", "scenarios", "plants", "aircraft", "firmware", "can", "results", "report", "watch", "exports"},
