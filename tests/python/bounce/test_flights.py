@@ -19,9 +19,15 @@ from python.aircraft.loops import loop_of
 def test_the_critical_gearing_is_that_of_the_margins(craft: str) -> None:
     plan = Plan(craft, 3, pilots.relaxing(3), 1.0, duration=60.0)
     transfer = flights.truth_of(plan).transfer(np.array([0, 1500, 2999]))
-    found = flights.critical_gearing(aircraft.load(craft), transfer)
+    found = stability.critical_gearing(aircraft.load(craft), transfer)
     loops = (loop_of(Coupled(aircraft.load(craft), 1.0), transfer, row) for row in range(3))
     assert found == pytest.approx([stability.margins(loop).gain for loop in loops], rel=2e-3)  # 0.02 dB
+
+
+@pytest.mark.parametrize(("until", "expected"), [(1.5, 1.0), (2.5, 4.0), (5.0, 4.0), (6.0, math.inf)])
+def test_an_alarm_that_has_ended_does_not_count(until: float, expected: float) -> None:
+    alarmed = np.array((False, True, False, False, True, True, False))
+    assert measure.standing(alarmed, np.arange(7.0), until) == expected
 
 
 def test_a_gearing_goes_up_after_a_while() -> None:

@@ -107,6 +107,21 @@ TEST(the_bus_says_how_stable_the_loop_is_once_a_publish_period)
     }
 }
 
+/* Not more often than each 40 ms, whatever the publish period. */
+TEST_EACH(2, a_margin_is_worked_out_once_a_publish_period)
+{
+    uint32_t count = 0u;
+    config.settings.publish_period = (test_round == 0u) ? 5.0e-3f : 0.1f;
+    start_bus();
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    for (uint32_t k = 0u; k < 1000u; k++) {
+        const uint32_t before_us = lever->bounce.time_us;
+        (void)run(1u);
+        count += (lever->bounce.time_us != before_us) ? 1u : 0u;
+    }
+    TEST_ASSERT_EQUAL_UINT32((test_round == 0u) ? 25u : 10u, count);
+}
+
 TEST(an_estimate_that_waits_for_samples_or_was_never_one_says_nothing_of_stability)
 {
     message_stability_t message;
@@ -135,4 +150,36 @@ TEST(frozen_parameters_carry_a_margin_and_a_base_that_is_missing_does_not)
         (void)lever_update(lever, &sample);
     }
     TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
+}
+
+TEST(what_is_said_is_the_margin_and_another_aircraft_begins_without_one)
+{
+    bounce_t *bounce = &lever->bounce;
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    (void)deliver_many(1000u);
+    bounce->margin = (margin_t){1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f};
+    bounce->state = (uint8_t)LEVER_BOUNCE_WARNING;
+    const lever_stability_t said = stability();
+    TEST_ASSERT_TRUE((said.gain_margin == 1.0f) && (said.gain_margin_sigma == 2.0f) && (said.modulus == 3.0f));
+    TEST_ASSERT_TRUE((said.modulus_sigma == 4.0f) && (said.frequency == 5.0f) && (said.frequency_sigma == 6.0f));
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, stability().gain_margin);
+    (void)run(1u);
+    TEST_ASSERT_TRUE(stability().gain_margin != 0.0f);
+}
+
+/* R44 */
+TEST(each_fault_of_sensors_or_model_takes_the_margin_away)
+{
+    static const uint32_t fault[] = {LEVER_FAULT_THETA, LEVER_FAULT_BASE, LEVER_FAULT_CLOCK, LEVER_FAULT_BOUND,
+        LEVER_FAULT_RECOVERED, LEVER_FAULT_MISMATCH, LEVER_FAULT_HANDS_OFF, 0u};
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    (void)deliver_many(4000u);
+    for (uint32_t i = 0u; i < 8u; i++) {
+        lever->estimator.faults = fault[i];
+        lever->bounce.time_us -= 1000000u;
+        instance_watch(lever);
+        TEST_ASSERT_EQUAL(fault[i] != 0u, stability().state == (uint8_t)LEVER_BOUNCE_UNKNOWN);
+    }
 }
