@@ -14,12 +14,16 @@ TEST(a_message_that_does_not_fit_is_not_encoded)
     const message_pilot_sigma_t sigma = {.model = (uint8_t)LEVER_MODEL_COUNT};
     const message_health_t health = {.mode = 0xFFu};
     const message_snapshot_t snapshot = {.part = (uint8_t)MESSAGE_PART_COUNT};
+    const message_motor_command_t motor = {.model = 8u};
+    const message_correction_t correction = {.mitigation = 8u};
     message_command_t command = {.request = 255u};
     TEST_ASSERT_FALSE(message_identity_encode(&frame, &page));
     TEST_ASSERT_FALSE(message_identity_encode(&frame, &identity));
     TEST_ASSERT_FALSE(message_pilot_sigma_encode(&frame, &sigma));
     TEST_ASSERT_FALSE(message_health_encode(&frame, &health));
     TEST_ASSERT_FALSE(message_snapshot_encode(&frame, &snapshot));
+    TEST_ASSERT_FALSE(message_motor_command_encode(&frame, &motor));
+    TEST_ASSERT_FALSE(message_correction_encode(&frame, &correction));
     TEST_ASSERT_FALSE(message_command_encode(&frame, &command));
     command = (message_command_t){.dither_rms = NAN};
     TEST_ASSERT_FALSE(message_command_encode(&frame, &command));
