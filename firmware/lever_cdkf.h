@@ -350,7 +350,7 @@ void lever_health(const lever_t *lever, lever_health_t *health);
 enum lever_platform_fault {
     LEVER_PLATFORM_CLOCK = 1,       /* the crystal did not start: on a less accurate oscillator */
     LEVER_PLATFORM_ROM = 2,         /* the program memory does not have its checksum */
-    LEVER_PLATFORM_SELF_TEST = 4,   /* the estimator did not give its golden vector at power-on */
+    LEVER_PLATFORM_SELF_TEST = 4,   /* a self test has failed: the golden vector, RAM, the stack */
     LEVER_PLATFORM_WATCHDOG = 8,    /* the last reset was the watchdog's */
     LEVER_PLATFORM_HARD_FAULT = 16, /* the last reset was that of a hard fault */
     LEVER_PLATFORM_BUS_OFF = 32,    /* the CAN controller is off the bus */
@@ -437,7 +437,7 @@ bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
 
 /* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and its
  * digest. A replay of such a log may begin anywhere, and proves itself equal to the bit at each snapshot
- * (host_tools/replay). All memory is the caller's; cost: firmware/port/PORTING.md.
+ * (host_tools/replay). All memory is the caller's; cost: firmware/can/README.md.
  *
  *     lever_recorder_t recorder;
  *     lever_recorder_init(&recorder, 500000);

@@ -18,6 +18,7 @@ NOT_RUN = {
     r"lever (live|monitor)(?!.*--once)": "runs until it is ended",
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
     r"lever (compare --(out|quick|envelope)|(envelope|bounce|faults) --json|figures --(out|campaign))": "takes minutes",
+    r"lever soak --json": "takes minutes",
 }
 SHORTER = {
     r"--seeds \d+": "--seeds 1",
