@@ -74,6 +74,13 @@ static inline void monitor_add_torque(monitor_t *monitor, float asked, float mea
 /* After a block of `period` seconds of samples `sample_period` apart: true when the torque has just been found wrong. */
 bool monitor_judge_torque(monitor_t *monitor, float period, float sample_period);
 
+/* Before the next sample: its value would be that of the last. */
+static inline bool monitor_repeats(const monitor_t *monitor, enum monitor_signal signal, float value)
+{
+    const float last = monitor->stillness[signal].now;
+    return !((value < last) || (value > last));
+}
+
 /* At the end of a block: true when a signal has just been found stuck. */
 bool monitor_has_just_stuck(monitor_t *monitor);
 

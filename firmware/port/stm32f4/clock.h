@@ -42,6 +42,9 @@ typedef struct clock_rates {
 /* Sets the clocks up, from their state after reset. Bounded: 30 ms if nothing answers. */
 clock_rates_t clock_start(void);
 
+/* Whether the last reset was that of a crystal that failed; from then on it is reported. */
+bool clock_has_reset(void);
+
 /* Interrupt of the clock security system: the crystal has failed. Resets, to start from the internal oscillator until
  * the next power-on. */
 void clock_failure_interrupt(void);

@@ -26,6 +26,11 @@ bool fault_has_reset(void)
     return has;
 }
 
+bool fault_lost_stack(void)
+{
+    return (fault_last.pc | fault_last.lr | fault_last.psr) == 0u;
+}
+
 /* The stack of the interrupted code is read only if it is in memory: one that has overflowed is not. */
 __attribute__((used, noreturn)) static void fault_record(const uint32_t *frame)
 {

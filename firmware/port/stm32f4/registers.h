@@ -57,7 +57,10 @@ enum rcc_bits {
     RCC_APB1_PWR = BIT(28),
     RCC_APB2_USART1 = BIT(4),
     RCC_CSR_RMVF = BIT(24),
+    RCC_CSR_BORRSTF = BIT(25),
+    RCC_CSR_PINRSTF = BIT(26),
     RCC_CSR_PORRSTF = BIT(27),
+    RCC_CSR_SFTRSTF = BIT(28),
     RCC_CSR_IWDGRSTF = BIT(29)
 };
 
@@ -163,6 +166,7 @@ enum can_bits {
     CAN_TSR_TXOK0 = BIT(1),
     CAN_TSR_ABRQ0 = BIT(7),  /* the same */
     CAN_TSR_ABRQ = 0x808080, /* one bit for each mailbox */
+    CAN_TSR_RQCP = 0x010101, /* the same */
     CAN_TSR_CODE_LOWEST = 24,
     CAN_TSR_TME0 = BIT(26), /* of mailbox 0; the next ones follow */
     CAN_TSR_TME = 7 << 26,

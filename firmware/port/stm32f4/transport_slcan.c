@@ -41,6 +41,11 @@ void transport_poll(uint32_t now_ms)
     }
 }
 
+bool transport_is_served(void)
+{
+    return usart_is_served();
+}
+
 void transport_status(lever_platform_t *status)
 {
     status->overruns = (uint16_t)usart_overruns();

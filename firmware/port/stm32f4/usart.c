@@ -31,6 +31,7 @@ static volatile uint8_t transmit_bytes[TRANSMIT_BYTES];
 static ring_t received = {.bytes = receive_bytes, .size = RECEIVE_BYTES};
 static ring_t waiting = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
 static volatile uint32_t overruns;
+static bool is_served; /* usart_is_served() */
 
 void usart_start(const clock_rates_t *rates)
 {
@@ -90,9 +91,18 @@ void usart_interrupt(void)
 
 void usart_poll(void)
 {
+    static uint32_t got;
+
     interrupts_off();
     receive();
+    is_served = (ring_used(&waiting) == 0u) || (waiting.got != got);
+    got = waiting.got;
     interrupts_on();
+}
+
+bool usart_is_served(void)
+{
+    return is_served;
 }
 
 bool usart_read(uint8_t *byte)
