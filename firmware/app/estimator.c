@@ -116,7 +116,7 @@ static void check(
     checked->base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
     checked->grip_force = sample->grip_force;
-    if (torque && (own_torque != 0.0f) && monitor_takes_torque(estimator->samples)) {
+    if (torque && monitor_takes_torque(estimator->samples)) {
         monitor_add_torque(monitor, own_torque, sample->tau_m * estimator->setup.torque_scale);
     }
     checked->tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;

@@ -56,7 +56,7 @@ static inline bool monitor_is_alive(monitor_t *monitor, enum monitor_signal sign
 }
 
 /* One sample in MONITOR_TORQUE_EVERY says enough. */
-enum monitor_limits { MONITOR_TORQUE_EVERY = 4 };
+enum monitor_limits { MONITOR_TORQUE_EVERY = 8 };
 static inline bool monitor_takes_torque(uint32_t samples)
 {
     return (samples % (uint32_t)MONITOR_TORQUE_EVERY) == 0u;

@@ -2,8 +2,8 @@
 
     python tests/evidence BUILD
 
-Proves by Eva, measures coverage, flies the fault matrix, runs the tests of firmware/REQUIREMENTS.md and all mutants of
-the core. Both files are there when all of it could be gathered; until then there is neither.
+Proves by Eva, measures coverage, flies the fault matrix, runs the tests of firmware/REQUIREMENTS.md and SECURITY.md,
+and all mutants of the core. Both files are there when all of it could be gathered; until then there is neither.
 
 Exit status: 0 when each requirement has tests that passed, each fault is met as demanded and Eva has no alarm; 1 when
 not, which the page shows; 2 when a part could not be gathered, and nothing is written.
@@ -126,7 +126,7 @@ def _coverage(build: Path) -> Content:
 
 def _requirements(build: Path, report: Path) -> Content:
     """Each with its tests and what they said."""
-    required = tracing.requirements((tools.FIRMWARE / "REQUIREMENTS.md").read_text(encoding="utf-8"))
+    required = tracing.requirements()
     said = results.of_c(build) | results.of_python(report)
     traced = tracing.traces()
     rows = []

@@ -26,6 +26,7 @@ def pilot() -> Pilot:
 
 @pytest.mark.requirement("R12", "R19", "R22", "R30", "R33", "R35", "R36")
 @pytest.mark.parametrize("name", ROWS)
+@pytest.mark.requirement("S5")
 def test_a_fault_is_met_as_demanded(name: str, pilot: Pilot) -> None:
     """Or it is known not to be, with the reason."""
     (verdict,) = matrix.flights([ROWS[name]], pilot)
