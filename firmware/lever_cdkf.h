@@ -428,7 +428,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1571 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1584 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);
@@ -443,7 +443,7 @@ bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
 
 /* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and its
  * digest. A replay of such a log may begin anywhere, and proves itself equal to the bit at each snapshot
- * (host_tools/replay). All memory is the caller's; cost: firmware/port/PORTING.md.
+ * (host_tools/replay). All memory is the caller's; cost: firmware/can/README.md.
  *
  *     lever_recorder_t recorder;
  *     lever_recorder_init(&recorder, 500000);

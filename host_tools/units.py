@@ -51,3 +51,12 @@ def parse(text: object, unit: str) -> float:
     if not math.isfinite(value):
         raise UnitError(f"{text!r} is too large")
     return value
+
+
+def finite_number(text: str) -> float:
+    """NaN for what is none."""
+    try:
+        number = float(text)
+    except ValueError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan

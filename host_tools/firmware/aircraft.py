@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
+from ..units import finite_number
 from .library import ffi, lib
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-WARNING, ALARM = 5.0, 3.5
+WARNING, ALARM = 5.0, 4.0
 """Gain margins below which there is a warning and an alarm, where nothing else is said [dB]."""
 
 
@@ -120,12 +121,3 @@ def read_response(path: str) -> AircraftResponse:
 
 
 _NUMBERS = {"gain_sigma": "[1]", "phase_sigma": "[rad]", "warning": "[dB]", "alarm": "[dB]"}
-
-
-def finite_number(text: str) -> float:
-    """NaN for what is none."""
-    try:
-        number = float(text)
-    except ValueError:
-        return math.nan
-    return number if math.isfinite(number) else math.nan

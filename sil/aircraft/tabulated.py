@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.aircraft import finite_number
+from lever_cdkf.host_tools.units import finite_number
 
 
 @dataclass(frozen=True)

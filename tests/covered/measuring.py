@@ -19,7 +19,7 @@ COMPILER, MERGER, READER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERAGE = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
 FLIGHTS = ROOT / "tests/quality/embedded"
 EXCLUSIONS = ROOT / "firmware/COVERAGE.md"
-PYTHON = ("can", "firmware/test_configuration.py")
+PYTHON = ("can/test_codec.py", "can/test_e2e.py", "firmware/test_configuration.py")
 """Tests below tests/python that run the core, too."""
 
 

@@ -86,7 +86,7 @@ bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, set
     char line[LINE_BYTES];
     unsigned number = 0u;
 
-    *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = 5.0f, .alarm = 3.5f};
+    *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = 5.0f, .alarm = 4.0f};
     while (fgets(line, (int)sizeof line, file) != NULL) {
         number++;
         if (!take_line(aircraft, line)) {

@@ -22,8 +22,8 @@ typedef struct queued {
 enum {
     FRAME_BYTES = sizeof(lever_frame_t),
     QUEUED_BYTES = sizeof(queued_t),
-    RECEIVE_BYTES = 32 * FRAME_BYTES, /* 16 samples */
-    TRANSMIT_BYTES = 512,             /* two steps with all their frames */
+    RECEIVE_BYTES = 512,  /* 16 samples: 32 frames */
+    TRANSMIT_BYTES = 512, /* two steps with all their frames */
     MODE_POLLS = 10000,
     FUNCTION_CAN = 9, /* alternate function of PB8 and PB9: data sheet, table 9 */
     PIN_RECEIVE = 8,
@@ -57,7 +57,7 @@ static void start_pins(void)
  * match. */
 static uint32_t filter_word(uint32_t id, uint32_t next_id)
 {
-    return FIELD(next_id, 16 + 5) | FIELD(id, 5);
+    return FIELD(next_id, 16u + 5u) | FIELD(id, 5u);
 }
 
 static void start_filter(void)
@@ -84,7 +84,8 @@ void can_start(const clock_rates_t *rates)
     can1.MCR = CAN_MCR_DBF | CAN_MCR_INRQ;
     (void)wait_for(&can1.MSR, CAN_MSR_INAK, CAN_MSR_INAK, MODE_POLLS);
     can1.MCR = CAN_MCR_DBF | CAN_MCR_INRQ | CAN_MCR_ABOM | CAN_MCR_RFLM | CAN_MCR_TXFP;
-    can1.BTR = rates->pll ? BIT_TIMING_BTR(CLOCK_PLL_APB1_HZ) : BIT_TIMING_BTR(CLOCK_RAW_HZ);
+    /* cppcheck-suppress misra-c2012-10.8 ; D7 */
+    can1.BTR = rates->has_pll ? BIT_TIMING_BTR(CLOCK_PLL_APB1_HZ) : BIT_TIMING_BTR(CLOCK_RAW_HZ);
     start_filter();
     can1.IER = CAN_IER_TMEIE | CAN_IER_FMPIE0 | CAN_IER_FOVIE0 | CAN_IER_BOFIE | CAN_IER_ERRIE;
     nvic.ISER[0] = BIT(INTERRUPT_CAN1_TX) | BIT(INTERRUPT_CAN1_RX0) | BIT(INTERRUPT_CAN1_SCE);

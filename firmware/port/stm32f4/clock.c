@@ -26,7 +26,9 @@ static bool slow_flash_down(void)
 /* RM0090 7.2.3 and 7.3.2: set up while it is off. P = 2 is coded as 0. */
 static bool start_pll(bool crystal)
 {
+    /* cppcheck-suppress misra-c2012-10.8 ; D7 */
     const uint32_t m = crystal ? (uint32_t)CLOCK_PLL_M(LEVER_STM32_HSE_MHZ) : (uint32_t)CLOCK_PLL_M(CLOCK_HSI_MHZ);
+    /* cppcheck-suppress misra-c2012-10.8 ; D7 */
     const uint32_t n = crystal ? (uint32_t)CLOCK_PLL_N(LEVER_STM32_HSE_MHZ) : (uint32_t)CLOCK_PLL_N(CLOCK_HSI_MHZ);
 
     rcc.CR &= ~(uint32_t)RCC_CR_PLLON;
@@ -73,8 +75,8 @@ clock_rates_t clock_start(void)
     if (!has_failed() && wait_for(&rcc.CR, RCC_CR_HSERDY, RCC_CR_HSERDY, CRYSTAL_POLLS)) {
         rates.crystal = run_from_pll(true);
     }
-    rates.pll = rates.crystal || run_from_pll(false);
-    if (rates.pll) {
+    rates.has_pll = rates.crystal || run_from_pll(false);
+    if (rates.has_pll) {
         rates.core_hz = CLOCK_PLL_CORE_HZ;
         rates.apb1_hz = CLOCK_PLL_APB1_HZ;
         rates.apb2_hz = CLOCK_PLL_APB2_HZ;

@@ -35,7 +35,7 @@ typedef struct clock_rates {
     uint32_t core_hz;
     uint32_t apb1_hz; /* CAN1 */
     uint32_t apb2_hz; /* USART1 */
-    bool pll;         /* the three above are those of CLOCK_PLL_..., otherwise CLOCK_RAW_HZ */
+    bool has_pll;     /* the three above are those of CLOCK_PLL_..., otherwise CLOCK_RAW_HZ */
     bool crystal; /* they are as accurate as the crystal, otherwise as the internal oscillator: 1 % at 25 degrees C */
 } clock_rates_t;
 

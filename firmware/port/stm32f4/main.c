@@ -32,7 +32,7 @@ typedef struct loss {
 
 static lever_memory_t memory;
 static loop_t loop;
-static uint8_t faults_at_start; /* of enum lever_platform_fault */
+static uint8_t lasting_faults; /* of enum lever_platform_fault, until the next reset */
 static message_platform_reset_t reset;
 static loss_t overruns;
 static loss_t dropped;
@@ -55,10 +55,17 @@ static bool is_shown(loss_t *loss, uint32_t count, uint32_t now_ms)
 
 static uint32_t faults_of(uint32_t failed_tests)
 {
-    uint32_t faults = ((failed_tests & MESSAGE_SELF_TEST_ROM) != 0u) ? (uint32_t)LEVER_PLATFORM_ROM : 0u;
+    uint32_t faults = ((failed_tests & (uint32_t)MESSAGE_SELF_TEST_ROM) != 0u) ? (uint32_t)LEVER_PLATFORM_ROM : 0u;
 
     faults |= ((failed_tests & ~(uint32_t)MESSAGE_SELF_TEST_ROM) != 0u) ? (uint32_t)LEVER_PLATFORM_SELF_TEST : 0u;
     return faults;
+}
+
+/* In two places, as one of them may be the bit of RAM that is wrong. */
+static void note_failed(uint32_t tests)
+{
+    reset.failed |= (uint8_t)tests;
+    lasting_faults |= (uint8_t)faults_of(tests);
 }
 
 static void report_status(void *self, lever_platform_t *status)
@@ -69,7 +76,7 @@ static void report_status(void *self, lever_platform_t *status)
     (void)memset(status, 0, sizeof *status);
     transport_status(status);
     status->dropped = (uint16_t)(status->dropped + (uint32_t)loop.totals.stale);
-    status->faults |= (uint8_t)(faults_at_start | faults_of(reset.failed));
+    status->faults |= (uint8_t)(lasting_faults | faults_of(reset.failed));
     status->faults |= is_shown(&overruns, status->overruns, now_ms) ? (uint8_t)LEVER_PLATFORM_OVERRUN : 0u;
     status->faults |= is_shown(&dropped, status->dropped, now_ms) ? (uint8_t)LEVER_PLATFORM_DROPPED : 0u;
 }
@@ -132,20 +139,18 @@ static uint32_t fault_of(enum message_cause cause)
 
 /* Nothing here stops the estimator: it says what is wrong, and who depends on it decides. Each step takes less than the
  * 0.35 s that the watchdog allows at the least, at 16 MHz, too. */
-static uint8_t test_all(const clock_rates_t *rates)
+static void test_all(const clock_rates_t *rates)
 {
-    uint32_t faults = rates->crystal ? 0u : (uint32_t)LEVER_PLATFORM_CLOCK;
-
     reset.cause = (uint8_t)reset_cause_read();
     reset.resets = (uint8_t)reset_cause_count();
     reset.fault_address = fault_last.pc;
-    faults |= fault_of((enum message_cause)reset.cause);
+    lasting_faults = rates->crystal ? (uint8_t)0u : (uint8_t)LEVER_PLATFORM_CLOCK;
+    lasting_faults |= (uint8_t)fault_of((enum message_cause)reset.cause);
     watchdog_start();
-    periodic_test_start();
+    note_failed(periodic_test_start());
     watchdog_kick();
-    reset.failed = self_test(&memory) ? 0u : (uint8_t)MESSAGE_SELF_TEST_GOLDEN;
+    note_failed(self_test(&memory) ? 0u : (uint32_t)MESSAGE_SELF_TEST_GOLDEN);
     watchdog_kick();
-    return (uint8_t)faults;
 }
 
 /* --- beside the loop --------------------------------------------------------------------------------------------- */
@@ -189,8 +194,7 @@ static void each_millisecond(void)
 
     if (now_ms != last_ms) {
         last_ms = now_ms;
-        periodic_test_step();
-        reset.failed |= (uint8_t)periodic_test_failed();
+        note_failed(periodic_test_step());
         report_reset(now_ms);
         feed_watchdog();
     }
@@ -200,7 +204,7 @@ int main(void)
 {
     const clock_rates_t rates = clock_start();
 
-    faults_at_start = test_all(&rates);
+    test_all(&rates);
     lever_t *lever = configure();
     tick_start(rates.core_hz);
     transport_start(&rates);

@@ -1,4 +1,4 @@
-/* Self tests of the machine that go on while the loop runs, a slice at a time. What has failed stays so until a reset.
+/* Self tests of the machine that go on while the loop runs, a slice at a time.
  *
  * ROM: the CRC of all of the image, against the build's. RAM: all of it that the image uses, stack included, by
  * ram_test.h; each word at least every second pass, since a march leaves out the stack that it stands on, which is
@@ -8,13 +8,10 @@
 
 #include <stdint.h>
 
-/* Marks the end of the stack, and makes one whole pass of the ROM test. */
-void periodic_test_start(void);
+/* Marks the end of the stack, and makes one whole pass of the ROM test. What fails: of enum message_self_test. */
+uint32_t periodic_test_start(void);
 
-/* The next slice of each test. About 1300 instructions, some 500 of them with interrupts off. */
-void periodic_test_step(void);
-
-/* What has failed: of enum message_self_test. */
-uint32_t periodic_test_failed(void);
+/* The next slice of each test, and what fails in it. About 1300 instructions, some 300 of them with interrupts off. */
+uint32_t periodic_test_step(void);
 
 #endif

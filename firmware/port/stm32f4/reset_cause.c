@@ -41,6 +41,11 @@ static enum message_cause cause_of(uint32_t flags)
     return cause;
 }
 
+static enum message_cause fault_cause(void)
+{
+    return fault_lost_stack() ? MESSAGE_CAUSE_STACK_OVERFLOW : MESSAGE_CAUSE_HARD_FAULT;
+}
+
 enum message_cause reset_cause_read(void)
 {
     const uint32_t flags = rcc.CSR;
@@ -50,14 +55,9 @@ enum message_cause reset_cause_read(void)
 
     rcc.CSR |= RCC_CSR_RMVF;
     count_reset(cause == MESSAGE_CAUSE_POWER_ON);
-    if (cause == MESSAGE_CAUSE_POWER_ON) {
-        /* nothing in memory is to be believed */
-    } else if (faulted) {
-        cause = fault_lost_stack() ? MESSAGE_CAUSE_STACK_OVERFLOW : MESSAGE_CAUSE_HARD_FAULT;
-    } else if (clock_failed) {
-        cause = MESSAGE_CAUSE_CLOCK_FAILURE;
-    } else {
-        /* as the flags say */
+    if (cause != MESSAGE_CAUSE_POWER_ON) { /* after which nothing in memory is to be believed */
+        cause = clock_failed ? MESSAGE_CAUSE_CLOCK_FAILURE : cause;
+        cause = faulted ? fault_cause() : cause;
     }
     return cause;
 }

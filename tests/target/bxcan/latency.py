@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from target.budget import cycles, trace
+from target.budget import trace
+from target.budget.cycles import TAKEN
 from target.bxcan.board import Board
 from target.bxcan.machine import ACCESS_CYCLES
 from unicorn import UC_HOOK_CODE, Uc
 
-TAKEN = cycles.MODEL["a branch that is taken, besides"]
 MASK, UNMASK, SLEEP = "cpsid", "cpsie", "wfi"
 
 

@@ -19,7 +19,7 @@ class Bit:
     number: int
 
     def get(self, cpu: Uc) -> int:
-        return cpu.mem_read(self.address, 4)[self.number // 8] >> self.number % 8 & 1
+        return int(cpu.mem_read(self.address, 4)[self.number // 8]) >> self.number % 8 & 1
 
     def put(self, cpu: Uc, value: int) -> None:
         byte = self.address + self.number // 8

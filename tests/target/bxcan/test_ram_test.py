@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import struct
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -83,13 +84,13 @@ def test_no_two_bits_of_a_word_are_alike_in_all_backgrounds(march: March) -> Non
 @pytest.mark.requirement("R45")
 def test_stuck_bit_is_found(march: March, value: int) -> None:
     for bit in bits(PAIRS):
-        assert march.finds(lambda cpu, bit=bit: memory.stuck(cpu, bit, value)), bit
+        assert march.finds(partial(memory.stuck, bit=bit, value=value)), bit
 
 
 @pytest.mark.parametrize("to", [0, 1])
 def test_bit_that_cannot_change_is_found(march: March, to: int) -> None:
     for bit in bits(PAIRS):
-        assert march.finds(lambda cpu, bit=bit: memory.no_transition(cpu, bit, to)), bit
+        assert march.finds(partial(memory.no_transition, bit=bit, to=to)), bit
 
 
 @pytest.mark.parametrize("rises", [True, False])
@@ -97,8 +98,8 @@ def test_bit_that_cannot_change_is_found(march: March, to: int) -> None:
 def test_bit_that_changes_with_another_is_found(march: March, rises: bool, becomes: int | None) -> None:
     for aggressor, victim in zip(bits(PAIRS), reversed(bits(PAIRS)), strict=True):
         if aggressor.address != victim.address:
-            seeded = (aggressor, victim, rises, becomes)
-            assert march.finds(lambda cpu, seeded=seeded: memory.coupled(cpu, *seeded)), seeded
+            pair = {"aggressor": aggressor, "victim": victim}
+            assert march.finds(partial(memory.coupled, **pair, rises=rises, becomes=becomes)), pair
 
 
 @pytest.mark.parametrize("value", [0, 1])

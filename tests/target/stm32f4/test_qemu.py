@@ -51,7 +51,7 @@ def test_starts_and_passes_its_self_tests(slcan_image: Path, tmp_path: Path) -> 
 
 
 def test_image_for_can_goes_round_without_a_controller_that_answers(can_image: Path, tmp_path: Path) -> None:
-    tested, milliseconds = (elf.symbol(can_image, name) for name in ("faults_at_start", "milliseconds"))
+    tested, milliseconds = (elf.symbol(can_image, name) for name in ("lasting_faults", "milliseconds"))
     with running(can_image, tmp_path) as board, board.debugger() as debugger:
         go_on_until(lambda: debugger.words(milliseconds, 1)[0] >= 100, debugger)
         assert debugger.words(tested, 1)[0] & 0xFF == CLOCK

@@ -266,3 +266,24 @@ TEST(a_chosen_adaptation_starts_its_walk_anew)
     }
     TEST_ASSERT_TRUE(sigma[1] > (1.001f * sigma[0]));
 }
+
+/* Each by itself; what is as it was does not. */
+TEST(a_choice_that_changes_is_said_on_the_bus)
+{
+    for (uint32_t k = 0u; k <= 5u; k++) {
+        lever_command_t command = command_none();
+        uint8_t *const choice[] = {
+            &command.model, &command.preload, &command.estimator, &command.adaptation, &command.mitigation};
+        const uint8_t now[] = {config.model, config.preload, config.estimator, config.adaptation, config.mitigation};
+        start();
+        for (uint32_t i = 0u; i < 5u; i++) {
+            *choice[i] = (uint8_t)(now[i] ^ ((i == k) ? 1u : 0u));
+        }
+        lever->link.pages = 0u;
+        TEST_ASSERT_TRUE(lever_command(lever, &command));
+        TEST_ASSERT_EQUAL(k < 5u, lever->link.pages != 0u);
+    }
+    lever_command_t command = command_none();
+    command.dither_rms = 1.1e4f;
+    TEST_ASSERT_FALSE(lever_command(lever, &command));
+}

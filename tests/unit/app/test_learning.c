@@ -195,8 +195,8 @@ TEST_EACH(3, a_new_grip_is_followed_with_what_is_measured)
 /* R6 */
 TEST_EACH(2, a_change_soon_after_another_is_followed_unless_the_hands_may_be_off)
 {
-    learning_t *learning = &lever->estimator.learning;
     start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    learning_t *learning = &lever->estimator.learning;
     (void)run(10000u);
     simulation.plant = plant_of_lever(3.2, 120.0, 4200.0);
     (void)run(2000u);
@@ -221,11 +221,11 @@ TEST_EACH(2, a_change_soon_after_another_is_followed_unless_the_hands_may_be_off
  * its seat goes on moving. */
 TEST_EACH(3, a_new_grip_moves_the_level_of_a_trim_that_is_followed)
 {
-    estimator_t *estimator = &lever->estimator;
     config = config_of(0u);
     config.preload = (uint8_t)((test_round == 0u) ? LEVER_PRELOAD_FIXED : LEVER_PRELOAD_TRIM);
     config.settings.seat_frequency = (test_round == 2u) ? 4.5f : 0.0f;
     start();
+    estimator_t *estimator = &lever->estimator;
     (void)run(5000u);
     estimator->learning.gripping = 1.0e-3f;
     estimator->learning.held_again = true;

@@ -3,6 +3,8 @@
 #include "can/e2e.h"
 #include "can/messages.h"
 
+#include <math.h>
+
 #include "test.h"
 
 enum { NONE = -1, DAMAGED = -2, DATA_ID = 1 };
@@ -77,4 +79,18 @@ TEST(a_message_that_does_not_fit_is_not_encoded)
     TEST_ASSERT_FALSE(message_identity_encode(&frame, &identity));
     TEST_ASSERT_FALSE(message_pilot_sigma_encode(&frame, &sigma));
     TEST_ASSERT_FALSE(message_health_encode(&frame, &health));
+}
+
+/* The greatest count of a signal is 65534, and 65535 is not available, as everything beyond. */
+TEST(a_value_that_does_not_fit_is_not_available)
+{
+    static const float value[] = {65.534f, 65.535f, 65.536f, -0.001f, 1.0e9f, NAN};
+    for (uint32_t i = 0u; i < 6u; i++) {
+        const message_pilot_parameters_t parameters = {.parameter = {value[i], 1.0f, 1.0f}};
+        message_pilot_parameters_t read;
+        lever_frame_t frame;
+        TEST_ASSERT_TRUE(
+            message_pilot_parameters_encode(&frame, &parameters) && message_pilot_parameters_decode(&read, &frame));
+        TEST_ASSERT_EQUAL(i == 0u, isfinite(read.parameter[0]));
+    }
 }
