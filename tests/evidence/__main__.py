@@ -3,7 +3,8 @@
     python tests/evidence BUILD
 
 Proves by Eva, flies the fault matrix and a day of soak, fuzzes, measures coverage, runs the tests of
-firmware/REQUIREMENTS.md and SECURITY.md and all mutants of the core. Both files are there when all of it could be gathered; until then there is neither.
+firmware/REQUIREMENTS.md and SECURITY.md and all mutants of the core. Both files are there when all of it could be
+gathered; until then there is neither.
 
 Exit status: 0 when each requirement has tests that passed, no fault is missed that is not known to be, and Eva, soak
 and fuzzers find nothing; 1 when not, which the page shows; 2 when a part could not be gathered, and nothing is written.
