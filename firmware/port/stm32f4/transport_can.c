@@ -38,6 +38,11 @@ bool transport_is_served(void)
     return can_is_served();
 }
 
+bool transport_takes_commands(void)
+{
+    return LEVER_COMMANDS != 0;
+}
+
 void transport_status(lever_platform_t *status)
 {
     const can_counts_t counts = can_counts();
