@@ -9,6 +9,12 @@
 
 enum { LINE_BYTES = 512, COLUMNS = 3, NAMES = 4 };
 
+/* A line without its LF. */
+typedef struct line {
+    char text[LINE_BYTES + 1];
+    bool is_text; /* it fits, and has no NUL */
+} line_t;
+
 /* A line "name = number", and where the number goes. */
 typedef struct entry {
     const char *name;
@@ -81,19 +87,37 @@ static bool take_line(lever_aircraft_t *aircraft, char *line)
     return (equals != NULL) ? take_entry(aircraft, text, equals) : take_point(aircraft, text);
 }
 
+/* Reads a line; false at the end of the file, when it is what was left. */
+static bool read_line(FILE *file, line_t *line)
+{
+    int byte = getc(file);
+
+    *line = (line_t){.is_text = true};
+    for (size_t length = 0u; (byte != EOF) && (byte != '\n'); length++) {
+        line->is_text = line->is_text && (byte != 0) && (length < (size_t)LINE_BYTES);
+        if (line->is_text) {
+            line->text[length] = (char)byte;
+        }
+        byte = getc(file);
+    }
+    return byte != EOF;
+}
+
 bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, settings_error_t *error)
 {
-    char line[LINE_BYTES];
+    line_t line;
     unsigned number = 0u;
+    bool is_more = true;
 
     *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = 5.0f, .alarm = 3.5f};
-    while (fgets(line, (int)sizeof line, file) != NULL) {
+    while (is_more) {
+        is_more = read_line(file, &line);
         number++;
-        if (!take_line(aircraft, line)) {
+        if (!line.is_text || !take_line(aircraft, line.text)) {
             (void)snprintf(error->text, sizeof error->text,
                 "%.200s:%u: neither gain_sigma, phase_sigma, warning or alarm = number, nor frequency, real and "
-                "imaginary part (of %d at most)",
-                path, number, LEVER_AIRCRAFT_POINTS);
+                "imaginary part (of %d at most), in %d bytes of text at most",
+                path, number, LEVER_AIRCRAFT_POINTS, LINE_BYTES);
             return false;
         }
     }
