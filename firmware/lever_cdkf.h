@@ -417,6 +417,58 @@ enum lever_mode lever_step(lever_t *lever);
  * replaced by newer ones. */
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 
+/* --- logs that begin anywhere -------------------------------------------------------------------------------------- */
+
+/* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
+ * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
+ * them is not larger for it. */
+enum lever_state_limits { LEVER_STATE_BYTES = 1571 };
+
+/* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
+uint16_t lever_state_layout(void);
+
+/* Between two samples, when lever_next_frame() has nothing left. */
+void lever_state_save(const lever_t *lever, uint8_t state[LEVER_STATE_BYTES]);
+
+/* From then on the instance is as that was which was saved: for a replay, on a desktop; a controller must not take its
+ * state from a bus. Returns false, changing nothing, if a value is out of its range, the settings are others, or one of
+ * the two has an aircraft and the other has none. Bytes that are accepted may make any estimate, but no harm. */
+bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES]);
+
+/* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and its
+ * digest. A replay of such a log may begin anywhere, and proves itself equal to the bit at each snapshot
+ * (host_tools/replay). All memory is the caller's; cost: firmware/port/PORTING.md.
+ *
+ *     lever_recorder_t recorder;
+ *     lever_recorder_init(&recorder, 500000);
+ *     ...                                           // after lever_step() and all of lever_next_frame():
+ *     lever_recorder_step(&recorder, lever);
+ *     while (lever_recorder_next_frame(&recorder, &tx)) { transmit(&tx); }
+ *
+ * What reaches an instance other than by frames (lever_idle(), lever_platform(), lever_command()) is not in a log, and a
+ * replay differs until the next snapshot where it matters. */
+typedef struct lever_recorder {
+    uint8_t state[LEVER_STATE_BYTES];
+    uint8_t counter;     /* E2E */
+    uint16_t sent;       /* frames of this snapshot */
+    uint16_t layout;     /* lever_state_layout() */
+    uint32_t period_us;  /* from snapshot to snapshot */
+    uint32_t time_us;    /* of the last sample */
+    uint32_t elapsed_us; /* since the snapshot was taken */
+    uint32_t taken_us;   /* when that was */
+    uint32_t crc;        /* of what was sent of it */
+} lever_recorder_t;
+
+/* `period_us` of sample time from one snapshot to the next, 264 frames each (on 1 Mbit/s classic CAN 3 % of the
+ * bus at a second, 6 % at half a second). */
+void lever_recorder_init(lever_recorder_t *recorder, uint32_t period_us);
+
+/* After a step whose frames have all been fetched, before the next frame is received. */
+void lever_recorder_step(lever_recorder_t *recorder, const lever_t *lever);
+
+/* The next frame of a snapshot to send now; false when there is none left. */
+bool lever_recorder_next_frame(lever_recorder_t *recorder, lever_frame_t *frame);
+
 #ifdef __cplusplus
 }
 #endif

@@ -98,7 +98,6 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
 void estimator_health(const estimator_t *estimator, lever_health_t *health)
 {
     health->mode = estimator->mode;
-    health->faults = estimator->faults;
     health->samples = estimator->samples;
     health->lost = estimator->lost;
     health->corrupt = estimator->corrupt;

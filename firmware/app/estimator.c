@@ -70,7 +70,6 @@ void estimator_start_over(estimator_t *estimator)
 void estimator_init(estimator_t *estimator, const lever_config_t *config)
 {
     setup_t *setup = &estimator->setup;
-    (void)memset(estimator, 0, sizeof *estimator);
     setup->settings = &config->settings;
     setup->model = config->model;
     setup->preload = config->preload;

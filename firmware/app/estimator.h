@@ -62,7 +62,7 @@ typedef struct estimator {
     uint32_t recoveries;
 } estimator_t;
 
-/* Starts from a checked configuration, whose settings are used as long as the instance is; all counts are zero. */
+/* Starts from a checked configuration, whose settings are used as long as the instance is. All of it is zero before. */
 void estimator_init(estimator_t *estimator, const lever_config_t *config);
 
 /* Back to before the first sample, with the choices as they are; counts go on. */
@@ -93,7 +93,7 @@ model_dynamics_t estimator_linearised(const estimator_t *estimator, model_step_t
 
 margin_t estimator_margin(const estimator_t *estimator, const lever_aircraft_t *aircraft);
 
-/* Mode, faults and counts; what concerns torque and machine is not the estimator's. */
+/* Mode, excitation and counts; faults are instance_faults(), and torque is not the estimator's. */
 void estimator_health(const estimator_t *estimator, lever_health_t *health);
 
 #endif

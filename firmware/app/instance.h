@@ -13,15 +13,18 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+enum instance_same { INSTANCE_SAME_THETA = 1, INSTANCE_SAME_Z_DDOT = 2 };
+
 /* The watch over the loop of arm, lever and rotor, and what is done about it. */
 typedef struct bounce {
     mitigation_t mitigation;
     uint8_t chosen;                   /* enum lever_mitigation */
+    uint8_t state;                    /* enum lever_bounce */
+    uint8_t same;                     /* of enum instance_same: what the last sample measured as the one before */
     bool mitigates;                   /* one is chosen, or still fades */
+    uint32_t time_us;                 /* of the sample with which the margin was worked out */
     const lever_aircraft_t *aircraft; /* NULL: none */
     margin_t margin;
-    uint32_t time_us; /* of the sample with which that was worked out */
-    uint8_t state;    /* enum lever_bounce */
 } bounce_t;
 
 struct lever {

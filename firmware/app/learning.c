@@ -179,9 +179,8 @@ static bool judge(
     *step = constant[CDKF_STEP];
     hands_step(&learning->hands, &setup->constants, cdkf->x[1], period, on_lever);
     const bool force_wrong = grip_force_judge(&learning->force, setup, &learning->hands);
-    const bool known = is_known(learning) || learning->monitor.base_wrong;
     bool base_wrong = false;
-    if (known && !learning->hands.off) {
+    if (is_known(learning) && !learning->hands.off) {
         base_wrong = monitor_step(&learning->monitor, &sudden, period);
     } else {
         monitor_trust_base(&learning->monitor);

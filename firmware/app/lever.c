@@ -70,12 +70,24 @@ void instance_watch(lever_t *lever)
     }
 }
 
+/* Which sensors say what they said last. */
+static uint8_t repeated(const monitor_t *monitor, const lever_sample_t *sample)
+{
+    const uint32_t theta = monitor_repeats(monitor, MONITOR_THETA, sample->theta) ? (uint32_t)INSTANCE_SAME_THETA : 0u;
+    const uint32_t base =
+        monitor_repeats(monitor, MONITOR_Z_DDOT, sample->z_ddot) ? (uint32_t)INSTANCE_SAME_Z_DDOT : 0u;
+    return (uint8_t)(theta | base);
+}
+
 enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
 {
     const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
     estimator_t *estimator = &lever->estimator;
     torque_sample_t *to_gate = &lever->to_gate;
     const uint32_t last_us = estimator->time_us;
+    if (lever->bounce.mitigates) {
+        lever->bounce.same = repeated(&estimator->learning.monitor, sample);
+    }
     const bool starts = (estimator->mode == LEVER_MODE_INIT);
     const enum lever_mode mode = estimator_update(estimator, sample, lever->gate.torque);
     const uint32_t faults = estimator->faults;
@@ -108,7 +120,9 @@ void instance_mitigate(lever_t *lever)
         .advances = to_gate->advances,
         .permitted = to_gate->permitted && ((faults & broken) == 0u),
         .sensed = ((faults & blind) == 0u),
-        .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u)};
+        .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u),
+        .same_theta = ((lever->bounce.same & (uint32_t)INSTANCE_SAME_THETA) != 0u),
+        .same_z_ddot = ((lever->bounce.same & (uint32_t)INSTANCE_SAME_Z_DDOT) != 0u)};
     const model_dynamics_t dynamics = estimator_linearised(estimator, &sample.step);
     sample.dynamics = &dynamics;
     sample.step.period = 1.0e-6f * (float)sample.elapsed_us;

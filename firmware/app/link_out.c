@@ -90,8 +90,7 @@ static bool encode_dynamics(lever_t *lever, lever_frame_t *frame)
         .damping_ratio = dynamics.damping_ratio,
         .damping_ratio_sigma = dynamics.damping_ratio_sigma,
         .model = lever->estimator.setup.model,
-        .valid = is_estimating(lever) && is_finite(dynamics.natural_frequency_sigma) &&
-                 is_finite(dynamics.damping_ratio_sigma)};
+        .valid = is_estimating(lever) && is_finite(dynamics.natural_frequency_sigma + dynamics.damping_ratio_sigma)};
     return message_pilot_dynamics_encode(frame, &message);
 }
 
@@ -105,7 +104,7 @@ static bool encode_feedthrough(lever_t *lever, lever_frame_t *frame)
         .gain_sigma = feedthrough.gain_sigma,
         .phase_sigma = feedthrough.phase_sigma,
         .frequency = link->frequency,
-        .valid = is_estimating(lever) && is_finite(feedthrough.gain_sigma) && is_finite(feedthrough.phase_sigma)};
+        .valid = is_estimating(lever) && is_finite(feedthrough.gain_sigma + feedthrough.phase_sigma)};
     const bool is_last = (link->frequency == (uint8_t)MESSAGE_FEEDTHROUGH_HIGHEST);
     link->frequency = is_last ? (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST : (uint8_t)(link->frequency + 1u);
     return message_feedthrough_encode(frame, &message);

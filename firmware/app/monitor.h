@@ -44,6 +44,13 @@ static inline bool monitor_is_alive(monitor_t *monitor, enum monitor_signal sign
     return !of->stuck;
 }
 
+/* Before the next sample: its value would be that of the last. */
+static inline bool monitor_repeats(const monitor_t *monitor, enum monitor_signal signal, float value)
+{
+    const float last = monitor->stillness[signal].now;
+    return !((value < last) || (value > last));
+}
+
 /* At the end of a block: true when a signal has just been found stuck. */
 bool monitor_has_just_stuck(monitor_t *monitor);
 

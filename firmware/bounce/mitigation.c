@@ -10,6 +10,9 @@
 #define BAND_HIGH 8.0f       /* [Hz] */
 #define OPENING_US 5.0e5f    /* [us] */
 #define CLOSING_US 7.0e4f    /* [us] */
+#define SAME_US 22000u       /* a sensor that says the same for longer is stuck, */
+#define SAME_LEAST 8u        /* if for so many samples more than */
+#define SAME_USUAL 3u        /* times the most for which it did lately */
 #define MEMORY 0.5f          /* of how the lever moves [s] */
 #define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
 #define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
@@ -53,6 +56,26 @@ static void age(mitigation_t *mitigation, uint32_t elapsed_us)
     }
 }
 
+/* A sensor is stuck. A coarse one in a quiet cabin says the same again and again: how long it usually does is learnt, and
+ * forgotten by a sample each time that `forgets`. */
+static bool is_stuck(mitigation_reading_t *reading, bool same, uint32_t elapsed_us, bool forgets)
+{
+    const uint32_t most = SAME_LEAST + (SAME_USUAL * reading->longest);
+    if (!same) {
+        const uint32_t learnt = (reading->same < most) ? reading->same : most;
+        reading->longest = (learnt > reading->longest) ? (uint8_t)learnt : reading->longest;
+        reading->same = 0u;
+    } else if (reading->same < UINT8_MAX) {
+        reading->same++;
+    } else {
+        /* counted to the end */
+    }
+    if (forgets && (reading->longest > 0u)) {
+        reading->longest--;
+    }
+    return (reading->same > most) && ((reading->same * elapsed_us) > SAME_US);
+}
+
 static void pass_gate(mitigation_t *mitigation, const mitigation_sample_t *sample)
 {
     const bool sensed = sample->sensed && (sample->rated || !mitigation->rated);
@@ -60,7 +83,12 @@ static void pass_gate(mitigation_t *mitigation, const mitigation_sample_t *sampl
     mitigation->counted = 0u;
     mitigation->rated = mitigation->rated || sample->rated;
     if (sample->advances && sensed) {
-        mitigation->sensed_left = sample->silence_us + 1u;
+        const uint32_t elapsed_us = sample->elapsed_us;
+        const bool forgets = (mitigation->samples == 0u);
+        const bool theta_stuck = is_stuck(&mitigation->theta, sample->same_theta, elapsed_us, forgets);
+        const bool base_stuck = is_stuck(&mitigation->z_ddot, sample->same_z_ddot, elapsed_us, forgets);
+        mitigation->samples++;
+        mitigation->sensed_left = (theta_stuck || base_stuck) ? 0u : (sample->silence_us + 1u);
     }
     mitigation->open = sample->advances && sample->permitted && (mitigation->sensed_left != 0u);
     if (mitigation->open) {

@@ -1,7 +1,8 @@
 /* What is done against collective bounce, by README.md: a correction of the lever's angle for the flight control
  * computer, and torque against the lever's rate. All of it passes one gate, which is open while all of this holds:
  *   - the mode, the sample clock and the machine permit it, and somebody holds the lever: mitigation_sample_t;
- *   - a sample with all its sensors came within 20 ms or 1.25 sample periods, whichever is longer.
+ *   - a sample with all its sensors came within 20 ms or 1.25 sample periods, whichever is longer;
+ *   - neither theta nor z_ddot has been the very same for more than 22 ms, and for much longer than is usual of it.
  * It opens within half a second. Otherwise all fades to zero within 70 ms; for that no sample is needed: the port calls
  * mitigation_idle().
  *
@@ -23,6 +24,12 @@ typedef struct mitigation_band {
     float level;
 } mitigation_band_t;
 
+/* A sensor that has noise does not say the very same for long. */
+typedef struct mitigation_reading {
+    uint8_t same;    /* samples for which it has been the same, */
+    uint8_t longest; /* and the most for which it was, lately */
+} mitigation_reading_t;
+
 /* A second-order filter at the natural frequency. */
 typedef struct mitigation_notch {
     float low_pass;
@@ -43,9 +50,12 @@ typedef struct mitigation {
     float expected_damping; /* and what it would be with the involuntary theta_dot */
     uint32_t sensed_left;   /* time for which the last sample with all its sensors serves [us] */
     uint32_t counted;       /* time since the last sample that mitigation_idle() has counted [us] */
-    bool rated;             /* theta_dot has been measured: from then on it is missed */
-    bool explained;         /* the estimated arm explains how the lever moves */
-    bool notches;           /* the correction is the notch's */
+    mitigation_reading_t theta;
+    mitigation_reading_t z_ddot;
+    uint8_t samples; /* with all sensors; wraps */
+    bool rated;      /* theta_dot has been measured: from then on it is missed */
+    bool explained;  /* the estimated arm explains how the lever moves */
+    bool notches;    /* the correction is the notch's */
     bool open;
     bool started;
 } mitigation_t;
@@ -63,8 +73,10 @@ typedef struct mitigation_sample {
     uint8_t mitigation;  /* enum lever_mitigation */
     bool advances;       /* the sample clock */
     bool permitted;
-    bool sensed; /* theta and z_ddot are valid, */
-    bool rated;  /* and theta_dot */
+    bool sensed;      /* theta and z_ddot are valid, */
+    bool rated;       /* and theta_dot */
+    bool same_theta;  /* theta as measured is that of the sample before, */
+    bool same_z_ddot; /* and z_ddot */
 } mitigation_sample_t;
 
 /* A sample came: renews the correction, and the torque to ask of the motor. Returns false when none is chosen and all has

@@ -45,7 +45,8 @@ enum message_id {
     MESSAGE_LINK_HEALTH_ID = 0x219,
     MESSAGE_FEEDTHROUGH_ID = 0x21A,
     MESSAGE_STABILITY_ID = 0x21B,
-    MESSAGE_CORRECTION_ID = 0x21C
+    MESSAGE_CORRECTION_ID = 0x21C,
+    MESSAGE_SNAPSHOT_ID = 0x21D
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -66,7 +67,8 @@ enum message_data_id {
     MESSAGE_FEEDTHROUGH_DATA_ID = 209,
     MESSAGE_GRIP_SAMPLE_DATA_ID = 225,
     MESSAGE_STABILITY_DATA_ID = 240,
-    MESSAGE_CORRECTION_DATA_ID = 9
+    MESSAGE_CORRECTION_DATA_ID = 9,
+    MESSAGE_SNAPSHOT_DATA_ID = 25
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -279,5 +281,21 @@ typedef struct message_link_health {
 
 bool message_link_health_encode(lever_frame_t *frame, const message_link_health_t *message);
 bool message_link_health_decode(message_link_health_t *message, const lever_frame_t *frame);
+
+enum message_part { MESSAGE_PART_BEGIN = 0, MESSAGE_PART_DATA = 1, MESSAGE_PART_END = 2, MESSAGE_PART_COUNT };
+
+/* One part of a snapshot: only that part's members are sent, and what is received leaves the others 0. */
+typedef struct message_snapshot {
+    uint8_t part;      /* enum message_part; not known: refused in both directions */
+    uint32_t time_us;  /* begin: of the sample after which the state was this */
+    uint16_t layout;   /* lever_state_layout() */
+    uint32_t data_low; /* data: the next six bytes of the state, lowest first */
+    uint16_t data_high;
+    uint32_t digest; /* end: CRC-32 over the bytes of the state */
+    uint16_t length; /* how many these are */
+} message_snapshot_t;
+
+bool message_snapshot_encode(lever_frame_t *frame, const message_snapshot_t *message);
+bool message_snapshot_decode(message_snapshot_t *message, const lever_frame_t *frame);
 
 #endif

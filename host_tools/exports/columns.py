@@ -14,7 +14,7 @@ from ..firmware.estimator import fault_names
 from ..firmware.library import enum_names
 from ..firmware.quantities import quantities, recorded_name
 from ..results.feedthrough import FEEDTHROUGH
-from ..results.trace import ESTIMATED, HEALTH, MEASURED, STABILITY, quantity_fields
+from ..results.trace import CORRECTION, ESTIMATED, HEALTH, MEASURED, STABILITY, TRUE_MARGIN, quantity_fields
 
 MEASUREMENT, ESTIMATE, RECORDED, TRUTH = "measurement", "estimate", "recorded", "truth"
 """Kinds of columns; recorded are the estimates of the firmware that ran when a log was recorded."""
@@ -32,6 +32,7 @@ _TRUTH = (  # column, unit, comment
     ("z_ddot_true_m_s2", "m/s^2", "Vertical acceleration of the base, up positive, without gravity."),
     ("tau_m_true_N_m", "N m", "Motor torque acting on the lever."),
     ("trim_true_rad", "rad", "Lever angle at which the pilot holds it."),
+    (TRUE_MARGIN, "dB", "By which the loop with the true arm may grow until it is unstable."),
 )
 
 
@@ -106,6 +107,7 @@ def _known(model: str) -> Iterator[Column]:
         yield _of_message(source, f"feedthrough_{field}", message, field, held=True)
     for source, message, field in STABILITY:
         yield _of_message(source, _STABILITY_NAMES.get(field, field), message, field, held=True)
+    yield _of_message(CORRECTION[0], CORRECTION[2], *CORRECTION[1:])
     yield _of_message("dither_N_m", "dither", "MOTOR_COMMAND", "dither")
     for source, unit, comment in _TRUTH:
         name = source[: source.index("_true")]

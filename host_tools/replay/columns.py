@@ -16,7 +16,7 @@ from ..can.fields import COUNTS
 from ..firmware.library import enum_names
 from ..firmware.quantities import recorded_name
 from ..results.feedthrough import FEEDTHROUGH
-from ..results.trace import ESTIMATED, HEALTH, MEASURED, STABILITY, Trace, quantity_fields
+from ..results.trace import CORRECTION, ESTIMATED, HEALTH, MEASURED, STABILITY, Trace, quantity_fields
 from .timeline import Timeline
 
 Continued = Callable[[str, FloatArray], FloatArray]
@@ -34,7 +34,7 @@ class Columns:
         self._timeline = timeline
         self._absent = sum(bit for bit, name in enum_names("lever_fault").items() if name in absent)
         self._fields = (*quantity_fields(model), *FEEDTHROUGH, *HEALTH, *(STABILITY if watched else ()))
-        self._with_recorded = with_recorded
+        self._watched, self._with_recorded = watched, with_recorded
         self._compared = (*ESTIMATED, *quantity_fields(model), *(entry for entry in HEALTH if entry[0] == "mode"))
         self._counts = dict.fromkeys(COUNTS, 0)
         self.misplaced = 0
@@ -48,6 +48,8 @@ class Columns:
             trace[column] = decoded.at_samples(message, field)
         for column, message, field in self._fields:
             trace[column] = decoded.held(message, field, self._unwrapped if field in COUNTS else None)
+        if self._watched:
+            trace[CORRECTION[0]] = decoded.at_samples(*CORRECTION[1:])
         trace["faults"] = _without(trace["faults"], self._absent)
         trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
         if self._with_recorded:

@@ -17,7 +17,7 @@ Reduce = Callable[[FloatArray], FloatArray]
 
 MOST = 8192
 """Stretches that are kept, at most."""
-_DENSE = ("theta_", "theta_dot_", "z_ddot_", "tau_m_", "dither_", "mode")
+_DENSE = ("theta_", "theta_dot_", "z_ddot_", "tau_m_", "dither_", "correction_", "mode")
 
 
 def _first(rows: FloatArray) -> FloatArray:

@@ -10,40 +10,14 @@ import numpy as np
 from ..can.traffic import why_refused
 from ..firmware.native import Config, Health, enum_names
 from ..firmware.quantities import quantities
-from ..results import nis, whiteness
+from ..results import bounce, nis, whiteness
+from ..results.bounce import Bounce
 from ..results.faults import LITTLE, OPTIONAL, WARNINGS, FaultCounts
 from ..results.nis import Innovations, freedom
+from ..results.summary import Stability
 from ..results.trace import CONVERGED_AFTER, MEASURED, Trace
+from . import proof
 from .reduction import Groups
-
-
-class Bounce:
-    """What the margin to collective bounce came to."""
-
-    def __init__(self, period: float) -> None:
-        self._period = period
-        self._states: dict[int, int] = {}
-        self._least: tuple[float, float, float] | None = None
-
-    def add(self, trace: Trace) -> None:
-        """Further samples; without an aircraft there are no columns."""
-        if "bounce" not in trace:
-            return
-        states, counts = np.unique(trace["bounce"][np.isfinite(trace["bounce"])], return_counts=True)
-        for state, count in zip(states.tolist(), counts.tolist(), strict=True):
-            self._states[int(state)] = self._states.get(int(state), 0) + count
-        margin = trace["gain_margin_dB"]
-        if np.isfinite(margin).any():
-            place = int(np.nanargmin(margin))
-            least = tuple(float(trace[name][place]) for name in ("gain_margin_dB", "gain_margin_sigma_dB", "time_s"))
-            self._least = min(self._least or least, least)  # type: ignore[assignment]
-
-    def summary(self) -> dict[str, Any]:
-        """Seconds in each state, and the least margin."""
-        names = enum_names("lever_bounce")
-        states = {names[state]: round(count * self._period, 9) for state, count in sorted(self._states.items())}
-        margin, sigma, at = self._least or (None, None, None)
-        return {"states_s": states, "least_margin_db": margin, "its_sigma_db": sigma, "at_s": at}
 
 
 class Figures:
@@ -131,11 +105,12 @@ def failure(summary: dict[str, Any]) -> str:
 
 def verdict(summary: dict[str, Any]) -> str:
     """The replay in a few sentences."""
-    measured = summary["whiteness"]
+    measured, stability = summary["whiteness"], summary["stability"]
     sentences = [
         *_troubles(summary),
+        proof.in_words(summary["snapshots"]),
         *_flags(summary),
-        _bounce(summary["stability"]),
+        bounce.verdict(stability and Stability(**stability)),
         _comparison(summary["comparison"]),
         nis.verdict(nis.Nis(**summary["nis"])),
         whiteness.verdict(whiteness.Whiteness(**measured) if measured else None),
@@ -160,21 +135,6 @@ def _flags(summary: dict[str, Any]) -> list[str]:
     return sentences
 
 
-def _bounce(stability: dict[str, Any] | None) -> str:
-    """How near the loop came to bounce."""
-    if stability is None:
-        return ""
-    states = stability["states_s"]
-    if stability["least_margin_db"] is None:
-        return "The margin to collective bounce was never known."
-    warned = [f"{name} for {states[name]:.3g} s" for name in ("warning", "alarm") if states.get(name)]
-    least, sigma = stability["least_margin_db"], stability["its_sigma_db"]
-    return (
-        f"The gain margin to collective bounce was least at {stability['at_s']:.4g} s: {least:.3g} ± {sigma:.2g} dB; "
-        f"{' and '.join(warned) or 'no alarm'}."
-    )
-
-
 def _comparison(comparison: dict[str, Any] | None) -> str:
     return "" if comparison is None else str(comparison["in_words"])
 
@@ -189,7 +149,7 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
         troubles += _protection(mapping)
     if recording["refused"]:
         why = why_refused(summary["corrupt"], summary["late"])
-        troubles.append(f"{recording['refused']:,} frames were refused: {why}.")
+        troubles.append(f"{recording['refused']:,} frames were refused{f': {why}' if why else ''}.")
     if recording["ends_early"]:
         troubles.append(f"The log is incomplete: {'; '.join(recording['ends_early'])}.")
     if recording["damaged_lines"]:

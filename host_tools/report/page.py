@@ -146,7 +146,7 @@ def _comparison(page: Page, run: Run) -> None:
 
 
 def _stability(page: Page, run: Run) -> None:
-    known = run.replayed.stability if run.replayed else None
+    known = run.summary.stability if run.summary else None
     limits = (known.warning_db, known.alarm_db) if known else ()
     page.section(
         "stability",
@@ -157,8 +157,8 @@ def _stability(page: Page, run: Run) -> None:
             stability.margin(run, limits),
             "By how much the loop through arm, lever and rotor may grow until it is unstable, with a band of ±2σ; at "
             "0 dB it is. Dotted lines are that limit and those of warning and alarm, bars at the foot the times of "
-            "these. Below, the frequency at which it would begin. There is nothing where the estimate does not carry "
-            "it.",
+            "these. Below, the frequency at which it would begin, and with mitigation the correction of the lever's "
+            "angle. There is nothing where the estimate does not carry it.",
         ),
     )
 

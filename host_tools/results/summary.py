@@ -34,6 +34,22 @@ class Estimator:
     settings: dict[str, float]
 
 
+@dataclass(frozen=True)
+class Stability:
+    """How near collective bounce was, with an aircraft."""
+
+    states_s: dict[str, float]
+    """Seconds in each state of enum lever_bounce."""
+    least_margin_db: float | None
+    its_sigma_db: float | None
+    at_s: float | None
+    warning_db: float
+    """Limits of the gain margin."""
+    alarm_db: float
+    greatest_correction_rad: float | None = None
+    """Of the lever's angle, by mitigation; None without."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Summary:
     """What both have."""
@@ -52,6 +68,8 @@ class Summary:
     passed: bool
     verdict: str
     """In a few sentences."""
+    stability: Stability | None = None
+    """None without an aircraft."""
     provenance: Provenance | None = None
     """Of the files of the run; None where there are none."""
 
@@ -185,20 +203,6 @@ class Comparison:
     in_words: str
 
 
-@dataclass(frozen=True)
-class Stability:
-    """How near collective bounce was, with an aircraft."""
-
-    states_s: dict[str, float]
-    """Seconds in each state of enum lever_bounce."""
-    least_margin_db: float | None
-    its_sigma_db: float | None
-    at_s: float | None
-    warning_db: float
-    """Limits of the gain margin."""
-    alarm_db: float
-
-
 @dataclass(frozen=True, kw_only=True)
 class ReplaySummary(Summary):
     """Of `lever replay`."""
@@ -211,8 +215,8 @@ class ReplaySummary(Summary):
     """Of the judged time with any of faults.WARNINGS of those; None where nothing is judged."""
     estimates: dict[str, Estimate]
     comparison: Comparison | None
-    stability: Stability | None = None
-    """None without an aircraft."""
+    snapshots: dict[str, Any] | None = None
+    """Of the estimator's state in the log: replay.proof.Counts."""
 
 
 # --- to and from JSON ------------------------------------------------------------------------------------------------

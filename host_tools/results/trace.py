@@ -62,7 +62,9 @@ STABILITY = (
     ("modulus_sigma", "STABILITY", "modulus_sigma"),
     ("bounce_frequency_Hz", "STABILITY", "frequency"),
 )
-"""Only where the estimator knows the aircraft."""
+CORRECTION = ("correction_rad", "CORRECTION", "correction")
+"""Both only where the estimator knows the aircraft."""
+TRUE_MARGIN = "gain_margin_true_dB"
 
 
 def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:

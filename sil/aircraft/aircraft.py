@@ -19,7 +19,8 @@ at low frequency the loop is a negative feedback; the arm beyond its own frequen
 round.
 
 The pitch follows gearing * (delta + correction)(t - delay) as a first-order actuator with limits of rate and travel.
-The correction is what the estimator has put out correction_delay and a sample period earlier.
+The correction is what the estimator has put out correction_delay and a sample period earlier. With lever_low_pass their
+sum passes a first-order low-pass with that corner: what flight control computers do against bounce, to compare with.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ class Aircraft:
     lift_deficiency: float = quantity("1", 0.7, above=0.0, greatest=1.0)
     delay: float = quantity("s", 0.020, least=0.0, greatest=0.2)
     correction_delay: float = quantity("s", 0.0, least=0.0, greatest=0.2)
+    lever_low_pass: float = quantity("Hz", 0.0, least=0.0)
     actuator_bandwidth: float = quantity("Hz", 8.0, above=0.0)
     actuator_rate: float = quantity("rad/s", np.radians(100.0), above=0.0)
     actuator_travel: float = quantity("rad", np.radians(8.0), above=0.0)
@@ -84,7 +86,7 @@ class Aircraft:
         airframe = (c @ resolvent)[:, 0, 0] + d[0, PITCH]
         actuator = 1.0 / (1.0 + s / (2.0 * np.pi * self.actuator_bandwidth))
         response: ComplexArray = airframe * actuator * np.exp(-s * self.delay)
-        return response
+        return response / (1.0 + s / (2.0 * np.pi * self.lever_low_pass)) if self.lever_low_pass else response
 
 
 SHELF = Shelf("aircraft", __package__)

@@ -42,7 +42,11 @@ class Flight:
         now, constants = len(self._lever), self.constants
         late = constants.correction_delay
         self._correction.append(correction)
-        self._lever.append(delta + (self._correction[now - late] if now >= late else 0.0))
+        angle = delta + (self._correction[now - late] if now >= late else 0.0)
+        if constants.passed < 1.0:
+            last = self._lever[-1] if now else 0.0
+            angle = last + constants.passed * (angle - last)
+        self._lever.append(angle)
         gust, rise = self._force[now], self._force[now + 1] - self._force[now]
         for substep in range(constants.substeps):
             begin, end = substep / constants.substeps, (substep + 1.0) / constants.substeps
@@ -81,6 +85,8 @@ class Constants:
     """[rad]"""
     delay: float
     """[sample periods]"""
+    passed: float
+    """Of a change of the lever's angle, in a sample period [1]."""
     correction_delay: int
     """Until a correction is added to the lever's angle [sample periods]."""
 
@@ -97,6 +103,7 @@ class Constants:
             aircraft.actuator_rate * step,
             aircraft.actuator_travel,
             aircraft.delay / period,
+            1.0 - math.exp(-period * 2.0 * math.pi * aircraft.lever_low_pass) if aircraft.lever_low_pass else 1.0,
             1 + round(aircraft.correction_delay / period),
         )
 

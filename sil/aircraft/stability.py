@@ -11,9 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
+from lever_cdkf.host_tools.models.transfer import Transfer
+
+from .aircraft import Aircraft
 
 Response = Callable[[ComplexArray], ComplexArray]
 """Of complex frequencies s [rad/s]."""
@@ -21,6 +25,7 @@ Response = Callable[[ComplexArray], ComplexArray]
 BAND = (0.5, 20.0)
 """Where crossings are looked for [Hz]; below it is the pilot's own flying."""
 _POINTS = 1000
+_COARSE = np.geomspace(*BAND, 500)
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,23 @@ def margins(loop: Response, band: tuple[float, float] = BAND) -> Margins:
         modulus=float(distance[nearest]),
         modulus_frequency=float(frequency[nearest]),
     )
+
+
+def critical_gearing(craft: Aircraft, transfer: Transfer) -> FloatArray:
+    """At which the loop becomes unstable, at each time of a pilot's transfer function [1]: margins() for many times at
+    once, by a grid alone."""
+    loop = _response(craft) * transfer.response(_COARSE)
+    below, above = loop.imag[:, :-1], loop.imag[:, 1:]
+    part = np.where(np.signbit(below) != np.signbit(above), below / (below - above + 1e-300), np.nan)
+    height = loop.real[:, :-1] + part * np.diff(loop.real, axis=1)
+    highest = np.max(np.where(np.isfinite(height), height, 0.0), axis=1)
+    critical: FloatArray = 1.0 / np.maximum(highest, 1e-9)
+    return critical
+
+
+@cache
+def _response(craft: Aircraft) -> ComplexArray:
+    return craft.response(_on_axis(_COARSE))
 
 
 def _on_axis(frequency: FloatArray) -> ComplexArray:

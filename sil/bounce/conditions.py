@@ -100,6 +100,9 @@ _ALARMS = (
 )
 
 CANCELLATION, DAMPING, BOTH, NOTCH = "cancellation", "damping", "cancellation_and_damping", "notch"
+LOW_PASS = 1.0
+"""What is done against bounce without a model: corner of a low-pass of the lever's angle [Hz]."""
+HIGH_CORNER = {"settings": {"cancellation_corner": 1.0}}
 MITIGATIONS = (CANCELLATION, DAMPING, BOTH, NOTCH, "notch_and_damping")
 
 
@@ -121,6 +124,9 @@ _LIMITS = (
     _limit(DAMPING, "lever damping"),
     _limit(NOTCH, "the notch"),
     _limit("notch_and_damping", "notch and lever damping"),
+    _limit("none", "no mitigation, but a low-pass of the lever's angle at 1 Hz", suffix="_low_pass", low_pass=LOW_PASS),
+    _limit(CANCELLATION, "cancellation, its corner at 1 Hz", suffix="_1hz", more=HIGH_CORNER),
+    _limit(BOTH, "cancellation and lever damping, corner at 1 Hz", suffix="_1hz", more=HIGH_CORNER),
     _limit(CANCELLATION, "cancellation, gusts of 0.1 g", suffix="_0.1g", gust=0.1),
     _limit(BOTH, "cancellation and lever damping, gusts of 0.1 g", suffix="_0.1g", gust=0.1),
     _limit(CANCELLATION, "cancellation that comes 5 ms later", suffix="_5ms", correction_delay=5e-3),
@@ -135,11 +141,11 @@ _LIMITS = (
 )
 
 
-def _cancelled(mitigation: str, *limits: Limit) -> Condition:
+def _cancelled(mitigation: str, *limits: Limit, title: str = "", suffix: str = "", **changes: Any) -> Condition:
     return Condition(
-        f"involuntary_{mitigation}",
-        f"involuntary part at twice the critical gearing, {mitigation.replace('_', ' ')}",
-        partial(measure.cancelled, mitigation=mitigation),
+        f"involuntary_{mitigation}{suffix}",
+        f"involuntary part at twice the critical gearing, {title or mitigation.replace('_', ' ')}",
+        partial(measure.cancelled, mitigation=mitigation, **changes),
         limits,
         ("involuntary cancelled", "back after a grip"),
         quick=bool(limits) and mitigation == CANCELLATION,
@@ -153,12 +159,14 @@ _AWAY = (
 )
 
 
-def _voluntary(mitigation: str, *limits: Limit, in_flight: bool = False) -> Condition:
+def _voluntary(
+    mitigation: str, *limits: Limit, in_flight: bool = False, title: str = "", suffix: str = "", **changes: Any
+) -> Condition:
     where = "in the loop, gain margin 6 dB" if in_flight else "a cabin that only gusts shake"
     return Condition(
-        f"voluntary_{mitigation}{'_in_flight' if in_flight else ''}",
-        f"the pilot's input at 0.5 Hz, {where}, {mitigation.replace('_', ' ')}",
-        partial(measure.voluntary, mitigation=mitigation, ratio=measure.STABLE if in_flight else 0.0),
+        f"voluntary_{mitigation}{suffix}{'_in_flight' if in_flight else ''}",
+        f"the pilot's input at 0.5 Hz, {where}, {title or mitigation.replace('_', ' ')}",
+        partial(measure.voluntary, mitigation=mitigation, ratio=measure.STABLE if in_flight else 0.0, **changes),
         limits,
         ("gain changed", "phase changed"),
         quick=bool(limits),
@@ -260,11 +268,14 @@ _FAULTS = (
     _fault("lever_lost", "LEVER_SAMPLE lost", _dropped("lever_frame")),
     _fault("sample_lost", "samples never come", _dropped("lever_frame", "base_frame"), quick=True),
     _fault("clock", "the sample clock stands", lambda plan: replace(plan, clock_stops=FAULT), quick=True),
-    _fault("base_stuck", "z̈ stuck but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="stuck")),
+    _fault("base_stuck", "z̈ stuck but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="stuck"), quick=True),
     _fault("base_zero", "z̈ zero but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="0 %")),
     _fault("base_sign", "z̈ of the wrong sign", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="-100 %")),
     _fault("theta_stuck", "θ stuck but “valid”", _sensor("theta", "1 mrad", kind="stuck")),
 )
+
+_LOW_PASSED: dict[str, Any] = {"title": "a low-pass at 1 Hz", "suffix": "_low_pass", "low_pass": LOW_PASS}
+_AT_1_HZ: dict[str, Any] = {"title": "cancellation, its corner at 1 Hz", "suffix": "_1hz", "more": HIGH_CORNER}
 
 CONDITIONS = {
     row.name: row
@@ -274,6 +285,7 @@ CONDITIONS = {
         _cancelled(CANCELLATION, *_AWAY),
         _cancelled(BOTH),
         _cancelled(NOTCH),
+        _cancelled(CANCELLATION, **_AT_1_HZ),
         _voluntary(CANCELLATION, *_UNTOUCHED),
         _voluntary(DAMPING),
         _voluntary(BOTH),
@@ -281,6 +293,10 @@ CONDITIONS = {
         _voluntary(CANCELLATION, in_flight=True),
         _voluntary(BOTH, in_flight=True),
         _voluntary(NOTCH, in_flight=True),
+        _voluntary("none", **_LOW_PASSED),
+        _voluntary("none", in_flight=True, **_LOW_PASSED),
+        _voluntary(CANCELLATION, **_AT_1_HZ),
+        _voluntary(CANCELLATION, in_flight=True, **_AT_1_HZ),
         *_WRONG,
         *_FAULTS,
     )

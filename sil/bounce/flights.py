@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
+from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
-from lever_cdkf.host_tools.models.transfer import Transfer
 from lever_cdkf.host_tools.units import GRAVITY
 from numpy.typing import NDArray
 
 from ..aircraft import aircraft
-from ..aircraft.aircraft import Aircraft, Coupled
-from ..aircraft.stability import BAND
+from ..aircraft.aircraft import Coupled
+from ..aircraft.known import UNSURE, known
+from ..aircraft.stability import critical_gearing
 from ..envelope.motions import stream
 from ..fast.closed_loop import Loop
 from ..plants.truth import Truth
@@ -27,13 +29,8 @@ from ..toml_tables import Place, read
 AIRCRAFT = ("uh60_like", "puma_like", "bo105_like")
 STRIDE = 20
 """Samples between two notes of what the firmware says."""
-UNSURE = 0.05
-"""Standard deviation by which gain [1] and phase [rad] of the response that the firmware is given are wrong, as it is
-told."""
 RAISED = (20.0, 25.0)
 """When a gearing goes up that does so [s]: the firmware knows the pilot by then."""
-_TABLE = np.geomspace(1.5, 8.0, 24)
-_GRID = np.geomspace(*BAND, 500)
 
 
 @dataclass(frozen=True)
@@ -60,6 +57,8 @@ class Plan:
     """Beyond a sample period [s]."""
     told_delay: float = 1e-3
     """What the firmware is told of that, with the sample period [s]."""
+    low_pass: float = 0.0
+    """Corner of a low-pass of the lever's angle, to compare with mitigation [Hz]; 0: none."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further tables of the scenario."""
     clock_stops: float | None = None
@@ -77,6 +76,7 @@ class Plan:
                 "model": self.craft,
                 "gearing": f"{self.gearing} 1",
                 "correction_delay": f"{self.correction_delay} s",
+                "lever_low_pass": f"{self.low_pass} Hz",
             },
             "base": [{"kind": "noise", "rms": f"{self.gust * GRAVITY} m/s^2", "low": "1 Hz", "high": "10 Hz"}],
         }
@@ -121,9 +121,9 @@ class Flown:
 
     @property
     def corrected(self) -> FloatArray:
-        """What the correction makes of the lever's angle, as it is used: a sample late [rad]."""
+        """What the correction, and a low-pass, make of the lever's angle, as it is used: a sample late [rad]."""
         corrected: FloatArray = self.theta + np.append(0.0, self.correction[:-1])
-        return corrected
+        return _low_passed(corrected, self.plan) if self.plan.low_pass else corrected
 
     def during(self, start: float, end: float) -> slice:
         """The samples between two times [s]."""
@@ -145,7 +145,7 @@ def fly(plan: Plan) -> Flown:
     assert scenario.aircraft is not None
     loop = Loop(scenario, inputs, by_frames=False, every=STRIDE)
     loop.gear(plan.gearings(inputs.time))
-    stability = loop.watch(known(scenario.aircraft, plan.seed))
+    stability = loop.watch(told(scenario.aircraft, plan.seed))
     if plan.clock_stops is not None:
         time = np.minimum(inputs.time, plan.clock_stops)
         loop.give_time(np.round(1e6 * time).astype(np.uint32))
@@ -165,31 +165,20 @@ def fly(plan: Plan) -> Flown:
     )
 
 
-def known(coupled: Coupled, seed: int) -> AircraftResponse:
+def told(coupled: Coupled, seed: int) -> AircraftResponse:
     """What the firmware is given of an aircraft: its response, off by what is stated."""
     gain, phase = UNSURE * stream(f"known {coupled.aircraft.title}", seed).standard_normal(2)
-    response = coupled.response(2j * np.pi * _TABLE.astype(np.complex128)) * (1.0 + gain) * np.exp(1j * phase)
-    return AircraftResponse(_TABLE.tolist(), response.tolist(), gain_sigma=UNSURE, phase_sigma=UNSURE)
+    off = (1.0 + gain) * np.exp(1j * phase)
+    return known(lambda s: coupled.response(s) * off)
+
+
+def _low_passed(angle: FloatArray, plan: Plan) -> FloatArray:
+    """As aircraft/flight.py does it."""
+    share = 1.0 - math.exp(-2.0 * math.pi * plan.low_pass * plan.scenario.period)
+    return np.array(list(accumulate(angle.tolist(), lambda last, now: last + share * (now - last))))
 
 
 def truth_of(plan: Plan) -> Truth:
     """The pilot of a flight, at every STRIDE-th sample."""
     scenario = plan.scenario
     return scenario.truth(scenario.time()).at(slice(None, None, STRIDE))
-
-
-def critical_gearing(craft: Aircraft, transfer: Transfer) -> FloatArray:
-    """At which the loop becomes unstable, at each time of a pilot's transfer function [1]: stability.margins() for many
-    times at once, by the grid alone."""
-    loop = _response(craft) * transfer.response(_GRID)
-    below, above = loop.imag[:, :-1], loop.imag[:, 1:]
-    part = np.where(np.signbit(below) != np.signbit(above), below / (below - above + 1e-300), np.nan)
-    height = loop.real[:, :-1] + part * np.diff(loop.real, axis=1)
-    highest = np.max(np.where(np.isfinite(height), height, 0.0), axis=1)
-    critical: FloatArray = 1.0 / np.maximum(highest, 1e-9)
-    return critical
-
-
-@cache
-def _response(craft: Aircraft) -> ComplexArray:
-    return craft.response(2j * np.pi * _GRID.astype(np.complex128))

@@ -12,12 +12,13 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.library import lib
 
 from ..aircraft import aircraft
+from ..aircraft.stability import critical_gearing
 from ..fast import plants
 from ..judged.result import Figure, largest, least, mean
 from ..plants.truth import Conditions
 from . import detectors, pilots
 from .detectors import Watched
-from .flights import STRIDE, Flown, Plan, critical_gearing, fly, truth_of
+from .flights import STRIDE, Flown, Plan, fly, truth_of
 
 Figures = dict[str, float]
 
@@ -188,9 +189,9 @@ def _slack(craft: str, seed: int, mitigation: str, **changes: Any) -> Plan:
     return replace(plan, **changes)
 
 
-def raised(plan: Plan, ratio: float) -> Plan:
-    """A stable flight in which the gearing goes up to so many times the critical one."""
-    critical = _least_critical(plan)
+def raised(plan: Plan, ratio: float, critical: float | None = None) -> Plan:
+    """A stable flight in which the gearing goes up to so many times the critical one, which may be known."""
+    critical = critical or _least_critical(plan)
     return replace(plan, gearing=ratio * critical, raised_from=min(ratio, STABLE) * critical)
 
 
@@ -214,8 +215,10 @@ def largest_gearing(
 
 
 def _largest_quiet(plan: Plan, most: float) -> float:
+    critical = _least_critical(plan)
+
     def is_quiet(ratio: float) -> bool:
-        return _vibration(fly(raised(plan, ratio))) <= most
+        return _vibration(fly(raised(plan, ratio, critical))) <= most
 
     quiet, factor = _LEAST, _COARSE
     while quiet * factor <= _MOST and is_quiet(quiet * factor):
@@ -233,13 +236,13 @@ CANCELLED_AT = 2.0
 """Gearing over the critical one."""
 
 
-def cancelled(craft: str, seed: int, *, mitigation: str) -> Measured:
+def cancelled(craft: str, seed: int, *, mitigation: str, **changes: Any) -> Measured:
     """How much of what the cabin does to the lever is left in its corrected angle."""
-    flown = fly(raised(_slack(craft, seed, mitigation), CANCELLED_AT))
+    flown = fly(raised(_slack(craft, seed, mitigation, **changes), CANCELLED_AT))
     involuntary, residual = _involuntary(flown)
     window = flown.during(30.0, 60.0)
     factor = 1.4 if seed % 2 else 1.0 / 1.4
-    plan = replace(_slack(craft, seed, mitigation), pilot=pilots.gripping(seed, _GRIPPED, factor))
+    plan = _slack(craft, seed, mitigation, pilot=pilots.gripping(seed, _GRIPPED, factor), **changes)
     after = fly(raised(plan, CANCELLED_AT))
     return Measured(
         {
@@ -286,13 +289,13 @@ VOLUNTARY = 0.5
 """[Hz]"""
 
 
-def voluntary(craft: str, seed: int, *, mitigation: str, ratio: float = STABLE) -> Measured:
+def voluntary(craft: str, seed: int, *, mitigation: str, ratio: float = STABLE, **changes: Any) -> Measured:
     """What the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over without, at so
     many times the critical gearing. At 0 the cabin does not answer."""
     pilot = pilots.table(pilots.arm(seed, pilots.SLACK))
     moves = {"kind": "sinusoid", "mean": pilot["trim"], "amplitude": "2 deg", "frequency": f"{VOLUNTARY} Hz"}
-    plan = geared(_slack(craft, seed, mitigation, pilot=pilot | {"trim": moves}), max(ratio, 1e-9))
-    answer = _answer(fly(plan)) / _answer(fly(replace(plan, mitigation="none")))
+    plan = geared(_slack(craft, seed, mitigation, pilot=pilot | {"trim": moves}, **changes), max(ratio, 1e-9))
+    answer = _answer(fly(plan)) / _answer(fly(replace(plan, mitigation="none", low_pass=0.0)))
     return Measured(
         {
             "gain changed": 100.0 * abs(abs(answer) - 1.0),

@@ -15,7 +15,7 @@ from .conditions import BOTH
 from .flights import STRIDE, Plan, fly
 from .measure import geared
 
-TITLE = "Seen coming, and stopped"
+TITLE = "Collective bounce, seen coming and stopped"
 CAPTION = (
     "A pilot in a UH-60-like helicopter in gusts of 0.05 g relaxes: from 10 to 40 s the damping of his arm falls from "
     "42 to 18 N s/m, and with it the gain margin of the loop through arm, lever and rotor. The same flight twice: "
@@ -24,15 +24,16 @@ CAPTION = (
     "simulation as <code>lever bounce</code>."
 )
 _BEYOND = 1.2  # gearing over critical in the end
-_MOST = 15.0  # [dB]
+_MOST = 10.0  # [dB]
 
 
 def tell() -> Story:
-    """Margin, lever and cabin in both flights. Raises LeverError."""
+    """Margin, lever, correction and cabin in both flights. Raises LeverError."""
     plan = geared(Plan("uh60_like", 1, pilots.relaxing(1), 1.0), _BEYOND)
     without, mitigated = fly(plan), fly(replace(plan, mitigation=BOTH))
-    rows = [axis("gain margin [dB]", range=[-5.0, _MOST]), axis("lever [°]"), axis("cabin [g]")]
-    figure = Figure(rows, time_axis(plan.duration), height=520)
+    rows = [axis("gain margin [dB]", range=[-5.0, _MOST])]
+    rows += [axis(title) for title in ("lever [°]", "correction [°]", "cabin [g]")]
+    figure = Figure(rows, time_axis(plan.duration), height=620)
     time, said = mitigated.notes[::5], mitigated.stability[::5]
     margin, sigma = (np.minimum(said[name], _MOST) for name in ("gain_margin", "gain_margin_sigma"))
     figure.add(*band(time, margin - 2.0 * sigma, np.minimum(margin + 2.0 * sigma, _MOST), "±2σ", "estimate-band"))
@@ -42,9 +43,14 @@ def tell() -> Story:
     for flown, name, colour in ((without, "without mitigation", "fault"), (mitigated, "with it", "good")):
         angle, z_ddot = np.degrees(flown.theta - flown.theta[0]), flown.z_ddot / GRAVITY
         figure.add(
-            line(time, angle[:: 5 * STRIDE], name, colour, 1), line(time, z_ddot[:: 5 * STRIDE], name, colour, 2)
+            line(time, angle[:: 5 * STRIDE], name, colour, 1), line(time, z_ddot[:: 5 * STRIDE], name, colour, 3)
         )
+    correction = np.degrees(mitigated.correction[:: 5 * STRIDE])
+    figure.add(line(time, correction, "with it", "good", 2))
     figure.level(0.0)
     alarms = mitigated.notes[mitigated.stability["state"] == lib.LEVER_BOUNCE_ALARM]
-    figure.mark(alarms[:1].tolist())
+    for alarm in alarms[:1].tolist():
+        figure.mark([alarm])
+        word = {"text": "alarm", "showarrow": False, "xanchor": "right"}
+        figure.annotations.append({"x": alarm, "y": 0.8 * _MOST, **word})
     return Story(TITLE, figure, CAPTION)

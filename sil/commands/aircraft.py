@@ -28,10 +28,7 @@ examples:
   lever aircraft uh60_like gearing=0.5 -o uh60.response
   lever replay session.log --aircraft uh60.response -o out/session
 """
-_SAID = {"gain_sigma": 0.05, "phase_sigma": 0.05}
-_LIMITS = ("warning", "alarm")
-_BAND, _POINTS = (1.5, 8.0), 24
-"""Of bounce [Hz]."""
+_SAID = ("gain_sigma", "phase_sigma", "warning", "alarm")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -66,17 +63,16 @@ def run(args: argparse.Namespace) -> int:
 
 def response(name: str, changes: list[str]) -> AircraftResponse:
     """Of an aircraft by its name or .toml file, or by its response in a .csv file. Raises LeverError."""
-    import numpy as np
     from lever_cdkf.host_tools.errors import LeverError
-    from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
 
     from ..aircraft.aircraft import Coupled, read_aircraft
+    from ..aircraft.known import known
     from ..aircraft.tabulated import Tabulated
     from ..toml_tables import Place
 
     given = {key.strip(): value.strip() for key, _, value in (change.partition("=") for change in changes)}
-    said: dict[str, float] = dict(_SAID)
-    for key in (*_SAID, *_LIMITS):
+    said: dict[str, float] = {}
+    for key in _SAID:
         if key in given:
             try:
                 said[key] = float(given.pop(key))
@@ -85,13 +81,9 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
     coupled: Coupled | Tabulated
     if name.endswith(".csv"):
         if given:
-            raise LeverError(
-                f"{name}: a response has no {next(iter(given))}; it may have {', '.join((*_SAID, *_LIMITS))}"
-            )
+            raise LeverError(f"{name}: a response has no {next(iter(given))}; it may have {', '.join(_SAID)}")
         coupled = Tabulated.load(name)
     else:
         gearing = given.pop("gearing", "1")
         coupled = read_aircraft({"model": name, **given, "gearing": f"{gearing} 1"}, Place("aircraft"))
-    frequency = np.geomspace(*_BAND, _POINTS)
-    values = coupled.response(2j * np.pi * frequency.astype(np.complex128))
-    return AircraftResponse(frequency.tolist(), values.tolist(), **said)
+    return known(coupled.response, **said)

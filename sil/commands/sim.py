@@ -52,7 +52,8 @@ and of faults the share of that time with each. Those that warn say that the est
 
 With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
 is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
-and lever_can with --lock-step; bus.log is the same to the byte but for the channel's name.
+the aircraft of a scenario that has one (`lever aircraft`, lever_can --aircraft), and lever_can with --lock-step;
+bus.log is the same to the byte but for the channel's name.
 """
 _EPILOG = """\
 examples:
@@ -98,6 +99,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     sim.add_argument("--seed", type=int, help="set the seed of all random numbers; with --seeds the first (default: 1)")
     sim.add_argument("--seeds", type=int, metavar="N", help="run N times, with consecutive seeds: median and worst")
     sim.add_argument("--jobs", type=int, metavar="N", help="with --seeds: processes (default: one a core)")
+    sim.add_argument(
+        "--snapshots",
+        metavar="SECONDS",
+        type=float,
+        help="the firmware also sends its whole state so often (0.1 to 10), so that bus.log may be cut anywhere",
+    )
     sim.add_argument("--realtime", action="store_true", help="pace the samples by the clock")
     sim.add_argument(
         "--settings",
@@ -118,7 +125,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     demo.add_argument("-o", "--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
     add_format_option(demo, ("csv",))
     add_json_option(demo)
-    demo.set_defaults(run=run_demo, realtime=False, settings=None)
+    demo.set_defaults(run=run_demo, realtime=False, settings=None, snapshots=None)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -140,6 +147,10 @@ def run(args: argparse.Namespace) -> int:
 
         sys.stdout.write(format_config(scenario.config))
         return 0
+    if args.snapshots is not None and not 0.1 <= args.snapshots <= 10.0:
+        raise LeverError(f"--snapshots {args.snapshots:g}: must be 0.1 to 10 s")
+    if args.snapshots is not None and args.interface != "lever":
+        raise LeverError(f"--snapshots is for --interface lever; over {args.interface}: lever_can --snapshots")
     channel = args.channel or _CHANNELS.get(args.interface)
     if channel is None:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
@@ -177,6 +188,7 @@ def _check_seeds(args: argparse.Namespace) -> None:
         ("--out", args.out is not None),
         ("--format", args.format is not None),
         ("--realtime", args.realtime),
+        ("--snapshots", args.snapshots is not None),
         ("--settings without a file", args.settings == _PRINT),
         (f"--interface {args.interface}", args.interface != "lever"),
         ("--channel", args.channel is not None),
@@ -246,6 +258,7 @@ def _simulate(
             formats=formats,
             inputs=inputs,
             story=story,
+            snapshots=args.snapshots,
         )
     print_tables(_tables(result), args.json)
     say(result.summary.verdict)
@@ -264,7 +277,7 @@ def open_bus(
     if interface == "lever":
         from lever_cdkf.host_tools.can.bus import LeverBus
 
-        return LeverBus(channel, config=scenario.config, **(bus_options or {}))
+        return LeverBus(channel, config=scenario.config, aircraft=scenario.known_aircraft, **(bus_options or {}))
     return buses.open_bus(interface, channel, bus_options or {})
 
 
@@ -300,7 +313,11 @@ def _tables(result: Result) -> Tables:
         "wall time [s]": summary.wall_time_s,
         "firmware": summary.firmware.version,
     }
-    return {summary.scenario.title: rows, "run": [run_row]}
+    near: list[Row] = []
+    if summary.stability is not None:
+        near = [{"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}]
+        near[0] |= {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}
+    return {summary.scenario.title: rows, "run": [run_row], **({"collective bounce": near} if near else {})}
 
 
 def _times(times: Sequence[float | None]) -> str:

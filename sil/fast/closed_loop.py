@@ -14,7 +14,7 @@ from lever_cdkf.host_tools.can.commander import Commander
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
-from lever_cdkf.host_tools.firmware.estimator import Estimator, make_command
+from lever_cdkf.host_tools.firmware.estimator import Estimator, Recorder, make_command
 from lever_cdkf.host_tools.firmware.library import ffi, struct_dtype
 from numpy.typing import NDArray
 
@@ -160,8 +160,9 @@ class Loop:
         else:
             loop.command = self.struct.keep(_command_structs(values))
 
-    def watch(self, aircraft: AircraftResponse) -> NDArray[Any]:
-        """The firmware watches the loop with this aircraft; returns what is kept of that: lever_stability_t."""
+    def watch(self, aircraft: AircraftResponse | None) -> NDArray[Any]:
+        """The firmware watches the loop with this aircraft, where there is one; returns what is kept of that:
+        lever_stability_t."""
         self._estimator.watch(aircraft)
         kept = np.zeros(len(self._healths), struct_dtype("lever_stability_t"))
         self.struct.pointer.stability = self.struct.array("struct lever_stability", kept, kept.dtype)
@@ -187,6 +188,11 @@ class Loop:
         loop.frame_id = self.struct.array("uint16_t", self._traffic.identifier, np.uint16)
         loop.frame_sample = self.struct.array("uint32_t", self._traffic.sample, np.uint32)
         loop.frame_data = ffi.cast("uint8_t (*)[8]", self.struct.array("uint8_t", self._traffic.data, np.uint8))
+
+    def send_snapshots(self, period: float) -> None:
+        """By frames: also sends the state of the firmware each `period` seconds."""
+        recorder = Recorder(self._estimator, period)
+        self.struct.pointer.recorder = self.struct.keep(recorder.pointer)
 
     def take_frames(self) -> Traffic:
         """Those since they were taken last."""

@@ -9,11 +9,25 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.can import codec, fields
 from lever_cdkf.host_tools.results.feedthrough import FEEDTHROUGH
-from lever_cdkf.host_tools.results.trace import ESTIMATED, HEALTH, MEASURED, Trace, quantity_fields
+from lever_cdkf.host_tools.results.trace import (
+    CORRECTION,
+    ESTIMATED,
+    HEALTH,
+    MEASURED,
+    STABILITY,
+    TRUE_MARGIN,
+    Trace,
+    quantity_fields,
+)
 from numpy.typing import NDArray
 
+from ..aircraft.stability import critical_gearing
 from .buslog import Frames
 from .loop import Recording
+
+_MARGIN_EVERY = 20  # samples: the true margin; linear in between
+_MARGIN_MOST = 40.0  # as the firmware says at most [dB]
+_AT_ONCE = 1000
 
 
 def columns_of(recording: Recording, frames: Frames) -> Trace:
@@ -27,8 +41,11 @@ def columns_of(recording: Recording, frames: Frames) -> Trace:
     for column, message, field in ESTIMATED:
         trace[column] = decoded.at_samples(message, field)
     model = recording.scenario.config.choices["model"]
-    for column, message, field in (*quantity_fields(model), *FEEDTHROUGH, *HEALTH):
+    watched = recording.scenario.aircraft is not None
+    for column, message, field in (*quantity_fields(model), *FEEDTHROUGH, *HEALTH, *(STABILITY if watched else ())):
         trace[column] = decoded.held(message, field)
+    if watched:
+        trace[CORRECTION[0]] = decoded.at_samples(*CORRECTION[1:])
     trace["dither_N_m"] = np.nan_to_num(decoded.at_samples("MOTOR_COMMAND", "dither"))
     return trace
 
@@ -43,7 +60,7 @@ def published(recording: Recording, frames: Frames) -> NDArray[np.bool_]:
 def _truth(recording: Recording) -> Trace:
     inputs = recording.inputs
     values = {**inputs.truth.parameters, **vars(inputs.truth.dynamics)}
-    return {
+    truth = {
         "time_s": inputs.time,
         "theta_true_rad": recording.theta,
         "theta_dot_true_rad_s": recording.theta_dot,
@@ -52,6 +69,18 @@ def _truth(recording: Recording) -> Trace:
         "trim_true_rad": inputs.truth.rest,
         **{quantity.column("true"): values[quantity.key] for quantity in recording.scenario.judged()},
     }
+    return truth if recording.scenario.aircraft is None else {**truth, TRUE_MARGIN: _true_margin(recording)}
+
+
+def _true_margin(recording: Recording) -> FloatArray:
+    """Of the loop with the true arm [dB]."""
+    coupled, inputs = recording.scenario.aircraft, recording.inputs
+    assert coupled is not None
+    at = np.arange(0, len(inputs.time), _MARGIN_EVERY)
+    parts = (inputs.truth.transfer(at[first : first + _AT_ONCE]) for first in range(0, len(at), _AT_ONCE))
+    critical = np.concatenate([critical_gearing(coupled.aircraft, transfer) for transfer in parts])
+    margin = np.minimum(20.0 * np.log10(critical / coupled.gearing), _MARGIN_MOST)
+    return np.interp(inputs.time, inputs.time[at], margin)
 
 
 class _Decoded:

@@ -81,7 +81,8 @@ class _HeardBus(LeverBus):
     """The firmware in this process, heard by a source both ways."""
 
     def __init__(self, source: SimulationSource) -> None:
-        super().__init__("simulation", config=source.scenario.config)
+        scenario = source.scenario
+        super().__init__("simulation", config=scenario.config, aircraft=scenario.known_aircraft)
         self._source = source
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:

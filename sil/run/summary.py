@@ -14,10 +14,18 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.native import enum_names
 from lever_cdkf.host_tools.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
-from lever_cdkf.host_tools.results import nis, summary, whiteness
+from lever_cdkf.host_tools.results import bounce, nis, summary, whiteness
 from lever_cdkf.host_tools.results.faults import FaultCounts
 from lever_cdkf.host_tools.results.nis import Innovations, Nis, freedom
-from lever_cdkf.host_tools.results.summary import Estimator, Firmware, Quality, SimulationSummary, TrueTransfer, Truth
+from lever_cdkf.host_tools.results.summary import (
+    Estimator,
+    Firmware,
+    Quality,
+    SimulationSummary,
+    Stability,
+    TrueTransfer,
+    Truth,
+)
 from lever_cdkf.host_tools.results.trace import Trace
 from lever_cdkf.host_tools.results.whiteness import Whiteness
 
@@ -49,6 +57,7 @@ def build(recording: Recording, trace: Trace) -> SimulationSummary:
         restarts=_last(trace["restarts"]),
         nis=_nis(scenario, trace),
         whiteness=_whiteness(scenario, trace),
+        stability=_stability(scenario, trace),
         modes_s=modes,
         passed=not (missed or recording.unanswered or recording.misplaced or "fault" in modes),
         verdict="",
@@ -158,6 +167,15 @@ def _whiteness(scenario: Scenario, trace: Trace) -> Whiteness | None:
     return whiteness.measure(judged, scenario.period)
 
 
+def _stability(scenario: Scenario, trace: Trace) -> Stability | None:
+    """None without an aircraft."""
+    if scenario.known_aircraft is None:
+        return None
+    gathered = bounce.Bounce(scenario.period)
+    gathered.add(trace)
+    return gathered.summary(scenario.known_aircraft)
+
+
 def _last(column: FloatArray) -> int:
     finite = column[np.isfinite(column)]
     return int(finite[-1]) if len(finite) else 0
@@ -217,6 +235,7 @@ def _verdict(summary: SimulationSummary) -> str:
             _verdict_sigma(summary.parameters),
             nis.verdict(summary.nis),
             whiteness.verdict(summary.whiteness),
+            bounce.verdict(summary.stability),
             _verdict_settings(summary),
         )
         if sentence

@@ -19,6 +19,7 @@ import numpy as np
 from lever_cdkf.host_tools.arrays import FloatArray
 from lever_cdkf.host_tools.errors import SettingsError
 from lever_cdkf.host_tools.firmware import quantities
+from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
 from lever_cdkf.host_tools.firmware.config import CHOICES, Setting
 from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.host_tools.firmware.settings_file import setting_value
@@ -27,6 +28,7 @@ from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
 from lever_cdkf.host_tools.units import UnitError
 
 from ..aircraft.aircraft import Coupled, read_aircraft
+from ..aircraft.known import known
 from ..plants import excitation, lever_plant, pilots
 from ..plants.sensors import VALUES, Corruption, Sensor, Sensors
 from ..plants.truth import Truth
@@ -165,6 +167,11 @@ class Scenario:
             return Config(**dataclasses.asdict(self.estimator), settings=self.settings)
         except SettingsError as error:
             raise ScenarioError(f"{self.file}: settings: {error}") from None
+
+    @cached_property
+    def known_aircraft(self) -> AircraftResponse | None:
+        """What the estimator is given of the aircraft, so that it watches the margin."""
+        return None if self.aircraft is None else known(self.aircraft.response)
 
     @cached_property
     def period(self) -> float:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 from accuracy.tables import Place, markdown
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.firmware.estimator import Estimator
 from lever_cdkf.host_tools.firmware.innovations import SAMPLE
@@ -77,9 +76,9 @@ def search(task: Task) -> list[Tuned]:
 def _recorded(overrides: Sequence[str]) -> recording.Recording:
     """The log of the scenario "steady" with these."""
     loaded = scenario.load("steady", overrides)
-    with LeverBus("lever", config=loaded.config) as bus, tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "bus.log"
-        log.write_bytes(b"".join(buslog.lines(runner.simulate(loaded, bus).frames, "vcan0")))
+        log.write_bytes(b"".join(buslog.lines(runner.simulate(loaded).frames, "vcan0")))
         return recording.read([log])
 
 

@@ -1,6 +1,6 @@
 """What large campaigns take, on paper: from the time of a run, the size of a row and the cost of a chunk, measured.
 
-    python tests/benchmark/campaign.py [--chunks N] [--rows N] [--price DOLLARS]
+    python tests/benchmark/campaign.py [--chunks N] [--rows N] [--flights N] [--price DOLLARS]
 
 The chunks are empty, so that what is measured is Dask alone: client and scheduler in one process, two workers. Memory
 is the peak of a process: of a worker that makes a chunk of `tracking`, and of what sums up and maps rows that are drawn
@@ -29,7 +29,6 @@ from lever_cdkf.sil.campaign import chunks, design, maps, session, spec, summary
 from lever_cdkf.sil.campaign.chunks import Chunk, Plan
 
 RUNS, CORES = (10**6, 10**9), (100, 1000)
-_MEASURED = 200  # flights of a minute
 
 
 def nothing(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, float]:
@@ -38,15 +37,15 @@ def nothing(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, float]:
     return 1, 0.0
 
 
-def cost_of_a_run() -> tuple[float, float]:
+def cost_of_a_run(flights: int) -> tuple[float, float]:
     """Processor time of a minute of flight with the dual estimator [s], and bytes of its row."""
     plan = Plan(dataclasses.replace(spec.load("tracking"), estimators=("dual",)))
     with tempfile.TemporaryDirectory() as folder:
         start = time.process_time()
-        chunks.make(plan, Chunk(0, _MEASURED), Path(folder))
+        chunks.make(plan, Chunk(0, flights), Path(folder))
         seconds = time.process_time() - start
         (file,) = Path(folder).glob("*.parquet")
-        return seconds / _MEASURED, file.stat().st_size / _MEASURED
+        return seconds / flights, file.stat().st_size / flights
 
 
 def cost_of_a_chunk(count: int) -> tuple[float, float]:
@@ -73,10 +72,10 @@ def memory_of(call: Callable[..., None], *arguments: Any) -> int:
         return pool.submit(memory).result()
 
 
-def make_chunk(folder: Path) -> None:
-    """What a worker does."""
+def make_chunk(flights: int, folder: Path) -> None:
+    """What a worker does, but for no more flights than these."""
     plan = Plan(spec.load("tracking"))
-    chunks.make(plan, plan.chunk(0), folder)
+    chunks.make(plan, Chunk(0, min(flights, plan.chunk(0).end)), folder)
 
 
 def of_rows(count: int) -> Plan:
@@ -114,11 +113,11 @@ def sum_up(count: int, folder: Path) -> None:
     maps.write(plan, folder)
 
 
-def memories(rows: int) -> Row:
+def memories(rows: int, flights: int) -> Row:
     """Of a campaign with so many rows [MB]."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        worker = memory_of(make_chunk, folder)
+        worker = memory_of(make_chunk, flights, folder)
         for file in folder.iterdir():
             file.unlink()
         draw_rows(rows, folder)
@@ -147,9 +146,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--chunks", type=int, default=10_000, help="empty chunks (default: %(default)s)")
     parser.add_argument("--rows", type=int, default=10**6, help="rows to sum up (default: %(default)s)")
+    parser.add_argument("--flights", type=int, default=200, help="of a minute, to measure with (default: %(default)s)")
     parser.add_argument("--price", type=float, default=0.04, help="of an hour of a core [$] (default: %(default)s)")
     args = parser.parse_args()
-    run, row = cost_of_a_run()
+    run, row = cost_of_a_run(args.flights)
     each, chunk = cost_of_a_chunk(args.chunks)
     measured: Row = {
         "a run [ms]": 1e3 * run,
@@ -160,7 +160,9 @@ def main() -> int:
         "client and scheduler [MB]": memory(),
     }
     campaigns = [on_paper(runs, cores, run, row, chunk, args.price) for runs in RUNS for cores in CORES]
-    print_tables({"measured": [measured], "memory": [memories(args.rows)], "campaigns of minutes": campaigns})
+    print_tables(
+        {"measured": [measured], "memory": [memories(args.rows, args.flights)], "campaigns of minutes": campaigns}
+    )
     return 0
 
 

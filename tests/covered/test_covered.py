@@ -1,4 +1,4 @@
-"""The tests reach the core: its lines, branches and conditions (MC/DC); what is excluded is, and is documented."""
+"""The tests reach all of the core, its lines, branches and conditions (MC/DC), but for what is excluded."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ import pytest
 from covered import __main__ as command
 from covered import measuring
 
-LEAST = {"lines": 99.5, "branches": 98.0, "mcdc": 95.0}
-"""[%]"""
 NEEDS = pytest.mark.requires(measuring.COMPILER, measuring.MERGER, measuring.READER)
 CORE = """\
 int decide(int a, int b);
@@ -29,8 +27,7 @@ TEST = "int decide(int a, int b);\nint main(void) { return decide(1, 1) - 1 + de
 @NEEDS
 def test_the_core_is_reached(build_dir: Path, tmp_path: Path) -> None:
     found = measuring.measure(command.sources(build_dir), tmp_path / "built")
-    listed = "\n".join(str(each) for each in found.open)
-    assert {kind: round(found.share(kind), 2) for kind in LEAST if found.share(kind) < LEAST[kind]} == {}, listed
+    assert [str(each) for each in found.open] == []
     excluded = {each.number for each in found.missing if each.number}
     assert excluded == {each.number for each in measuring.exclusions()}
 

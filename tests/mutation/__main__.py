@@ -1,4 +1,4 @@
-"""Says which mutants of the core the unit tests kill.
+"""Says which mutants of the core the tests kill.
 
     python tests/mutation BUILD [--random N] [--seed S] [--file PART] [--assertions] [--json FILE]
 
@@ -11,17 +11,49 @@ import argparse
 import json
 import os
 import random
+import subprocess
 import sys
 import time
-from dataclasses import asdict, replace
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from mutation.equivalent import equivalents
-from mutation.killing import judged, measured
+from mutation.killing import Judge, Test
 from mutation.schemata import Mutant
 
 GOLDEN = Path(__file__).resolve().parents[1] / "quality/embedded/golden.txt"
+
+
+def unit_tests(build: Path) -> Iterator[Test]:
+    """Each test of the C programs."""
+    for name in (build / "programs.txt").read_text().split():
+        program = build / "programs" / name
+        listed = subprocess.run([program, "--list"], stdout=subprocess.PIPE, text=True, check=True).stdout
+        yield from (Test(program, (test,), f"{name}: {test}") for test in listed.splitlines())
+
+
+def oracle_cases(build: Path) -> Iterator[Test]:
+    for case in sorted((build / "cases").glob("*.case")):
+        yield Test(build / "programs/oracle", (str(case),), f"oracle: {case.stem}")
+
+
+def flights(build: Path, program: Path) -> Iterator[Test]:
+    """Those whose bits are kept, each compared with all lines that it prints, so that it ends at the first difference.
+    Raises RuntimeError when they are not the accepted ones."""
+    lines: dict[str, list[str]] = defaultdict(list)
+    flown = subprocess.run([program], stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines(keepends=True)
+    if [line for line in flown if len(line.split()) == 2] != GOLDEN.read_text().splitlines(keepends=True):
+        raise RuntimeError("the flights are not the accepted ones: cmake --build build --target golden-accept")
+    for line in flown:
+        run = line.split()[0]
+        lines["codec" if run.startswith("codec.") else run].append(line)
+    for run, expected in lines.items():
+        file = build / "cases" / f"{run}.lines"
+        file.write_text("".join(expected))
+        yield Test(build / "programs/flights", (str(file), run), f"flight: {run}")
 
 
 def main() -> int:
@@ -43,15 +75,15 @@ def main() -> int:
         mutants = sorted(random.Random(args.seed).sample(mutants, args.random), key=lambda each: each.number)
         print(f"{args.random} mutants drawn with seed {args.seed}")
     start = time.monotonic()
-    programs = [measured(args.build / "programs" / name) for name in (args.build / "programs.txt").read_text().split()]
-    programs += [measured(args.build / "oracle", case) for case in sorted((args.build / "cases").glob("*.case"))]
-    if not args.assertions:  # the flights end at the first difference, mostly in the first of them
-        programs.append(replace(measured(args.build / "flights", GOLDEN), seconds=0.01, patience=1.2))
+    tests = [*unit_tests(args.build), *oracle_cases(args.build)]
+    if not args.assertions:
+        tests += flights(args.build, args.build.parent / "lever_flights")
     verdicts = []
-    for verdict in judged(mutants, programs, args.jobs):
-        verdicts.append(verdict)
-        if not verdict.killer:
-            print(f"{verdict.mutant}{'' if verdict.reached else '  (not reached)'}", flush=True)
+    with Judge(args.jobs) as judge:
+        for verdict in judge.verdicts(mutants, judge.measured(tests)):
+            verdicts.append(verdict)
+            if not verdict.killer:
+                print(f"{verdict.mutant}{'' if verdict.reached else '  (not reached)'}", flush=True)
     killed = sum(bool(verdict.killer) for verdict in verdicts)
     share = 100 * killed / len(mutants)
     print(f"{killed} of {len(mutants)} mutants killed ({share:.1f} %) in {time.monotonic() - start:.0f} s")

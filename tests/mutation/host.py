@@ -2,8 +2,9 @@
 
     python tests/mutation/host.py [--count N] [--seed S] [--json FILE]
 
-Each mutant meets the test files that call the function it is in, those of its own folder first, until one fails.
-Which functions a test file calls is measured once and kept in build/tests/mutation/reached.json.
+Mutants of python_equivalent.txt are not drawn. Each mutant meets the test files that call the function it is in, those
+of its own folder first, until one fails. Which functions a test file calls is measured once and kept in
+build/tests/mutation/reached.json.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from mutation.python_mutants import PythonMutant, drawn, text_with
 
 ROOT = Path(__file__).resolve().parents[2]
 HOOK = Path(__file__).resolve().parent / "hook"
+EQUIVALENT = Path(__file__).with_name("python_equivalent.txt")
+"""Mutants that change nothing that can be seen: the reason after #, their names below it."""
 MUTATED = ("host_tools", "sil")
 TESTS = ("tests/python", "tests/accuracy", "tests/slcan")
 PATIENCE = 10
@@ -112,9 +115,9 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every verdict")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     args = parser.parse_args()
-    mutants = [
-        each for each in drawn(ROOT, files_under(MUTATED, "*.py"), args.count, args.seed) if args.only in str(each)
-    ]
+    equivalent = EQUIVALENT.read_text(encoding="utf-8").splitlines()
+    all_drawn = drawn(ROOT, files_under(MUTATED, "*.py"), args.count, args.seed, equivalent)
+    mutants = [each for each in all_drawn if args.only in str(each)]
     if args.list:
         print(*mutants, sep="\n")
         return 0

@@ -1,89 +1,130 @@
-"""Which mutants the unit tests kill: each test program that reaches a mutant runs with it until one fails."""
+"""Which mutants the tests kill: each case that reaches a mutant runs with it until one fails."""
 
 from __future__ import annotations
 
-import os
-import resource
 import subprocess
 import tempfile
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from subprocess import DEVNULL
+from threading import local
+from typing import NamedTuple
 
 from .schemata import Mutant
 
 PATIENCE = 10
-"""A mutant hangs when a program evaluates so many times as many expressions as without."""
-GRACE = 1_000_000
+"""A mutant hangs when a case evaluates so many times as many expressions as without."""
+GRACE = 100_000
+START = 0.0005
+"""What a case costs beside its own time [s]."""
+
+
+class Test(NamedTuple):
+    """A program of mutant.c with the arguments of one case."""
+
+    program: Path
+    arguments: tuple[str, ...]
+    name: str
 
 
 @dataclass(frozen=True)
-class Program:
-    """A program of tests, or one with one case, as it runs without a mutant."""
+class Case:
+    """A test as it runs without a mutant."""
 
-    command: tuple[Path, ...]
+    test: Test
     seconds: float
     expressions: int
     """Evaluated that could have held a mutant."""
     reached: frozenset[int]
     """Mutant.guard of those."""
-    patience: float = PATIENCE
-
-    @property
-    def name(self) -> str:
-        return self.command[-1].name
-
-    def kills(self, mutant: Mutant) -> bool:
-        environment = {
-            "MUTANT": str(mutant.number),
-            "MUTANT_MOST": str(round(self.patience * self.expressions) + GRACE),
-        }
-        return _run(self.command, environment) != 0
-
-
-def _run(command: tuple[Path, ...], environment: dict[str, str]) -> int:
-    with tempfile.TemporaryDirectory() as folder:
-        everything = os.environ | environment
-        return subprocess.run(
-            command, cwd=folder, env=everything, stdout=DEVNULL, stderr=DEVNULL, check=False
-        ).returncode
-
-
-def measured(*command: Path) -> Program:
-    """Runs it without a mutant. Raises RuntimeError when it fails."""
-    with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder) / "report"
-        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        if _run(command, {"MUTANT_REPORT": str(report)}) != 0:
-            raise RuntimeError(f"{' '.join(map(str, command))} fails without a mutant")
-        seconds = 0.005 + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-        expressions, *reached = map(int, report.read_text().split())
-    return Program(command, seconds, expressions, frozenset(reached))
 
 
 @dataclass(frozen=True)
 class Verdict:
     mutant: Mutant
     killer: str
-    """Program that fails; none: the mutant survives."""
+    """Test that fails; none: the mutant survives."""
     reached: bool
 
 
-def judged(mutants: Sequence[Mutant], programs: Sequence[Program], jobs: int) -> Iterator[Verdict]:
-    """The verdict on each mutant, in the order of `mutants`. What killed others of the same function is tried first."""
-    kills: dict[tuple[str, str], dict[str, int]] = defaultdict(lambda: defaultdict(int))
+class Servers:
+    """The programs of one thread; each is started when it is first needed."""
 
-    def judge(mutant: Mutant) -> Verdict:
-        record = kills[(mutant.path, mutant.function)]
-        able = [program for program in programs if mutant.guard in program.reached]
-        for program in sorted(able, key=lambda p: p.seconds / (1 + record[p.name])):
-            if program.kills(mutant):
-                record[program.name] += 1
-                return Verdict(mutant, program.name, True)
+    def __init__(self, stack: ExitStack) -> None:
+        self.stack = stack
+        self.running: dict[Path, subprocess.Popen[str]] = {}
+        self.folder = stack.enter_context(tempfile.TemporaryDirectory())
+
+    def run(self, test: Test, mutant: int, most: int) -> list[int]:
+        """Exit status, microseconds, expressions, and without a mutant the guards reached."""
+        server = self.running.get(test.program) or self._start(test.program)
+        assert server.stdin is not None
+        assert server.stdout is not None
+        server.stdin.write("\t".join((str(mutant), str(most), *test.arguments)) + "\n")
+        server.stdin.flush()
+        return [int(word) for word in server.stdout.readline().split("\t")]
+
+    def _start(self, program: Path) -> subprocess.Popen[str]:
+        pipe = subprocess.PIPE
+        server = subprocess.Popen([program], cwd=self.folder, stdin=pipe, stdout=pipe, text=True)
+        self.running[program] = self.stack.enter_context(server)
+        return server
+
+
+class Judge:
+    """Runs tests with and without mutants, so many at a time."""
+
+    def __init__(self, jobs: int) -> None:
+        self.stack = ExitStack()
+        self.pool = self.stack.enter_context(ThreadPoolExecutor(jobs))
+        self.own = local()
+        self.tried: Counter[tuple[str, str]] = Counter()
+        """By function (none: any) and test."""
+        self.killed: Counter[tuple[str, str]] = Counter()
+
+    def __enter__(self) -> Judge:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stack.close()
+
+    def _run(self, test: Test, mutant: int, most: int) -> list[int]:
+        if not hasattr(self.own, "servers"):
+            self.own.servers = Servers(self.stack)
+        answer: list[int] = self.own.servers.run(test, mutant, most)
+        return answer
+
+    def measured(self, tests: Sequence[Test]) -> list[Case]:
+        """Runs each without a mutant. Raises RuntimeError when one fails."""
+        return list(self.pool.map(self._measure, tests))
+
+    def _measure(self, test: Test) -> Case:
+        status, microseconds, expressions, *reached = self._run(test, 0, 2**60)
+        if status != 0:
+            raise RuntimeError(f"{test.name} fails without a mutant")
+        return Case(test, START + 1e-6 * microseconds, expressions, frozenset(reached))
+
+    def verdicts(self, mutants: Sequence[Mutant], cases: Sequence[Case]) -> Iterator[Verdict]:
+        """In the order of `mutants`."""
+        return self.pool.map(lambda mutant: self._verdict(mutant, cases), mutants)
+
+    def _verdict(self, mutant: Mutant, cases: Sequence[Case]) -> Verdict:
+        """Those cases come first that promise most for their time."""
+        function = f"{mutant.path}:{mutant.function}"
+        able = [case for case in cases if mutant.guard in case.reached]
+        for case in sorted(able, key=lambda case: case.seconds / self._promise(function, case.test.name)):
+            fails = self._run(case.test, mutant.number, PATIENCE * case.expressions + GRACE)[0] != 0
+            for place in ("", function):
+                self.tried[place, case.test.name] += 1
+                self.killed[place, case.test.name] += fails
+            if fails:
+                return Verdict(mutant, case.test.name, True)
         return Verdict(mutant, "", bool(able))
 
-    with ThreadPoolExecutor(jobs) as pool:
-        yield from pool.map(judge, mutants)
+    def _promise(self, function: str, test: str) -> float:
+        """How probably it kills: what it has killed of the same function counts, and of all."""
+        overall = (self.killed["", test] + 0.5) / (self.tried["", test] + 1)
+        return (self.killed[function, test] + overall) / (self.tried[function, test] + 1)

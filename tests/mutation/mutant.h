@@ -1,12 +1,14 @@
-/* Chooses a mutant at run time, by the environment variable MUTANT (none: 0). Included first by every mutated file. */
+/* The mutant that is switched on; 0: none. Included first by every mutated file. */
 #ifndef MUTATION_MUTANT_H
 #define MUTATION_MUTANT_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
+enum { MUTANTS_MOST = 20000 };
+
 extern uint32_t mutant;
-extern uint8_t mutant_reached[]; /* [number of the first mutant of an expression or statement] */
+extern uint8_t mutant_reached[MUTANTS_MOST]; /* [number of the first mutant of an expression or statement] */
 extern uint64_t mutant_left; /* expressions with mutants still to be computed before the program counts as hanging */
 
 void mutant_hangs(void);

@@ -3,16 +3,18 @@
 Comparisons, operators, `and` and `or` are exchanged, conditions negated, constants changed (an integer by one, a float
 by half, a name in quotes), results replaced by None, statements without a new name dropped, two arguments swapped.
 Texts for people, annotations and imports have no mutants.
+
+A draw is by names of mutants, not by lines: code that is added elsewhere leaves it nearly as it was.
 """
 
 from __future__ import annotations
 
 import ast
 import copy
+import hashlib
 import itertools
-import random
-from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,34 +42,33 @@ class PythonMutant:
     line: int
     function: int
     """First line of the function around it, decorators included; 0: none."""
-    operator: str
-    before: str
-    after: str
+    name: str
+    """Module, function and change, with (2) when it is the second of that name: stays when lines move."""
 
     def __str__(self) -> str:
-        return f"{self.path}:{self.line}: {self.operator}: {self.before} -> {self.after or '(dropped)'}"
+        return f"{self.line}: {self.name}"
 
 
-def _operators(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+def _operators(node: ast.AST) -> Iterator[ast.AST]:
     """What takes the place of an expression."""
     if isinstance(node, ast.Compare):
         for k, operator in enumerate(node.ops):
             for other in COMPARISONS[type(operator)]:
                 new = copy.copy(node)
                 new.ops = [*node.ops[:k], other(), *node.ops[k + 1 :]]
-                yield "comparison", new
+                yield new
     elif isinstance(node, (ast.BinOp, ast.AugAssign)):
         new_op = copy.copy(node)
         new_op.op = ARITHMETIC[type(node.op)]()
-        yield "arithmetic", new_op
+        yield new_op
     elif isinstance(node, ast.BoolOp):
-        yield "boolean", ast.BoolOp(ast.Or() if isinstance(node.op, ast.And) else ast.And(), node.values)
+        yield ast.BoolOp(ast.Or() if isinstance(node.op, ast.And) else ast.And(), node.values)
     elif isinstance(node, ast.UnaryOp):
-        yield "boolean" if isinstance(node.op, ast.Not) else "arithmetic", node.operand
+        yield node.operand
     elif isinstance(node, ast.Call) and len(node.args) > 1:
         first, second, *rest = node.args
         if ast.dump(first) != ast.dump(second) and not isinstance(second, ast.Starred):
-            yield "argument", ast.Call(node.func, [second, first, *rest], node.keywords)
+            yield ast.Call(node.func, [second, first, *rest], node.keywords)
 
 
 def _constants(value: object) -> Iterator[str | float]:
@@ -81,17 +82,17 @@ def _constants(value: object) -> Iterator[str | float]:
         yield value + "_"
 
 
-def _statements(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
     """What takes the place of a statement."""
     if isinstance(node, ast.Return) and node.value is not None and not _is_none(node.value):
-        yield "return", ast.Return(None)
+        yield ast.Return(None)
     is_call = isinstance(node, ast.Expr) and not isinstance(node.value, ast.Constant)
     if (
         is_call
         or _assigns_to_part(node)
         or isinstance(node, (ast.AugAssign, ast.Raise, ast.Delete, ast.Continue, ast.Break))
     ):
-        yield "statement", ast.Pass()
+        yield ast.Pass()
 
 
 def _assigns_to_part(node: ast.AST) -> bool:
@@ -105,15 +106,15 @@ def _is_none(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and node.value is None
 
 
-def replacements(node: ast.AST, field: str) -> Iterator[tuple[str, ast.AST]]:
-    """Operator and what takes the place of a node that is this field of its parent."""
+def replacements(node: ast.AST, field: str) -> Iterator[ast.AST]:
+    """What takes the place of a node that is this field of its parent."""
     yield from _operators(node)
     yield from _statements(node)
     if isinstance(node, ast.Constant):
         for value in _constants(node.value):
-            yield "constant", ast.Constant(value)
+            yield ast.Constant(value)
     if field in ("test", "ifs") and isinstance(node, ast.expr) and not isinstance(node, (ast.Compare, ast.UnaryOp)):
-        yield "boolean", ast.UnaryOp(ast.Not(), node)
+        yield ast.UnaryOp(ast.Not(), node)
 
 
 def _skips(node: ast.AST, parent: ast.AST) -> bool:
@@ -126,12 +127,13 @@ def _skips(node: ast.AST, parent: ast.AST) -> bool:
 
 
 Place = tuple[ast.AST, str, int | None]
+Function = tuple[int, str]
 
 
-def _places(parent: ast.AST, function: int = 0) -> Iterator[tuple[ast.AST, Place, int]]:
-    """Each node that may change, where it hangs, and the first line of the function around it."""
-    if isinstance(parent, (ast.FunctionDef, ast.AsyncFunctionDef)) and not function:
-        function = min([parent.lineno, *(each.lineno for each in parent.decorator_list)])
+def _places(parent: ast.AST, function: Function = (0, "")) -> Iterator[tuple[ast.AST, Place, Function]]:
+    """Each node that may change, where it hangs, and first line and name of the function around it."""
+    if isinstance(parent, (ast.FunctionDef, ast.AsyncFunctionDef)) and not function[0]:
+        function = min([parent.lineno, *(each.lineno for each in parent.decorator_list)]), f"{parent.name}()"
     for field, value in ast.iter_fields(parent):
         if field in UNTOUCHED:
             continue
@@ -149,26 +151,33 @@ def _put(place: Place, node: ast.AST) -> None:
         getattr(parent, field)[index] = node
 
 
-def _changes(tree: ast.Module) -> Iterator[tuple[str, ast.AST, ast.AST, Place, int]]:
-    """Of a module: operator, node, what takes its place, where that is, and the line of the function."""
+def _changes(tree: ast.Module) -> Iterator[tuple[ast.AST, ast.AST, Place, Function]]:
+    """Of a module: node, what takes its place, where that is, and the function."""
     for node, place, function in list(_places(tree)):
-        for operator, new in replacements(node, place[1]):
-            yield operator, node, ast.fix_missing_locations(ast.copy_location(new, node)), place, function
+        for new in replacements(node, place[1]):
+            yield node, ast.fix_missing_locations(ast.copy_location(new, node)), place, function
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else f"{text[:59]}…"
 
 
 def mutants_of(root: Path, path: Path) -> Iterator[PythonMutant]:
     """All mutants of a module, a path relative to the root."""
     changes = _changes(ast.parse((root / path).read_text(encoding="utf-8")))
-    for number, (operator, node, new, _, function) in enumerate(changes):
-        after = "" if isinstance(new, ast.Pass) else ast.unparse(new)
-        line = getattr(node, "lineno", 0)
-        yield PythonMutant(path, number, line, function, operator, ast.unparse(node), after)
+    seen: Counter[str] = Counter()
+    for number, (node, new, _, (first, function)) in enumerate(changes):
+        after = "(dropped)" if isinstance(new, ast.Pass) else ast.unparse(new)
+        name = f"{path}: {function or 'module'}: {_short(ast.unparse(node))} -> {_short(after)}"
+        seen[name] += 1
+        which = f" ({seen[name]})" if seen[name] > 1 else ""
+        yield PythonMutant(path, number, getattr(node, "lineno", 0), first, name + which)
 
 
 def text_with(root: Path, mutant: PythonMutant) -> str:
     """The module with the mutant in it."""
     tree = ast.parse((root / mutant.path).read_text(encoding="utf-8"))
-    _, _, new, place, _ = next(itertools.islice(_changes(tree), mutant.number, None))
+    _, new, place, _ = next(itertools.islice(_changes(tree), mutant.number, None))
     _put(place, new)
     return ast.unparse(tree)
 
@@ -182,8 +191,15 @@ def lines_of(root: Path, paths: Iterable[Path]) -> dict[tuple[Path, int], list[P
     return lines
 
 
-def drawn(root: Path, paths: Iterable[Path], count: int, seed: int) -> list[PythonMutant]:
-    """Random mutants of different lines, each line as likely as another."""
-    lines = lines_of(root, paths)
-    chance = random.Random(seed)
-    return [chance.choice(lines[line]) for line in chance.sample(sorted(lines), count)]
+def drawn(
+    root: Path, paths: Iterable[Path], count: int, seed: int, left_out: Container[str] = ()
+) -> list[PythonMutant]:
+    """Random mutants of different lines, each line as likely as another; those with a name that is left out are not
+    drawn, others take their place."""
+
+    def rank(mutant: PythonMutant) -> bytes:
+        return hashlib.sha256(f"{seed} {mutant.name}".encode()).digest()
+
+    lines = sorted(lines_of(root, paths).values(), key=lambda mutants: rank(mutants[0]))
+    candidates = (min(mutants, key=rank) for mutants in lines)
+    return list(itertools.islice((each for each in candidates if each.name not in left_out), count))

@@ -242,8 +242,7 @@ class Session:
 def simulated(name: str, folder: Path, *overrides: str) -> Session:
     """A short run of a scenario."""
     made = scenario.load(name, [*SHORT, *overrides])
-    with LeverBus("lever", config=made.config) as bus:
-        return Session(simulate(made, bus, folder), folder, made.config)
+    return Session(simulate(made, out_dir=folder), folder, made.config)
 
 
 @pytest.fixture(scope="session")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import can
 import cantools
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.sil.run.runner import simulate
 from lever_cdkf.sil.scenarios import scenario
 from quality import tools
@@ -28,19 +29,44 @@ BO_ 258 MOTOR: 2 FCC
 """
 
 
+SourceTree = Callable[[str], Path]
+
+
+@pytest.fixture(scope="session")
+def _made(
+    tmp_path_factory: pytest.TempPathFactory, build_dir: Path, recording: Path, aircraft: Path
+) -> Callable[[str], Path]:
+    """Makes the folders of source_tree()."""
+
+    @cache
+    def make(name: str) -> Path:
+        folder = tmp_path_factory.mktemp(name, numbered=False)
+        for entry in tools.ROOT.iterdir():
+            if entry.name not in ("build", "out") and not entry.name.startswith("."):
+                (folder / entry.name).symlink_to(entry)
+        (folder / "build").symlink_to(build_dir)
+        (folder / "out").mkdir()
+        shutil.copy(recording, folder / "out/session.log")
+        shutil.copytree(aircraft, folder, dirs_exist_ok=True)
+        (folder / "quick.toml").write_text(quick_campaign(), encoding="utf-8")
+        return folder
+
+    return make
+
+
 @pytest.fixture
-def scratch(tmp_path: Path, build_dir: Path, recording: Path, aircraft: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder that looks like the source tree, with a recording out/session.log and files of a user's own."""
-    for entry in tools.ROOT.iterdir():
-        if entry.name not in ("build", "out") and not entry.name.startswith("."):
-            (tmp_path / entry.name).symlink_to(entry)
-    (tmp_path / "build").symlink_to(build_dir)
-    (tmp_path / "out").mkdir()
-    shutil.copy(recording, tmp_path / "out/session.log")
-    shutil.copytree(aircraft, tmp_path, dirs_exist_ok=True)
+def source_tree(_made: SourceTree, build_dir: Path, monkeypatch: pytest.MonkeyPatch) -> SourceTree:
+    """source_tree(name): a folder that looks like the source tree, with a recording out/session.log and files of a
+    user's own; the same for the same name. The commands of the virtual environment are found meanwhile."""
     monkeypatch.setenv("PATH", f"{build_dir}/venv/bin:{os.environ['PATH']}")
     monkeypatch.setenv("PYTEST_ADDOPTS", "--collect-only")
-    return tmp_path
+    return _made
+
+
+def quick_campaign() -> str:
+    """The spec of that name with 9 of its 100 flights."""
+    text = (tools.ROOT / "sil/campaign/specs/quick.toml").read_text(encoding="utf-8")
+    return text.replace("steps = 5", "steps = 3").replace("seeds = 4", "seeds = 1")
 
 
 @pytest.fixture(scope="session")
@@ -90,6 +116,5 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def simulated(folder: Path, seconds: float) -> Path:
     """A folder with the files of a run."""
     steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=2 s", "limits={}"])
-    with LeverBus("vcan0", config=steady.config) as bus:
-        simulate(steady, bus, folder, channel="vcan0")
+    simulate(steady, out_dir=folder, channel="vcan0")
     return folder

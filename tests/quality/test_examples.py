@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentParser
-from pathlib import Path
 
 import pytest
 import readmes
 from lever_cdkf.host_tools import cli
 from quality import tools
+from quality.conftest import SourceTree
 
 NOT_RUN = {
     r"--interface|can0": "needs a CAN interface or a serial device",
@@ -23,7 +23,8 @@ SHORTER = {
     r"--seeds \d+": "--seeds 1",
     r"(lever compare --(scenarios|models))": r"lever compare --duration 2 --scenarios step_up --\2",
     r"(lever (envelope|bounce) --quick)": r"\1 --seeds 1",
-    r"--start 60 --length 120": "--length 25",
+    r"--start 60 --length 120": "--length 22",
+    r"lever tune flight\.\w+": r"\g<0> --keep m_p_walk --keep c_p_walk --keep k_p_walk",
     r"(lever sim sudden_grip|lever sim steady --seed 7) (--set)": r'\1 --set "limits={}" \2',
 }
 """The same command, with less to calculate."""
@@ -70,7 +71,8 @@ def test_examples_can_be_typed(command: str) -> None:
 
 
 @pytest.mark.parametrize("command", [name for name in parsers() if any(not reason(line) for line in examples(name))])
-def test_examples_work(command: str, scratch: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_work(command: str, source_tree: SourceTree, monkeypatch: pytest.MonkeyPatch) -> None:
+    scratch = source_tree(f"help of {command}")
     monkeypatch.setenv("HOME", str(scratch))
     lines = [line for line in examples(command) if not reason(line)]
     script = "\n".join((USERS_FILES, *lines))

@@ -1,16 +1,18 @@
 """What README files and pages tell people to type works: commands and Python run, C compiles.
 
-Each fenced block of language `sh`, `python` or `c` of a README is a file that is run or compiled. All `sh` blocks of
-another page (FLASH.md, SIL.md …) are one script, so that a step finds what the steps before have left in out/. They run
-in a scratch folder that looks like the source tree, with the virtual environment active, and what conftest.py puts
-there. Not run are lines that begin with ctest or cmake (they are what runs this; but a page may build in out/) and sudo
-(not a test's to use). What pytest is to run is only found. A block `console` is not run and says why; its `lever`
-commands have at least options that there are.
+Each fenced block of language `sh` or `python` is run, in the order of its page, so that it finds what those before have
+left in out/; a block of C is compiled. A page has a scratch folder that looks like the source tree, with the virtual
+environment active, and what conftest.py puts there. Not run are lines that begin with ctest or cmake (they are what
+runs this; but a page other than a README may build in out/) and sudo (not a test's to use). What pytest is to run is
+only found. A block `console` is not run and says why; its `lever` commands have at least options that there are.
+
+What takes long is made shorter (SHORTER), unless LEVER_LITERAL is set.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -19,6 +21,7 @@ import readmes
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.signals.mapping import read_mapping
 from quality import tools
+from quality.conftest import SourceTree
 
 IGNORED = set(re.findall(r"^/(\w+)/$", (tools.ROOT / ".gitignore").read_text(), re.MULTILINE))
 FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
@@ -34,40 +37,64 @@ NEEDED = {
     "tshark": pytest.mark.requires("tshark"),
 }
 """By blocks with these words in them."""
+SHORTER = {
+    r"lever tune \S+": r"\g<0> --keep m_p_walk --keep c_p_walk --keep k_p_walk",
+    r"--seeds 4": "--seeds 2",
+    r"lever compare --scenarios step_up": r"\g<0> --duration 3",
+    r"lever campaign quick": "lever campaign quick.toml",
+    r"--chunks \d+ --rows \d+": "--chunks 10 --rows 1000 --flights 10",
+}
+"""The same command, with less to calculate."""
 
 
-def case(name: str, content: str) -> object:
-    return pytest.param(content, id=name, marks=[mark for words, mark in NEEDED.items() if words in content])
-
-
-def blocks(language: str) -> list[object]:
-    return [
-        case(f"{readme.relative_to(tools.ROOT)}:{line}", content)
-        for readme in READMES
-        for line, content in readmes.blocks(readme, language).items()
-    ]
+def shorter(script: str) -> str:
+    for pattern, instead in {} if os.environ.get("LEVER_LITERAL") else SHORTER.items():
+        script = re.sub(pattern, instead, script)
+    return script
 
 
 LINKING = [
     tools.ROOT / "README.md",
     *(page for folder in FOLDERS for page in sorted((tools.ROOT / folder).rglob("*.md"))),
 ]
-PAGES = {
-    page.name: "\n".join(scripts)
-    for folder in FOLDERS
-    for page in sorted((tools.ROOT / folder).rglob("*.md"))
-    if page.name != "README.md" and (scripts := list(readmes.blocks(page, "sh").values()))
-}
+Block = tuple[Path, int, str, str]
+"""Page, line, language, content."""
+BLOCKS: list[Block] = sorted(
+    (page, line, language, content)
+    for page in LINKING
+    for language in ("sh", "python", "c")
+    for line, content in readmes.blocks(page, language).items()
+)
 
 
-def is_run(line: str, in_page: bool) -> bool:
-    return not line.startswith(("cmake", "ctest", "sudo")) or (in_page and line.startswith("cmake") and "out/" in line)
+def cases(*languages: str) -> list[object]:
+    """The blocks of these languages, as parameters."""
+    return [
+        pytest.param(
+            block,
+            id=f"{block[0].relative_to(tools.ROOT)}:{block[1]}",
+            marks=[mark for words, mark in NEEDED.items() if words in block[3]],
+        )
+        for block in BLOCKS
+        if block[2] in languages
+    ]
 
 
-def run_here(script: str, scratch: Path, in_page: bool = False) -> None:
-    lines = "\n".join(line for line in script.splitlines() if is_run(line, in_page))
+def is_run(line: str, in_readme: bool) -> bool:
+    return not line.startswith(("cmake", "ctest", "sudo")) or (
+        not in_readme and line.startswith("cmake") and "out/" in line
+    )
+
+
+def run_here(block: Block, scratch: Path) -> None:
+    page, _, language, content = block
     there = set(scratch.iterdir())
-    tools.assert_silent(["timeout", TIME_LIMIT, "bash", "-euo", "pipefail", "-c", lines], cwd=scratch)
+    if language == "sh":
+        lines = "\n".join(line for line in shorter(content).splitlines() if is_run(line, page in READMES))
+        command = ["bash", "-euo", "pipefail", "-c", lines]
+    else:
+        command = [tools.python_tool("python"), "-W", "error", "-c", content]
+    tools.assert_silent(["timeout", TIME_LIMIT, *command], cwd=scratch)
     made = {path.name for path in set(scratch.iterdir()) - there}
     assert made <= IGNORED, "what a page makes belongs into a folder that git ignores"
 
@@ -126,31 +153,24 @@ def test_a_mapping_file_is_one(tmp_path: Path) -> None:
     assert set(mapping.sources) == {"theta", "z_ddot"}
 
 
-@pytest.mark.parametrize("script", blocks("sh"))
-def test_commands(script: str, scratch: Path, request: pytest.FixtureRequest) -> None:
-    if "build/stm32f4" in script or "lever flash" in script:
+def test_there_are_pages_and_every_abbreviation_is_needed() -> None:
+    assert {"FLASH.md", "SIL.md", "README.md"} <= {block[0].name for block in BLOCKS}
+    assert not [pattern for pattern in SHORTER if not any(re.search(pattern, block[3]) for block in BLOCKS)]
+
+
+@pytest.mark.parametrize("block", cases("sh", "python"))
+def test_a_block_does_what_its_page_says(block: Block, source_tree: SourceTree, request: pytest.FixtureRequest) -> None:
+    """To run one that needs what others have left: -k with the name of its page."""
+    page, _, _, content = block
+    if "build/stm32f4" in content or "lever flash" in content:
         request.getfixturevalue("slcan_image")
-    run_here(script, scratch)
-
-
-def test_there_are_pages() -> None:
-    assert {"FLASH.md", "SIL.md"} <= PAGES.keys()
-
-
-@pytest.mark.parametrize("script", [case(name, script) for name, script in PAGES.items()])
-def test_page_can_be_followed(script: str, scratch: Path) -> None:
-    run_here(script, scratch, in_page=True)
-
-
-@pytest.mark.parametrize("program", blocks("python"))
-def test_python(program: str, scratch: Path) -> None:
-    tools.assert_silent(["timeout", TIME_LIMIT, tools.python_tool("python"), "-W", "error", "-c", program], cwd=scratch)
+    run_here(block, source_tree(str(page.relative_to(tools.ROOT)).replace("/", ".")))
 
 
 @pytest.mark.requires("cc|gcc|clang")
-@pytest.mark.parametrize("text", blocks("c"))
-def test_c(text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("block", cases("c"))
+def test_c(block: Block, tmp_path: Path) -> None:
     source = tmp_path / "example.c"
-    source.write_text(text, encoding="utf-8")
+    source.write_text(block[3], encoding="utf-8")
     flags = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I", tools.FIRMWARE)
     tools.assert_silent([tools.first_installed("cc|gcc|clang"), *flags, source])

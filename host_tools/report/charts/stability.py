@@ -6,6 +6,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...firmware.library import enum_names
+from ...results.trace import CORRECTION, TRUE_MARGIN
 from ..figure import Figure, Spec, axis, axis_range, band, line, time_axis
 from ..run import Run
 from ..series import spread_indices
@@ -15,7 +16,7 @@ _COLOURS = {"warning": "joint", "alarm": "fault"}
 
 
 def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
-    """Gain margin and critical frequency over time, with the times of warning and alarm; `limits` [dB] of these."""
+    """Gain margin, frequency and correction over time, and when there is warning or alarm; `limits` [dB] of these."""
     gain, sigma, state = (run.column(name) for name in ("gain_margin_dB", "gain_margin_sigma_dB", "bounce"))
     frequency = run.column("bounce_frequency_Hz")
     if gain is None or sigma is None or state is None or frequency is None:
@@ -24,8 +25,10 @@ def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
     time, low, high = run.time[chosen], (gain - 2.0 * sigma)[chosen], (gain + 2.0 * sigma)[chosen]
     settled = slice(len(chosen) // 10, None)
     shown = axis_range([low[settled], high[settled], np.array((0.0, *limits))], slice(None))
+    true, correction = run.column(TRUE_MARGIN), run.column(CORRECTION[0])
     rows = [axis("gain margin [dB]", range=shown, weight=2.0), axis("frequency [Hz]")]
-    figure = Figure(rows, time_axis(run.end), 400)
+    rows += [] if correction is None else [axis("correction [°]")]
+    figure = Figure(rows, time_axis(run.end), 300 + 50 * len(rows))
     for name, colour in _COLOURS.items():
         figure.add(*_stretches(time, state[chosen], name, colour, shown))
     figure.add(*band(time, low, high, "margin ± 2σ", "estimate-band"))
@@ -33,6 +36,10 @@ def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
     figure.add(
         line(time, frequency[chosen], "critical frequency", "violet", 1, hovertemplate="%{y:.3g} Hz<extra></extra>")
     )
+    if true is not None:
+        figure.add(line(time, true[chosen], "truth", "truth", line_dash="dash", zorder=1))
+    if correction is not None:
+        figure.add(line(time, np.degrees(correction[chosen]), "correction", "good", 2))
     figure.level(0.0, *limits)
     figure.mark(run.changes)
     return figure

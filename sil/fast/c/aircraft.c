@@ -51,7 +51,12 @@ double aircraft_advance(aircraft_t *aircraft, uint32_t sample, double delta, dou
 {
     const uint32_t late = aircraft->correction_delay;
     aircraft->correction[sample] = correction;
-    aircraft->lever[sample] = delta + ((sample >= late) ? aircraft->correction[sample - late] : 0.0);
+    double angle = delta + ((sample >= late) ? aircraft->correction[sample - late] : 0.0);
+    if (aircraft->passed < 1.0) {
+        const double last = (sample > 0u) ? aircraft->lever[sample - 1u] : 0.0;
+        angle = last + (aircraft->passed * (angle - last));
+    }
+    aircraft->lever[sample] = angle;
     for (uint32_t i = 0u; i < aircraft->substeps; i++) {
         advance_substep(aircraft, sample, i);
     }

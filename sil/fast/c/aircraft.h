@@ -17,6 +17,7 @@ typedef struct aircraft {
     double most_change;             /* of the pitch in a substep [rad] */
     double travel;                  /* of the pitch [rad] */
     double delay;                   /* [sample periods], at least 1 */
+    double passed;                  /* of a change of the lever's angle, in a sample period [1] */
     uint32_t correction_delay;      /* [sample periods], at least 1 */
     const double *gearing;          /* pitch over the lever's angle [1] */
     const double *gust;             /* vertical force over mass [m/s^2] */

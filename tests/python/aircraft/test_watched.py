@@ -14,13 +14,19 @@ from lever_cdkf.host_tools.can.logs import Recording
 from lever_cdkf.host_tools.can.traffic import Traffic, read_samples
 from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse, read_response
 from lever_cdkf.host_tools.firmware.native import Config, Estimator
+from lever_cdkf.host_tools.firmware.settings_file import format_config
 from lever_cdkf.host_tools.watch import panels, status
 from lever_cdkf.host_tools.watch.picture import Picture
 from lever_cdkf.host_tools.watch.sources import LogSource
+from lever_cdkf.sil.aircraft import aircraft, stability
+from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.commands.aircraft import response
+from lever_cdkf.sil.scenarios import scenario
+from python.aircraft.loops import loop_of
 from python.conftest import Refused, Session
 from python.report.reading import figures, read
 
+SAME = ("sim", "replay")
 CHANGED = "uh60_like,gearing=0.5,warning=30"
 
 
@@ -59,6 +65,41 @@ def test_every_file_has_it(out: Path) -> None:
     assert set(pyarrow.parquet.read_table(out / "trace.parquet")["bounce"].to_pylist()) >= {"warning"}
     assert "figure-stability" in figures(read(out / "report.html"))
     assert cli.main(["replay", str(out / "trace.parquet"), "-o", str(out.parent / "again")]) == 0
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulation of a scenario with an aircraft, and the replay of its log with the same."""
+    folder = tmp_path_factory.mktemp("flown")
+    cancelled = ("estimator.mitigation='cancellation'", "duration=8 s", "pilot.c_p=30 N s/m", "limits={}")
+    overrides = [part for each in cancelled for part in ("--set", each)]
+    assert cli.main(["sim", "bounce", *overrides, "-o", str(folder / "sim")]) == 0
+    watched = ["--aircraft", "uh60_like,gearing=0.5"]
+    settings = folder / "flown.settings"
+    settings.write_text(format_config(scenario.load("bounce", list(cancelled)).config))
+    log = str(folder / "sim" / "bus.log")
+    assert cli.main(["replay", log, *watched, "--settings", str(settings), "-o", str(folder / "replay")]) == 0
+    return folder
+
+
+def test_a_simulation_has_what_a_replay_of_its_log_has(flown: Path) -> None:
+    of_sim, of_replay = (np.genfromtxt(flown / each / "trace.csv", delimiter=",", names=True) for each in SAME)
+    for column in ("bounce", "gain_margin_dB", "gain_margin_sigma_dB", "modulus", "correction_rad"):
+        assert np.array_equal(of_sim[column], of_replay[column], equal_nan=True)
+    assert np.count_nonzero(of_sim["correction_rad"]) > 5000
+    of_sim, of_replay = (json.loads((flown / each / "summary.json").read_text())["stability"] for each in SAME)
+    assert of_sim == of_replay
+    assert of_sim["greatest_correction_rad"] > 1e-3
+    assert "figure-stability" in figures(read(flown / "sim" / "report.html"))
+
+
+def test_a_simulation_knows_the_true_margin(flown: Path) -> None:
+    trace = np.genfromtxt(flown / "sim" / "trace.csv", delimiter=",", names=True)
+    coupled = Coupled(aircraft.load("uh60_like"), 0.5)
+    truth = scenario.load("bounce", ["pilot.c_p=30 N s/m"]).truth(np.zeros(1))
+    expected = stability.margins(loop_of(coupled, truth.transfer(np.array([0])), 0)).gain_db
+    assert trace["gain_margin_true_dB"] == pytest.approx(expected, abs=0.02)
+    assert trace["gain_margin_dB"][-1] == pytest.approx(expected, abs=3.0 * trace["gain_margin_sigma_dB"][-1])
 
 
 def test_without_an_aircraft_there_is_none(session: Session, tmp_path: Path) -> None:

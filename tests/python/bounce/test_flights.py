@@ -19,7 +19,7 @@ from python.aircraft.loops import loop_of
 def test_the_critical_gearing_is_that_of_the_margins(craft: str) -> None:
     plan = Plan(craft, 3, pilots.relaxing(3), 1.0, duration=60.0)
     transfer = flights.truth_of(plan).transfer(np.array([0, 1500, 2999]))
-    found = flights.critical_gearing(aircraft.load(craft), transfer)
+    found = stability.critical_gearing(aircraft.load(craft), transfer)
     loops = (loop_of(Coupled(aircraft.load(craft), 1.0), transfer, row) for row in range(3))
     assert found == pytest.approx([stability.margins(loop).gain for loop in loops], rel=2e-3)  # 0.02 dB
 

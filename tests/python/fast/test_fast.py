@@ -38,7 +38,7 @@ LATE_AND_WRONG = (
 
 
 def python_run(wanted: Scenario) -> loop.Recording:
-    with LeverBus(config=wanted.config) as bus:
+    with LeverBus(config=wanted.config, aircraft=wanted.known_aircraft) as bus:
         return loop.run(wanted, bus)
 
 
@@ -105,7 +105,7 @@ GAPS = 'sensors.dropout=[{what="base_frame", share="60 %", burst="150 ms", start
     [
         *((name, ()) for name in ("steady", "grip_force", "sensor_dropout", "sensor_faults", "mayo_ectomorphic")),
         ("bounce", MITIGATED),
-        ("bounce", (*MITIGATED, "aircraft.correction_delay=5 ms", GAPS)),
+        ("bounce", (*MITIGATED, "aircraft.correction_delay=5 ms", "aircraft.lever_low_pass=5 Hz", GAPS)),
     ],
 )
 def test_a_run_in_process_has_the_frames_of_one_over_a_bus(name: str, overrides: Sequence[str]) -> None:

@@ -13,6 +13,7 @@ from lever_cdkf.sil import oracle
 from lever_cdkf.sil.oracle.estimator import model_of
 from lever_cdkf.sil.oracle.scale import PARAMETERS
 from numpy.typing import NDArray
+from python.oracle.kept import values_of
 
 Array = NDArray[Any]
 DERIVED = ("natural_frequency", "damping_ratio")
@@ -179,7 +180,8 @@ def expected_of(case: Case) -> Expected:
     inputs["time_s"] = inputs["time_us"] * 1e-6
     start, first = oracle.align(inputs, config.settings)
     choices = (case.preload, case.adaptation, BOUNDS[case.model], case.model, case.form or case.estimator)
-    values = oracle.run(oracle.Estimator(config.settings, start, *choices), inputs, first, EVERY)
+    estimator = oracle.Estimator(config.settings, start, *choices)
+    values = values_of(str(case), lambda: oracle.run(estimator, inputs, first, EVERY))
     return Expected(config, samples, first, values)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.host_tools.report import write_report
 from lever_cdkf.sil.run.runner import Result, simulate
 from lever_cdkf.sil.scenarios import scenario
@@ -45,9 +44,7 @@ share = "1 %"
 
 def run(name: str, *overrides: str) -> Result:
     """A scenario through the firmware in this process."""
-    made = scenario.load(name, overrides)
-    with LeverBus("lever", config=made.config) as bus:
-        return simulate(made, bus)
+    return simulate(scenario.load(name, overrides))
 
 
 @pytest.fixture(scope="session")

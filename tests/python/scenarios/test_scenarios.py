@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.sil.run import runner
 from lever_cdkf.sil.scenarios import inputs, scenario
 
@@ -22,8 +21,7 @@ BROKEN = {
 @cache
 def result(name: str) -> runner.Result:
     wanted = scenario.load(name, [f"duration={BROKEN[name]}"] if name in BROKEN else [])
-    with LeverBus("lever", config=wanted.config) as bus:
-        return runner.simulate(wanted, bus)
+    return runner.simulate(wanted)
 
 
 def rms(name: str) -> dict[str, float]:

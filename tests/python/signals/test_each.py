@@ -16,7 +16,7 @@ from python.signals.flight import MAPPED, NATURAL_FREQUENCY
 def test_a_row_for_each(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty.blf").write_bytes(b"")
     logs = [str(folder / "flight.blf"), str(tmp_path / "empty.blf"), str(folder / "flight.log")]
-    arguments = ["--each", "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED, "--length", "30"]
+    arguments = ["--each", "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED, "--length", "15"]
     written = ["-o", str(tmp_path / "out"), "--json", str(tmp_path / "rows.json")]
     assert cli.main(["replay", *logs, *arguments, *written]) == 1
     assert f"lever: replay: {logs[1]}: " in capsys.readouterr().err

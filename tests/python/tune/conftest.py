@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
 from lever_cdkf.sil.run import buslog, runner
 from lever_cdkf.sil.scenarios import scenario
 
@@ -73,8 +72,7 @@ def simulate(tmp_path_factory: pytest.TempPathFactory) -> Simulate:
         values = {**LOADS, **NOISE, **CALIBRATION, **pilot, **shaken, **others}
         (folder / "known.toml").write_text(_SCENARIO.format(duration=duration, **values))
         loaded = scenario.load(str(folder / "known.toml"))
-        with LeverBus("lever", config=loaded.config) as bus:
-            frames = runner.simulate(loaded, bus).frames
+        frames = runner.simulate(loaded).frames
         log = folder / "bus.log"
         log.write_bytes(b"".join(buslog.lines(frames, "vcan0")))
         return log

@@ -92,3 +92,15 @@ def test_a_delay_is_undone_across_what_is_missing(wrong: Recording) -> None:
     undone = recorded.without_delay(delay)
     assert (undone["z_ddot_valid"] == samples["z_ddot_valid"]).all()
     assert np.abs(undone["z_ddot"] - np.sin(omega * recorded.time))[:-5].max() < 1e-3
+
+
+def test_what_is_not_known_of_the_torque_is_part_of_the_gain(steady_log: Path) -> None:
+    """Divide the lever's equation by the gain of the torque, 1 + e. An arm lighter by e M / l^2 has the inertia M then,
+    and its first moment is less by e M / l instead of e l mu. The gain of the accelerometer makes up for it."""
+    likelihood = Likelihood(recording.read([steady_log]), held_out=0.0)
+    m_p, own, first_moment, length, inertia, e = 2.8, 0.25 * 1.2, 0.5 * 1.2, 0.45, 0.020, 0.07
+    share = 1.0 - (length**2 * (own + m_p) + inertia) / (length**2 * (first_moment + m_p))
+    kept = ("z_ddot_delay", "lever_friction", *NOISE)
+    alone, beside = (calibrate(likelihood, {**NOISE, "tau_m_gain_sigma": s}, kept).entries[0] for s in (0.0, e))
+    assert beside.best == alone.best
+    assert math.sqrt(beside.sigma**2 - alone.sigma**2) == pytest.approx(share * e, rel=0.2)

@@ -107,6 +107,21 @@ TEST(the_bus_says_how_stable_the_loop_is_once_a_publish_period)
     }
 }
 
+/* Not more often than each 40 ms, whatever the publish period. */
+TEST_EACH(2, a_margin_is_worked_out_once_a_publish_period)
+{
+    uint32_t count = 0u;
+    config.settings.publish_period = (test_round == 0u) ? 5.0e-3f : 0.1f;
+    start_bus();
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    for (uint32_t k = 0u; k < 1000u; k++) {
+        const uint32_t before_us = lever->bounce.time_us;
+        (void)run(1u);
+        count += (lever->bounce.time_us != before_us) ? 1u : 0u;
+    }
+    TEST_ASSERT_EQUAL_UINT32((test_round == 0u) ? 25u : 10u, count);
+}
+
 TEST(an_estimate_that_waits_for_samples_or_was_never_one_says_nothing_of_stability)
 {
     message_stability_t message;

@@ -1,4 +1,5 @@
 /* Commands: what each changes, what it leaves alone, and that unknown ones change nothing. */
+#include "app/instance.h"
 #include "rig.h"
 
 enum { CHOICES = COMBINATIONS * LEVER_ADAPTATION_COUNT * LEVER_PRELOAD_COUNT };
@@ -103,6 +104,51 @@ TEST(reset_ends_dither_and_the_next_run_is_the_first_one_again)
     }
     assert_same_estimates(lever, other);
     TEST_ASSERT_TRUE((health().torque != 0.0f) && (health().torque == health_of(other).torque));
+}
+
+/* But for counts, and what the first samples set. */
+TEST(a_reset_leaves_nothing_of_what_was)
+{
+    start();
+    estimator_t *now = &lever->estimator;
+    learning_t *learning = &now->learning;
+    estimator_t expected = *now;
+    const dither_t no_dither = lever->dither;
+    dither(0.3f);
+    (void)run(2000u);
+    void *const all[] = {&learning->hands, &learning->monitor, &learning->force, &learning->whiteness,
+        &learning->calibration, &now->trim, &now->averages};
+    const size_t size[] = {sizeof learning->hands, sizeof learning->monitor, sizeof learning->force,
+        sizeof learning->whiteness, sizeof learning->calibration, sizeof now->trim, sizeof now->averages};
+    for (uint32_t i = 0u; i < (sizeof size / sizeof size[0]); i++) {
+        (void)memset(all[i], 1, size[i]);
+    }
+    float *const value[] = {&learning->wait, &learning->changed, &learning->gripping, &learning->kept_ago,
+        &learning->elapsed, &now->nis, &now->base_missing, &now->last_z_ddot, &now->raw_z_ddot, &now->last_tau_m};
+    for (uint32_t i = 0u; i < (sizeof value / sizeof value[0]); i++) {
+        *value[i] = 1.0f;
+    }
+    bool *const flag[] = {&learning->calm, &learning->held_again, &learning->moved, &learning->bounded, &now->frozen};
+    for (uint32_t i = 0u; i < (sizeof flag / sizeof flag[0]); i++) {
+        *flag[i] = true;
+    }
+    now->faults = LEVER_FAULT_GAP;
+    request(LEVER_REQUEST_RESET);
+    expected.samples = now->samples;
+    expected.time_us = now->time_us;
+    expected.alignment = now->alignment;
+    expected.z_ddot = now->z_ddot;
+    expected.tau_m = now->tau_m;
+    TEST_ASSERT_EQUAL_MEMORY(&expected, now, sizeof expected);
+    TEST_ASSERT_EQUAL_MEMORY(&no_dither, &lever->dither, sizeof no_dither);
+}
+
+TEST(an_instance_in_memory_that_was_used_is_a_new_one)
+{
+    lever_t *other = lever_init(&other_memory, &config);
+    (void)memset(&memory, 0xA5, sizeof memory);
+    start();
+    TEST_ASSERT_EQUAL_MEMORY(other, lever, sizeof *lever);
 }
 
 /* Dither that a reset asks for fades in anew, as there is no torque to fade from. */

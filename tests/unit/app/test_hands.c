@@ -78,3 +78,19 @@ TEST(the_verdict_has_hysteresis)
         TEST_ASSERT_EQUAL(was ? ((k % 4u) != 3u) : ((k % 4u) == 0u), hands.off);
     }
 }
+
+/* The lever's own equation of motion, with gravity and spring where the preload is fixed. */
+TEST(the_impulse_without_hands_is_that_of_the_lever_alone)
+{
+    model_constants_t fixed = constants;
+    const model_step_t step = {.period = PERIOD, .z_ddot = 2.0f, .tau_m = 1.5f, .trim_cosine = 0.9f};
+    const float x[MODEL_STATES] = {0.4f, 0.3f};
+    const float lift = 0.45f * 0.6f * 0.9f;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, PERIOD * (1.5f - (lift * 2.0f) - (0.5f * 0.3f) - (5.0f * 0.4f)),
+        hands_predict(&hands, &constants, &step, x));
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, PERIOD * (1.5f - (lift * 2.0f)), hands.drive);
+    fixed.trim = false;
+    fixed.lever_preload_angle = 0.1f;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, PERIOD * (1.5f - (lift * (2.0f + 9.80665f)) - (0.5f * 0.3f) - (5.0f * 0.3f)),
+        hands_predict(&hands, &fixed, &step, x));
+}

@@ -45,3 +45,13 @@ TEST(an_instance_depends_on_its_configuration_and_samples_only)
         assert_same_estimates((k == 0u) ? lever : other, alone);
     }
 }
+
+TEST(a_parameter_has_a_name_and_a_unit_and_what_is_none_has_neither)
+{
+    TEST_ASSERT_EQUAL_STRING("k_p", lever_parameter_name((uint8_t)LEVER_MODEL_LEVER, 2u));
+    TEST_ASSERT_EQUAL_STRING("N/m", lever_parameter_unit((uint8_t)LEVER_MODEL_LEVER, 2u));
+    TEST_ASSERT_NULL(lever_parameter_name((uint8_t)LEVER_MODEL_LEVER, PARAMETERS));
+    TEST_ASSERT_NULL(lever_parameter_unit((uint8_t)LEVER_MODEL_LEVER, PARAMETERS));
+    TEST_ASSERT_NULL(lever_parameter_name((uint8_t)LEVER_MODEL_COUNT, 0u));
+    TEST_ASSERT_NULL(lever_parameter_unit((uint8_t)LEVER_MODEL_COUNT, 0u));
+}

@@ -189,3 +189,72 @@ TEST_EACH(3, a_new_grip_is_followed_with_what_is_measured)
         TEST_ASSERT_FLOAT_WITHIN(4.0f * after.natural_frequency_sigma, 3.637f, after.natural_frequency);
     }
 }
+
+/* Soon after one change another is followed, but not while it may be that nobody holds the lever any more: here the
+ * verdict is held at that. */
+/* R6 */
+TEST_EACH(2, a_change_soon_after_another_is_followed_unless_the_hands_may_be_off)
+{
+    learning_t *learning = &lever->estimator.learning;
+    start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    (void)run(10000u);
+    simulation.plant = plant_of_lever(3.2, 120.0, 4200.0);
+    (void)run(2000u);
+    const float first = learning->changed;
+    TEST_ASSERT_TRUE((first > 0.0f) && (first < 2.5f));
+    float last = first;
+    bool again = false;
+    simulation.plant = plant_of_lever(2.0, 30.0, 1000.0);
+    for (uint32_t ms = 0u; ms < 500u; ms++) {
+        if (test_round == 1u) {
+            learning->hands.residual = 0.6f * learning->hands.change;
+            learning->hands.idle = true;
+        }
+        (void)run(1u);
+        again = again || (learning->changed > last);
+        last = learning->changed;
+    }
+    TEST_ASSERT_EQUAL(test_round == 0u, again);
+}
+
+/* The lever rests at another angle after a grip; only where the trim is followed is that to be learnt anew. A trunk on
+ * its seat goes on moving. */
+TEST_EACH(3, a_new_grip_moves_the_level_of_a_trim_that_is_followed)
+{
+    estimator_t *estimator = &lever->estimator;
+    config = config_of(0u);
+    config.preload = (uint8_t)((test_round == 0u) ? LEVER_PRELOAD_FIXED : LEVER_PRELOAD_TRIM);
+    config.settings.seat_frequency = (test_round == 2u) ? 4.5f : 0.0f;
+    start();
+    (void)run(5000u);
+    estimator->learning.gripping = 1.0e-3f;
+    estimator->learning.held_again = true;
+    for (uint32_t k = 0u; (k < 20u) && (estimator->cdkf.acting <= (uint32_t)CDKF_STEP); k++) {
+        (void)run(1u);
+    }
+    TEST_ASSERT_EQUAL(test_round != 0u, estimator->cdkf.acting > (uint32_t)CDKF_STEP);
+    TEST_ASSERT_EQUAL(test_round == 2u, fabsf(estimator->base_motion.seat_dot) > 1.0e-6f);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, estimator->learning.gripping);
+}
+
+/* Its sign is wrong: it is said within a second, nothing is learnt of it, and once it is right it is trusted again. */
+/* R32 */
+TEST(a_base_acceleration_of_the_wrong_sign_is_found_and_teaches_nothing)
+{
+    start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    (void)run(10000u);
+    const lever_estimate_t before = estimate();
+    uint32_t found = 0u;
+    for (uint32_t k = 0u; k < 3000u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.z_ddot = -sample.z_ddot;
+        (void)lever_update(lever, &sample);
+        found += has_fault(LEVER_FAULT_BASE) ? 1u : 0u;
+    }
+    TEST_ASSERT_TRUE(found > 2000u);
+    for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
+        TEST_ASSERT_FLOAT_WITHIN(3.0f * before.parameter_sigma[i], before.parameter[i], estimate().parameter[i]);
+    }
+    (void)run(3000u);
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_BASE));
+}

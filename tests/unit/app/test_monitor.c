@@ -103,6 +103,13 @@ TEST(a_base_acceleration_that_always_changed_is_stuck_without_the_innovations)
     }
 }
 
+TEST(an_angle_that_stands_still_without_a_surprise_rests)
+{
+    for (uint32_t k = 0u; k < 50u; k++) {
+        TEST_ASSERT_FALSE(block((uint32_t)MONITOR_THETA, (k < 25u) ? (float)k : 0.5f));
+    }
+}
+
 TEST(surprise_is_the_mean_of_nis_over_a_tenth_of_a_second)
 {
     surprise(3.0, 100u);

@@ -107,6 +107,19 @@ TEST(six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none)
     TEST_ASSERT_EQUAL(LEVER_MODE_FAULT, run_damaged(1u));
 }
 
+/* A tenth of them each second; innovations from before a restart say nothing of the filter after it. */
+TEST(restarts_are_forgotten_and_innovations_begin_anew)
+{
+    averages_t *averages = &lever->estimator.averages;
+    averages->innovation = 50.0f;
+    (void)run_damaged(1u);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, estimate().nis);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.0f, averages->innovation);
+    averages->restarts = 4.0f;
+    (void)run(1000u);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 4.0f * 0.9048f, averages->restarts);
+}
+
 /* R13 */
 TEST(only_a_reset_leaves_fault)
 {

@@ -1,4 +1,5 @@
 /* Single samples: what is missing, invalid, implausible, late, twice; time that wraps or starts anew. */
+#include "model/model.h"
 #include "rig.h"
 
 enum { SIGNALS = 4 }; /* theta, theta_dot, tau_m, z_ddot */
@@ -68,6 +69,40 @@ TEST(a_value_that_is_not_finite_or_plausible_is_corrupt_and_counts_as_missing_an
         }
     }
     TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
+}
+
+/* During alignment, when no value is a spike. */
+TEST(a_value_is_plausible_up_to_its_limit)
+{
+    static const float limit[SIGNALS] = {MODEL_THETA_MOST, 1.0e4f, 1.0e4f, 1.0e4f};
+    for (uint32_t which = 0u; which <= (uint32_t)SIGNALS; which++) {
+        for (uint32_t beyond = 0u; beyond < 2u; beyond++) {
+            start();
+            (void)run(10u);
+            lever_sample_t sample = sample_after(1u);
+            sample.grip_force_valid = true;
+            float *value = (which < (uint32_t)SIGNALS) ? value_of(&sample, which) : &sample.grip_force;
+            *value = ((beyond == 1u) ? 1.2f : 1.0f) * ((which < (uint32_t)SIGNALS) ? limit[which] : 1.0e4f);
+            (void)lever_update(lever, &sample);
+            TEST_ASSERT_EQUAL_UINT32(beyond, health().corrupt);
+        }
+    }
+}
+
+/* In whole periods, rounded; a clock that advances by less than a quarter of one as good as stands. */
+TEST(time_that_passes_is_counted_in_periods)
+{
+    static const uint32_t elapsed_us[] = {1400u, 1600u, 2300u, 2600u, 300u, 200u};
+    static const uint32_t lost[] = {0u, 1u, 1u, 2u, 0u, 0u};
+    for (uint32_t k = 0u; k < 6u; k++) {
+        start();
+        (void)run(400u);
+        lever_sample_t sample = sample_after(1u);
+        sample.time_us += elapsed_us[k] - (uint32_t)PERIOD_US;
+        (void)lever_update(lever, &sample);
+        TEST_ASSERT_EQUAL_UINT32(lost[k], health().lost);
+        TEST_ASSERT_EQUAL(k == 5u, has_fault(LEVER_FAULT_CLOCK));
+    }
 }
 
 TEST(not_a_number_in_the_very_first_sample_does_no_harm)

@@ -165,6 +165,29 @@ TEST(it_goes_on_through_gaps)
     TEST_ASSERT_TRUE(greatest < (2.0 * expected));
 }
 
+/* In parts of at most 20 ms. */
+TEST(a_long_step_is_taken_in_parts)
+{
+    static const float period[] = {0.02f, 0.021f, 0.05f, 0.1f};
+    static const uint32_t parts[] = {1u, 2u, 3u, 5u};
+    for (uint32_t i = 0u; i < 4u; i++) {
+        involuntary_t whole;
+        model_step_t step = about;
+        step.z_ddot = 2.0f;
+        step.tau_m = 0.5f;
+        step.period = period[i];
+        involuntary_start(&whole, 0.0f);
+        TEST_ASSERT_TRUE(involuntary_step(&whole, &arm, &lever, &step, (float)CORNER));
+        setUp();
+        step.period /= (float)parts[i];
+        for (uint32_t k = 0u; k < parts[i]; k++) {
+            TEST_ASSERT_TRUE(involuntary_step(&motion, &arm, &lever, &step, (float)CORNER));
+        }
+        TEST_ASSERT_EQUAL_FLOAT(motion.theta, whole.theta);
+        TEST_ASSERT_EQUAL_FLOAT(motion.theta_dot, whole.theta_dot);
+    }
+}
+
 /* A black box may be such. */
 TEST(an_arm_that_is_not_stable_is_refused)
 {

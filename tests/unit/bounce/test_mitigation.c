@@ -126,7 +126,17 @@ TEST(it_waits_until_the_lever_moves)
     TEST_ASSERT_EQUAL_FLOAT(1.0f, now().weight);
 }
 
-typedef enum cause { NOT_PERMITTED, NOT_SENSED, NO_RATE, CLOCK_STANDS, SILENCE, CHOSEN_OFF, CAUSES } cause_t;
+typedef enum cause {
+    NOT_PERMITTED,
+    NOT_SENSED,
+    NO_RATE,
+    CLOCK_STANDS,
+    THETA_STUCK,
+    BASE_STUCK,
+    SILENCE,
+    CHOSEN_OFF,
+    CAUSES
+} cause_t;
 
 static void spoil(cause_t cause)
 {
@@ -134,6 +144,8 @@ static void spoil(cause_t cause)
     sample.sensed = (cause != NOT_SENSED);
     sample.rated = (cause != NO_RATE);
     sample.advances = (cause != CLOCK_STANDS);
+    sample.same_theta = (cause == THETA_STUCK);
+    sample.same_z_ddot = (cause == BASE_STUCK);
     sample.mitigation =
         (cause == CHOSEN_OFF) ? (uint8_t)LEVER_MITIGATION_NONE : (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING;
 }
@@ -187,6 +199,53 @@ TEST(a_moment_without_sensors_changes_nothing)
         mitigation_idle(&mitigation, 9000u);
         TEST_ASSERT_EQUAL_FLOAT(1.0f, now().weight);
     }
+}
+
+/* A coarse sensor in a quiet cabin: 20 samples the same, then 40; all that it has been before may become three times as
+ * long. */
+TEST(what_is_often_the_same_is_not_stuck)
+{
+    static const uint32_t lengths[] = {20u, 40u, 100u, 254u};
+    run(3000u);
+    for (uint32_t i = 0u; i < (sizeof lengths / sizeof lengths[0]); i++) {
+        for (uint32_t k = 0u; k < 20u; k++) {
+            sample.same_theta = false;
+            sample.same_z_ddot = false;
+            run(1u);
+            sample.same_theta = ((k % 2u) == 0u);
+            sample.same_z_ddot = !sample.same_theta;
+            run(lengths[i]);
+            TEST_ASSERT_EQUAL_FLOAT(1.0f, now().weight);
+        }
+    }
+}
+
+/* What was usual is forgotten, by a sample in 256. */
+TEST(a_sensor_that_was_quiet_long_ago_is_stuck_as_soon_as_any)
+{
+    run(3000u);
+    sample.same_z_ddot = true;
+    run(20u);
+    sample.same_z_ddot = false;
+    run(21u * 256u);
+    spoil(BASE_STUCK);
+    run(22u);
+    TEST_ASSERT_TRUE(mitigation.open);
+    run(1u);
+    TEST_ASSERT_FALSE(mitigation.open);
+}
+
+/* At 100 Hz 22 ms are two samples, which any two may be. */
+TEST(a_few_samples_that_are_the_same_are_no_fault_however_long_they_take)
+{
+    run(3000u);
+    sample.elapsed_us = 10000u;
+    sample.step.period = 0.01f;
+    spoil(THETA_STUCK);
+    run(8u);
+    TEST_ASSERT_TRUE(mitigation.open);
+    run(1u);
+    TEST_ASSERT_FALSE(mitigation.open);
 }
 
 TEST(it_comes_back_within_a_second)
@@ -440,4 +499,19 @@ TEST(with_slow_samples_it_is_passive_in_time_too)
         mitigation_idle(&mitigation, 5000u);
     }
     TEST_ASSERT_EQUAL_FLOAT(0.0f, now().weight);
+}
+
+/* A motor that no longer is to damp fades out before the mitigation is done. */
+TEST(damping_that_is_chosen_away_fades)
+{
+    sample.mitigation = (uint8_t)LEVER_MITIGATION_DAMPING;
+    run(3000u);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, mitigation.damping_weight);
+    sample.mitigation = (uint8_t)LEVER_MITIGATION_NONE;
+    run(35u);
+    TEST_ASSERT_TRUE(on);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.5f, mitigation.damping_weight);
+    run(36u);
+    TEST_ASSERT_FALSE(on);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, mitigation.damping);
 }
