@@ -249,7 +249,7 @@ def _simulate(
     with ExitStack() as stack:
         progress, bus = stack.enter_context(Progress(scenario.name)), None
         if interface != "lever" or bus_options:
-            bus = stack.enter_context(open_bus(scenario, interface, channel, bus_options))
+            bus = stack.enter_context(open_bus(scenario, interface, channel, {**bus_options, **_snapshots(args)}))
         result = simulate(
             *(scenario, bus, args.out),
             channel=channel,
@@ -268,6 +268,11 @@ def _simulate(
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)
     return 1
+
+
+def _snapshots(args: argparse.Namespace) -> dict[str, float]:
+    """As an option of the bus; only that of the firmware in this process has it."""
+    return {} if args.snapshots is None else {"snapshots": args.snapshots}
 
 
 def open_bus(

@@ -20,7 +20,7 @@ SEEDED = {
 
 @pytest.mark.requires(eva.PROGRAM)
 @pytest.mark.parametrize("name", eva.SOURCES)
-@pytest.mark.requirement("R14")
+@pytest.mark.requirement("R14", "S6")
 def test_there_is_no_alarm(name: str) -> None:
     proof = eva.prove(name)
     assert proof.alarms == 0, proof.text
