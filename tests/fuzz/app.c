@@ -230,9 +230,9 @@ static float noise(bench_t *bench)
     return ((float)(bench->noise >> 8u) * (2.0f / 16777216.0f)) - 1.0f;
 }
 
-/* A lever that swings on a bouncing base, in the grip of a hand, whose force is what the lever as shipped needs for that.
- * Of the shape, the lower four bits are its frequency, from
- * 3 Hz on, the next two the amplitude; then that of the noise. */
+/* A lever that swings on a bouncing base, in the grip of a hand, whose force is what the lever as shipped needs for
+ * that. Of the shape, the lower four bits are its frequency, from 3 Hz on, the next two the amplitude; then that of the
+ * noise. */
 static lever_sample_t flight_sample(bench_t *bench)
 {
     const float omega = 19.0f + (float)(bench->shape & 15u);
