@@ -80,7 +80,7 @@ static bool is_authenticator(command_guard_t *guard, const lever_frame_t *frame)
 
 enum port_result command_guard_receive(void *self, lever_frame_t *frame)
 {
-    command_guard_t *const guard = self; /* cppcheck-suppress misra-c2012-11.5 ; D4 */
+    command_guard_t *const guard = self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
 
     enum port_result result;
     bool passes;

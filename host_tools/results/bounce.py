@@ -44,7 +44,7 @@ class Bounce:
         names = enum_names("lever_bounce")
         states = {names[state]: round(count * self._period, 9) for state, count in sorted(self._states.items())}
         margin, sigma, at = self._least or (None, None, None)
-        return Stability(states, margin, sigma, at, aircraft.warning, aircraft.alarm, self._correction)
+        return Stability(states, margin, sigma, at, aircraft.warning, aircraft.alarm, self._correction, aircraft.name)
 
 
 def verdict(stability: Stability | None) -> str:
@@ -52,10 +52,10 @@ def verdict(stability: Stability | None) -> str:
     if stability is None:
         return ""
     if stability.least_margin_db is None:
-        return "The margin to collective bounce was never known."
+        return f"With {stability.aircraft}, the margin to collective bounce was never known."
     states = stability.states_s
     warned = [f"{name} for {states[name]:.3g} s" for name in ("warning", "alarm") if states.get(name)]
     return (
-        f"The gain margin to collective bounce was least at {stability.at_s:.4g} s: {stability.least_margin_db:.3g} ± "
-        f"{stability.its_sigma_db:.2g} dB; {' and '.join(warned) or 'no alarm'}."
+        f"With {stability.aircraft}, the gain margin to collective bounce was least at {stability.at_s:.4g} s: "
+        f"{stability.least_margin_db:.3g} ± {stability.its_sigma_db:.2g} dB; {' and '.join(warned) or 'no alarm'}."
     )

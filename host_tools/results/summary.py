@@ -48,6 +48,8 @@ class Stability:
     alarm_db: float
     greatest_correction_rad: float | None = None
     """Of the lever's angle, by mitigation; None without."""
+    aircraft: str = ""
+    """Which, with its gearing, or its file."""
 
 
 @dataclass(frozen=True, kw_only=True)

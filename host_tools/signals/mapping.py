@@ -19,7 +19,6 @@ or the same as TOML, a table for each input, and one for each message with E2E p
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -27,13 +26,9 @@ from typing import Any
 
 from ..errors import LeverError
 from ..near_names import did_you_mean
+from ..toml_text import TomlError, parse
 from ..units import split
 from .units import INPUTS, KINDS, factor
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 GRAVITY_CHOICES = ("auto", "included", "none")
 PROTECTED = "protected"
@@ -136,11 +131,11 @@ def _toml(path: str) -> dict[str, Any]:
     if not path.lower().endswith(".toml"):
         raise LeverError(f"--map {path}: it is neither KEY=MESSAGE.SIGNAL nor a .toml file")
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return parse(Path(path).read_bytes())
     except OSError as error:
         raise LeverError(f"cannot read {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise LeverError(f"{path}: not a mapping in TOML: {error}") from None
+    except TomlError as error:
+        raise LeverError(f"{path}: {error}") from None
 
 
 def _time(table: Any) -> str | None:
