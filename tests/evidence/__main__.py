@@ -2,11 +2,12 @@
 
     python tests/evidence BUILD
 
-Proves by Eva, measures coverage, flies the fault matrix, runs the tests of firmware/REQUIREMENTS.md and SECURITY.md,
-and all mutants of the core. Both files are there when all of it could be gathered; until then there is neither.
+Proves by Eva, flies the fault matrix and a day of soak, fuzzes, measures coverage, runs the tests of
+firmware/REQUIREMENTS.md and SECURITY.md and all mutants of the core. Both files are there when all of it could be
+gathered; until then there is neither.
 
-Exit status: 0 when each requirement has tests that passed, each fault is met as demanded and Eva has no alarm; 1 when
-not, which the page shows; 2 when a part could not be gathered, and nothing is written.
+Exit status: 0 when each requirement has tests that passed, no fault is missed that is not known to be, and Eva, soak
+and fuzzers find nothing; 1 when not, which the page shows; 2 when a part could not be gathered, and nothing is written.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from covered import __main__ as covered
 from covered import measuring
 from evidence import page, results
 from evidence.results import EvidenceError
+from fuzz import libfuzzer
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import Outputs
 from lever_cdkf.host_tools.provenance import provenance
@@ -36,6 +38,8 @@ from quality import tools, tracing
 
 Content = dict[str, Any]
 TOOLS = (eva.PROGRAM, measuring.COMPILER, measuring.MERGER, measuring.READER)
+FUZZED = 60
+"""[s] a target."""
 FILES = ("evidence.json", "EVIDENCE.html")
 
 
@@ -70,6 +74,8 @@ def gather(build: Path, scratch: Path) -> Content:
     parts = {
         "eva": lambda: _eva(),
         "fault_rows": lambda: _faults(build, scratch / "faults.json"),
+        "soak": lambda: _soak(build, scratch / "soak.json"),
+        "fuzz": lambda: _fuzz(build),
         "coverage": lambda: _coverage(build),
         "requirements": lambda: _requirements(build, scratch / "pytest.xml"),
         "mutants": lambda: _mutants(build / "tests/mutation", scratch / "mutants.json"),
@@ -86,12 +92,13 @@ def gather(build: Path, scratch: Path) -> Content:
     return content
 
 
-def _run(command: Sequence[str | Path]) -> None:
-    """A part that is a program; what it says is progress. Raises EvidenceError for a status beyond 1, "something is
-    missed"."""
+def _run(command: Sequence[str | Path]) -> int:
+    """A part that is a program; what it says is progress. Returns its status, which may be 1, "something is missed".
+    Raises EvidenceError for another."""
     status = subprocess.run([str(word) for word in command], cwd=tools.ROOT, check=False).returncode
     if status not in (0, 1):
         raise EvidenceError(f"{Path(command[0]).name} {Path(command[1]).name} ended with status {status}")
+    return status
 
 
 def _read(file: Path) -> Content:
@@ -115,6 +122,21 @@ def _faults(build: Path, file: Path) -> Content:
     _run([build / "venv/bin/lever", "faults", "--json", file])
     content = _read(file)
     return {name: content[name] for name in ("count", "missed", "silent", "rows")}
+
+
+def _soak(build: Path, file: Path) -> Content:
+    """A day without a reset, as `lever soak` has it."""
+    _run([build / "venv/bin/lever", "soak", "--out", file.with_suffix(".html"), "--json", file])
+    content = _read(file)
+    return {name: content[name] for name in ("total", "memory_growth_mib", "troubles")} | {
+        "hours": len(content["hours"])
+    }
+
+
+def _fuzz(build: Path) -> Content:
+    """Each fuzz target for a while."""
+    command = [sys.executable, tools.ROOT / "tests/fuzz", "--seconds", str(FUZZED), "--build", build / "fuzz"]
+    return {"targets": list(libfuzzer.SOURCES), "seconds": FUZZED, "found": _run(command)}
 
 
 def _coverage(build: Path) -> Content:

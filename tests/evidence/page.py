@@ -28,14 +28,17 @@ def build(content: Mapping[str, Any]) -> str:
     page.section("coverage", "Coverage", "Coverage of the core by its tests", _coverage(content["coverage"]))
     page.section("mutants", "Mutants", "Mutants of the core", _mutants(content["mutants"]))
     page.section("proof", "Proof", "Abstract interpretation by Frama-C Eva", _proof(content["eva"]["modules"]))
+    page.section("soak", "Soak", "A day without a reset", _soak(content["soak"]))
+    page.section("fuzz", "Fuzz", "Fuzzing", _fuzz(content["fuzz"]))
     page.section("made", "Made", "How this was made", _made(content))
     state = "good" if holds(content) else "bad"
     return page.html(f'<p class="verdict {state}">{html.escape(verdict(content))}</p>', _STYLE)
 
 
 def holds(content: Mapping[str, Any]) -> bool:
-    """Nothing is untested, no fault missed that is not known to be, no alarm raised."""
-    return not (content["requirements"]["untested"] or content["fault_rows"]["unexpected"] or content["eva_alarms"])
+    """Nothing is untested, no fault missed that is not known to be, nothing found by Eva, soak or fuzzers."""
+    found = content["eva_alarms"] or content["soak"]["troubles"] or content["fuzz"]["found"]
+    return not (content["requirements"]["untested"] or content["fault_rows"]["unexpected"] or found)
 
 
 def verdict(content: Mapping[str, Any]) -> str:
@@ -120,6 +123,17 @@ def _proof(modules: Sequence[Mapping[str, Any]]) -> str:
         for each in modules
     )
     return table(("harness", "files", "alarms", "statements reached"), rows)
+
+
+def _soak(content: Mapping[str, Any]) -> str:
+    rows = [[html.escape(name), html.escape(str(value))] for name, value in content["total"].items() if name != "hour"]
+    rows += [["hours", str(content["hours"])], ["memory growth [MiB]", f"{content['memory_growth_mib']:g}"]]
+    return table(("", ""), rows) + _listed("Troubles", content["troubles"])
+
+
+def _fuzz(content: Mapping[str, Any]) -> str:
+    found = "with a finding" if content["found"] else "without a finding"
+    return f"<p>{', '.join(content['targets'])}: {content['seconds']} s each, {found}.</p>"
 
 
 def _made(content: Mapping[str, Any]) -> str:
