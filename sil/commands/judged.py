@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
-from lever_cdkf.host_tools.files import make_folder, write_text
+from lever_cdkf.host_tools.files import check_writable, make_folder, write_texts
 from lever_cdkf.host_tools.layout import say
 
 from .names import check_names
@@ -88,6 +88,7 @@ class JudgedCommand(ABC, Generic[Row]):
         if not 1 <= seeds <= 1000:
             raise LeverError(f"--seeds {seeds}: must be from 1 to 1000")
         make_folder(args.out)  # before a campaign that could then not be kept
+        check_writable(args.out / f"{self.name}.html")
         with Progress(self.name) as progress:
             results = self.measure(chosen, seeds, progress.show)
         print_tables({f"{seeds} random {self.each} a condition": table.lines(results)})
@@ -110,10 +111,11 @@ class JudgedCommand(ABC, Generic[Row]):
         from ..judged import table
 
         origin = provenance()
+        files = {args.out / f"{self.name}.html": with_provenance(self.page(results, seeds), origin)}
         if args.json is not None:
             content = {"rows": table.rows(results), "provenance": asdict(origin)}
-            write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-        write_text(args.out / f"{self.name}.html", with_provenance(self.page(results, seeds), origin))
+            files[Path(args.json)] = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        write_texts(files)
         say(f"Written to {args.out}: {self.name}.html")
 
     def _chosen(self, args: argparse.Namespace) -> list[Row]:
