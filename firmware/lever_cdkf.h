@@ -131,11 +131,14 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1856 };
+/* Room for one instance: 1,856 bytes, and as much more as pointers are longer than 32 bits. */
+typedef struct lever_room {
+    const void *pointers[4];
+    uint8_t rest[1840];
+} lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
-    uint8_t bytes[LEVER_MEMORY_BYTES];
+    lever_room_t room;
 } lever_memory_t;
 
 typedef struct lever lever_t;
@@ -350,7 +353,7 @@ void lever_health(const lever_t *lever, lever_health_t *health);
 enum lever_platform_fault {
     LEVER_PLATFORM_CLOCK = 1,       /* the crystal did not start: on a less accurate oscillator */
     LEVER_PLATFORM_ROM = 2,         /* the program memory does not have its checksum */
-    LEVER_PLATFORM_SELF_TEST = 4,   /* the estimator did not give its golden vector at power-on */
+    LEVER_PLATFORM_SELF_TEST = 4,   /* a self test has failed: the golden vector, RAM, the stack */
     LEVER_PLATFORM_WATCHDOG = 8,    /* the last reset was the watchdog's */
     LEVER_PLATFORM_HARD_FAULT = 16, /* the last reset was that of a hard fault */
     LEVER_PLATFORM_BUS_OFF = 32,    /* the CAN controller is off the bus */
@@ -381,6 +384,9 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
  *   - a COMMAND, or lever_command(), was accepted within the last second of sample time: repeat one (keep-alive);
  *   - the platform reports none of ROM, SELF_TEST, WATCHDOG.
  * Opening takes dither_fade. */
+
+/* Torque leaves, or will with the next sample; or mitigation adds to the angle. */
+bool lever_is_acting(const lever_t *lever);
 
 /* No sample came for elapsed_us since the last lever_step(), lever_update() or lever_idle(), by the port's own clock
  * [us]. The estimate stays; the gate and the fade of the correction age, and while these are not yet zero MOTOR_COMMAND
@@ -416,6 +422,58 @@ enum lever_mode lever_step(lever_t *lever);
  * STATE_ESTIMATE, so who has received that has everything the step gives. Frames not fetched before the next step are
  * replaced by newer ones. */
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
+
+/* --- logs that begin anywhere -------------------------------------------------------------------------------------- */
+
+/* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
+ * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
+ * them is not larger for it. */
+enum lever_state_limits { LEVER_STATE_BYTES = 1584 };
+
+/* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
+uint16_t lever_state_layout(void);
+
+/* Between two samples, when lever_next_frame() has nothing left. */
+void lever_state_save(const lever_t *lever, uint8_t state[LEVER_STATE_BYTES]);
+
+/* From then on the instance is as that was which was saved: for a replay, on a desktop; a controller must not take its
+ * state from a bus. Returns false, changing nothing, if a value is out of its range, the settings are others, or one of
+ * the two has an aircraft and the other has none. Bytes that are accepted may make any estimate, but no harm. */
+bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES]);
+
+/* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and its
+ * digest. A replay of such a log may begin anywhere, and proves itself equal to the bit at each snapshot
+ * (host_tools/replay). All memory is the caller's; cost: firmware/can/README.md.
+ *
+ *     lever_recorder_t recorder;
+ *     lever_recorder_init(&recorder, 500000);
+ *     ...                                           // after lever_step() and all of lever_next_frame():
+ *     lever_recorder_step(&recorder, lever);
+ *     while (lever_recorder_next_frame(&recorder, &tx)) { transmit(&tx); }
+ *
+ * What reaches an instance other than by frames (lever_idle(), lever_platform(), lever_command()) is not in a log, and a
+ * replay differs until the next snapshot where it matters. */
+typedef struct lever_recorder {
+    uint8_t state[LEVER_STATE_BYTES];
+    uint8_t counter;     /* E2E */
+    uint16_t sent;       /* frames of this snapshot */
+    uint16_t layout;     /* lever_state_layout() */
+    uint32_t period_us;  /* from snapshot to snapshot */
+    uint32_t time_us;    /* of the last sample */
+    uint32_t elapsed_us; /* since the snapshot was taken */
+    uint32_t taken_us;   /* when that was */
+    uint32_t crc;        /* of what was sent of it */
+} lever_recorder_t;
+
+/* `period_us` of sample time from one snapshot to the next, 264 frames each (on 1 Mbit/s classic CAN 3 % of the
+ * bus at a second, 6 % at half a second). */
+void lever_recorder_init(lever_recorder_t *recorder, uint32_t period_us);
+
+/* After a step whose frames have all been fetched, before the next frame is received. */
+void lever_recorder_step(lever_recorder_t *recorder, const lever_t *lever);
+
+/* The next frame of a snapshot to send now; false when there is none left. */
+bool lever_recorder_next_frame(lever_recorder_t *recorder, lever_frame_t *frame);
 
 #ifdef __cplusplus
 }

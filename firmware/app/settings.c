@@ -1,5 +1,6 @@
 /* The table of settings: lever_settings.def as rows, to read, to take the defaults from and to check against. */
 #include "lever_cdkf.h"
+#include "math/crc32.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -39,18 +40,14 @@ void lever_config_default(lever_config_t *config)
     config->mitigation = (uint8_t)LEVER_MITIGATION_NONE;
 }
 
-/* Bit by bit, lowest first: it is asked for once. */
 uint32_t lever_settings_crc(const lever_settings_t *settings)
 {
     uint32_t words[SETTINGS];
     /* cppcheck-suppress misra-c2012-21.15 ; D2 */
     (void)memcpy(words, settings, sizeof words);
-    uint32_t crc = UINT32_MAX;
+    uint32_t crc = CRC32_START;
     for (uint32_t i = 0u; i < lever_setting_count(); i++) {
-        crc ^= words[i];
-        for (uint32_t bit = 0u; bit < 32u; bit++) {
-            crc = (crc >> 1u) ^ (((crc & 1u) != 0u) ? 0xEDB88320u : 0u);
-        }
+        crc = crc32_shift(crc ^ words[i], 32u);
     }
     return ~crc;
 }

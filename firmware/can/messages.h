@@ -45,7 +45,9 @@ enum message_id {
     MESSAGE_LINK_HEALTH_ID = 0x219,
     MESSAGE_FEEDTHROUGH_ID = 0x21A,
     MESSAGE_STABILITY_ID = 0x21B,
-    MESSAGE_CORRECTION_ID = 0x21C
+    MESSAGE_CORRECTION_ID = 0x21C,
+    MESSAGE_SNAPSHOT_ID = 0x21D,
+    MESSAGE_PLATFORM_RESET_ID = 0x21F
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -66,7 +68,9 @@ enum message_data_id {
     MESSAGE_FEEDTHROUGH_DATA_ID = 209,
     MESSAGE_GRIP_SAMPLE_DATA_ID = 225,
     MESSAGE_STABILITY_DATA_ID = 240,
-    MESSAGE_CORRECTION_DATA_ID = 9
+    MESSAGE_CORRECTION_DATA_ID = 9,
+    MESSAGE_SNAPSHOT_DATA_ID = 25,
+    MESSAGE_PLATFORM_RESET_DATA_ID = 73
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -226,6 +230,36 @@ typedef struct message_platform_health {
 bool message_platform_health_encode(lever_frame_t *frame, const message_platform_health_t *message);
 bool message_platform_health_decode(message_platform_health_t *message, const lever_frame_t *frame);
 
+enum message_cause {
+    MESSAGE_CAUSE_UNKNOWN = 0,
+    MESSAGE_CAUSE_POWER_ON = 1,
+    MESSAGE_CAUSE_BROWN_OUT = 2,
+    MESSAGE_CAUSE_PIN = 3,
+    MESSAGE_CAUSE_SOFTWARE = 4, /* asked for, by a debugger, too */
+    MESSAGE_CAUSE_WATCHDOG = 5,
+    MESSAGE_CAUSE_HARD_FAULT = 6,
+    MESSAGE_CAUSE_STACK_OVERFLOW = 7, /* a hard fault whose stack was not in memory */
+    MESSAGE_CAUSE_CLOCK_FAILURE = 8
+};
+
+enum message_self_test {
+    MESSAGE_SELF_TEST_ROM = 1,
+    MESSAGE_SELF_TEST_RAM = 2,
+    MESSAGE_SELF_TEST_STACK = 4, /* was, once, deeper than it may be */
+    MESSAGE_SELF_TEST_GOLDEN = 8 /* the estimator did not give its golden vector at power-on */
+};
+
+/* A port sends this one itself, with e2e_protect(). */
+typedef struct message_platform_reset {
+    uint32_t fault_address; /* instruction of the last hard fault since power-on; 0: none, or not known */
+    uint8_t cause;          /* enum message_cause */
+    uint8_t resets;         /* since power-on, the low eight bits */
+    uint8_t failed;         /* of enum message_self_test, since the last reset */
+} message_platform_reset_t;
+
+bool message_platform_reset_encode(lever_frame_t *frame, const message_platform_reset_t *message);
+bool message_platform_reset_decode(message_platform_reset_t *message, const lever_frame_t *frame);
+
 enum message_page { MESSAGE_PAGE_VERSION = 0, MESSAGE_PAGE_SETTINGS = 1, MESSAGE_PAGE_CHOICES = 2, MESSAGE_PAGE_COUNT };
 
 /* One page of it: only that page's members are sent, and what is received leaves the others 0. */
@@ -279,5 +313,21 @@ typedef struct message_link_health {
 
 bool message_link_health_encode(lever_frame_t *frame, const message_link_health_t *message);
 bool message_link_health_decode(message_link_health_t *message, const lever_frame_t *frame);
+
+enum message_part { MESSAGE_PART_BEGIN = 0, MESSAGE_PART_DATA = 1, MESSAGE_PART_END = 2, MESSAGE_PART_COUNT };
+
+/* One part of a snapshot: only that part's members are sent, and what is received leaves the others 0. */
+typedef struct message_snapshot {
+    uint8_t part;      /* enum message_part; not known: refused in both directions */
+    uint32_t time_us;  /* begin: of the sample after which the state was this */
+    uint16_t layout;   /* lever_state_layout() */
+    uint32_t data_low; /* data: the next six bytes of the state, lowest first */
+    uint16_t data_high;
+    uint32_t digest; /* end: CRC-32 over the bytes of the state */
+    uint16_t length; /* how many these are */
+} message_snapshot_t;
+
+bool message_snapshot_encode(lever_frame_t *frame, const message_snapshot_t *message);
+bool message_snapshot_decode(message_snapshot_t *message, const lever_frame_t *frame);
 
 #endif

@@ -31,14 +31,14 @@ from can.typechecking import CanFilters
 from ..errors import LeverError
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.config import Config
-from ..firmware.estimator import FRAME_SAMPLE, Estimator
+from ..firmware.estimator import FRAME_SAMPLE, Estimator, Recorder
 from ..firmware.settings_file import make_config, read_assignments
 from .codec import raw_field
 
 LOG = logging.getLogger("can.lever")
 
 _MEANINGLESS = {"single_handle", "bitrate", "timing", "fd"}  # python-can's tools and configuration files pass these
-_OPTIONS = "config, settings, aircraft, receive_own_messages, rx_queue_size, can_filters"
+_OPTIONS = "config, settings, aircraft, snapshots, receive_own_messages, rx_queue_size, can_filters"
 _NOBODY, _SEVERAL = 0, -1  # senders; no thread has these identifiers
 
 
@@ -57,6 +57,7 @@ class LeverBus(BusABC):
         config: Config | None = None,
         settings: Mapping[str, str | float] | str | os.PathLike[str] | None = None,
         aircraft: AircraftResponse | None = None,
+        snapshots: float | None = None,
         receive_own_messages: bool = False,
         rx_queue_size: int = 65536,
         **kwargs: Any,
@@ -66,6 +67,7 @@ class LeverBus(BusABC):
         :param config: configuration of the firmware; its defaults if neither this nor `settings` is given
         :param settings: instead of `config`: settings and choices by name, or the path of a settings file
         :param aircraft: the helicopter whose margin to collective bounce the firmware watches
+        :param snapshots: [s] also send the state of the firmware so often, as SNAPSHOT
         :param receive_own_messages: also receive what is sent, before the answers to it
         :param rx_queue_size: most frames that wait to be received
         :raises LeverBusError: (a CanInitializationError) with what is wrong
@@ -79,6 +81,7 @@ class LeverBus(BusABC):
             raise LeverBusError(f"rx_queue_size is {rx_queue_size!r}; it must be a number of frames, at least 1")
         self.estimator = Estimator(_configuration(config, settings))
         self.estimator.watch(aircraft)
+        self._recorder = None if snapshots is None else Recorder(self.estimator, snapshots)
         self.channel = str(channel)
         self.channel_info = f"lever firmware in this process, channel {self.channel!r}"
         self.receive_own_messages = receive_own_messages
@@ -168,16 +171,19 @@ class LeverBus(BusABC):
         if is_sample:
             estimator.step()
         while (answer := estimator.next_frame()) is not None:
-            identifier, data = answer
-            self._put(
-                Message(
-                    timestamp=self._timestamp,
-                    arbitration_id=identifier,
-                    is_extended_id=False,
-                    channel=self.channel,
-                    data=data,
-                )
-            )
+            self._put(self._from_estimator(*answer))
+        if is_sample and self._recorder is not None:
+            for identifier, data in self._recorder.frames():
+                self._put(self._from_estimator(identifier, data))
+
+    def _from_estimator(self, identifier: int, data: bytes) -> Message:
+        return Message(
+            timestamp=self._timestamp,
+            arbitration_id=identifier,
+            is_extended_id=False,
+            channel=self.channel,
+            data=data,
+        )
 
     def _own(self, msg: Message) -> Message:
         return Message(

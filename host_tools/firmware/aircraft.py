@@ -14,7 +14,7 @@ from .settings_file import lines_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-WARNING, ALARM = 5.0, 3.5
+WARNING, ALARM = 5.0, 4.0
 """Gain margins below which there is a warning and an alarm, where nothing else is said [dB]."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
@@ -218,6 +218,17 @@ class Estimator:
         lib.lever_health(self.pointer, self._health)
         return health_of(self._health)
 
+    def state(self) -> bytes:
+        """All that its future depends on besides configuration, aircraft and what it is given; between two samples."""
+        room = ffi.new("uint8_t[]", lib.LEVER_STATE_BYTES)
+        lib.lever_state_save(self.pointer, room)
+        return bytes(room)
+
+    def restore(self, state: bytes) -> bool:
+        """Goes on from the state of an instance with the same settings; False, and unchanged, for one that is of
+        another kind."""
+        return len(state) == lib.LEVER_STATE_BYTES and bool(lib.lever_state_restore(self.pointer, state))
+
     def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
         """Takes a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""
         length = len(data)
@@ -240,6 +251,27 @@ class Estimator:
         if not lib.lever_next_frame(self.pointer, answer):
             return None
         return answer.id, self._answer_data[0 : answer.length]
+
+
+def state_layout() -> int:
+    """Of the bytes of state(): those of another version of the firmware have another one."""
+    return int(lib.lever_state_layout())
+
+
+class Recorder:
+    """Sends the state of an estimator each `period` seconds of sample time, as SNAPSHOT frames."""
+
+    def __init__(self, estimator: Estimator, period: float) -> None:
+        self._estimator = estimator
+        self.pointer: Any = ffi.new("lever_recorder_t *")
+        lib.lever_recorder_init(self.pointer, round(period * 1e6))
+        self._frame = ffi.new("lever_frame_t *")
+
+    def frames(self) -> Iterator[tuple[int, bytes]]:
+        """Those to send now: after a step all of whose frames have been fetched, before the next frame is taken."""
+        lib.lever_recorder_step(self.pointer, self._estimator.pointer)
+        while lib.lever_recorder_next_frame(self.pointer, self._frame):
+            yield self._frame.id, bytes(ffi.buffer(self._frame.data))
 
 
 def feed(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:

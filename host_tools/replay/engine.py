@@ -13,7 +13,8 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..can import codec
-from ..can.bulk import RECORDED, SLOTS, Feeder, Frames, Rows
+from ..can.bulk import FRAME, RECORDED, SLOTS, Feeder, Frames, Rows
+from ..can.identity import Identity
 from ..can.logs import Recording
 from ..can.traffic import Traffic
 from ..exports.signal_files import calendar
@@ -33,6 +34,7 @@ from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
 from .outputs import FILES, SUMMARY, Folder
+from .proof import OTHER_CHOICES, Proof
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
 from .summary import Figures, failure, verdict
@@ -108,9 +110,8 @@ class _Replay:
 
     def __init__(self, traffic: Traffic | MappedTraffic, options: Options, folder: Folder | None) -> None:
         self._traffic, self._options, self._folder = traffic, options, folder
-        estimator = Estimator(options.config)
-        estimator.watch(options.aircraft)
-        self._feeder = Feeder(estimator)
+        self._feeder = Feeder(self._new_estimator())
+        self._proof = Proof(self._feeder.estimator, self._new_estimator, options.chosen)
         self._commands = Commands(options.config.choices, options.chosen)
         self._repeats = Repeats()
         self._timeline = Timeline(options.config.settings["sample_period"])
@@ -120,6 +121,7 @@ class _Replay:
         self._model_number = -1
         self._model_changes = 0
         self._recorded_contract: int | None = None
+        self._recorded = Identity()
         self._other_contract = False
 
     def run(self, progress: Progress | None) -> None:
@@ -128,20 +130,38 @@ class _Replay:
         for frames in self._traffic.chunks():
             self._repeats.add(frames)
             self._identify(frames)
-            for fed, rows in self._feeder.feed(self._commands.applied(frames)):
+            self._feed(self._commands.applied(frames))
+            if progress is not None:
+                progress(recording.done, recording.size)
+        self._feed(np.empty(0, FRAME), last=True)
+        self._take(self._feeder.flush(), last=True)
+
+    def _new_estimator(self) -> Estimator:
+        estimator = Estimator(self._options.config)
+        if self._options.aircraft is not None:
+            estimator.watch(self._options.aircraft)
+        return estimator
+
+    def _feed(self, frames: Frames, last: bool = False) -> None:
+        self._proof.first_us = self._traffic.first_us
+        for piece, snapshot in self._proof.pieces(frames, last):
+            for fed, rows in self._feeder.feed(piece):
                 if self._folder is not None:
                     self._folder.log(fed, self._traffic.channel or "")
                 self._take(rows)
-            if progress is not None:
-                progress(recording.done, recording.size)
-        self._take(self._feeder.flush(), last=True)
+            if self._commands.changed:
+                self._proof.counts.not_compared = OTHER_CHOICES
+            if snapshot is not None:
+                self._proof.compare(snapshot, int(piece["time_us"][-1]))
 
     def _identify(self, frames: Frames) -> None:
-        """Which contract the recorded estimator speaks, by its first IDENTITY that says so."""
-        if self._recorded_contract is None:
-            data = frames["data"][frames["id"] == codec.message("IDENTITY").frame_id]
-            contracts = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))["contract"]
-            self._recorded_contract = next((int(number) for number in contracts[np.isfinite(contracts)]), None)
+        """Which contract the recorded estimator speaks, by its first IDENTITY that says so, and its last choices."""
+        data = frames["data"][frames["id"] == codec.message("IDENTITY").frame_id]
+        fields = codec.decode_columns("IDENTITY", np.ascontiguousarray(data))
+        said = {name: column[np.isfinite(column)] for name, column in fields.items()}
+        if self._recorded_contract is None and len(said["contract"]):
+            self._recorded_contract = int(said["contract"][0])
+        self._recorded.take({name: float(column[-1]) for name, column in said.items() if len(column)})
 
     def _take(self, rows: Rows, last: bool = False) -> None:
         """Gathers rows, so that what is done with columns pays."""
@@ -206,13 +226,17 @@ class _Replay:
             **self.figures.summary(self._feeder.estimator.health()),
             "stability": self._stability(),
             "comparison": compared,
+            "snapshots": self._proof.summary(),
         }
         summary["passed"] = not failure(summary)
         summary["verdict"] = verdict(summary)
         return summary
 
     def _estimator(self) -> dict[str, Any]:
-        choices = self._commands.choices | {"model": self.model}
+        choices = self._commands.choices
+        if self._proof.counts.begun_at_s is not None:
+            choices |= self._recorded.choices  # COMMANDs before the log
+        choices |= {"model": self.model}
         return {**choices, "settings": self._options.config.settings}
 
     def _stability(self) -> dict[str, Any] | None:

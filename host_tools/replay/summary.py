@@ -16,6 +16,7 @@ from ..results.faults import LITTLE, OPTIONAL, WARNINGS, FaultCounts
 from ..results.nis import Innovations, freedom
 from ..results.summary import Stability
 from ..results.trace import CONVERGED_AFTER, MEASURED, Trace
+from . import proof
 from .reduction import Groups
 
 
@@ -107,6 +108,7 @@ def verdict(summary: dict[str, Any]) -> str:
     measured, stability = summary["whiteness"], summary["stability"]
     sentences = [
         *_troubles(summary),
+        proof.in_words(summary["snapshots"]),
         *_flags(summary),
         bounce.verdict(stability and Stability(**stability)),
         _comparison(summary["comparison"]),
@@ -147,7 +149,7 @@ def _troubles(summary: dict[str, Any]) -> list[str]:
         troubles += _protection(mapping)
     if recording["refused"]:
         why = why_refused(summary["corrupt"], summary["late"])
-        troubles.append(f"{recording['refused']:,} frames were refused: {why}.")
+        troubles.append(f"{recording['refused']:,} frames were refused{f': {why}' if why else ''}.")
     if recording["ends_early"]:
         troubles.append(f"The log is incomplete: {'; '.join(recording['ends_early'])}.")
     if recording["damaged_lines"]:

@@ -223,6 +223,8 @@ class ReplaySummary(Summary):
     """Of the judged time with any of faults.WARNINGS of those; None where nothing is judged."""
     estimates: dict[str, Estimate]
     comparison: Comparison | None
+    snapshots: dict[str, Any] | None = None
+    """Of the estimator's state in the log: replay.proof.Counts."""
 
 
 # --- to and from JSON ------------------------------------------------------------------------------------------------

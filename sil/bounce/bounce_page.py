@@ -24,7 +24,10 @@ def build(results: Sequence[Result], seeds: int) -> str:
         "in the loop. Charts: of each condition the flight in which its first figure was worst.",
         "lever bounce",
     )
-    charts = [None if result.excerpt is None else _chart(result.excerpt, result.shown) for result in results]
+    charts = [
+        None if result.excerpt is None else _chart(result.excerpt, str(result.worst_run(result.condition.figures[0])))
+        for result in results
+    ]
     return judged_page.build(page, results, charts, "Gearing is collective pitch over the lever's angle.")
 
 

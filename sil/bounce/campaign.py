@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +26,7 @@ class Result(judged.Result):
     known = FIGURES
     condition: Condition
     excerpt: Excerpt | None = None
-    shown: str = ""
-    """Which flight the excerpt is of."""
+    """Of the flight in which its first figure was worst."""
 
 
 class Task(NamedTuple):
@@ -60,7 +59,7 @@ def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[Result]:
 
 def _result(row: Condition, flights: Sequence[tuple[str, int]], found: Sequence[Measured]) -> Result:
     values = {name: np.array([each.figures[name] for each in found]) for name in row.figures}
-    first = row.figures[0]
-    worst = int(np.argmax(values[first] if FIGURES[first].more_is_worse else -values[first]))
-    craft, seed = flights[worst]
-    return Result(row, values, excerpt=found[worst].excerpt, shown=f"{craft}, pilot {seed}")
+    names = [f"{craft}, pilot {seed}" for craft, seed in flights]
+    result = Result(row, values, runs=names)
+    worst = names.index(str(result.worst_run(row.figures[0])))
+    return replace(result, excerpt=found[worst].excerpt)

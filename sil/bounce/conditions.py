@@ -225,7 +225,7 @@ def _left(name: str, title: str, spoil: Callable[[Plan], Plan]) -> Condition:
 
 
 _TRUNK = {"model": "two_dof", "m_p": "3.2 kg", "c_p": "30 N s/m", "k_p": "2100 N/m"}
-_SPOILT: tuple[tuple[str, str, Callable[[Plan], Plan]], ...] = (
+SPOILT: tuple[tuple[str, str, Callable[[Plan], Plan]], ...] = (
     *(
         (f"{name}_{word}", f"{name} {sign} 30 %, and held there", _stuck_with(name, factor))
         for name in ("m_p", "c_p", "k_p")
@@ -238,8 +238,8 @@ _SPOILT: tuple[tuple[str, str, Callable[[Plan], Plan]], ...] = (
     ("friction", "Coulomb friction of 0.3 N m", _more(lever={"lever_friction": "0.3 N m"})),
 )
 _WRONG = (
-    *(_wrong(name, title, spoil, quick=name == "k_p_low") for name, title, spoil in _SPOILT),
-    *(_left(name, title, spoil) for name, title, spoil in _SPOILT),
+    *(_wrong(name, title, spoil, quick=name == "k_p_low") for name, title, spoil in SPOILT),
+    *(_left(name, title, spoil) for name, title, spoil in SPOILT),
 )
 
 

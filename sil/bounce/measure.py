@@ -114,11 +114,18 @@ def _first(where: BoolArray, time: FloatArray) -> float:
     return float(time[int(np.argmax(where))]) if where.any() else math.inf
 
 
+def standing(alarmed: BoolArray, time: FloatArray, until: float) -> float:
+    """When the alarm was raised that stands at `until`, or else the next one [s]; one that has ended does not count."""
+    begun = time[np.diff(alarmed, prepend=False) & alarmed]
+    at = int(np.searchsorted(time, until, side="right")) - 1
+    return float(begun[begun <= until][-1]) if alarmed[at] else _first(alarmed & (time > until), time)
+
+
 def relaxing(craft: str, seed: int) -> Measured:
     """A pilot relaxes until the loop is unstable: who sees it coming?"""
     flown = fly(geared(Plan(craft, seed, pilots.relaxing(seed), 1.0, duration=75.0), BEYOND))
     notes, doubled = flown.notes, _doubled(flown)
-    alarm = _first(flown.stability["state"] == lib.LEVER_BOUNCE_ALARM, notes)
+    alarm = standing(flown.stability["state"] == lib.LEVER_BOUNCE_ALARM, notes, doubled)
     rover, spectrum = (_first(level > limit, time) for time, level, limit in _detected(flown))
     at = int(np.searchsorted(notes, alarm)) if math.isfinite(alarm) else 0
     figures = {

@@ -18,7 +18,7 @@ those that there are.
 AIRCRAFT is one of them, or a .toml file with the keys of theirs. KEY=VALUE after it changes one (delay=30 ms), and says
   gearing                  pitch of the blades over the lever's angle (default: 0.5; in service 0.3 to 0.6)
   gain_sigma, phase_sigma  how well the response is known [1, rad] (default: 0.05)
-  warning, alarm           gain margins below which there is one [dB] (default: 5, 3.5)
+  warning, alarm           gain margins below which there is one [dB] (default: 5, 4)
 
 A response that was measured or computed elsewhere, with gearing, is a .csv file of frequency [Hz], real and imaginary
 part of the cabin's acceleration over the lever's angle [(m/s^2)/rad].

@@ -100,6 +100,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     sim.add_argument("--seed", type=int, help="set the seed of all random numbers; with --seeds the first (default: 1)")
     sim.add_argument("--seeds", type=int, metavar="N", help="run N times, with consecutive seeds: median and worst")
     sim.add_argument("--jobs", type=int, metavar="N", help="with --seeds: processes (default: one a core)")
+    sim.add_argument(
+        "--snapshots",
+        metavar="SECONDS",
+        type=float,
+        help="the firmware also sends its whole state so often (0.1 to 10), so that bus.log may be cut anywhere",
+    )
     sim.add_argument("--realtime", action="store_true", help="pace the samples by the clock")
     sim.add_argument(
         "--settings",
@@ -120,7 +126,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     demo.add_argument("-o", "--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
     add_format_option(demo, ("csv",))
     add_json_option(demo)
-    demo.set_defaults(run=run_demo, realtime=False, settings=None)
+    demo.set_defaults(run=run_demo, realtime=False, settings=None, snapshots=None)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -142,6 +148,10 @@ def run(args: argparse.Namespace) -> int:
 
         sys.stdout.write(format_config(scenario.config))
         return 0
+    if args.snapshots is not None and not 0.1 <= args.snapshots <= 10.0:
+        raise LeverError(f"--snapshots {args.snapshots:g}: must be 0.1 to 10 s")
+    if args.snapshots is not None and args.interface != "lever":
+        raise LeverError(f"--snapshots is for --interface lever; over {args.interface}: lever_can --snapshots")
     channel = args.channel or _CHANNELS.get(args.interface)
     if channel is None:
         raise LeverError(f"--interface {args.interface} needs --channel, such as /dev/ttyUSB0")
@@ -179,6 +189,7 @@ def _check_seeds(args: argparse.Namespace) -> None:
         ("--out", args.out is not None),
         ("--format", args.format is not None),
         ("--realtime", args.realtime),
+        ("--snapshots", args.snapshots is not None),
         ("--settings without a file", args.settings == _PRINT),
         (f"--interface {args.interface}", args.interface != "lever"),
         ("--channel", args.channel is not None),
@@ -239,7 +250,7 @@ def _simulate(
     with ExitStack() as stack:
         progress, bus = stack.enter_context(Progress(scenario.name)), None
         if interface != "lever" or bus_options:
-            bus = stack.enter_context(open_bus(scenario, interface, channel, bus_options))
+            bus = stack.enter_context(open_bus(scenario, interface, channel, {**bus_options, **_snapshots(args)}))
         result = simulate(
             *(scenario, bus, args.out),
             channel=channel,
@@ -248,6 +259,7 @@ def _simulate(
             formats=formats,
             inputs=inputs,
             story=story,
+            snapshots=args.snapshots,
         )
     print_tables(_tables(result), args.json)
     say(result.summary.verdict)
@@ -257,6 +269,11 @@ def _simulate(
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)
     return 1
+
+
+def _snapshots(args: argparse.Namespace) -> dict[str, float]:
+    """As an option of the bus; only that of the firmware in this process has it."""
+    return {} if args.snapshots is None else {"snapshots": args.snapshots}
 
 
 def open_bus(

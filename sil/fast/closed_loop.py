@@ -14,7 +14,7 @@ from lever_cdkf.host_tools.can.commander import Commander
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware import quantities
 from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
-from lever_cdkf.host_tools.firmware.estimator import Estimator, make_command
+from lever_cdkf.host_tools.firmware.estimator import Estimator, Recorder, make_command
 from lever_cdkf.host_tools.firmware.library import ffi, struct_dtype
 from numpy.typing import NDArray
 
@@ -86,12 +86,15 @@ class Traffic:
 class Loop:
     """A run under way."""
 
-    def __init__(self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int) -> None:
-        """`every`: of how many samples one has its estimate kept."""
+    def __init__(
+        self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int, estimator: Estimator | None = None
+    ) -> None:
+        """`every`: of how many samples one has its estimate kept. `estimator`: goes on from where it is, without the
+        reset that a run begins with."""
         if not plants.has(inputs.truth):
             raise LeverError(f"a pilot of model {inputs.truth.model} runs in Python only: use run.runner.simulate()")
         self._scenario, self._inputs = scenario, inputs
-        self._estimator = Estimator(scenario.config)
+        self._estimator, self._goes_on = estimator or Estimator(scenario.config), estimator is not None
         self.struct = Struct("loop_t")
         count = len(inputs.time)
         loop = self.struct.pointer
@@ -153,6 +156,8 @@ class Loop:
         commands = scenario_inputs.commands(self._scenario, self._inputs.time)
         samples = sorted(commands)
         values = [commands[sample] for sample in samples]
+        if self._goes_on:
+            values[0] = {**values[0], "request": "none"}
         loop.commands = len(samples)
         loop.command_sample = self.struct.array("uint32_t", np.array(samples), np.uint32)
         if loop.by_frames:
@@ -188,6 +193,11 @@ class Loop:
         loop.frame_id = self.struct.array("uint16_t", self._traffic.identifier, np.uint16)
         loop.frame_sample = self.struct.array("uint32_t", self._traffic.sample, np.uint32)
         loop.frame_data = ffi.cast("uint8_t (*)[8]", self.struct.array("uint8_t", self._traffic.data, np.uint8))
+
+    def send_snapshots(self, period: float) -> None:
+        """By frames: also sends the state of the firmware each `period` seconds."""
+        recorder = Recorder(self._estimator, period)
+        self.struct.pointer.recorder = self.struct.keep(recorder.pointer)
 
     def take_frames(self) -> Traffic:
         """Those since they were taken last."""

@@ -100,6 +100,8 @@ class Result:
     """Figures, one value a run; empty when it could not be run."""
     problem: str = ""
     """Why it could not be run."""
+    runs: Sequence[str] = ()
+    """What each run was, where that has a name."""
 
     def of(self, limit: Limit) -> float:
         """What is held against a limit; NaN without runs."""
@@ -109,6 +111,13 @@ class Result:
         if limit.over == "median":
             return float(np.median(values))
         return figure.worst(values) if limit.over == "worst" else figure.pool(values)
+
+    def worst_run(self, figure: str) -> str | None:
+        """The name of the run in which a figure was worst."""
+        if not self.runs:
+            return None
+        values = self.values[figure]
+        return self.runs[int(np.argmax(values if self.known[figure].more_is_worse else -values))]
 
     @property
     def ok(self) -> bool:

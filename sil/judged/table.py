@@ -112,6 +112,7 @@ def _figure(result: Result, name: str) -> dict[str, Any]:
         "all runs": _number(figure.pool(values)),
         "median": _number(_median(values)),
         "worst": _number(figure.worst(values)),
+        "worst run": result.worst_run(name),
     }
 
 

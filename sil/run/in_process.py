@@ -19,24 +19,31 @@ from . import loop
 from .loop import Progress, Recording
 
 
-def run(scenario: Scenario, channel: str = "lever", progress: Progress | None = None) -> Recording:
-    """Runs `scenario`; `channel` names the estimator in errors. A pilot whose plant the C does not have runs in
-    Python.
+def run(
+    scenario: Scenario, channel: str = "lever", progress: Progress | None = None, snapshots: float | None = None
+) -> Recording:
+    """Runs `scenario`; `channel` names the estimator in errors, which sends its state each `snapshots` seconds. A pilot
+    whose plant the C does not have runs in Python.
 
     Raises NoAnswerError when the firmware falls silent, RefusedError when it refuses a COMMAND.
     """
     inputs = prepare(scenario)
     if plants.has(inputs.truth):
-        return _run_in_c(scenario, inputs, f"the firmware in this process, channel {channel!r}", progress)
-    with LeverBus(channel, config=scenario.config, aircraft=scenario.known_aircraft) as bus:
+        where = f"the firmware in this process, channel {channel!r}"
+        return _run_in_c(scenario, inputs, where, progress, snapshots)
+    with LeverBus(channel, config=scenario.config, aircraft=scenario.known_aircraft, snapshots=snapshots) as bus:
         return loop.run(scenario, bus, progress=progress)
 
 
-def _run_in_c(scenario: Scenario, inputs: Inputs, where: str, progress: Progress | None) -> Recording:
+def _run_in_c(
+    scenario: Scenario, inputs: Inputs, where: str, progress: Progress | None, snapshots: float | None
+) -> Recording:
     count = len(inputs.time)
     run = closed_loop.Loop(scenario, inputs, by_frames=True, every=count)
     run.keep_frames()
     run.watch(scenario.known_aircraft)
+    if snapshots is not None:
+        run.send_snapshots(snapshots)
     given = run.struct.pointer
     given.most_unanswered = loop.MOST_UNANSWERED
     parts, done = [], 0

@@ -55,11 +55,13 @@ def simulate(
     formats: Sequence[str] = ("csv",),
     inputs: Sequence[str | Path] = (),
     story: Callable[[], Story] | None = None,
+    snapshots: float | None = None,
 ) -> Result:
     """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
     it; with `out_dir` also writes bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra
     `report`) and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the
-    scenario is from; `story` makes a first picture for the report.
+    scenario is from; `story` makes a first picture for the report; in this process the firmware sends its state each
+    `snapshots` seconds.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
     files but for the wall times are the same either way. Raises LeverError.
@@ -68,11 +70,13 @@ def simulate(
     if out_dir is not None:
         make_folder(out_dir)  # before a run that could then not be kept
     if bus is None and not realtime:
-        recording = in_process.run(scenario, channel, progress)
+        recording = in_process.run(scenario, channel, progress, snapshots)
     else:
         with ExitStack() as stack:
             config, aircraft = scenario.config, scenario.known_aircraft
-            estimator = bus or stack.enter_context(LeverBus(channel, config=config, aircraft=aircraft))
+            estimator = bus or stack.enter_context(
+                LeverBus(channel, config=config, aircraft=aircraft, snapshots=snapshots)
+            )
             recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
             recording.has_aircraft = isinstance(estimator, LeverBus)
     _check_bounded(recording)

@@ -19,7 +19,7 @@ from lever_cdkf.sil.run import seeds
 
 SEEDS = 20
 """Runs of each scenario: seeds 1 to 20."""
-BEGIN = "<!-- accuracy of {name}: written by `cmake --build build --target accuracy-accept` -->\n"
+BEGIN = "<!-- accuracy of {name}: written by `cmake --build build --target {target}` -->\n"
 END = "<!-- accuracy: end -->\n"
 
 _FREQUENCY, _DAMPING = (each.key for each in DYNAMICS)
@@ -33,6 +33,8 @@ class Place:
     file: str
     name: str
     """In the mark above it."""
+    target: str = "accuracy-accept"
+    """That writes it."""
 
     def __str__(self) -> str:
         return f"{self.file}, {self.name}"
@@ -152,7 +154,7 @@ def replaced(text: str, place: Place, table: str) -> str:
 
 
 def _parts(text: str, place: Place) -> tuple[str, str, str]:
-    mark = BEGIN.format(name=place.name)
+    mark = BEGIN.format(name=place.name, target=place.target)
     before, begin, rest = text.partition(mark)
     table, end, after = rest.partition(END)
     if not (begin and end):

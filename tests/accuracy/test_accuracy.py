@@ -102,7 +102,7 @@ def test_what_differs_is_named(new: str, expected: list[str]) -> None:
 
 
 def test_a_table_replaces_another_between_the_marks_and_nothing_else() -> None:
-    first, second = (f"{tables.BEGIN.format(name=name)}{OLD}{tables.END}" for name in "ab")
+    first, second = (f"{tables.BEGIN.format(name=name, target='accuracy-accept')}{OLD}{tables.END}" for name in "ab")
     place = Place("x", "b")
     assert tables.written(f"before\n{first}{second}after\n", place) == OLD
     replaced = tables.replaced(f"before\n{first}{second}after\n", place, "new\n")

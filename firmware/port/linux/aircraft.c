@@ -7,7 +7,7 @@
 
 #define BLANK " \t"
 #define WARNING 5.0f /* where nothing else is said [dB] */
-#define ALARM 3.5f
+#define ALARM 4.0f
 
 enum { COLUMNS = 3, NAMES = 4 };
 

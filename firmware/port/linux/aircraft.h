@@ -5,7 +5,7 @@
  *     gain_sigma = 0.1       # how well the gain is known, relative to it [1]
  *     phase_sigma = 0.1      # [rad]
  *     warning = 5            # gain margin below which there is a warning [dB]; 5 without this line
- *     alarm = 3.5            # and an alarm [dB]; 3.5 without this line
+ *     alarm = 4              # and an alarm [dB]; 4 without this line
  *     1.5  -12.1  4.2        # frequency [Hz], real and imaginary part [(m/s^2)/rad]; 3 to LEVER_AIRCRAFT_POINTS lines
  */
 #ifndef LEVER_PORT_AIRCRAFT_H

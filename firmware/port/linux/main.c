@@ -12,6 +12,7 @@
 #include "port/linux/socketcan.h"
 #include "port/linux/stop.h"
 #include "port/loop.h"
+#include "port/recording.h"
 
 enum { EXIT_GOOD = 0, EXIT_BAD_INTERFACE = 1, EXIT_BAD_USAGE = 2 };
 
@@ -21,7 +22,9 @@ typedef struct session {
     slcan_host_t slcan_host;
     slcan_peer_t slcan_peer;
     const char *reason; /* of it: what is wrong */
-    port_t port;
+    port_t medium;
+    recording_t recording;
+    port_t port; /* the medium, with snapshots or without */
     loop_t loop;
 } session_t;
 
@@ -106,12 +109,12 @@ static bool open_medium(session_t *session, int stop)
     const char *const interface = session->options->interface;
     bool good = false;
 
-    session->port = slcan_peer_port(&session->slcan_peer);
+    session->medium = slcan_peer_port(&session->slcan_peer);
     session->reason = session->slcan_peer.tty.reason;
     switch (session->options->medium) {
     case OPTIONS_MEDIUM_SLCAN:
         good = slcan_host_open(&session->slcan_host, interface, stop);
-        session->port = slcan_host_port(&session->slcan_host);
+        session->medium = slcan_host_port(&session->slcan_host);
         session->reason = session->slcan_host.tty.reason;
         break;
     case OPTIONS_MEDIUM_PTY:
@@ -126,7 +129,7 @@ static bool open_medium(session_t *session, int stop)
         good = socketcan_open(&session->socketcan, interface, stop);
         session->socketcan.on_bus_state = print_bus_state;
         session->socketcan.context = session;
-        session->port = socketcan_port(&session->socketcan);
+        session->medium = socketcan_port(&session->socketcan);
         session->reason = session->socketcan.reason;
         break;
     }
@@ -184,6 +187,10 @@ static int run(const options_t *options)
         print_reason(&session);
         close_medium(&session);
         return EXIT_BAD_INTERFACE;
+    }
+    session.port = session.medium;
+    if (options->snapshot_us != 0u) {
+        session.port = recording_port(&session.recording, &session.medium, lever, options->snapshot_us);
     }
     loop_init(&session.loop, &session.port, lever,
         is_adapter(options) ? LOOP_DROP : LOOP_HOLD); /* a bus is waited for, a host that does not read is not */

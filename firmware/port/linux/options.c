@@ -8,7 +8,11 @@
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+#define SNAPSHOTS_LEAST 0.1 /* [s] */
+#define SNAPSHOTS_MOST 10.0
 
 static const char help[] =
     "lever_can: estimates a pilot's mass, damping and stiffness on the collective lever, on a CAN interface.\n"
@@ -40,6 +44,8 @@ static const char help[] =
     "  --mitigation NAME    what is done against collective bounce\n"
     "  --aircraft FILE      watch the margin to collective bounce with the response of this helicopter (STABILITY);\n"
     "                       `lever aircraft` writes such a file, firmware/port/linux/aircraft.h says what is in it\n"
+    "  --snapshots SECONDS  also send the whole state so often (SNAPSHOT; 0.5 is 6 % of a bus of 1 Mbit/s), so that a\n"
+    "                       log may begin anywhere: `lever replay` starts from one, and proves itself by the others\n"
     "  --lock-step          time is that of the samples alone: for simulations that may pause; never beside a motor\n"
     "  --verbose            also print all settings, and every change of mode\n"
     "  --help, --version    print this, or the version, and exit\n"
@@ -76,6 +82,7 @@ static const struct option known[] = {
     {"adaptation", required_argument, NULL, '='},
     {"mitigation", required_argument, NULL, '='},
     {"aircraft", required_argument, NULL, 'a'},
+    {"snapshots", required_argument, NULL, 'n'},
     {"lock-step", no_argument, NULL, 'k'},
     {"verbose", no_argument, NULL, 'v'},
     {"help", no_argument, NULL, 'h'},
@@ -128,6 +135,18 @@ static void choose(options_t *options, enum options_medium medium, const char *i
     options->interface = interface;
 }
 
+static bool read_snapshots(options_t *options, const char *argument, settings_error_t *error)
+{
+    char *end = NULL;
+    const double seconds = strtod(argument, &end);
+
+    if ((end == argument) || (*end != '\0') || !((seconds >= SNAPSHOTS_LEAST) && (seconds <= SNAPSHOTS_MOST))) {
+        return refuse(error, "--snapshots takes seconds, from 0.1 to 10: ", argument);
+    }
+    options->snapshot_us = (uint32_t)((1.0e6 * seconds) + 0.5);
+    return true;
+}
+
 static bool read_option(options_t *options, int option, const char *name, const char *argument, settings_error_t *error)
 {
     bool good = true;
@@ -156,6 +175,9 @@ static bool read_option(options_t *options, int option, const char *name, const 
         break;
     case '=':
         good = settings_set(&options->config, name, argument, error);
+        break;
+    case 'n':
+        good = read_snapshots(options, argument, error);
         break;
     case 'k':
         options->lock_step = true;

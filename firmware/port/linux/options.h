@@ -3,6 +3,7 @@
 #define LEVER_PORT_OPTIONS_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "lever_cdkf.h"
 #include "port/linux/settings.h"
@@ -23,6 +24,7 @@ typedef struct options {
     const char *interface; /* its name; of argv */
     bool verbose;
     bool lock_step;        /* see loop.h */
+    uint32_t snapshot_us;  /* from one SNAPSHOT to the next; 0: none */
     lever_config_t config; /* checked */
     bool has_aircraft;
     lever_aircraft_t aircraft; /* as it stands in its file */

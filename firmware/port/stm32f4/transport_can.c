@@ -33,6 +33,16 @@ void transport_poll(uint32_t now_ms)
     can_poll(now_ms);
 }
 
+bool transport_is_served(void)
+{
+    return can_is_served();
+}
+
+bool transport_takes_commands(void)
+{
+    return LEVER_COMMANDS != 0;
+}
+
 void transport_status(lever_platform_t *status)
 {
     const can_counts_t counts = can_counts();

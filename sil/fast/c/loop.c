@@ -256,6 +256,18 @@ static void take_answer(loop_t *loop)
     loop->unanswered_in_a_row = answered ? 0u : (loop->unanswered_in_a_row + 1u);
 }
 
+/* What does not follow this sample follows the next. */
+static void take_snapshots(loop_t *loop, const lever_t *lever)
+{
+    lever_frame_t frame;
+    uint32_t count = 0u;
+    lever_recorder_step(loop->recorder, lever);
+    while ((count < (uint32_t)LOOP_SNAPSHOTS) && lever_recorder_next_frame(loop->recorder, &frame)) {
+        record(loop, (uint16_t)frame.id, frame.data);
+        count++;
+    }
+}
+
 static void step_by_frames(loop_t *loop, lever_t *lever)
 {
     if (has_command(loop)) {
@@ -277,6 +289,9 @@ static void step_by_frames(loop_t *loop, lever_t *lever)
         const uint64_t payload = bits_of(&loop->base_field, measured_base(loop)) | time_us;
         send_payload(loop, lever, (uint32_t)MESSAGE_BASE_SAMPLE_ID, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, payload);
         take_answer(loop);
+        if (loop->recorder != NULL) {
+            take_snapshots(loop, lever);
+        }
     }
 }
 

@@ -17,13 +17,15 @@ struct lever_command;
 struct lever_estimate;
 struct lever_frame;
 struct lever_health;
+struct lever_recorder;
 struct lever_stability;
 
 enum loop_signal { LOOP_THETA, LOOP_THETA_DOT, LOOP_TAU_M, LOOP_GRIP_FORCE, LOOP_Z_DDOT, LOOP_SIGNALS };
 
 enum loop_limits {
-    LOOP_PENDING = 32, /* frames of the estimator that wait to be taken */
-    LOOP_FRAMES = 64   /* that a sample can bring into the record, at most */
+    LOOP_PENDING = 32,   /* frames of the estimator that wait to be taken */
+    LOOP_SNAPSHOTS = 32, /* of a snapshot that follow a sample, at most */
+    LOOP_FRAMES = 96     /* that a sample can bring into the record, at most */
 };
 
 /* A field of a frame, as the DBC has it: value = scale * its signed bits. */
@@ -72,6 +74,7 @@ typedef struct loop {
     loop_field_t correction_field;           /* of CORRECTION */
     const uint8_t *no_lever;                 /* the frame is never sent */
     const uint8_t *no_base;                  /* likewise */
+    struct lever_recorder *recorder;         /* by frames, sends snapshots; NULL: none does */
     const uint32_t *time_us;                 /* by structs, of the samples; NULL: as they are */
     const double *torque;                    /* asked of the motor besides what the firmware asks for [N m] */
     uint32_t commands;                       /* before which samples there is a COMMAND, */

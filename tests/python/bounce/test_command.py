@@ -43,7 +43,7 @@ def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch)
     (result,) = campaign.run([row], 2, lambda *_: None)
     assert sorted(result.values["alarm lead"].tolist()) == [9.0, 9.0, 10.0, 19.0, 19.0, 20.0]
     assert not result.ok
-    assert result.shown == "uh60_like, pilot 0"
+    assert result.worst_run("alarm lead") == "uh60_like, pilot 0"
     assert "MISSED" in bounce_page.build([result], 2)
     assert np.isclose(result.of(row.limits[0]), 9.0)
 

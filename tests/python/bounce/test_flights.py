@@ -24,6 +24,12 @@ def test_the_critical_gearing_is_that_of_the_margins(craft: str) -> None:
     assert found == pytest.approx([stability.margins(loop).gain for loop in loops], rel=2e-3)  # 0.02 dB
 
 
+@pytest.mark.parametrize(("until", "expected"), [(1.5, 1.0), (2.5, 4.0), (5.0, 4.0), (6.0, math.inf)])
+def test_an_alarm_that_has_ended_does_not_count(until: float, expected: float) -> None:
+    alarmed = np.array((False, True, False, False, True, True, False))
+    assert measure.standing(alarmed, np.arange(7.0), until) == expected
+
+
 def test_a_gearing_goes_up_after_a_while() -> None:
     plan = measure.raised(Plan("puma_like", 1, pilots.table(pilots.arm(1)), 1.0, duration=30.0), 3.0)
     least = plan.gearing / 3.0

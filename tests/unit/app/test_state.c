@@ -1,0 +1,247 @@
+/* The state of an instance as bytes: all of it, the same again, and nothing that does harm. */
+#include "app/instance.h"
+#include "app/state.h"
+#include "frames.h"
+
+#include <stddef.h>
+
+enum { FIRST_ROW = 1 }; /* byte 0 says whether there is an aircraft */
+
+static uint8_t state[LEVER_STATE_BYTES];
+static lever_memory_t other_memory;
+static random_source_t source;
+static const lever_aircraft_t aircraft = {.count = 3u,
+    .frequency = {2.0f, 4.0f, 8.0f},
+    .real = {1.0f, 1.0f, 1.0f},
+    .gain_sigma = 0.1f,
+    .phase_sigma = 0.1f,
+    .warning = 6.0f,
+    .alarm = 3.0f};
+
+void setUp(void)
+{
+    lever_config_default(&config);
+    config.settings.torque_limit = 2.0f;
+    config.settings.torque_rms = 1.0f;
+    source.state = 7u;
+}
+
+static uint32_t width_of(const state_row_t *row)
+{
+    return (row->most < 0x100u) ? 1u : ((row->most < 0x10000u) ? 2u : 4u);
+}
+
+TEST(its_rows_fill_it)
+{
+    uint32_t bytes = FIRST_ROW;
+    for (uint32_t i = 0u; i < state_row_count(); i++) {
+        bytes += state_row(i)->count * width_of(state_row(i));
+    }
+    TEST_ASSERT_EQUAL_UINT32(LEVER_STATE_BYTES, bytes);
+}
+
+/* Samples, commands, dither, mitigation and gaps, so that little is 0. */
+static void fly(uint32_t samples)
+{
+    lever_command_t command = command_none();
+    command.dither_rms = 0.4f;
+    command.mitigation = (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING;
+    for (uint32_t k = 0u; k < samples; k++) {
+        if ((k % 500u) == 100u) {
+            const lever_frame_t frame = command_frame(&command);
+            (void)lever_on_frame(lever, &frame);
+        }
+        next_pair();
+        if ((k % 300u) == 7u) {
+            lever_frame.data[3] ^= 4u; /* one that is corrupt */
+        }
+        (void)lever_on_frame(lever, &lever_frame);
+        TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &base_frame));
+        (void)lever_step(lever);
+        (void)fetch();
+    }
+}
+
+static void assert_same_future(lever_t *restored)
+{
+    lever_t *first = lever;
+    uint8_t expected[LEVER_STATE_BYTES];
+    for (uint32_t k = 0u; k < 1500u; k++) {
+        lever_frame_t answer;
+        next_pair();
+        lever = first;
+        (void)take_pair();
+        const uint32_t count = fetch();
+        (void)lever_on_frame(restored, &lever_frame);
+        (void)lever_on_frame(restored, &base_frame);
+        (void)lever_step(restored);
+        for (uint32_t i = 0u; i < count; i++) {
+            TEST_ASSERT_TRUE(lever_next_frame(restored, &answer));
+            TEST_ASSERT_EQUAL_UINT32(frames[i].id, answer.id);
+            TEST_ASSERT_EQUAL_MEMORY(frames[i].data, answer.data, sizeof answer.data);
+        }
+        TEST_ASSERT_FALSE(lever_next_frame(restored, &answer));
+    }
+    lever_state_save(first, expected);
+    lever_state_save(restored, state);
+    TEST_ASSERT_EQUAL_MEMORY(expected, state, sizeof state);
+}
+
+/* R53 */
+TEST(a_restored_instance_goes_on_as_the_one_that_was_saved)
+{
+    for (uint32_t i = 0u; i < (uint32_t)COMBINATIONS; i++) {
+        lever_config_t other_config = config;
+        config.model = config_of(i).model;
+        config.estimator = config_of(i).estimator;
+        start_bus();
+        fly(1000u + (97u * i));
+        lever_state_save(lever, state);
+        other_config.model =
+            (uint8_t)((config.model + 1u) % (uint32_t)LEVER_MODEL_COUNT); /* a COMMAND has changed it */
+        other_config.settings = config.settings;
+        lever_t *restored = lever_init(&other_memory, &other_config);
+        TEST_ASSERT_TRUE(lever_state_restore(restored, state));
+        assert_same_future(restored);
+    }
+}
+
+static void assert_refused(lever_t *instance)
+{
+    uint8_t before[LEVER_STATE_BYTES];
+    uint8_t after[LEVER_STATE_BYTES];
+    lever_state_save(instance, before);
+    TEST_ASSERT_FALSE(lever_state_restore(instance, state));
+    lever_state_save(instance, after);
+    TEST_ASSERT_EQUAL_MEMORY(before, after, sizeof after);
+}
+
+TEST(other_settings_or_an_aircraft_on_one_side_are_refused)
+{
+    start_bus();
+    fly(50u);
+    lever_state_save(lever, state);
+    lever_config_t other_config = config;
+    other_config.settings.theta_noise *= 2.0f;
+    assert_refused(lever_init(&other_memory, &other_config));
+    lever_t *watching = lever_init(&other_memory, &config);
+    TEST_ASSERT_TRUE(lever_aircraft(watching, &aircraft));
+    assert_refused(watching);
+    lever_state_save(watching, state);
+    assert_refused(lever);
+    TEST_ASSERT_TRUE(lever_state_restore(watching, state));
+}
+
+TEST(without_an_aircraft_it_is_the_same_whether_that_was_said_or_not)
+{
+    uint8_t unsaid[LEVER_STATE_BYTES];
+    start_bus();
+    fly(50u);
+    lever_state_save(lever, unsaid);
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_TRUE(lever_aircraft(lever, NULL));
+    lever_state_save(lever, state);
+    TEST_ASSERT_EQUAL_MEMORY(unsaid, state, sizeof state);
+}
+
+/* What indexes, chooses or counts bits, written out: a value beyond would be one beyond an array. */
+TEST(limits_are_those_of_what_they_index)
+{
+    static const struct {
+        size_t offset;
+        uint32_t most;
+    } limits[] = {{offsetof(struct lever, estimator.setup.model), 3u},
+        {offsetof(struct lever, estimator.setup.preload), 1u}, {offsetof(struct lever, estimator.setup.estimator), 1u},
+        {offsetof(struct lever, estimator.setup.adaptation), 3u}, {offsetof(struct lever, estimator.cdkf.acting), 5u},
+        {offsetof(struct lever, estimator.mode), 5u}, {offsetof(struct lever, estimator.nis_size), 2u},
+        {offsetof(struct lever, link.due), 0x1FFFu}, /* 13 messages */
+        {offsetof(struct lever, link.pages), 7u}, {offsetof(struct lever, link.counter), 15u},
+        {offsetof(struct lever, link.command_result), 3u}, {offsetof(struct lever, bounce.chosen), 5u},
+        {offsetof(struct lever, bounce.state), 3u}};
+    for (uint32_t i = 0u; i < (uint32_t)(sizeof limits / sizeof limits[0]); i++) {
+        uint32_t row = 0u;
+        while (state_row(row)->offset != limits[i].offset) {
+            row++;
+            TEST_ASSERT_LESS_THAN_UINT32(state_row_count(), row);
+        }
+        TEST_ASSERT_EQUAL_UINT32(limits[i].most, state_row(row)->most);
+    }
+}
+
+/* Every value that is limited: at its limit it is taken, beyond not. */
+TEST(a_value_beyond_its_range_is_refused)
+{
+    uint32_t at = FIRST_ROW;
+    start_bus();
+    fly(50u);
+    for (uint32_t i = 0u; i < state_row_count(); i++) {
+        const state_row_t *row = state_row(i);
+        const uint32_t width = width_of(row);
+        for (uint32_t k = 0u; k < row->count; k++) {
+            const uint32_t greatest = (width == 1u) ? 0xFFu : ((width == 2u) ? 0xFFFFu : UINT32_MAX);
+            for (uint32_t beyond = 0u; (row->most < greatest) && (beyond < 2u); beyond++) {
+                lever_state_save(lever, state);
+                const uint32_t value = row->most + beyond;
+                for (uint32_t byte = 0u; byte < width; byte++) {
+                    state[at + byte] = (uint8_t)((value >> (8u * byte)) & 0xFFu);
+                }
+                lever_t *other = lever_init(&other_memory, &config);
+                if (beyond == 0u) {
+                    TEST_ASSERT_TRUE(lever_state_restore(other, state));
+                } else {
+                    assert_refused(other);
+                }
+            }
+            at += width;
+        }
+    }
+}
+
+/* Values anywhere in their ranges, floats of any bits; under the sanitizers. */
+TEST(any_bytes_that_are_accepted_break_nothing)
+{
+    start_bus();
+    fly(20u);
+    for (uint32_t trial = 0u; trial < 200u; trial++) {
+        uint32_t at = FIRST_ROW + 4u; /* behind the checksum of the settings */
+        lever_state_save(lever, state);
+        for (uint32_t i = 1u; i < state_row_count(); i++) {
+            const state_row_t *row = state_row(i);
+            const uint32_t width = width_of(row);
+            for (uint32_t k = 0u; k < row->count; k++) {
+                const uint32_t bits = (uint32_t)(random_unit(&source) * 4294967295.0);
+                const bool kept = (random_unit(&source) < (0.005 * (double)trial));
+                const uint32_t value = (row->most == UINT32_MAX) ? bits : (bits % (row->most + 1u));
+                for (uint32_t byte = 0u; (byte < width) && !kept; byte++) {
+                    state[at + byte] = (uint8_t)((value >> (8u * byte)) & 0xFFu);
+                }
+                at += width;
+            }
+        }
+        lever_t *hurt = lever_init(&other_memory, &config);
+        state[0] = (uint8_t)(trial % 2u);
+        TEST_ASSERT_TRUE(lever_aircraft(hurt, (state[0] != 0u) ? &aircraft : NULL));
+        TEST_ASSERT_TRUE(lever_state_restore(hurt, state));
+        lever_t *mine = lever;
+        lever = hurt;
+        (void)fetch();
+        for (uint32_t k = 0u; k < 60u; k++) {
+            lever_sample_t sample = sample_after(1u);
+            (void)lever_update(lever, &sample);
+            next_pair();
+            (void)lever_on_frame(lever, &lever_frame);
+            (void)lever_on_frame(lever, &base_frame);
+            (void)lever_step(lever);
+            (void)fetch();
+            lever_idle(lever, 5000u);
+            (void)estimate();
+        }
+        lever = mine;
+    }
+}
+
+TEST(the_layout_is_a_number_of_its_own)
+{
+    TEST_ASSERT_EQUAL_UINT16(lever_state_layout(), lever_state_layout());
+    TEST_ASSERT_NOT_EQUAL(0u, lever_state_layout());
+}
