@@ -321,8 +321,8 @@ def _tables(result: Result) -> Tables:
     }
     near: list[Row] = []
     if summary.stability is not None:
-        near = [{"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}]
-        near[0] |= {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}
+        margin = {"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}
+        near = [margin | {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}]
     return {summary.scenario.title: rows, "run": [run_row], **({"collective bounce": near} if near else {})}
 
 
