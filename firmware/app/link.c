@@ -3,7 +3,6 @@
 #include "app/instance.h"
 
 #include <stddef.h>
-#include <string.h>
 
 #define BIT(output) ((uint32_t)1u << (uint32_t)(output))
 #define EVERY_PAGE ((1u << (uint32_t)MESSAGE_PAGE_COUNT) - 1u)
@@ -47,7 +46,6 @@ void link_init(link_t *link, const lever_settings_t *settings)
 {
     const float period_us = (settings->sample_period * 1.0e6f) + 0.5f;
     const float publish_us = (settings->publish_period * 1.0e6f) + 0.5f;
-    (void)memset(link, 0, sizeof *link);
     link->period_us = (uint32_t)period_us;
     link->publish_us = (uint32_t)publish_us;
     link->identity_us = LONG_AGO_US;

@@ -57,6 +57,7 @@ typedef struct link {
     uint8_t counter[OUTPUTS]; /* E2E counter of the next frame of each */
 } link_t;
 
+/* All of it is zero before. */
 void link_init(link_t *link, const lever_settings_t *settings);
 
 /* The functions of lever_cdkf.h of the same names. */

@@ -8,16 +8,14 @@
 
 #define HALF_TURN_OF_TIME 0x80000000u
 
-enum {
-    FRAME_DATA = 6,                                                   /* bytes of the state in a frame */
-    FRAMES = 2 + ((LEVER_STATE_BYTES + FRAME_DATA - 1) / FRAME_DATA), /* with begin and end */
-    PERIOD_LEAST_US = FRAMES
-};
+#define FRAME_DATA 6u /* bytes of the state in a frame */
+#define FRAMES (2u + ((((uint32_t)LEVER_STATE_BYTES + FRAME_DATA) - 1u) / FRAME_DATA)) /* with begin and end */
+#define PERIOD_LEAST_US FRAMES
 
 void lever_recorder_init(lever_recorder_t *recorder, uint32_t period_us)
 {
     (void)memset(recorder, 0, sizeof *recorder);
-    recorder->period_us = (period_us > (uint32_t)PERIOD_LEAST_US) ? period_us : (uint32_t)PERIOD_LEAST_US;
+    recorder->period_us = (period_us > PERIOD_LEAST_US) ? period_us : PERIOD_LEAST_US;
     recorder->elapsed_us = recorder->period_us;
     recorder->sent = (uint16_t)FRAMES;
     recorder->layout = lever_state_layout();
@@ -44,12 +42,13 @@ void lever_recorder_step(lever_recorder_t *recorder, const lever_t *lever)
 /* The next six bytes of the state, which count for the digest, and 0 behind its end. */
 static void add_data(lever_recorder_t *recorder, message_snapshot_t *message)
 {
-    const uint32_t begin = ((uint32_t)recorder->sent - 1u) * (uint32_t)FRAME_DATA;
+    const uint32_t begin = ((uint32_t)recorder->sent - 1u) * FRAME_DATA;
     uint64_t data = 0u;
-    for (uint32_t i = 0u; (i < (uint32_t)FRAME_DATA) && ((begin + i) < (uint32_t)LEVER_STATE_BYTES); i++) {
+    for (uint32_t i = 0u; (i < FRAME_DATA) && ((begin + i) < (uint32_t)LEVER_STATE_BYTES); i++) {
         const uint8_t byte = recorder->state[begin + i];
         recorder->crc = crc32_shift(recorder->crc ^ byte, 8u);
-        data |= (uint64_t)byte << (8u * i);
+        const uint32_t place = 8u * i;
+        data |= (uint64_t)byte << place;
     }
     message->data_low = (uint32_t)(data & UINT32_MAX);
     message->data_high = (uint16_t)(data >> 32u);
@@ -57,7 +56,7 @@ static void add_data(lever_recorder_t *recorder, message_snapshot_t *message)
 
 bool lever_recorder_next_frame(lever_recorder_t *recorder, lever_frame_t *frame)
 {
-    const uint32_t due = 1u + (recorder->elapsed_us / (recorder->period_us / (uint32_t)FRAMES));
+    const uint32_t due = 1u + (recorder->elapsed_us / (recorder->period_us / FRAMES));
     const bool sends = (recorder->sent < (uint16_t)FRAMES) && (recorder->sent < due);
     if (sends) {
         message_snapshot_t message = {.part = (uint8_t)MESSAGE_PART_DATA};
@@ -65,7 +64,7 @@ bool lever_recorder_next_frame(lever_recorder_t *recorder, lever_frame_t *frame)
             message.part = (uint8_t)MESSAGE_PART_BEGIN;
             message.time_us = recorder->taken_us;
             message.layout = recorder->layout;
-        } else if (recorder->sent == ((uint16_t)FRAMES - 1u)) {
+        } else if (recorder->sent == (FRAMES - 1u)) {
             message.part = (uint8_t)MESSAGE_PART_END;
             message.digest = ~recorder->crc;
             message.length = (uint16_t)LEVER_STATE_BYTES;

@@ -140,7 +140,6 @@ static places_t places_of(const loop_t *loop)
                 highest = height;
                 places.crosses = true;
                 places.crossing = ((float)i - 1.0f) + part;
-                places.slope.real = value.real - before.real;
                 places.slope.imaginary = value.imaginary - before.imaginary;
             }
         }
@@ -241,6 +240,18 @@ static float hypotenuse(float a, float b, float c)
     return sqrtf((a * a) + ((b * b) + (c * c)));
 }
 
+static bool is_small(derived_complex_t value)
+{
+    return ((value.real * value.real) + (value.imaginary * value.imaginary)) <= (LEAST_HEIGHT * LEAST_HEIGHT);
+}
+
+/* Where L does not cross within the table it may beyond it, unless it has become small there. NaN has not. */
+static float hidden_beyond(const loop_t *loop)
+{
+    const float last = (float)loop->aircraft->count - 1.0f;
+    return (is_small(loop_at(loop, 0.0f)) && is_small(loop_at(loop, last))) ? 0.0f : MARGIN_MOST;
+}
+
 margin_t margin_of(const lever_aircraft_t *aircraft, const cdkf_t *cdkf, const model_t *model,
     const model_constants_t *constants, const model_step_t *step)
 {
@@ -253,6 +264,7 @@ margin_t margin_of(const lever_aircraft_t *aircraft, const cdkf_t *cdkf, const m
         .by = {1.0f, 0.0f}};
     places_t places = places_of(&loop);
     const limits_t at = limits_at(&loop, &places);
+    const float hidden = places.crosses ? 0.0f : hidden_beyond(&loop);
     const float frequency = critical_frequency(&loop, &places, &at);
     loop.by.real = 1.0f + aircraft->gain_sigma;
     const limits_t louder = limits_near(&loop, &places);
@@ -272,7 +284,7 @@ margin_t margin_of(const lever_aircraft_t *aircraft, const cdkf_t *cdkf, const m
     const derived_couple_t modulus_sigma = derived_sigma(cdkf, modulus);
     const float by_phase = critical_frequency(&loop, &places, &later) - frequency;
     const margin_t result = {.gain = (at.height > LEAST_HEIGHT) ? -(DECIBELS * logarithm(at.height)) : MARGIN_MOST,
-        .gain_sigma = hypotenuse(sigma.first, louder_by(&louder, &at), louder_by(&later, &at)),
+        .gain_sigma = hidden + hypotenuse(sigma.first, louder_by(&louder, &at), louder_by(&later, &at)),
         .modulus = at.modulus,
         .modulus_sigma = hypotenuse(modulus_sigma.first, louder.modulus - at.modulus, later.modulus - at.modulus),
         .frequency = frequency,

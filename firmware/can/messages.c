@@ -277,6 +277,31 @@ bool message_platform_health_decode(message_platform_health_t *message, const le
     return fits;
 }
 
+/* --- PLATFORM_RESET ----------------------------------------------------------------------------------------------- */
+
+static const place_t platform_reset_code[] = {CODE(12u, 15u), CODE(16u, 255u), CODE(24u, 255u), CODE(32u, UINT32_MAX)};
+static const layout_t platform_reset = CODES_ONLY(MESSAGE_PLATFORM_RESET_ID, platform_reset_code);
+
+bool message_platform_reset_encode(lever_frame_t *frame, const message_platform_reset_t *message)
+{
+    const uint32_t code[] = {message->cause, message->resets, message->failed, message->fault_address};
+    return layout_encode(frame, &platform_reset, code, no_quantity);
+}
+
+bool message_platform_reset_decode(message_platform_reset_t *message, const lever_frame_t *frame)
+{
+    uint32_t code[COUNT(platform_reset_code)];
+    float value[1];
+    const bool fits = layout_decode(code, value, &platform_reset, frame);
+    if (fits) {
+        message->cause = (uint8_t)code[0];
+        message->resets = (uint8_t)code[1];
+        message->failed = (uint8_t)code[2];
+        message->fault_address = code[3];
+    }
+    return fits;
+}
+
 /* --- IDENTITY, multiplexed by page -------------------------------------------------------------------------------- */
 
 enum { PAGE_CODES = 6 }; /* of the page that has most */

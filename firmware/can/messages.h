@@ -46,7 +46,8 @@ enum message_id {
     MESSAGE_FEEDTHROUGH_ID = 0x21A,
     MESSAGE_STABILITY_ID = 0x21B,
     MESSAGE_CORRECTION_ID = 0x21C,
-    MESSAGE_SNAPSHOT_ID = 0x21D
+    MESSAGE_SNAPSHOT_ID = 0x21D,
+    MESSAGE_PLATFORM_RESET_ID = 0x21F
 };
 
 /* The data_id_base of each message for e2e.h: attribute E2EDataIdBase of the DBC. */
@@ -68,7 +69,8 @@ enum message_data_id {
     MESSAGE_GRIP_SAMPLE_DATA_ID = 225,
     MESSAGE_STABILITY_DATA_ID = 240,
     MESSAGE_CORRECTION_DATA_ID = 9,
-    MESSAGE_SNAPSHOT_DATA_ID = 25
+    MESSAGE_SNAPSHOT_DATA_ID = 25,
+    MESSAGE_PLATFORM_RESET_DATA_ID = 73
 };
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
@@ -227,6 +229,36 @@ typedef struct message_platform_health {
 
 bool message_platform_health_encode(lever_frame_t *frame, const message_platform_health_t *message);
 bool message_platform_health_decode(message_platform_health_t *message, const lever_frame_t *frame);
+
+enum message_cause {
+    MESSAGE_CAUSE_UNKNOWN = 0,
+    MESSAGE_CAUSE_POWER_ON = 1,
+    MESSAGE_CAUSE_BROWN_OUT = 2,
+    MESSAGE_CAUSE_PIN = 3,
+    MESSAGE_CAUSE_SOFTWARE = 4, /* asked for, by a debugger, too */
+    MESSAGE_CAUSE_WATCHDOG = 5,
+    MESSAGE_CAUSE_HARD_FAULT = 6,
+    MESSAGE_CAUSE_STACK_OVERFLOW = 7, /* a hard fault whose stack was not in memory */
+    MESSAGE_CAUSE_CLOCK_FAILURE = 8
+};
+
+enum message_self_test {
+    MESSAGE_SELF_TEST_ROM = 1,
+    MESSAGE_SELF_TEST_RAM = 2,
+    MESSAGE_SELF_TEST_STACK = 4, /* was, once, deeper than it may be */
+    MESSAGE_SELF_TEST_GOLDEN = 8 /* the estimator did not give its golden vector at power-on */
+};
+
+/* A port sends this one itself, with e2e_protect(). */
+typedef struct message_platform_reset {
+    uint32_t fault_address; /* instruction of the last hard fault since power-on; 0: none, or not known */
+    uint8_t cause;          /* enum message_cause */
+    uint8_t resets;         /* since power-on, the low eight bits */
+    uint8_t failed;         /* of enum message_self_test, since the last reset */
+} message_platform_reset_t;
+
+bool message_platform_reset_encode(lever_frame_t *frame, const message_platform_reset_t *message);
+bool message_platform_reset_decode(message_platform_reset_t *message, const lever_frame_t *frame);
 
 enum message_page { MESSAGE_PAGE_VERSION = 0, MESSAGE_PAGE_SETTINGS = 1, MESSAGE_PAGE_CHOICES = 2, MESSAGE_PAGE_COUNT };
 

@@ -109,7 +109,8 @@ static enum port_result restore(loop_t *loop, uint32_t now)
     } else if ((now - loop->tried_us) >= (1000u * loop->pause_ms)) {
         result = loop->port->restore(loop->port->self);
         loop->tried_us = now;
-        loop->pause_ms = (loop->pause_ms < (LOOP_BACKOFF_LAST_MS / 2)) ? (2u * loop->pause_ms) : LOOP_BACKOFF_LAST_MS;
+        const uint32_t doubled = 2u * loop->pause_ms;
+        loop->pause_ms = (doubled < (uint32_t)LOOP_BACKOFF_LAST_MS) ? doubled : (uint32_t)LOOP_BACKOFF_LAST_MS;
     } else {
         /* not yet */
     }
@@ -129,7 +130,7 @@ static bool rest(loop_t *loop, bool received)
     } else if (loop->is_held) {
         going = port->wait(port->self, false, LOOP_RETRY_MS);
     } else if (!received) {
-        going = port->wait(port->self, true, loop->lock_step ? -1 : LOOP_IDLE_MS);
+        going = port->wait(port->self, true, loop->lock_step ? -1 : (int32_t)LOOP_IDLE_MS);
     } else if (loop->batch >= (uint32_t)LOOP_BATCH) {
         going = port->wait(port->self, true, 0);
     } else {

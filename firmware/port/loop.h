@@ -5,7 +5,7 @@
  *     loop_t loop;
  *     loop_init(&loop, &port, lever, LOOP_DROP);
  *     while (loop_turn(&loop) == PORT_DONE) {
- *         feed_watchdog();
+ *         // feed the watchdog if loop.sample_us has changed: a turn by itself has finished nothing
  *     }
  *
  * Guarantees, given a port that keeps its contract:

@@ -51,7 +51,7 @@ def find(frames: Frames) -> list[Snapshot]:
             last = first + ends[0]
             end = codec.decode_columns(NAME, data[last : last + 1])
             digest, length = int(end["digest"][0]), int(end["length"][0])
-            in_order = (np.diff(counter[first : last + 1].astype(np.int64)) % 16 == 1).all()
+            in_order = bool(((counter[first + 1 : last + 1] - counter[first:last]) & 15 == 1).all())
             content = data[first + 1 : last, 2:].tobytes()
             if in_order and len(content) == -(-length // _DATA_BYTES) * _DATA_BYTES:
                 state = content[:length] if zlib.crc32(content[:length]) == digest else None

@@ -34,7 +34,7 @@ from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
 from .outputs import FILES, SUMMARY, Folder
-from .proof import Proof
+from .proof import OTHER_CHOICES, Proof
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
 from .summary import Figures, failure, verdict
@@ -111,7 +111,7 @@ class _Replay:
     def __init__(self, traffic: Traffic | MappedTraffic, options: Options, folder: Folder | None) -> None:
         self._traffic, self._options, self._folder = traffic, options, folder
         self._feeder = Feeder(self._new_estimator())
-        self._proof = Proof(self._feeder.estimator, self._new_estimator, bool(options.chosen))
+        self._proof = Proof(self._feeder.estimator, self._new_estimator, options.chosen)
         self._commands = Commands(options.config.choices, options.chosen)
         self._repeats = Repeats()
         self._timeline = Timeline(options.config.settings["sample_period"])
@@ -143,11 +143,14 @@ class _Replay:
         return estimator
 
     def _feed(self, frames: Frames, last: bool = False) -> None:
+        self._proof.first_us = self._traffic.first_us
         for piece, snapshot in self._proof.pieces(frames, last):
             for fed, rows in self._feeder.feed(piece):
                 if self._folder is not None:
                     self._folder.log(fed, self._traffic.channel or "")
                 self._take(rows)
+            if self._commands.changed:
+                self._proof.counts.not_compared = OTHER_CHOICES
             if snapshot is not None:
                 self._proof.compare(snapshot, int(piece["time_us"][-1]))
 

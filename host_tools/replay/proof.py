@@ -8,7 +8,7 @@ between two snapshots is judged by itself.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -17,7 +17,9 @@ import numpy as np
 from ..can import codec, snapshots
 from ..can.bulk import Feeder, Frames
 from ..can.snapshots import Snapshot
+from ..firmware.config import CHOICES
 from ..firmware.estimator import Estimator, state_layout
+from ..firmware.library import enum_names, lib
 
 _LONGEST_US = 20_000_000
 """Two periods of the longest between snapshots: after that a snapshot that has begun does not end any more."""
@@ -25,6 +27,9 @@ _SILENT_US = 1_000_000
 """Without a frame of a snapshot for so long from the start on, there are none."""
 _SAMPLES_LATE = 8
 """Samples that a recorder may have seen before the SNAPSHOT of an earlier one."""
+
+
+OTHER_CHOICES = "other choices were made for the replay"
 
 
 @dataclass
@@ -49,14 +54,14 @@ class Counts:
 class Proof:
     """Sits between the frames of a log and an estimator that has taken none yet."""
 
-    def __init__(self, estimator: Estimator, another: Callable[[], Estimator], chosen: bool) -> None:
-        """`another` makes an estimator of the same configuration and aircraft; `chosen`: some of its choices are not
-        those of the log."""
-        self.counts = Counts(not_compared="choices were made on the command line" if chosen else None)
-        self._estimator, self._another = estimator, another
+    def __init__(self, estimator: Estimator, another: Callable[[], Estimator], chosen: Mapping[str, str]) -> None:
+        """`another` makes an estimator of the same configuration and aircraft; `chosen` are choices that stay."""
+        self.counts = Counts()
+        self._estimator, self._another, self._chosen = estimator, another, chosen
         self._held: Frames | None = None
         self._started = self._known = False
-        self._first_us = 0
+        self.first_us = 0
+        """Recorded time of the first frame of the log [us]."""
         self._base = codec.message("BASE_SAMPLE").frame_id
         self._time_of = codec.raw_field("BASE_SAMPLE", "time_us")
 
@@ -64,7 +69,6 @@ class Proof:
         """The frames to feed, in pieces; the estimator has the state of the snapshot, if there is one, after its piece.
         Some are held back until the next call, or the `last`."""
         held = frames if self._held is None else np.concatenate((self._held, frames))
-        self._first_us = int(held["time_us"][0]) if self._held is None and len(held) else self._first_us
         self._held = held
         found = snapshots.find(held)
         if not (self._started or last or self._may_start(held, found)):
@@ -84,7 +88,7 @@ class Proof:
             return
         if not self._is_comparable(snapshot):
             return
-        seconds = (recorded_us - self._first_us) * 1e-6
+        seconds = (recorded_us - self.first_us) * 1e-6
         if zlib.crc32(self._estimator.state()) == snapshot.digest:
             self.counts.equal += 1
             self.counts.last_equal_s = seconds
@@ -103,7 +107,8 @@ class Proof:
 
     def _may_start(self, held: Frames, found: list[Snapshot]) -> bool:
         """The first whole snapshot is there, or there will be none."""
-        span = int(held["time_us"][-1] - held["time_us"][0]) if len(held) else 0
+        samples = held["time_us"][held["id"] == self._base]  # a COMMAND may be of long before
+        span = abs(int(samples[-1] - samples[0])) if len(samples) else 0
         silent = not (held["id"] == codec.message(snapshots.NAME).frame_id).any()
         return any(each.state for each in found) or span > (_SILENT_US if silent else _LONGEST_US)
 
@@ -119,7 +124,7 @@ class Proof:
         """Frames before it belong to no snapshot that is still to come."""
         if found and not found[-1].ended:
             begin = found[-1].begin
-            if held["time_us"][-1] - held["time_us"][begin] < _LONGEST_US:
+            if abs(held["time_us"][-1] - held["time_us"][begin]) < _LONGEST_US:
                 place = places[-1]
                 return begin if place is None else place
         samples = np.flatnonzero(held["id"] == self._base)[-_SAMPLES_LATE:]
@@ -135,7 +140,7 @@ class Proof:
             for _ in Feeder(trial).feed(held[: place + 1]):
                 pass
             if zlib.crc32(trial.state()) != snapshot.digest and self._estimator.restore(snapshot.state):
-                self.counts.begun_at_s = (int(held["time_us"][place]) - self._first_us) * 1e-6
+                self.counts.begun_at_s = (int(held["time_us"][place]) - self.first_us) * 1e-6
                 self.counts.left_out = place + 1
                 self.counts.found += 1
                 return place + 1
@@ -163,9 +168,24 @@ class Proof:
             self._known = True
             if snapshot.layout != state_layout():
                 self.counts.not_compared = "they are of another version of the firmware"
-            elif not self._another().restore(snapshot.state):
-                self.counts.not_compared = "they are of other settings, or only one of both has an aircraft"
+            else:
+                trial = self._another()
+                if not trial.restore(snapshot.state):
+                    self.counts.not_compared = "they are of other settings, or only one of both has an aircraft"
+                elif any(choices_of(trial)[what] != name for what, name in self._chosen.items()):
+                    self.counts.not_compared = OTHER_CHOICES
         return self.counts.not_compared is None
+
+
+def choices_of(estimator: Estimator) -> dict[str, str]:
+    """As they stand, by its answer to a COMMAND that keeps them; the estimator is of no other use then."""
+    keep = {what: float(lib.LEVER_KEEP) for what in CHOICES}
+    data = codec.encode("COMMAND", 0, {"request": 0, "dither_rms": 65.535, **keep})
+    estimator.on_frame(codec.message("COMMAND").frame_id, data)
+    answer = estimator.next_frame()
+    assert answer is not None
+    _, fields = codec.decode(*answer)
+    return {what: enum_names(f"lever_{what}")[int(fields[what])] for what in CHOICES}
 
 
 def in_words(summary: dict[str, Any] | None) -> str:

@@ -86,12 +86,15 @@ class Traffic:
 class Loop:
     """A run under way."""
 
-    def __init__(self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int) -> None:
-        """`every`: of how many samples one has its estimate kept."""
+    def __init__(
+        self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int, estimator: Estimator | None = None
+    ) -> None:
+        """`every`: of how many samples one has its estimate kept. `estimator`: goes on from where it is, without the
+        reset that a run begins with."""
         if not plants.has(inputs.truth):
             raise LeverError(f"a pilot of model {inputs.truth.model} runs in Python only: use run.runner.simulate()")
         self._scenario, self._inputs = scenario, inputs
-        self._estimator = Estimator(scenario.config)
+        self._estimator, self._goes_on = estimator or Estimator(scenario.config), estimator is not None
         self.struct = Struct("loop_t")
         count = len(inputs.time)
         loop = self.struct.pointer
@@ -153,6 +156,8 @@ class Loop:
         commands = scenario_inputs.commands(self._scenario, self._inputs.time)
         samples = sorted(commands)
         values = [commands[sample] for sample in samples]
+        if self._goes_on:
+            values[0] = {**values[0], "request": "none"}
         loop.commands = len(samples)
         loop.command_sample = self.struct.array("uint32_t", np.array(samples), np.uint32)
         if loop.by_frames:

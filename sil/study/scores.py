@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from lever_cdkf.host_tools.arrays import Array
 from lever_cdkf.host_tools.statistics import chi_square_band
-from scipy.stats import bootstrap
 
 from .data import Batch, Estimates
 
@@ -67,6 +66,8 @@ def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 20
     def quotient(square: Array, least: Array, axis: int) -> Array:
         root: Array = np.sqrt(square.mean(axis=axis) / least.mean(axis=axis))
         return root
+
+    from scipy.stats import bootstrap  # which takes a third of a second
 
     drawn = bootstrap((square, least), quotient, paired=True, axis=0, n_resamples=draws, method="percentile", rng=seed)
     spread: Array = drawn.standard_error

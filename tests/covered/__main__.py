@@ -1,5 +1,4 @@
-"""Says what of the core the tests do not reach: lines, branches and conditions (MC/DC). Those of C, the cases of the
-float64 oracle, and those of Python that compare codec, margin and configuration.
+"""Says what of the core the tests do not reach: lines, branches and conditions (MC/DC).
 
     python tests/covered BUILD [--json FILE]
 

@@ -11,7 +11,16 @@ from lint import checks
 
 CHECKS: dict[str, Callable[..., str]] = {
     check.__name__: check
-    for check in (checks.layout, checks.tidy, checks.tidy_cross, checks.misra, checks.python, checks.types)
+    for check in (
+        checks.layout,
+        checks.tidy,
+        checks.tidy_cross,
+        checks.misra,
+        checks.misra_image,
+        checks.analyzer,
+        checks.python,
+        checks.types,
+    )
 }
 
 

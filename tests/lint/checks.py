@@ -18,7 +18,9 @@ MISRA = (FIRMWARE / "MISRA.md").read_text(encoding="utf-8")
 NOT_APPLIED = {f"misra-c2012-{rule}" for rule in re.findall(r"^\| (\d+\.\d+) \|", MISRA, re.MULTILINE)}
 DEVIATIONS: dict[str, str] = dict(re.findall(r"^\| (D\d+) \| (\d+\.\d+) \|", MISRA, re.MULTILINE))
 """Number and rule of each."""
-MISRA_FINDING = re.compile(r"^\S+?:\d+: \S+ (?P<rule>misra-[\w.-]+|unmatchedSuppression)$", re.MULTILINE)
+CPPCHECK_FINDING = re.compile(
+    r"^\S+?:\d+: (?:\S+ (?P<rule>misra-[\w.-]+|unmatchedSuppression)|(?:error|warning) \w+)$", re.MULTILINE
+)
 
 
 def _run(tool: str, *arguments: str | Path, environment: dict[str, str] | None = None) -> tuple[bool, str]:
@@ -55,18 +57,37 @@ def tidy_cross(database: str | Path, file: str | Path) -> str:
 
 
 def misra(*files: str | Path) -> str:
-    """C files keep to MISRA C:2012, by cppcheck's add-on, but for what firmware/MISRA.md names.
+    """C files keep to MISRA C:2012, by cppcheck's add-on, but for what firmware/MISRA.md names; nor has cppcheck itself
+    anything to warn of.
 
-    That says which advisory rules are not applied, and numbers each deviation from the others. A deviation is
+    That page says which advisory rules are not applied, and numbers each deviation from the others. A deviation is
     suppressed on the line where it is, with its number. cppcheck's exit status says nothing reliable, so its output is
     read.
     """
-    options = ("--addon=misra", "--std=c99", "--quiet", "--inline-suppr", "--enable=style,information")
+    options = ("--addon=misra", "--std=c99", "--quiet", "--inline-suppr", "--enable=style,warning,information")
     template = "--template={file}:{line}: {severity} {id}"
     with tempfile.TemporaryDirectory() as scratch:  # otherwise its dumps are written beside the sources
         _, output = _run("cppcheck", *options, f"--cppcheck-build-dir={scratch}", template, "-I", FIRMWARE, *files)
-    found = [match[0] for match in MISRA_FINDING.finditer(output) if match["rule"] not in NOT_APPLIED]
+    found = [match[0] for match in CPPCHECK_FINDING.finditer(output) if match["rule"] not in NOT_APPLIED]
     return "\n".join(["fix, or suppress as firmware/MISRA.md says:", *found, ""]) if found else ""
+
+
+def misra_image(build_headers: str, *files: str | Path) -> str:
+    """The same of all the files of an image for the microcontroller beside the core, as they are compiled for it."""
+    return misra("-D__arm__", f"-I{build_headers}", *files)
+
+
+def analyzer(build_headers: str, *files: str | Path) -> str:
+    """gcc's static analyzer finds nothing in C files: in those of the microcontroller with its compiler."""
+    said = ""
+    for file in map(str, files):
+        cross = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
+        compiler = cross if "/port/stm32f4/" in file else ["gcc"]
+        options = ("-std=c99", "-O2", "-fanalyzer", "-Werror", f"-I{FIRMWARE}", f"-I{build_headers}")
+        command = [*compiler, *options, "-c", file, "-o", os.devnull]
+        result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        said += _said(result.returncode == 0, result.stderr)
+    return said
 
 
 def python() -> str:

@@ -40,6 +40,36 @@ def test_seeded_violations_of_misra_are_found(tmp_path: Path) -> None:
     assert all(f"misra-c2012-{rule}\n" in findings for rule in ("7.1", "15.6", "17.2"))
 
 
+def test_seeded_violations_in_an_interrupt_are_found(tmp_path: Path) -> None:
+    """The driver of CAN, as it is compiled for its image, with a few lines more."""
+    text = (checks.FIRMWARE / "port/stm32f4/can.c").read_text(encoding="utf-8")
+    seeded = tmp_path / "can.c"
+    begin = "void can_error_interrupt(void)\n{\n"
+    assert begin in text
+    wrong = "    uint32_t *address = (uint32_t *)0x40006400;\n    if (*address)\n        off = *address;\n"
+    seeded.write_text(text.replace(begin, begin + wrong))
+    findings = checks.misra_image(str(tmp_path), seeded)
+    assert all(f"misra-c2012-{rule}\n" in findings for rule in ("11.4", "14.4", "15.6"))
+    assert "can.c:" not in checks.misra_image(str(tmp_path), checks.FIRMWARE / "port/stm32f4/can.c")
+
+
+def test_seeded_errors_are_found_by_cppcheck_and_by_the_analyzer(tmp_path: Path) -> None:
+    seeded = tmp_path / "seeded.c"
+    seeded.write_text(
+        "#include <stdlib.h>\n"
+        "int seeded(int x);\n"
+        "int seeded(int x)\n"
+        "{\n"
+        "    int *memory = malloc(sizeof *memory);\n"
+        "    int result = *memory;\n"
+        "    free(memory);\n"
+        "    return (x > 0) ? result : *memory;\n"
+        "}\n"
+    )
+    assert "Werror=analyzer-use-after-free" in checks.analyzer(str(tmp_path), seeded)
+    assert "error deallocret" in checks.misra(seeded)
+
+
 def test_every_deviation_from_misra_is_documented_and_used() -> None:
     files = (file for suffix in "ch" for file in checks.FIRMWARE.rglob(f"*.{suffix}"))
     assert checks.suppressed(file.read_text(encoding="utf-8") for file in files) == (checks.DEVIATIONS, 0)

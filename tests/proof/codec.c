@@ -38,6 +38,7 @@ PROVE(health, SET(excitation))
 PROVE(motor_command, (SET(torque), SET(dither), FLAG(valid)))
 PROVE(correction, (SET(correction), SET(weight), FLAG(valid)))
 PROVE(platform_health, FLAG(valid))
+PROVE(platform_reset, (void)f)
 PROVE(identity, SET(dither_rms))
 PROVE(command_ack, SET(dither_rms))
 PROVE(link_health, FLAG(valid))
@@ -58,6 +59,7 @@ static void prove_all(float f)
     prove_motor_command(f);
     prove_correction(f);
     prove_platform_health(f);
+    prove_platform_reset(f);
     prove_identity(f);
     prove_command_ack(f);
     prove_link_health(f);

@@ -18,9 +18,11 @@ NOT_RUN = {
     r"lever (live|monitor)(?!.*--once)": "runs until it is ended",
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
     r"lever (compare --(out|quick|envelope)|(envelope|bounce|faults) --json|figures --(out|campaign))": "takes minutes",
+    r"lever soak --json": "takes minutes",
 }
 SHORTER = {
     r"--seeds \d+": "--seeds 1",
+    r"--only (bode|alarm) \w+": r"--only \1",
     r"(lever compare --(scenarios|models))": r"lever compare --duration 2 --scenarios step_up --\2",
     r"(lever (envelope|bounce) --quick)": r"\1 --seeds 1",
     r"--start 60 --length 120": "--length 22",

@@ -22,7 +22,7 @@ PORT_MAY_INCLUDE = {
     "linux": {"port", "port/linux", "port/slcan", "can/messages.h"},
     "slcan": {"port/slcan"},
     "embedded": {"port/embedded"},
-    "stm32f4": {"port", "port/stm32f4", "port/embedded", "port/slcan", "can/messages.h"},
+    "stm32f4": {"port", "port/stm32f4", "port/embedded", "port/slcan", "can/messages.h", "can/e2e.h"},
 }
 SYSTEM_HEADERS = {"math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 LIBRARY_FUNCTIONS = {"memcpy", "memmove", "memset", "sqrtf"}

@@ -36,13 +36,14 @@ MAY_IMPORT = {
         *("firmware", "models", "report"),
     },
     "sil/faults": {"fast", "envelope", "firmware", "can"},
+    "sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "sil/study": {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
     "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
     "sil/commands": {
-        *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "faults", "aircraft"),
+        *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "faults", "soak", "aircraft"),
         *("firmware", "can", "report", "exports"),
     },
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -23,12 +24,12 @@ def lever_sim(*options: str) -> str:
 
 
 def test_with_an_aircraft_the_margin_is_on_the_bus(build_dir: Path, tmp_path: Path) -> None:
-    """And is the one of a replay of the same log with the same file."""
+    """And is the one of a replay of the same log with the same file; so is the whole state, by its snapshots."""
     link, settings, aircraft, out = (tmp_path / name for name in ("lever0", "settings", "uh60.response", "out"))
     settings.write_text(lever_sim("--settings"))
     lever("aircraft", "uh60_like", "gearing=0.5", "-o", str(aircraft))
     options = ["--settings", str(settings), "--aircraft", str(aircraft)]
-    with rig.LeverCan(build_dir / "lever_can", str(link), options, tmp_path, "pty"):
+    with rig.LeverCan(build_dir / "lever_can", str(link), [*options, "--snapshots", "0.5"], tmp_path, "pty"):
         lever_sim("--interface=slcan", f"--channel={link}", "--bus-option=timeout=0.01", f"--out={out}")
     log = (out / "bus.log").read_text()
     (out / "bus.log").write_text(log.replace(f" {link} ", " lever "))  # a name that is short enough for a bus
@@ -39,6 +40,8 @@ def test_with_an_aircraft_the_margin_is_on_the_bus(build_dir: Path, tmp_path: Pa
     )
     assert len(sent) > 50
     assert sent == again
+    snapshots = json.loads((tmp_path / "again/summary.json").read_text())["snapshots"]
+    assert (snapshots["equal"], snapshots["different"], snapshots["begun_at_s"]) == (7, 0, None)
 
 
 def test_frames_and_estimates_are_those_of_a_run_in_one_process(build_dir: Path, tmp_path: Path) -> None:

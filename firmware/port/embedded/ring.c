@@ -9,7 +9,7 @@ uint32_t ring_used(const ring_t *ring)
 
 bool ring_put(ring_t *ring, const void *record, uint32_t length)
 {
-    const uint8_t *bytes = record;
+    const uint8_t *bytes = record; /* cppcheck-suppress misra-c2012-11.5 ; D4 */
     const uint32_t start = ring->put;
 
     if (length > (ring->size - ring_used(ring))) {
@@ -24,7 +24,7 @@ bool ring_put(ring_t *ring, const void *record, uint32_t length)
 
 bool ring_get(ring_t *ring, void *record, uint32_t length)
 {
-    uint8_t *bytes = record;
+    uint8_t *bytes = record; /* cppcheck-suppress misra-c2012-11.5 ; D4 */
     const uint32_t start = ring->got;
 
     if (length > ring_used(ring)) {

@@ -32,11 +32,11 @@ static uint32_t digit_value(char digit)
     uint32_t value = 16u;
 
     if ((digit >= '0') && (digit <= '9')) {
-        value = (uint32_t)(digit - '0');
+        value = (uint32_t)digit - (uint32_t)'0';
     } else if ((digit >= 'A') && (digit <= 'F')) {
-        value = (uint32_t)(digit - 'A') + 10u;
+        value = ((uint32_t)digit - (uint32_t)'A') + 10u;
     } else if ((digit >= 'a') && (digit <= 'f')) {
-        value = (uint32_t)(digit - 'a') + 10u;
+        value = ((uint32_t)digit - (uint32_t)'a') + 10u;
     } else {
         /* not a digit */
     }
@@ -57,13 +57,13 @@ static bool read_hex(const char *text, uint32_t digits, uint32_t *value)
     return good;
 }
 
-/* Writes `digits` of them and returns where the text goes on. */
-static char *write_hex(char *text, uint32_t digits, uint32_t value)
+/* Writes `digits` of them from text[at] on, and returns where the text goes on. */
+static uint32_t write_hex(char *text, uint32_t at, uint32_t digits, uint32_t value)
 {
     for (uint32_t i = 0u; i < digits; i++) {
-        text[i] = "0123456789ABCDEF"[(value >> (4u * (digits - 1u - i))) & 0xFu];
+        text[at + i] = "0123456789ABCDEF"[(value >> (4u * (digits - 1u - i))) & 0xFu];
     }
-    return &text[digits];
+    return at + digits;
 }
 
 /* --- lines ------------------------------------------------------------------------------------------------------- */
@@ -138,24 +138,24 @@ bool slcan_read_frame(const slcan_line_t *line, bool may_have_time, slcan_frame_
 uint32_t slcan_write_frame(const slcan_frame_t *frame, uint16_t time_stamp, char text[SLCAN_LINE_BYTES])
 {
     const uint32_t length = (frame->frame.length < (uint32_t)DATA_BYTES) ? frame->frame.length : (uint32_t)DATA_BYTES;
-    char *end = &text[1];
+    uint32_t at = 1u;
 
     if (frame->extended) {
         text[0] = frame->remote ? 'R' : 'T';
-        end = write_hex(end, EXTENDED_DIGITS, frame->frame.id & extended_ids);
+        at = write_hex(text, at, EXTENDED_DIGITS, frame->frame.id & extended_ids);
     } else {
         text[0] = frame->remote ? 'r' : 't';
-        end = write_hex(end, STANDARD_DIGITS, frame->frame.id & standard_ids);
+        at = write_hex(text, at, STANDARD_DIGITS, frame->frame.id & standard_ids);
     }
-    end = write_hex(end, 1u, length);
+    at = write_hex(text, at, 1u, length);
     for (uint32_t i = 0u; (i < length) && !frame->remote; i++) {
-        end = write_hex(end, 2u, frame->frame.data[i]);
+        at = write_hex(text, at, 2u, frame->frame.data[i]);
     }
     if (time_stamp != (uint16_t)SLCAN_NO_TIME) {
-        end = write_hex(end, TIME_DIGITS, time_stamp);
+        at = write_hex(text, at, TIME_DIGITS, time_stamp);
     }
-    *end = CR;
-    return (uint32_t)(end - text) + 1u;
+    text[at] = CR;
+    return at + 1u;
 }
 
 /* --- acceptance filter ------------------------------------------------------------------------------------------- */
@@ -214,8 +214,9 @@ static void answer(slcan_t *slcan, bool good)
 /* Answers V, v and N: the command, four characters, CR. */
 static void answer_identity(slcan_t *slcan, char command, const char *four)
 {
-    char text[6] = {command};
+    char text[6];
 
+    text[0] = command;
     (void)memcpy(&text[1], four, 4u);
     text[5] = CR;
     (void)put(slcan, text, sizeof text);
@@ -226,7 +227,7 @@ static bool set_bit_rate(slcan_t *slcan, const slcan_line_t *line)
     const bool good = (line->length == 2u) && (line->text[1] >= '0') && (line->text[1] <= '8');
 
     if (good) {
-        slcan->bit_rate = (uint8_t)(line->text[1] - '0');
+        slcan->bit_rate = (uint8_t)digit_value(line->text[1]);
         slcan->bit_timing = 0u;
     }
     return good;
@@ -309,9 +310,10 @@ static bool configure(slcan_t *slcan, const slcan_line_t *line)
 
 static void answer_status(slcan_t *slcan)
 {
-    char text[4] = {'F'};
+    char text[4];
 
-    (void)write_hex(&text[1], 2u, slcan->status);
+    text[0] = 'F';
+    (void)write_hex(text, 1u, 2u, slcan->status);
     text[3] = CR;
     if (put(slcan, text, sizeof text)) {
         slcan->status = 0u;
@@ -379,7 +381,8 @@ bool slcan_send(slcan_t *slcan, const slcan_frame_t *frame, uint32_t time_ms)
         return true;
     }
     const uint32_t stamp = slcan->time_stamps ? (time_ms % (uint32_t)SLCAN_TIME_STAMPS) : (uint32_t)SLCAN_NO_TIME;
-    if (!put(slcan, text, slcan_write_frame(frame, (uint16_t)stamp, text))) {
+    const uint32_t length = slcan_write_frame(frame, (uint16_t)stamp, text);
+    if (!put(slcan, text, length)) {
         slcan->status |= (uint8_t)SLCAN_STATUS_RECEIVE_FULL | (uint8_t)SLCAN_STATUS_DATA_OVERRUN;
         return false;
     }

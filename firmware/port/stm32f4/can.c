@@ -22,8 +22,8 @@ typedef struct queued {
 enum {
     FRAME_BYTES = sizeof(lever_frame_t),
     QUEUED_BYTES = sizeof(queued_t),
-    RECEIVE_BYTES = 32 * FRAME_BYTES, /* 16 samples */
-    TRANSMIT_BYTES = 512,             /* two steps with all their frames */
+    RECEIVE_BYTES = 512,  /* 16 samples: 32 frames */
+    TRANSMIT_BYTES = 512, /* two steps with all their frames */
     MODE_POLLS = 10000,
     FUNCTION_CAN = 9, /* alternate function of PB8 and PB9: data sheet, table 9 */
     PIN_RECEIVE = 8,
@@ -34,9 +34,12 @@ static volatile uint8_t receive_bytes[RECEIVE_BYTES];
 static volatile uint8_t transmit_bytes[TRANSMIT_BYTES];
 static ring_t received = {.bytes = receive_bytes, .size = RECEIVE_BYTES};
 static ring_t waiting = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
-static volatile can_counts_t counts;     /* each written by one interrupt, or with interrupts off */
-static volatile bool off;                /* the bus */
-static volatile uint32_t time_ms;        /* of the last can_poll() */
+static volatile can_counts_t counts; /* each written by one interrupt, or with interrupts off */
+static volatile bool off;            /* the bus */
+static volatile uint32_t time_ms;    /* of the last can_poll() */
+static volatile bool receive_came;   /* the interrupt, since then */
+static volatile bool transmit_came;
+static bool is_served;                   /* can_is_served() */
 static uint32_t since_ms[CAN_MAILBOXES]; /* of the frame in each */
 
 /* --- start ------------------------------------------------------------------------------------------------------- */
@@ -54,7 +57,7 @@ static void start_pins(void)
  * match. */
 static uint32_t filter_word(uint32_t id, uint32_t next_id)
 {
-    return FIELD(next_id, 16 + 5) | FIELD(id, 5);
+    return FIELD(next_id, 16u + 5u) | FIELD(id, 5u);
 }
 
 static void start_filter(void)
@@ -81,7 +84,8 @@ void can_start(const clock_rates_t *rates)
     can1.MCR = CAN_MCR_DBF | CAN_MCR_INRQ;
     (void)wait_for(&can1.MSR, CAN_MSR_INAK, CAN_MSR_INAK, MODE_POLLS);
     can1.MCR = CAN_MCR_DBF | CAN_MCR_INRQ | CAN_MCR_ABOM | CAN_MCR_RFLM | CAN_MCR_TXFP;
-    can1.BTR = rates->pll ? BIT_TIMING_BTR(CLOCK_PLL_APB1_HZ) : BIT_TIMING_BTR(CLOCK_RAW_HZ);
+    /* cppcheck-suppress misra-c2012-10.8 ; D7 */
+    can1.BTR = rates->has_pll ? BIT_TIMING_BTR(CLOCK_PLL_APB1_HZ) : BIT_TIMING_BTR(CLOCK_RAW_HZ);
     start_filter();
     can1.IER = CAN_IER_TMEIE | CAN_IER_FMPIE0 | CAN_IER_FOVIE0 | CAN_IER_BOFIE | CAN_IER_ERRIE;
     nvic.ISER[0] = BIT(INTERRUPT_CAN1_TX) | BIT(INTERRUPT_CAN1_RX0) | BIT(INTERRUPT_CAN1_SCE);
@@ -109,6 +113,7 @@ void can_receive_interrupt(void)
 {
     lever_frame_t frame;
 
+    receive_came = true;
     if ((can1.RFR[0] & CAN_RFR_FOVR) != 0u) {
         can1.RFR[0] = CAN_RFR_FOVR;
         counts.overruns++;
@@ -194,6 +199,7 @@ void can_transmit_interrupt(void)
 {
     const uint32_t status = can1.TSR;
 
+    transmit_came = true;
     for (uint32_t mailbox = 0u; mailbox < (uint32_t)CAN_MAILBOXES; mailbox++) {
         if ((status & FIELD(CAN_TSR_RQCP0, 8u * mailbox)) != 0u) {
             can1.TSR = FIELD(CAN_TSR_RQCP0, 8u * mailbox);
@@ -218,10 +224,30 @@ bool can_send(const lever_frame_t *frame)
     return taken;
 }
 
+/* What raises an interrupt is there, and none has come. */
+static bool look_for_interrupts(void)
+{
+    const bool waits = (can1.RFR[0] & CAN_RFR_FMP) != 0u;
+    const bool ended = (can1.TSR & CAN_TSR_RQCP) != 0u;
+    const bool served = (receive_came || !waits) && (transmit_came || !ended);
+
+    receive_came = false;
+    transmit_came = false;
+    return served;
+}
+
+bool can_is_served(void)
+{
+    return is_served;
+}
+
 /* RM0090 32.7.1: what is taken back raises the interrupt, which counts it. */
 void can_poll(uint32_t now_ms)
 {
     interrupts_off();
+    if (now_ms != time_ms) {
+        is_served = look_for_interrupts();
+    }
     time_ms = now_ms;
     if ((can1.ESR & CAN_ESR_BOFF) == 0u) {
         off = false;

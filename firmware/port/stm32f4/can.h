@@ -49,6 +49,9 @@ bool can_send(const lever_frame_t *frame);
  * more often. */
 void can_poll(uint32_t now_ms);
 
+/* Whether, at the last can_poll(), nothing waited for an interrupt, or one had come since the call before. */
+bool can_is_served(void);
+
 can_counts_t can_counts(void);
 can_errors_t can_errors(void);
 

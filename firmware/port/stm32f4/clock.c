@@ -11,9 +11,10 @@ enum {
     PLL_Q = 7 /* 48 MHz for peripherals that are not used: within what they bear */
 };
 
-/* CRYSTAL_FAILED: it has, since power-on. Survives the reset that follows. */
+/* Whether it has failed since power-on, and if that made the last reset. Survives the reset that follows. */
 static uint32_t crystal_state __attribute__((section(".noinit")));
-#define CRYSTAL_FAILED 0xC4157A1Fu
+#define CRYSTAL_HAS_RESET 0xC4157A1Fu
+#define CRYSTAL_FAILED 0xC4157A20u
 
 /* RM0090 3.5.1 (table 10): 5 wait states at 168 MHz and 2.7 to 3.6 V; caches and prefetch hide most of them. */
 static bool slow_flash_down(void)
@@ -25,7 +26,9 @@ static bool slow_flash_down(void)
 /* RM0090 7.2.3 and 7.3.2: set up while it is off. P = 2 is coded as 0. */
 static bool start_pll(bool crystal)
 {
+    /* cppcheck-suppress misra-c2012-10.8 ; D7 */
     const uint32_t m = crystal ? (uint32_t)CLOCK_PLL_M(LEVER_STM32_HSE_MHZ) : (uint32_t)CLOCK_PLL_M(CLOCK_HSI_MHZ);
+    /* cppcheck-suppress misra-c2012-10.8 ; D7 */
     const uint32_t n = crystal ? (uint32_t)CLOCK_PLL_N(LEVER_STM32_HSE_MHZ) : (uint32_t)CLOCK_PLL_N(CLOCK_HSI_MHZ);
 
     rcc.CR &= ~(uint32_t)RCC_CR_PLLON;
@@ -54,6 +57,11 @@ static bool run_from_pll(bool crystal)
     return start_pll(crystal) && slow_flash_down() && switch_to_pll();
 }
 
+static bool has_failed(void)
+{
+    return (crystal_state == CRYSTAL_HAS_RESET) || (crystal_state == CRYSTAL_FAILED);
+}
+
 clock_rates_t clock_start(void)
 {
     clock_rates_t rates = {.core_hz = CLOCK_RAW_HZ, .apb1_hz = CLOCK_RAW_HZ, .apb2_hz = CLOCK_RAW_HZ};
@@ -64,11 +72,11 @@ clock_rates_t clock_start(void)
         crystal_state = 0u;
     }
     rcc.CR |= RCC_CR_HSEON;
-    if ((crystal_state != CRYSTAL_FAILED) && wait_for(&rcc.CR, RCC_CR_HSERDY, RCC_CR_HSERDY, CRYSTAL_POLLS)) {
+    if (!has_failed() && wait_for(&rcc.CR, RCC_CR_HSERDY, RCC_CR_HSERDY, CRYSTAL_POLLS)) {
         rates.crystal = run_from_pll(true);
     }
-    rates.pll = rates.crystal || run_from_pll(false);
-    if (rates.pll) {
+    rates.has_pll = rates.crystal || run_from_pll(false);
+    if (rates.has_pll) {
         rates.core_hz = CLOCK_PLL_CORE_HZ;
         rates.apb1_hz = CLOCK_PLL_APB1_HZ;
         rates.apb2_hz = CLOCK_PLL_APB2_HZ;
@@ -81,10 +89,20 @@ clock_rates_t clock_start(void)
     return rates;
 }
 
+bool clock_has_reset(void)
+{
+    const bool has = crystal_state == CRYSTAL_HAS_RESET;
+
+    if (has) {
+        crystal_state = CRYSTAL_FAILED;
+    }
+    return has;
+}
+
 void clock_failure_interrupt(void)
 {
     rcc.CIR |= RCC_CIR_CSSC;
-    crystal_state = CRYSTAL_FAILED;
+    crystal_state = CRYSTAL_HAS_RESET;
     scb.AIRCR = SCB_AIRCR_RESET;
     synchronise();
 }

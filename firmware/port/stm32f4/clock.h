@@ -35,12 +35,15 @@ typedef struct clock_rates {
     uint32_t core_hz;
     uint32_t apb1_hz; /* CAN1 */
     uint32_t apb2_hz; /* USART1 */
-    bool pll;         /* the three above are those of CLOCK_PLL_..., otherwise CLOCK_RAW_HZ */
+    bool has_pll;     /* the three above are those of CLOCK_PLL_..., otherwise CLOCK_RAW_HZ */
     bool crystal; /* they are as accurate as the crystal, otherwise as the internal oscillator: 1 % at 25 degrees C */
 } clock_rates_t;
 
 /* Sets the clocks up, from their state after reset. Bounded: 30 ms if nothing answers. */
 clock_rates_t clock_start(void);
+
+/* Whether the last reset was that of a crystal that failed; from then on it is reported. */
+bool clock_has_reset(void);
 
 /* Interrupt of the clock security system: the crystal has failed. Resets, to start from the internal oscillator until
  * the next power-on. */

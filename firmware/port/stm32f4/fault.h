@@ -25,6 +25,9 @@ extern fault_record_t fault_last;
 /* Whether the last reset was that of a hard fault; from then on it is reported. */
 bool fault_has_reset(void);
 
+/* Whether the stack was not in memory at the last one: it had grown too far. */
+bool fault_lost_stack(void);
+
 /* Interrupt: records and resets. */
 void fault_interrupt(void);
 

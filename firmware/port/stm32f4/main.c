@@ -2,19 +2,26 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "can/e2e.h"
+#include "can/messages.h"
 #include "lever_build.h"
 #include "lever_cdkf.h"
+#include "port/command_guard.h"
 #include "port/embedded/self_test.h"
 #include "port/loop.h"
 #include "port/stm32f4/clock.h"
 #include "port/stm32f4/fault.h"
+#include "port/stm32f4/periodic_test.h"
 #include "port/stm32f4/processor.h"
-#include "port/stm32f4/rom.h"
+#include "port/stm32f4/reset_cause.h"
 #include "port/stm32f4/tick.h"
 #include "port/stm32f4/transport.h"
 #include "port/stm32f4/watchdog.h"
 
-enum { SHOWN_MS = 1000 }; /* a loss is shown for so long, so that some HEALTH frame shows it */
+enum {
+    SHOWN_MS = 1000, /* a loss is shown for so long, so that some HEALTH frame shows it */
+    RESET_MS = 1000  /* between two PLATFORM_RESET */
+};
 
 /* A count, and until when its last change is to be seen. */
 typedef struct loss {
@@ -25,7 +32,8 @@ typedef struct loss {
 
 static lever_memory_t memory;
 static loop_t loop;
-static uint8_t faults_at_start; /* of enum lever_platform_fault */
+static uint8_t lasting_faults; /* of enum lever_platform_fault, until the next reset */
+static message_platform_reset_t reset;
 static loss_t overruns;
 static loss_t dropped;
 
@@ -45,6 +53,21 @@ static bool is_shown(loss_t *loss, uint32_t count, uint32_t now_ms)
     return loss->shown;
 }
 
+static uint32_t faults_of(uint32_t failed_tests)
+{
+    uint32_t faults = ((failed_tests & (uint32_t)MESSAGE_SELF_TEST_ROM) != 0u) ? (uint32_t)LEVER_PLATFORM_ROM : 0u;
+
+    faults |= ((failed_tests & ~(uint32_t)MESSAGE_SELF_TEST_ROM) != 0u) ? (uint32_t)LEVER_PLATFORM_SELF_TEST : 0u;
+    return faults;
+}
+
+/* In two places, as one of them may be the bit of RAM that is wrong. */
+static void note_failed(uint32_t tests)
+{
+    reset.failed |= (uint8_t)tests;
+    lasting_faults |= (uint8_t)faults_of(tests);
+}
+
 static void report_status(void *self, lever_platform_t *status)
 {
     const uint32_t now_ms = tick_ms();
@@ -53,7 +76,7 @@ static void report_status(void *self, lever_platform_t *status)
     (void)memset(status, 0, sizeof *status);
     transport_status(status);
     status->dropped = (uint16_t)(status->dropped + (uint32_t)loop.totals.stale);
-    status->faults |= faults_at_start;
+    status->faults |= (uint8_t)(lasting_faults | faults_of(reset.failed));
     status->faults |= is_shown(&overruns, status->overruns, now_ms) ? (uint8_t)LEVER_PLATFORM_OVERRUN : 0u;
     status->faults |= is_shown(&dropped, status->dropped, now_ms) ? (uint8_t)LEVER_PLATFORM_DROPPED : 0u;
 }
@@ -79,8 +102,10 @@ static uint32_t now_us(void *self)
     return 1000u * tick_ms();
 }
 
+static command_guard_t guard = {.receive = transport_receive};
 static const port_t port = {
-    .receive = transport_receive,
+    .self = &guard,
+    .receive = command_guard_receive,
     .send = transport_send,
     .wait = wait_frame,
     .now_us = now_us,
@@ -98,35 +123,98 @@ static lever_t *configure(void)
     return lever_init(&memory, &config);
 }
 
+static uint32_t fault_of(enum message_cause cause)
+{
+    uint32_t fault = 0u;
+
+    if (cause == MESSAGE_CAUSE_WATCHDOG) {
+        fault = LEVER_PLATFORM_WATCHDOG;
+    } else if ((cause == MESSAGE_CAUSE_HARD_FAULT) || (cause == MESSAGE_CAUSE_STACK_OVERFLOW)) {
+        fault = LEVER_PLATFORM_HARD_FAULT;
+    } else {
+        /* nothing went wrong, or CLOCK says so */
+    }
+    return fault;
+}
+
 /* Nothing here stops the estimator: it says what is wrong, and who depends on it decides. Each step takes less than the
  * 0.35 s that the watchdog allows at the least, at 16 MHz, too. */
-static uint8_t test_all(const clock_rates_t *rates)
+static void test_all(const clock_rates_t *rates)
 {
-    uint32_t faults = rates->crystal ? 0u : (uint32_t)LEVER_PLATFORM_CLOCK;
-
-    faults |= watchdog_has_reset() ? (uint32_t)LEVER_PLATFORM_WATCHDOG : 0u;
-    faults |= fault_has_reset() ? (uint32_t)LEVER_PLATFORM_HARD_FAULT : 0u;
+    reset.cause = (uint8_t)reset_cause_read();
+    reset.resets = (uint8_t)reset_cause_count();
+    reset.fault_address = fault_last.pc;
+    lasting_faults = rates->crystal ? (uint8_t)0u : (uint8_t)LEVER_PLATFORM_CLOCK;
+    lasting_faults |= (uint8_t)fault_of((enum message_cause)reset.cause);
     watchdog_start();
-    faults |= rom_is_intact() ? 0u : (uint32_t)LEVER_PLATFORM_ROM;
+    note_failed(periodic_test_start());
     watchdog_kick();
-    faults |= self_test(&memory) ? 0u : (uint32_t)LEVER_PLATFORM_SELF_TEST;
+    note_failed(self_test(&memory) ? 0u : (uint32_t)MESSAGE_SELF_TEST_GOLDEN);
     watchdog_kick();
-    return (uint8_t)faults;
+}
+
+/* --- beside the loop --------------------------------------------------------------------------------------------- */
+
+/* The loop has finished something: a step, or telling the estimator that no sample comes, which is due each LOOP_IDLE_MS.
+ * Going round, or a tick, or interrupts are nothing, and neither is a step if what its frames travel by stands still. */
+static void feed_watchdog(void)
+{
+    static uint32_t fed_us;
+
+    if ((loop.sample_us != fed_us) && transport_is_served()) {
+        fed_us = loop.sample_us;
+        watchdog_kick();
+    }
+}
+
+/* After the first sample and then each second, if there are samples: on a bus that asks nothing, nothing is said. */
+static void report_reset(uint32_t now_ms)
+{
+    static uint32_t sent_ms;
+    static uint64_t samples;
+    static uint8_t counter;
+    lever_frame_t frame;
+
+    if ((loop.totals.samples != samples) && ((samples == 0u) || ((now_ms - sent_ms) >= (uint32_t)RESET_MS))) {
+        samples = loop.totals.samples;
+        sent_ms = now_ms;
+        if (message_platform_reset_encode(&frame, &reset)) {
+            e2e_protect(&frame, MESSAGE_PLATFORM_RESET_DATA_ID, counter);
+            (void)transport_send(NULL, &frame); /* counted there if it finds no room */
+            counter++;
+        }
+    }
+}
+
+/* In a line, so that the watchdog is not fed without the tests either. */
+static void each_millisecond(void)
+{
+    static uint32_t last_ms;
+    const uint32_t now_ms = tick_ms();
+
+    if (now_ms != last_ms) {
+        last_ms = now_ms;
+        note_failed(periodic_test_step());
+        report_reset(now_ms);
+        feed_watchdog();
+    }
 }
 
 int main(void)
 {
     const clock_rates_t rates = clock_start();
 
-    faults_at_start = test_all(&rates);
+    test_all(&rates);
     lever_t *lever = configure();
     tick_start(rates.core_hz);
     transport_start(&rates);
     watchdog_tighten(); /* not before: at 16 MHz lever_init() may take longer than the loop may */
     if (lever != NULL) {
+        guard.lever = lever;
+        guard.takes_commands = transport_takes_commands();
         loop_init(&loop, &port, lever, LOOP_DROP);
         while (loop_turn(&loop) == PORT_DONE) {
-            watchdog_kick();
+            each_millisecond();
         }
     }
     return 1; /* a configuration that is refused: the watchdog resets, and nothing is ever sent */

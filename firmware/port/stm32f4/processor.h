@@ -9,11 +9,13 @@
 
 static inline void interrupts_off(void)
 {
+    /* cppcheck-suppress misra-c2012-17.3 ; D9 */
     __asm__ volatile("cpsid i" ::: "memory");
 }
 
 static inline void interrupts_on(void)
 {
+    /* cppcheck-suppress misra-c2012-17.3 ; D9 */
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
@@ -21,12 +23,14 @@ static inline void interrupts_on(void)
  * again. */
 static inline void wait_for_interrupt(void)
 {
+    /* cppcheck-suppress misra-c2012-17.3 ; D9 */
     __asm__ volatile("dsb\n\twfi" ::: "memory");
 }
 
 /* All memory accesses before are done, and all instructions after are fetched anew. */
 static inline void synchronise(void)
 {
+    /* cppcheck-suppress misra-c2012-17.3 ; D9 */
     __asm__ volatile("dsb\n\tisb" ::: "memory");
 }
 

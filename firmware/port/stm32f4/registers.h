@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 /* Bit n, and a field of a register: a value at its lowest bit. */
-#define BIT(n) (1u << (n))
+#define BIT(n) ((uint32_t)1u << (n))
 #define FIELD(value, lowest) ((uint32_t)(value) << (lowest))
 
 typedef volatile uint32_t reg_t;
@@ -38,28 +38,29 @@ typedef struct rcc {
     reg_t CSR;  /* 7.3.21 */
 } rcc_t;
 
-enum rcc_bits {
-    RCC_CR_HSEON = BIT(16),
-    RCC_CR_HSERDY = BIT(17),
-    RCC_CR_CSSON = BIT(19),
-    RCC_CR_PLLON = BIT(24),
-    RCC_CR_PLLRDY = BIT(25),
-    RCC_PLLCFGR_PLLSRC_HSE = BIT(22),
-    RCC_CFGR_SW_PLL = 2,           /* SW, bits 1:0 */
-    RCC_CFGR_SWS = 3 << 2,         /* field */
-    RCC_CFGR_SWS_PLL = 2 << 2,     /* its value */
-    RCC_CFGR_PPRE1_DIV4 = 5 << 10, /* PPRE1, bits 12:10 */
-    RCC_CFGR_PPRE2_DIV2 = 4 << 13, /* PPRE2, bits 15:13 */
-    RCC_CIR_CSSC = BIT(23),
-    RCC_AHB1_GPIOA = BIT(0),
-    RCC_AHB1_GPIOB = BIT(1),
-    RCC_APB1_CAN1 = BIT(25),
-    RCC_APB1_PWR = BIT(28),
-    RCC_APB2_USART1 = BIT(4),
-    RCC_CSR_RMVF = BIT(24),
-    RCC_CSR_PORRSTF = BIT(27),
-    RCC_CSR_IWDGRSTF = BIT(29)
-};
+#define RCC_CR_HSEON BIT(16u)
+#define RCC_CR_HSERDY BIT(17u)
+#define RCC_CR_CSSON BIT(19u)
+#define RCC_CR_PLLON BIT(24u)
+#define RCC_CR_PLLRDY BIT(25u)
+#define RCC_PLLCFGR_PLLSRC_HSE BIT(22u)
+#define RCC_CFGR_SW_PLL 2u                 /* SW, bits 1:0 */
+#define RCC_CFGR_SWS FIELD(3u, 2u)         /* field */
+#define RCC_CFGR_SWS_PLL FIELD(2u, 2u)     /* its value */
+#define RCC_CFGR_PPRE1_DIV4 FIELD(5u, 10u) /* PPRE1, bits 12:10 */
+#define RCC_CFGR_PPRE2_DIV2 FIELD(4u, 13u) /* PPRE2, bits 15:13 */
+#define RCC_CIR_CSSC BIT(23u)
+#define RCC_AHB1_GPIOA BIT(0u)
+#define RCC_AHB1_GPIOB BIT(1u)
+#define RCC_APB1_CAN1 BIT(25u)
+#define RCC_APB1_PWR BIT(28u)
+#define RCC_APB2_USART1 BIT(4u)
+#define RCC_CSR_RMVF BIT(24u)
+#define RCC_CSR_BORRSTF BIT(25u)
+#define RCC_CSR_PINRSTF BIT(26u)
+#define RCC_CSR_PORRSTF BIT(27u)
+#define RCC_CSR_SFTRSTF BIT(28u)
+#define RCC_CSR_IWDGRSTF BIT(29u)
 
 /* PWR, power control: RM0090 5.4 */
 typedef struct pwr {
@@ -67,19 +68,17 @@ typedef struct pwr {
     reg_t CSR;
 } pwr_t;
 
-enum pwr_bits { PWR_CR_VOS = BIT(14) };
+#define PWR_CR_VOS BIT(14u)
 
 /* FLASH interface: RM0090 3.9.1 */
 typedef struct flash {
     reg_t ACR;
 } flash_t;
 
-enum flash_bits {
-    FLASH_ACR_LATENCY = 7, /* field */
-    FLASH_ACR_PRFTEN = BIT(8),
-    FLASH_ACR_ICEN = BIT(9),
-    FLASH_ACR_DCEN = BIT(10)
-};
+#define FLASH_ACR_LATENCY 7u /* field */
+#define FLASH_ACR_PRFTEN BIT(8u)
+#define FLASH_ACR_ICEN BIT(9u)
+#define FLASH_ACR_DCEN BIT(10u)
 
 /* GPIO port: RM0090 8.4 */
 typedef struct gpio {
@@ -105,16 +104,14 @@ typedef struct usart {
     reg_t GTPR;
 } usart_t;
 
-enum usart_bits {
-    USART_SR_ORE = BIT(3),
-    USART_SR_RXNE = BIT(5),
-    USART_SR_TXE = BIT(7),
-    USART_CR1_RE = BIT(2),
-    USART_CR1_TE = BIT(3),
-    USART_CR1_RXNEIE = BIT(5),
-    USART_CR1_TXEIE = BIT(7),
-    USART_CR1_UE = BIT(13)
-};
+#define USART_SR_ORE BIT(3u)
+#define USART_SR_RXNE BIT(5u)
+#define USART_SR_TXE BIT(7u)
+#define USART_CR1_RE BIT(2u)
+#define USART_CR1_TE BIT(3u)
+#define USART_CR1_RXNEIE BIT(5u)
+#define USART_CR1_TXEIE BIT(7u)
+#define USART_CR1_UE BIT(13u)
 
 /* bxCAN: RM0090 32.9; a mailbox, of either direction: 32.9.3 */
 typedef struct can_mailbox {
@@ -150,40 +147,39 @@ typedef struct can {
     reg_t FR[CAN_BANKS][2];
 } can_t;
 
-enum can_bits {
-    CAN_MCR_INRQ = BIT(0),
-    CAN_MCR_SLEEP = BIT(1),
-    CAN_MCR_TXFP = BIT(2),
-    CAN_MCR_RFLM = BIT(3),
-    CAN_MCR_ABOM = BIT(6),
-    CAN_MCR_DBF = BIT(16),
-    CAN_MSR_INAK = BIT(0),
-    CAN_MSR_ERRI = BIT(2),
-    CAN_TSR_RQCP0 = BIT(0), /* this and the next of mailbox 0; mailbox m has them 8 m higher */
-    CAN_TSR_TXOK0 = BIT(1),
-    CAN_TSR_ABRQ0 = BIT(7),  /* the same */
-    CAN_TSR_ABRQ = 0x808080, /* one bit for each mailbox */
-    CAN_TSR_CODE_LOWEST = 24,
-    CAN_TSR_TME0 = BIT(26), /* of mailbox 0; the next ones follow */
-    CAN_TSR_TME = 7 << 26,
-    CAN_RFR_FMP = 3, /* field */
-    CAN_RFR_FOVR = BIT(4),
-    CAN_RFR_RFOM = BIT(5),
-    CAN_IER_TMEIE = BIT(0),
-    CAN_IER_FMPIE0 = BIT(1),
-    CAN_IER_FOVIE0 = BIT(3),
-    CAN_IER_BOFIE = BIT(10),
-    CAN_IER_ERRIE = BIT(15),
-    CAN_ESR_BOFF = BIT(2),
-    CAN_ESR_TEC_LOWEST = 16,
-    CAN_ESR_REC_LOWEST = 24,
-    CAN_IR_TXRQ = BIT(0),
-    CAN_IR_RTR = BIT(1),
-    CAN_IR_IDE = BIT(2),
-    CAN_IR_STID_LOWEST = 21,
-    CAN_DTR_DLC = 15, /* field */
-    CAN_FMR_FINIT = BIT(0)
-};
+#define CAN_MCR_INRQ BIT(0u)
+#define CAN_MCR_SLEEP BIT(1u)
+#define CAN_MCR_TXFP BIT(2u)
+#define CAN_MCR_RFLM BIT(3u)
+#define CAN_MCR_ABOM BIT(6u)
+#define CAN_MCR_DBF BIT(16u)
+#define CAN_MSR_INAK BIT(0u)
+#define CAN_MSR_ERRI BIT(2u)
+#define CAN_TSR_RQCP0 BIT(0u) /* this and the next of mailbox 0; mailbox m has them 8 m higher */
+#define CAN_TSR_TXOK0 BIT(1u)
+#define CAN_TSR_ABRQ0 BIT(7u)  /* the same */
+#define CAN_TSR_ABRQ 0x808080u /* one bit for each mailbox */
+#define CAN_TSR_RQCP 0x010101u /* the same */
+#define CAN_TSR_CODE_LOWEST 24u
+#define CAN_TSR_TME0 BIT(26u) /* of mailbox 0; the next ones follow */
+#define CAN_TSR_TME FIELD(7u, 26u)
+#define CAN_RFR_FMP 3u /* field */
+#define CAN_RFR_FOVR BIT(4u)
+#define CAN_RFR_RFOM BIT(5u)
+#define CAN_IER_TMEIE BIT(0u)
+#define CAN_IER_FMPIE0 BIT(1u)
+#define CAN_IER_FOVIE0 BIT(3u)
+#define CAN_IER_BOFIE BIT(10u)
+#define CAN_IER_ERRIE BIT(15u)
+#define CAN_ESR_BOFF BIT(2u)
+#define CAN_ESR_TEC_LOWEST 16u
+#define CAN_ESR_REC_LOWEST 24u
+#define CAN_IR_TXRQ BIT(0u)
+#define CAN_IR_RTR BIT(1u)
+#define CAN_IR_IDE BIT(2u)
+#define CAN_IR_STID_LOWEST 21u
+#define CAN_DTR_DLC 15u /* field */
+#define CAN_FMR_FINIT BIT(0u)
 
 /* IWDG, independent watchdog: RM0090 21.4 */
 typedef struct iwdg {
@@ -202,7 +198,7 @@ typedef struct dbgmcu {
     reg_t APB1_FZ; /* 38.16.4 */
 } dbgmcu_t;
 
-enum dbgmcu_bits { DBGMCU_APB1_FZ_IWDG = BIT(12) };
+#define DBGMCU_APB1_FZ_IWDG BIT(12u)
 
 /* SysTick: PM0214 4.5 */
 typedef struct systick {
@@ -212,14 +208,19 @@ typedef struct systick {
     reg_t CALIB;
 } systick_t;
 
-enum systick_bits { SYSTICK_CTRL_ENABLE = BIT(0), SYSTICK_CTRL_TICKINT = BIT(1), SYSTICK_CTRL_CLKSOURCE = BIT(2) };
+#define SYSTICK_CTRL_ENABLE BIT(0u)
+#define SYSTICK_CTRL_TICKINT BIT(1u)
+#define SYSTICK_CTRL_CLKSOURCE BIT(2u)
 
 /* NVIC, interrupt set-enable: PM0214 4.3.2; positions: RM0090 12.2 (table 62) */
 typedef struct nvic {
     reg_t ISER[8];
 } nvic_t;
 
-enum interrupt { INTERRUPT_CAN1_TX = 19, INTERRUPT_CAN1_RX0 = 20, INTERRUPT_CAN1_SCE = 22, INTERRUPT_USART1 = 37 };
+#define INTERRUPT_CAN1_TX 19u
+#define INTERRUPT_CAN1_RX0 20u
+#define INTERRUPT_CAN1_SCE 22u
+#define INTERRUPT_USART1 37u
 
 /* SCB, system control block: PM0214 4.4 */
 typedef struct scb {

@@ -2,9 +2,9 @@
 #ifndef LEVER_PORT_STM32F4_ROM_H
 #define LEVER_PORT_STM32F4_ROM_H
 
-#include <stdbool.h>
+#include "port/embedded/rom_test.h"
 
-/* Whether the flash holds what was built. About 11 instructions a byte. */
-bool rom_is_intact(void);
+/* The test of all of the image, not begun. */
+rom_test_t rom_test_of_image(void);
 
 #endif

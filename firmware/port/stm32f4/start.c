@@ -4,17 +4,10 @@
 
 #include "port/stm32f4/clock.h"
 #include "port/stm32f4/fault.h"
+#include "port/stm32f4/image.h"
 #include "port/stm32f4/processor.h"
 #include "port/stm32f4/registers.h"
 #include "port/stm32f4/tick.h"
-
-extern uint32_t image_stack_top[]; /* of image.ld, all of them */
-extern uint32_t image_data[];
-extern uint32_t image_data_end[];
-extern const uint32_t image_data_in_flash[];
-extern uint32_t image_bss[];
-extern uint32_t image_bss_end[];
-extern const uint32_t image_start[];
 
 int main(void);
 /* NOLINTNEXTLINE(misc-use-internal-linkage): image.ld makes it the entry point */
@@ -31,6 +24,7 @@ typedef struct vectors {
     void (*other[EXCEPTIONS - FIRST_OTHER])(void); /* an entry that is 0 faults, and so is recorded */
 } vectors_t;
 
+/* cppcheck-suppress misra-c2012-9.2 ; D10 */
 __attribute__((section(".vectors"), used)) static const vectors_t vectors = {
     .stack = image_stack_top,
     .reset = reset_interrupt,
@@ -39,19 +33,26 @@ __attribute__((section(".vectors"), used)) static const vectors_t vectors = {
     .other = {[SYSTEM_TICK - FIRST_OTHER] = tick_interrupt},
 };
 
+/* Between two symbols. */
+static uint32_t words(const uint32_t *begin, const uint32_t *end)
+{
+    return (
+        uint32_t)(((uintptr_t)end - (uintptr_t)begin) / sizeof *begin); /* cppcheck-suppress misra-c2012-11.4 ; D8 */
+}
+
 void reset_interrupt(void)
 {
-    const uint32_t *from = image_data_in_flash;
+    const uint32_t initialised = words(image_data, image_data_end);
+    const uint32_t cleared = words(image_bss, image_bss_end);
 
     scb.CPACR |= SCB_CPACR_FPU;
     synchronise();
-    scb.VTOR = (uint32_t)(uintptr_t)image_start;
-    for (uint32_t *to = image_data; to < image_data_end; to++) {
-        *to = *from;
-        from++;
+    scb.VTOR = (uint32_t)(uintptr_t)image_start; /* cppcheck-suppress misra-c2012-11.4 ; D8 */
+    for (uint32_t i = 0u; i < initialised; i++) {
+        image_data[i] = image_data_in_flash[i];
     }
-    for (uint32_t *to = image_bss; to < image_bss_end; to++) {
-        *to = 0u;
+    for (uint32_t i = 0u; i < cleared; i++) {
+        image_bss[i] = 0u;
     }
     (void)main();
     for (;;) {

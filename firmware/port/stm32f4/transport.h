@@ -27,6 +27,13 @@ bool transport_has_received(void);
 /* What no interrupt tells. To be called each millisecond or more often. */
 void transport_poll(uint32_t now_ms);
 
+/* Whether what its interrupts are for is done, as of the last transport_poll(). False now and then says nothing: it
+ * has just become due; false for long says that they come no more. */
+bool transport_is_served(void);
+
+/* Whether COMMANDs may change anything: port/command_guard.h. */
+bool transport_takes_commands(void);
+
 /* Fills in the state of the bus, and what has been lost since the start. */
 void transport_status(lever_platform_t *status);
 

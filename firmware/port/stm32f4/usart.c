@@ -31,6 +31,7 @@ static volatile uint8_t transmit_bytes[TRANSMIT_BYTES];
 static ring_t received = {.bytes = receive_bytes, .size = RECEIVE_BYTES};
 static ring_t waiting = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
 static volatile uint32_t overruns;
+static bool is_served; /* usart_is_served() */
 
 void usart_start(const clock_rates_t *rates)
 {
@@ -39,9 +40,9 @@ void usart_start(const clock_rates_t *rates)
     (void)rcc.APB2ENR; /* errata ES0182 2.1.13: a clock is there two cycles after its enabling */
     pin_to_peripheral(&gpioa, PIN_TRANSMIT, FUNCTION_USART);
     pin_to_peripheral(&gpioa, PIN_RECEIVE, FUNCTION_USART);
-    usart1.BRR = rates->pll ? DIVIDER(CLOCK_PLL_APB2_HZ) : DIVIDER(CLOCK_RAW_HZ);
+    usart1.BRR = rates->has_pll ? DIVIDER(CLOCK_PLL_APB2_HZ) : DIVIDER(CLOCK_RAW_HZ);
     usart1.CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_RE | USART_CR1_RXNEIE;
-    nvic.ISER[INTERRUPT_USART1 / 32] = BIT(INTERRUPT_USART1 % 32);
+    nvic.ISER[INTERRUPT_USART1 / 32u] = BIT(INTERRUPT_USART1 % 32u);
 }
 
 /* Writes while there is room in the hardware, which is two bytes; the rest goes out by interrupt. A QEMU older than 8.2
@@ -90,9 +91,18 @@ void usart_interrupt(void)
 
 void usart_poll(void)
 {
+    static uint32_t got;
+
     interrupts_off();
     receive();
+    is_served = (ring_used(&waiting) == 0u) || (waiting.got != got);
+    got = waiting.got;
     interrupts_on();
+}
+
+bool usart_is_served(void)
+{
+    return is_served;
 }
 
 bool usart_read(uint8_t *byte)

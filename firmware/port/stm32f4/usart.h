@@ -18,6 +18,10 @@ void usart_start(const clock_rates_t *rates);
 /* What no interrupt tells. To be called in each wait of the loop. */
 void usart_poll(void);
 
+/* Whether, at the last usart_poll(), nothing waited to be sent, or some of it had left since the call before. What is
+ * received needs no interrupt. */
+bool usart_is_served(void);
+
 /* Takes the next received byte; false when there is none. */
 bool usart_read(uint8_t *byte);
 

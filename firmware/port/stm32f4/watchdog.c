@@ -27,11 +27,3 @@ void watchdog_kick(void)
 {
     iwdg.KR = IWDG_KR_RELOAD;
 }
-
-bool watchdog_has_reset(void)
-{
-    const bool has = (rcc.CSR & RCC_CSR_IWDGRSTF) != 0u;
-
-    rcc.CSR |= RCC_CSR_RMVF; /* RM0090 7.3.21 */
-    return has;
-}

@@ -33,6 +33,7 @@ def test_a_campaign_that_is_done_is_only_summed_up(lever: Run, small_file: Path,
     assert (status, err) == (0, "")
     assert "48 runs, 0 failed" in out
     summary = json.loads((done / "summary.json").read_text())
+    assert summary["minutes_a_run"] == pytest.approx(1.0 / 60.0)
     assert {name: summary[name] for name in ("asked", "runs", "failed")} == {"asked": 48, "runs": 48, "failed": 0}
     rows, _ = json.loads((done / "printed.json").read_text()).values()
     assert [(row["estimator"], row["runs"]) for row in rows] == [("dual", 24), ("rls", 24)]

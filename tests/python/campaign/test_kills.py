@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from python.campaign.conftest import files
+from python.conftest import Run
 
 pytestmark = pytest.mark.usefixtures("installed")
 
@@ -80,7 +81,7 @@ def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
 class TestKilled:
     def test_a_worker(self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path) -> None:
-        client = begin(small_file, "-o", tmp_path, "--workers", "2")
+        client = begin(small_file, "-o", tmp_path, "--workers", "1")
         until(lambda: len(files(tmp_path)) >= 2, client)
         os.kill(workers(client.pid)[0], signal.SIGKILL)
         out, err = client.communicate(timeout=PATIENCE)
@@ -88,13 +89,7 @@ class TestKilled:
         assert files(tmp_path) == undisturbed
         assert "48 runs, 0 failed" in out
 
-    def test_the_client(
-        self,
-        small_file: Path,
-        undisturbed: dict[str, bytes],
-        tmp_path: Path,
-        lever: Callable[..., tuple[int, str, str]],
-    ) -> None:
+    def test_the_client(self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path, lever: Run) -> None:
         client = begin(small_file, "-o", tmp_path, "--workers", "1")
         until(lambda: len(files(tmp_path)) >= 2, client)
         children = workers(client.pid)
@@ -107,16 +102,15 @@ class TestKilled:
         kept = files(tmp_path)
         assert kept.items() <= undisturbed.items()
         assert 2 <= len(kept) < len(undisturbed)
-        assert "add --resume" in begin(small_file, "-o", tmp_path).communicate()[1]
+        assert "add --resume" in lever("campaign", small_file, "-o", tmp_path)[2]
         written = {name: (tmp_path / name).stat().st_mtime_ns for name in kept}
-        client = begin(small_file, "-o", tmp_path, "--workers", "2", "--resume")
-        assert "48 runs, 0 failed" in client.communicate(timeout=PATIENCE)[0]
+        assert "48 runs, 0 failed" in lever("campaign", small_file, "-o", tmp_path, "--workers", "1", "--resume")[1]
         assert files(tmp_path) == undisturbed
         assert {name: (tmp_path / name).stat().st_mtime_ns for name in kept} == written
         assert list(tmp_path.glob(".*")) == []
 
     def test_ctrl_c_of_a_terminal(self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path) -> None:
-        client = begin(small_file, "-o", tmp_path, "--workers", "2", start_new_session=True)
+        client = begin(small_file, "-o", tmp_path, "--workers", "1", start_new_session=True)
         until(lambda: len(files(tmp_path)) >= 2, client)
         os.killpg(client.pid, signal.SIGINT)
         _, err = client.communicate(timeout=PATIENCE)
@@ -132,6 +126,4 @@ class TestKilled:
             scheduler.kill()
             assert "repeat the command with --resume" in client.communicate(timeout=PATIENCE)[1]
             assert client.returncode == 2
-        client = begin(small_file, "-o", tmp_path, "--workers", "1", "--resume")
-        assert "48 runs, 0 failed" in client.communicate(timeout=PATIENCE)[0]
-        assert files(tmp_path) == undisturbed
+        assert files(tmp_path).items() <= undisturbed.items()

@@ -168,7 +168,7 @@ def test_shutdown_ends_a_waiting_receiver(make_bus: MakeBus) -> None:
         ({"settings": {"preload": "no"}}, "preload = 'no' is not known; allowed: fixed, trim"),
         ({"settings": "/none/my.settings"}, "/none/my.settings: cannot be read"),
         ({"settings": {}, "config": Config()}, "takes config or settings, not both"),
-        ({"speed": 3}, "interface 'lever' has no option speed; it has config, settings, snapshots, receive_own"),
+        ({"speed": 3}, "interface 'lever' has no option speed; it has config, settings, aircraft, snapshots, rec"),
         ({"fd": True}, "interface 'lever' is classic CAN: it has no fd"),
         ({"rx_queue_size": 0}, "rx_queue_size is 0; it must be a number of frames, at least 1"),
         ({"rx_queue_size": "many"}, "rx_queue_size is 'many'; it must be a number of frames"),

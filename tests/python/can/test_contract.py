@@ -24,7 +24,7 @@ def test_the_version_is_what_identity_says(codec: Codec) -> None:
 def test_no_two_messages_have_the_same_data_id_with_the_same_counter() -> None:
     """Of a frame taken for another message the CRC is wrong then, whatever its counter is."""
     bases = [data_id_base(message) for message in DBC.messages]
-    assert len(set(bases)) == len(bases) == 18
+    assert len(set(bases)) == len(bases) == 19
     assert max(bases) + 15 <= 255
 
 
@@ -81,7 +81,7 @@ def test_scales_have_whole_reciprocals() -> None:
 def test_named_values_are_the_enums(codec: Codec) -> None:
     choices = (*CHOICES, "request", "mode", "bounce")
     enums = {name: codec.enum(f"lever_{name}") for name in choices}
-    enums |= {name: codec.enum(f"message_{name}") for name in ("page", "part", "result")}
+    enums |= {name: codec.enum(f"message_{name}") for name in ("page", "part", "result", "cause")}
     tested = 0
     for message in DBC.messages:
         for signal in message.signals:
@@ -97,7 +97,7 @@ def test_named_values_are_the_enums(codec: Codec) -> None:
             assert signal.choices is not None
             assert {value: str(name) for value, name in signal.choices.items()} == expected, signal.name
             tested += 1
-    assert tested == 28
+    assert tested == 29
 
 
 def test_every_fault_has_its_named_bit(codec: Codec) -> None:

@@ -75,7 +75,9 @@ def test_the_log_has_every_frame_and_can_be_replayed(
 ) -> None:
     sent = messages(session, 3000)
     log = tmp_path / "a.log"
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     assert record(log, sent) == 0
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
     told = capsys.readouterr().out
     assert "3000 frames, 0 lost, 0 corrupt, 0 error frames" in told
     assert "LEVER_SAMPLE" in told

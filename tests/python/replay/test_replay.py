@@ -21,7 +21,7 @@ from lever_cdkf.host_tools.replay import engine, reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
 from lever_cdkf.host_tools.replay.summary import verdict
 from python.conftest import Refused, Session, simulated
-from python.report.reading import figures, read
+from python.report.reading import figures, first_number, read, unpack
 
 Summary = dict[str, Any]
 
@@ -357,6 +357,11 @@ def test_the_page_has_all_but_truth(replay: tuple[Path, Summary]) -> None:
     ]
     curves = {trace["name"] for figure in figures(page).values() for trace in figure["data"]}
     assert {"recorded", "replayed", "measured", "estimate"} <= curves
+    for trace in figures(page)["figure-comparison"]["data"]:
+        assert unpack(trace["x"])[[0, -1]] == pytest.approx([0.0, replay[1]["samples"] * 1e-3], abs=2e-3)
+    (at_the_end,) = (table for table in page.tables if "at the end, ± one σ" in table[0])
+    assert [row[0].split()[-1] for row in at_the_end[1:]] == ["mass", "damping", "stiffness", "frequency", "ratio"]
+    assert first_number(at_the_end[3][1]) == pytest.approx(replay[1]["estimates"]["k_p"]["last"], rel=5e-3)
     assert "truth" not in curves
     assert "Natural frequency at the end" in "".join(page.text)
     cells = {row[0]: row[1:] for table in page.tables for row in table}

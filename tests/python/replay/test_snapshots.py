@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.firmware.native import Config
+from lever_cdkf.host_tools.firmware.native import Config, lib
 from lever_cdkf.host_tools.replay.engine import Options, replay
 from lever_cdkf.host_tools.replay.proof import Counts
 from lever_cdkf.sil.run import buslog
@@ -21,6 +21,8 @@ Summary = dict[str, Any]
 
 CUTS = int(os.environ.get("LEVER_CUTS", "12"))
 """Places at which the log is cut; 1,000 once: replay/README.md."""
+FRAMES = 2 + -(-lib.LEVER_STATE_BYTES // 6)
+"""Of a snapshot."""
 FLIPS = int(os.environ.get("LEVER_CUTS", "25"))
 
 
@@ -85,8 +87,9 @@ def test_one_flipped_bit_is_found(lines: list[str], tmp_path: Path) -> None:
     source = random.Random(2)
     before, _ = counts(lines, tmp_path)
     inputs = {codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")}
+    compared = next(place for place, line in enumerate(lines) if seconds(line) >= 5.0)  # the last whole snapshot's
     for _ in range(FLIPS):
-        place = source.randrange(len(lines) - 3000)
+        place = source.randrange(compared)
         spoilt = lines.copy()
         spoilt[place] = flipped(lines[place], source)
         found, summary = counts(spoilt, tmp_path)
@@ -107,7 +110,7 @@ def test_what_is_lost_of_the_snapshots_themselves(lines: list[str], tmp_path: Pa
     """Without a part of its state a snapshot still says whether the replay is equal; without its end it does not."""
     of_snapshots = [place for place, line in enumerate(lines) if " 21D#" in line]
     without_data, without_end = (
-        [line for place, line in enumerate(lines) if place != of_snapshots[nth]] for nth in (264 + 5, 264 + 263)
+        [line for place, line in enumerate(lines) if place != of_snapshots[nth]] for nth in (FRAMES + 5, 2 * FRAMES - 1)
     )
     assert counts(without_data, tmp_path)[0].equal == 11
     found, summary = counts(without_end, tmp_path)
@@ -131,9 +134,12 @@ def test_other_settings_and_choices_are_not_compared(lines: list[str], tmp_path:
     found, summary = counts(lines[4000:], tmp_path, config=Config(settings={"theta_noise": 0.01}))
     assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
     assert "of other settings" in summary["verdict"]
-    found, summary = counts(lines[4000:], tmp_path, chosen={"estimator": "joint"})
-    assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
-    assert "choices were made on the command line" in summary["verdict"]
+    for part in (lines, lines[4000:]):
+        other = {"config": Config(estimator="joint"), "chosen": {"estimator": "joint"}}
+        found, summary = counts(part, tmp_path, **other)
+        assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
+        assert "other choices were made for the replay" in summary["verdict"]
+    assert counts(lines[4000:], tmp_path, chosen={"estimator": "dual"})[0].equal > 0
 
 
 def test_choices_before_the_log_are_told(tmp_path: Path) -> None:
@@ -143,6 +149,14 @@ def test_choices_before_the_log_are_told(tmp_path: Path) -> None:
     assert found.begun_at_s is not None
     assert found.different == 0
     assert summary["estimator"]["model"] == "linear_physical"
+
+
+def test_a_part_by_its_time(lines: list[str], tmp_path: Path) -> None:
+    """COMMANDs before it come first; they are in the state of the snapshot."""
+    found, summary = counts(lines, tmp_path, start=3.3)
+    assert summary["recording"]["commands"] > 0
+    assert found.begun_at_s == pytest.approx(0.2, abs=0.002)
+    assert (found.equal, found.different) == (4, 0)
 
 
 def test_a_log_without_any_is_as_before(lines: list[str], tmp_path: Path) -> None:

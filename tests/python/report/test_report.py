@@ -221,6 +221,10 @@ def test_the_band_of_the_feedthrough_is_what_was_sent(page: Reader, result: Resu
             width = curves["high3"][place] - curves["low2"][place]
             assert np.radians(width) == pytest.approx(4.0 * phase, abs=5e-3)
     assert step["traces"] == list(range(8))  # band and curves, not the coherence
+    caption = "".join(page.text)
+    held = re.search(r"held the true magnitude (\d+) % and the true phase (\d+) % of the time", caption)
+    assert held is not None
+    assert all(80 < int(share) <= 100 for share in held.groups())
 
 
 def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result) -> None:
@@ -271,6 +275,8 @@ def test_close_ups_show_one_stretch_at_a_time(page: Reader) -> None:
         for visible, trace in zip(button["data"]["visible"], figure["data"], strict=True):
             x = unpack(trace["x"])
             assert visible == (begin - 1e-3 < x.min() and x.max() < end + 1e-3)
+    colours = {trace["name"]: (trace.get("line") or trace["marker"])["color"] for trace in figure["data"]}
+    assert colours == {"measured": "@measured", "truth": "@truth", "estimate": "@estimate"}
 
 
 def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Reader, result: Result) -> None:

@@ -241,6 +241,7 @@ def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
         (("angle=LvrAngle",), "the inputs are theta, theta_dot, z_ddot, tau_m, grip_force"),
         (("theta=AccLat",), "it is in g, which is no unit of angle"),
         (("theta=LvrAngle,unit=furlong",), "furlong is no unit of angle"),
+        (("z_ddot=AccVert,gravity=out",), "gravity = out; it may be auto, included, none"),
         (("theta=LvrAngle,sign=2",), "sign = 2; it may be 1 or -1"),
         (("theta=LvrAngle,delay=4",), "delay = 4 s is more than a second"),
         (("theta=LvrAngle,delay=4 kg",), "delay = 4 kg; it must be a number, in s or with a unit of time"),

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import can
 import cantools.database
+import numpy as np
 import pytest
 from cantools.database.can import Database
 from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.provenance import provenance
+from lever_cdkf.host_tools.signals import plots, proposal
 from lever_cdkf.host_tools.signals.bus_signals import load_database
+from lever_cdkf.host_tools.signals.recorded import Signal
 from python.conftest import Refused
 from python.signals.databases import AIRCRAFT, WITH_TORQUE, WITHHELD, Aircraft, database
 from python.signals.flight import NATURAL_FREQUENCY, Flight, write_log
@@ -64,6 +69,7 @@ def test_the_proposal_can_be_used_as_it_is(folder: Path, tmp_path: Path, capsys:
     assert page.read_text().count("<svg") == 4
     assert "5 other signals never change" in said  # foreign.dbc has nine
     assert "▁" in said
+    assert f"Written: {toml}, {page}" in " ".join(said.split())
     summary = replayed(tmp_path / "out", log, "--dbc", dbc, "--map", toml)
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
 
@@ -73,6 +79,22 @@ def test_columns_and_a_picture(folder: Path, tmp_path: Path, capsys: pytest.Capt
     assert cli.main(["map", str(folder / "columns.csv"), "-o", str(picture)]) == 0
     assert "--map 'theta=Lever angle' 'theta_dot=Lever rate' 'z_ddot=Vertical acc.'" in capsys.readouterr().out
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_signal_that_begins_later_is_drawn_later(tmp_path: Path) -> None:
+    values = np.arange(100.0)
+    signals = [("theta", Signal("early", 5.0 + values, values)), ("theta", Signal("late", 45.0 + values, values))]
+    plots.write(tmp_path / "page.html", signals, "title", provenance())
+    starts = re.findall(r'<path d="M([\d.]+) ', (tmp_path / "page.html").read_text())
+    assert float(starts[1]) - float(starts[0]) == pytest.approx((640 - 84 - 20) * 40.0 / 139.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("word", "weight"),
+    [("lever", 2.0), ("lvr", 2.0), ("lev", 2.0), ("leverangle", 5.0), ("lx", 0.0), ("levers", 2.0), ("vlr", 0.0)],
+)
+def test_words_of_names_may_be_shortened_or_compounds(word: str, weight: float) -> None:
+    assert proposal._weight({"lever": 2.0, "angle": 3.0}, word) == weight
 
 
 def test_a_database_in_utf_8_or_not(tmp_path: Path) -> None:

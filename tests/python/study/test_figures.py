@@ -169,6 +169,9 @@ def test_the_surfaces_are_the_answer_of_the_linearised_lever() -> None:
             # The firmware linearises about the angle it measures, not about the one that its parameters would hold.
             assert surface.ridge[index] == pytest.approx(natural, rel=1e-5 if surface is truth else 3e-3)
         assert estimate.ridge[index] == found[k].natural_frequency
+    peaks = [max(at_once) for at_once in truth.magnitude.T]
+    told = f"the peak is between {number(min(peaks))} and {number(max(peaks))} deg per m/s²"
+    assert told in made("bode").caption
 
 
 # --- linear models ---------------------------------------------------------------------------------------------------

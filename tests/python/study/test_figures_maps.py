@@ -42,6 +42,9 @@ def test_no_label_lies_on_another(width: str) -> None:
     boxes = [text.get_window_extent() for text in texts if text.get_text() and text.get_visible()]
     assert len(boxes) > 20
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+    upper, lower = (sheet.axes[4 * row] for row in range(2))  # they share both scales, whose numbers stand at the foot
+    assert not any(tick.label1.get_visible() for tick in upper.xaxis.get_major_ticks())
+    assert upper.get_xlim() == lower.get_xlim()
 
 
 def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -> None:

@@ -6,6 +6,7 @@ import asyncio
 import re
 import shlex
 import subprocess
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -167,7 +168,9 @@ def test_once(log: Path, flight: Flight, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
+    running = threading.active_count()
     assert cli.main(["monitor", "--scenario", "steady", "--once", "--duration", "3"]) == 0
+    assert threading.active_count() == running, "it goes on after the picture"
     assert re.search(
         r"^simulation of steady · model lever · watching for 0:\d\d min · firmware 0.2.0$",
         capsys.readouterr().out,

@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-_TAKEN = 2
+TAKEN = 2
 _USED_AT_ONCE = 1
 _CONDITION = "(?:eq|ne|cs|cc|hs|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)?"
 _ACCUMULATE = re.compile(rf"v(?:n?ml[as]|fn?m[as]){_CONDITION}\.f32")
@@ -29,7 +29,7 @@ MODEL = {
     "transfer of n registers (ldm, stm, vldm, vstm, push, pop, ldrd, strd)": "1 + n",
     "udiv, sdiv": 12,
     "any other, stores too": 1,
-    "a branch that is taken, besides": _TAKEN,
+    "a branch that is taken, besides": TAKEN,
     "a float that is computed or loaded and used by the next instruction, besides": _USED_AT_ONCE,
 }
 """The model, as it is printed."""
@@ -94,5 +94,5 @@ def of_block(block: Sequence[Instruction], after: Instruction, is_jump: bool) ->
     spent = [each.cycles for each in block]
     for place, (each, following) in enumerate(zip(block, [*block[1:], after], strict=True)):
         spent[place] += _USED_AT_ONCE if each.result & following.sources else 0
-    spent[-1] += _TAKEN if is_jump else 0
+    spent[-1] += TAKEN if is_jump else 0
     return spent

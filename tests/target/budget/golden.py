@@ -33,7 +33,16 @@ JOINT_TO_DUAL = 1.02
 
 _COUNTED = ("mean", "worst", "start_up_worst")
 _WHOLE = ("instructions_after_gap", "cycles_after_gap", "init")
-_BYTES = ("text_bytes", "rodata_bytes", "data_bytes", "bss_bytes", "instance_bytes", "memory_bytes", "stack_bytes")
+_BYTES = (
+    "text_bytes",
+    "rodata_bytes",
+    "recorder_bytes",
+    "data_bytes",
+    "bss_bytes",
+    "instance_bytes",
+    "memory_bytes",
+    "stack_bytes",
+)
 
 
 def numbers(budget: dict[str, Any]) -> dict[str, float]:

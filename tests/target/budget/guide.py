@@ -68,6 +68,7 @@ def memory(values: Values) -> str:
     rows = {
         "flash: code of the core, all of it": values["text_bytes"],
         "flash: its constants, of which the texts of the settings are most": values["rodata_bytes"],
+        "flash: code and constants of the recorder, where it is used": values["recorder_bytes"],
         "RAM: variables of the core": values["data_bytes"] + values["bss_bytes"],
         f"RAM: `lever_memory_t`, for each instance ({used:g} of them used)": room,
         "flash or RAM: `lever_config_t`, which instances may share": ffi.sizeof("lever_config_t"),

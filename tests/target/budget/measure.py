@@ -159,6 +159,7 @@ def _bytes(elf: Path) -> dict[str, Any]:
         "rodata_bytes": library["rodata"],
         "data_bytes": library["data"],
         "bss_bytes": library["bss"],
+        "recorder_bytes": library["recorder"],
         "instance_bytes": instance["lever"],
         "memory_bytes": instance["lever_memory"],
         "files": sizes.of_files(elf),

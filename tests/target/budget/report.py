@@ -89,6 +89,7 @@ def tables(budget: dict[str, Any]) -> Tables:
 _BYTES = {
     "text_bytes": "code of the core (.text)",
     "rodata_bytes": "constants of the core (.rodata)",
+    "recorder_bytes": "the recorder, where it is used (.text, .rodata)",
     "data_bytes": "variables of the core (.data)",
     "bss_bytes": "variables of the core (.bss)",
     "instance_bytes": "an instance",

@@ -12,14 +12,25 @@ _SECTION = re.compile(r"^\.(text|rodata|data|bss)(?:\.\S*)?\s+(\d+)\s", re.MULTI
 _TYPE = r"DW_TAG_{kind}_type\)\s+<\w+>\s+DW_AT_name\s+:[^\n]*\b{name}\s+<\w+>\s+DW_AT_byte_size\s+: (\d+)"
 
 
+RECORDER = ("app/state.c", "app/recorder.c", "can/messages_snapshot.c")
+"""What only an image that sends snapshots has."""
+
+
 def of_core(elf: Path) -> dict[str, int]:
-    """Bytes of text, rodata, data and bss of the core: of text what is linked into the image, which has all of the
-    façade; of the others what is in the library."""
-    total = dict.fromkeys(("text", "rodata", "data", "bss"), 0)
-    for path in core_objects(elf).values():
+    """Bytes of text, rodata, data and bss of the core without the recorder, and as "recorder" of both kinds of flash of
+    that: of text what is linked into the image, which has all of the façade; of the others what is in the library."""
+    total = dict.fromkeys(("text", "rodata", "data", "bss", "recorder"), 0)
+    texts = of_files(elf)
+    for name, path in core_objects(elf).items():
+        found = dict.fromkeys(total, 0)
         for kind, count in _SECTION.findall(run_tool("size", "-A", path)):
-            total[kind] += int(count)
-    return total | {"text": sum(of_files(elf).values())}
+            found[kind] += int(count)
+        found["text"] = texts.get(name, 0)
+        if name in RECORDER:
+            found["recorder"], found["text"], found["rodata"] = found["text"] + found["rodata"], 0, 0
+        for kind, count in found.items():
+            total[kind] += count
+    return total
 
 
 def of_files(elf: Path) -> dict[str, int]:

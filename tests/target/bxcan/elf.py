@@ -14,6 +14,7 @@ class Image:
     """`flash` begins at FLASH, with the vector table; `symbols` are addresses by name."""
 
     def __init__(self, path: Path) -> None:
+        self.path = path
         self.flash = bytes(elf.flash_bytes(path))
         rows = [line.split() for line in elf.tool("nm", path).splitlines()]
         self.symbols = {row[2]: int(row[0], 16) for row in rows if len(row) == 3}

@@ -9,10 +9,11 @@ from lever_cdkf.host_tools.can import codec
 from target.bxcan.board import Board
 from target.bxcan.frame import Frame
 
-LEVER_SAMPLE, BASE_SAMPLE, GRIP_SAMPLE, COMMAND, STATE_ESTIMATE, HEALTH, PLATFORM_HEALTH = (
+LEVER_SAMPLE, BASE_SAMPLE, GRIP_SAMPLE, COMMAND, STATE_ESTIMATE, HEALTH = (
     codec.message(name).frame_id
-    for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND", "STATE_ESTIMATE", "HEALTH", "PLATFORM_HEALTH")
+    for name in ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND", "STATE_ESTIMATE", "HEALTH")
 )
+OF_MACHINE = [codec.message(name).frame_id for name in ("PLATFORM_HEALTH", "PLATFORM_RESET")]
 IDENTITY = 0x217
 INPUTS = {LEVER_SAMPLE, BASE_SAMPLE, GRIP_SAMPLE, COMMAND, IDENTITY}
 _encode_lever, _encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
@@ -32,7 +33,7 @@ def is_estimate(frame: Frame) -> bool:
 
 def answers(frames: list[Frame]) -> list[Frame]:
     """Without what the firmware in this process does not send."""
-    return [frame for frame in frames if frame.identifier != PLATFORM_HEALTH]
+    return [frame for frame in frames if frame.identifier not in OF_MACHINE]
 
 
 class Talk:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import can
+import numpy as np
 import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.firmware.config import CHOICES
@@ -12,7 +13,7 @@ from lever_cdkf.sil.scenarios import scenario
 from target.bxcan.board import MS, Board, BoardBus
 from target.bxcan.bus import Peer
 from target.bxcan.frame import Frame
-from target.bxcan.talk import COMMAND, PLATFORM_HEALTH, STATE_ESTIMATE, Talk, answers, is_estimate
+from target.bxcan.talk import COMMAND, OF_MACHINE, STATE_ESTIMATE, Talk, answers, is_estimate
 
 URGENT = Frame(0x010, b"\x55" * 8)
 """Of another node, more important than anything of ours."""
@@ -30,14 +31,14 @@ URGENT = Frame(0x010, b"\x55" * 8)
 def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
     board: Board, name: str, changes: list[str]
 ) -> None:
-    """Bit for bit, every frame but PLATFORM_HEALTH, which the firmware in this process has no board for."""
+    """Bit for bit, every frame but those of a machine, which the firmware in this process has no board for."""
     played = scenario.load(name, changes)
     bus = BoardBus(board)
     there = loop.run(played, bus).frames()
     bus.shutdown()
     with can.Bus(interface="lever") as reference:
         here = loop.run(played, reference).frames()
-    ours = there.identifier != PLATFORM_HEALTH
+    ours = ~np.isin(there.identifier, OF_MACHINE)
     assert there.identifier[ours].tolist() == here.identifier.tolist()
     assert there.data[ours].tobytes() == here.data.tobytes()
     assert len(there.of(STATE_ESTIMATE)) == len(played.time())
@@ -112,8 +113,8 @@ def test_all_mailboxes_wait(talk: Talk, board: Board) -> None:
         board.run(MS)
         waited = max(waited, sum(box.is_pending for box in board.can.tx.boxes))
         board.run(2 * MS)  # within the 5 ms after which lever_idle() speaks
-        received = [frame for frame in board.peer.frames()[heard:] if frame != URGENT]
-        assert answers(received) == talk.expected()
+        received = [frame for frame in answers(board.peer.frames()[heard:]) if frame != URGENT]
+        assert received == talk.expected()
         assert is_estimate(received[-1])
     assert waited == 3
 

@@ -127,19 +127,19 @@ class Board:
             line = self._read_line()
 
     def platform_health(self) -> dict[str, float]:
-        """What PLATFORM_HEALTH says after some samples of a lever that rests."""
+        """What PLATFORM_HEALTH and PLATFORM_RESET say after some samples of a lever that rests."""
         assert self.command("O") == ""
         lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
+        said: dict[str, dict[str, float]] = {}
         for k in range(300):
             frames = ((0x110, lever_sample(k, 0.35, 0.0, 0.0)), (0x111, base_sample(k, 0.0, 1000 * k)))
             for identifier, data in frames:
                 self._line.sendall(f"t{identifier:03X}8{data.hex()}\r".encode())
-            answers = list(self._answers())
-            for identifier, data in answers:
-                if (said := codec.decode(identifier, data))[0] == "PLATFORM_HEALTH":
-                    assert self.command("C") == ""
-                    return said[1]
-        raise AssertionError("no PLATFORM_HEALTH in 300 samples")
+            said |= dict(codec.decode(*frame) for frame in self._answers())
+            if "PLATFORM_HEALTH" in said and "PLATFORM_RESET" in said:
+                assert self.command("C") == ""
+                return said["PLATFORM_HEALTH"] | said["PLATFORM_RESET"]
+        raise AssertionError("no PLATFORM_HEALTH or no PLATFORM_RESET in 300 samples")
 
     def _answers(self) -> Iterator[tuple[int, bytes]]:
         """The frames of one step, the last of which is STATE_ESTIMATE."""

@@ -15,6 +15,8 @@ pytestmark = pytest.mark.requires("qemu-system-arm", "arm-none-eabi-gcc")
 
 CLOCK, ROM, SELF_TEST, HARD_FAULT = 1, 2, 4, 16
 """Bits of enum lever_platform_fault (lever_cdkf.h)."""
+BY_HARD_FAULT, BY_STACK_OVERFLOW = 6, 7
+"""Of enum message_cause (can/messages.h)."""
 SP, PC = 13, 15
 NOWHERE = 0x6000_0000
 """External memory, of which there is none."""
@@ -49,7 +51,7 @@ def test_starts_and_passes_its_self_tests(slcan_image: Path, tmp_path: Path) -> 
 
 
 def test_image_for_can_goes_round_without_a_controller_that_answers(can_image: Path, tmp_path: Path) -> None:
-    tested, milliseconds = (elf.symbol(can_image, name) for name in ("faults_at_start", "milliseconds"))
+    tested, milliseconds = (elf.symbol(can_image, name) for name in ("lasting_faults", "milliseconds"))
     with running(can_image, tmp_path) as board, board.debugger() as debugger:
         go_on_until(lambda: debugger.words(milliseconds, 1)[0] >= 100, debugger)
         assert debugger.words(tested, 1)[0] & 0xFF == CLOCK
@@ -91,7 +93,9 @@ def test_hard_fault_is_recorded_and_reported_once(slcan_image: Path, tmp_path: P
         debugger.write_register(PC, NOWHERE)
         debugger.go_on()
         board.wait_for_answer()
-        assert board.platform_health()["faults"] == CLOCK | HARD_FAULT
+        health = board.platform_health()
+        assert (health["faults"], health["cause"]) == (CLOCK | HARD_FAULT, BY_HARD_FAULT)
+        assert health["fault_address"] == NOWHERE
 
         debugger.stop()
         mark, count, pc, _lr, _psr, cfsr, hfsr, _address = debugger.words(fault_last, 8)
@@ -118,7 +122,8 @@ def test_stack_overflow_is_a_hard_fault(slcan_image: Path, tmp_path: Path) -> No
         debugger.write_register(SP, 0x2000_0010)
         debugger.go_on()
         board.wait_for_answer()
-        assert board.platform_health()["faults"] == CLOCK | HARD_FAULT
+        health = board.platform_health()
+        assert (health["faults"], health["cause"]) == (CLOCK | HARD_FAULT, BY_STACK_OVERFLOW)
         debugger.stop()
         _mark, count, pc, *_ = debugger.words(fault_last, 8)
         assert (count, pc) == (1, 0)

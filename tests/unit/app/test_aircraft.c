@@ -151,3 +151,35 @@ TEST(frozen_parameters_carry_a_margin_and_a_base_that_is_missing_does_not)
     }
     TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
 }
+
+TEST(what_is_said_is_the_margin_and_another_aircraft_begins_without_one)
+{
+    bounce_t *bounce = &lever->bounce;
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    (void)deliver_many(1000u);
+    bounce->margin = (margin_t){1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f};
+    bounce->state = (uint8_t)LEVER_BOUNCE_WARNING;
+    const lever_stability_t said = stability();
+    TEST_ASSERT_TRUE((said.gain_margin == 1.0f) && (said.gain_margin_sigma == 2.0f) && (said.modulus == 3.0f));
+    TEST_ASSERT_TRUE((said.modulus_sigma == 4.0f) && (said.frequency == 5.0f) && (said.frequency_sigma == 6.0f));
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, stability().state);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, stability().gain_margin);
+    (void)run(1u);
+    TEST_ASSERT_TRUE(stability().gain_margin != 0.0f);
+}
+
+/* R44 */
+TEST(each_fault_of_sensors_or_model_takes_the_margin_away)
+{
+    static const uint32_t fault[] = {LEVER_FAULT_THETA, LEVER_FAULT_BASE, LEVER_FAULT_CLOCK, LEVER_FAULT_BOUND,
+        LEVER_FAULT_RECOVERED, LEVER_FAULT_MISMATCH, LEVER_FAULT_HANDS_OFF, 0u};
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    (void)deliver_many(4000u);
+    for (uint32_t i = 0u; i < 8u; i++) {
+        lever->estimator.faults = fault[i];
+        lever->bounce.time_us -= 1000000u;
+        instance_watch(lever);
+        TEST_ASSERT_EQUAL(fault[i] != 0u, stability().state == (uint8_t)LEVER_BOUNCE_UNKNOWN);
+    }
+}

@@ -140,6 +140,11 @@ TEST(a_reset_leaves_nothing_of_what_was)
     expected.z_ddot = now->z_ddot;
     expected.tau_m = now->tau_m;
     TEST_ASSERT_EQUAL_MEMORY(&expected, now, sizeof expected);
+    for (uint32_t i = 0u; i < (sizeof value / sizeof value[0]); i++) {
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, *value[i]);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0u, now->faults);
+    TEST_ASSERT_TRUE((no_dither.low_pass == 0.0f) && (no_dither.low_pass_rate == 0.0f) && (no_dither.slope == 0.0f));
     TEST_ASSERT_EQUAL_MEMORY(&no_dither, &lever->dither, sizeof no_dither);
 }
 
@@ -265,4 +270,25 @@ TEST(a_chosen_adaptation_starts_its_walk_anew)
         sigma[k] = estimate().parameter_sigma[2];
     }
     TEST_ASSERT_TRUE(sigma[1] > (1.001f * sigma[0]));
+}
+
+/* Each by itself; what is as it was does not. */
+TEST(a_choice_that_changes_is_said_on_the_bus)
+{
+    for (uint32_t k = 0u; k <= 5u; k++) {
+        lever_command_t command = command_none();
+        uint8_t *const choice[] = {
+            &command.model, &command.preload, &command.estimator, &command.adaptation, &command.mitigation};
+        const uint8_t now[] = {config.model, config.preload, config.estimator, config.adaptation, config.mitigation};
+        start();
+        for (uint32_t i = 0u; i < 5u; i++) {
+            *choice[i] = (uint8_t)(now[i] ^ ((i == k) ? 1u : 0u));
+        }
+        lever->link.pages = 0u;
+        TEST_ASSERT_TRUE(lever_command(lever, &command));
+        TEST_ASSERT_EQUAL(k < 5u, lever->link.pages != 0u);
+    }
+    lever_command_t command = command_none();
+    command.dither_rms = 1.1e4f;
+    TEST_ASSERT_FALSE(lever_command(lever, &command));
 }

@@ -165,3 +165,14 @@ TEST(spectrum_is_flat_in_the_band_half_at_its_corners_and_gone_beyond)
     TEST_ASSERT_DOUBLE_WITHIN(2.0e-4, 0.0, power[6] / power[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-5, 0.0, power[7] / power[0]);
 }
+
+/* A tenth of the samples a second: what is asked beyond is that. */
+TEST(the_band_ends_at_a_tenth_of_the_sampling_rate)
+{
+    dither_t beyond;
+    dither_t at;
+    dither_init(&beyond, 2.0f, 12.0f, 0.01f, 1.0f, 0.5f);
+    dither_init(&at, 2.0f, 10.0f, 0.01f, 1.0f, 0.5f);
+    TEST_ASSERT_EQUAL_FLOAT(at.high, beyond.high);
+    TEST_ASSERT_EQUAL_FLOAT(at.scale, beyond.scale);
+}

@@ -1,4 +1,5 @@
 /* Received frames: samples paired by counter; frames that are lost, corrupt, repeated, out of order or not for us. */
+#include "app/instance.h"
 #include "frames.h"
 
 void setUp(void)
@@ -51,6 +52,34 @@ TEST(a_lever_sample_serves_the_one_base_sample_with_its_counter)
         TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
     }
     assert_counts(18u, 0u, 0u);
+}
+
+/* And for nothing else of its turn; nor does one from before a reset. */
+TEST(a_grip_sample_serves_the_one_base_sample_with_its_counter)
+{
+    const message_grip_sample_t grip = {.grip_force = 12.5f, .grip_force_valid = true};
+    const lever_sample_t *sample = &lever->link.sample;
+    lever_command_t reset = command_none();
+    lever_frame_t frame;
+    TEST_ASSERT_TRUE(message_grip_sample_encode(&frame, &grip));
+    next_pair();
+    e2e_protect(&frame, (uint8_t)MESSAGE_GRIP_SAMPLE_DATA_ID, e2e_counter(&base_frame));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
+    (void)take_pair();
+    TEST_ASSERT_TRUE(sample->grip_force_valid && (sample->grip_force == 12.5f));
+    for (uint32_t k = 0u; k < 17u; k++) {
+        (void)deliver();
+        TEST_ASSERT_FALSE(sample->grip_force_valid);
+    }
+    next_pair();
+    e2e_protect(&frame, (uint8_t)MESSAGE_GRIP_SAMPLE_DATA_ID, e2e_counter(&base_frame));
+    (void)lever_on_frame(lever, &frame);
+    (void)lever_on_frame(lever, &lever_frame);
+    reset.request = (uint8_t)LEVER_REQUEST_RESET;
+    frame = command_frame(&reset);
+    TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
+    TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &base_frame));
+    TEST_ASSERT_FALSE(sample->grip_force_valid || sample->theta_valid);
 }
 
 /* By the validity bits of each value; and a code for "not available" is no measurement, whatever its flag says. */

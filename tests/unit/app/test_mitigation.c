@@ -239,3 +239,14 @@ TEST(damping_ends_with_the_commands)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, health().torque);
     TEST_ASSERT_EQUAL_FLOAT(1.0f, correction().weight);
 }
+
+TEST(each_fault_of_sensors_clock_or_hands_closes_it)
+{
+    static const uint32_t fault[] = {LEVER_FAULT_CLOCK, LEVER_FAULT_RECOVERED, LEVER_FAULT_HANDS_OFF, 0u};
+    (void)deliver_many(3000u);
+    for (uint32_t i = 0u; i < 4u; i++) {
+        lever->estimator.faults = fault[i];
+        instance_mitigate(lever);
+        TEST_ASSERT_EQUAL(fault[i] == 0u, lever->bounce.mitigation.open);
+    }
+}

@@ -129,3 +129,20 @@ TEST(a_period_that_is_too_short_is_as_short_as_can_be)
     TEST_ASSERT_EQUAL_UINT32(FRAMES - 1, record(1000u)); /* a millisecond later */
     TEST_ASSERT_EQUAL_UINT32(1u, whole);
 }
+
+TEST(a_part_that_is_not_known_is_refused_both_ways)
+{
+    const message_snapshot_t unknown = {.part = (uint8_t)MESSAGE_PART_COUNT};
+    message_snapshot_t message = {.part = (uint8_t)MESSAGE_PART_END, .digest = 5u};
+    lever_frame_t frame = {.id = 1u};
+    TEST_ASSERT_FALSE(message_snapshot_encode(&frame, &unknown));
+    TEST_ASSERT_EQUAL_UINT32(1u, frame.id);
+    TEST_ASSERT_TRUE(message_snapshot_encode(&frame, &message));
+    lever_frame_t other = frame;
+    other.data[1] = (uint8_t)(unknown.part << 4u);
+    TEST_ASSERT_FALSE(message_snapshot_decode(&message, &other));
+    other = frame;
+    other.id++;
+    TEST_ASSERT_FALSE(message_snapshot_decode(&message, &other));
+    TEST_ASSERT_EQUAL_UINT32(5u, message.digest);
+}

@@ -1,12 +1,22 @@
 /* The state of an instance as bytes: all of it, the same again, and nothing that does harm. */
+#include "app/instance.h"
 #include "app/state.h"
 #include "frames.h"
+
+#include <stddef.h>
 
 enum { FIRST_ROW = 1 }; /* byte 0 says whether there is an aircraft */
 
 static uint8_t state[LEVER_STATE_BYTES];
 static lever_memory_t other_memory;
 static random_source_t source;
+static const lever_aircraft_t aircraft = {.count = 3u,
+    .frequency = {2.0f, 4.0f, 8.0f},
+    .real = {1.0f, 1.0f, 1.0f},
+    .gain_sigma = 0.1f,
+    .phase_sigma = 0.1f,
+    .warning = 6.0f,
+    .alarm = 3.0f};
 
 void setUp(void)
 {
@@ -108,13 +118,6 @@ static void assert_refused(lever_t *instance)
 
 TEST(other_settings_or_an_aircraft_on_one_side_are_refused)
 {
-    static const lever_aircraft_t aircraft = {.count = 3u,
-        .frequency = {2.0f, 4.0f, 8.0f},
-        .real = {1.0f, 1.0f, 1.0f},
-        .gain_sigma = 0.1f,
-        .phase_sigma = 0.1f,
-        .warning = 6.0f,
-        .alarm = 3.0f};
     start_bus();
     fly(50u);
     lever_state_save(lever, state);
@@ -127,6 +130,42 @@ TEST(other_settings_or_an_aircraft_on_one_side_are_refused)
     lever_state_save(watching, state);
     assert_refused(lever);
     TEST_ASSERT_TRUE(lever_state_restore(watching, state));
+}
+
+TEST(without_an_aircraft_it_is_the_same_whether_that_was_said_or_not)
+{
+    uint8_t unsaid[LEVER_STATE_BYTES];
+    start_bus();
+    fly(50u);
+    lever_state_save(lever, unsaid);
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_TRUE(lever_aircraft(lever, NULL));
+    lever_state_save(lever, state);
+    TEST_ASSERT_EQUAL_MEMORY(unsaid, state, sizeof state);
+}
+
+/* What indexes, chooses or counts bits, written out: a value beyond would be one beyond an array. */
+TEST(limits_are_those_of_what_they_index)
+{
+    static const struct {
+        size_t offset;
+        uint32_t most;
+    } limits[] = {{offsetof(struct lever, estimator.setup.model), 3u},
+        {offsetof(struct lever, estimator.setup.preload), 1u}, {offsetof(struct lever, estimator.setup.estimator), 1u},
+        {offsetof(struct lever, estimator.setup.adaptation), 3u}, {offsetof(struct lever, estimator.cdkf.acting), 5u},
+        {offsetof(struct lever, estimator.mode), 5u}, {offsetof(struct lever, estimator.nis_size), 2u},
+        {offsetof(struct lever, link.due), 0x1FFFu}, /* 13 messages */
+        {offsetof(struct lever, link.pages), 7u}, {offsetof(struct lever, link.counter), 15u},
+        {offsetof(struct lever, link.command_result), 3u}, {offsetof(struct lever, bounce.chosen), 5u},
+        {offsetof(struct lever, bounce.state), 3u}};
+    for (uint32_t i = 0u; i < (uint32_t)(sizeof limits / sizeof limits[0]); i++) {
+        uint32_t row = 0u;
+        while (state_row(row)->offset != limits[i].offset) {
+            row++;
+            TEST_ASSERT_LESS_THAN_UINT32(state_row_count(), row);
+        }
+        TEST_ASSERT_EQUAL_UINT32(limits[i].most, state_row(row)->most);
+    }
 }
 
 /* Every value that is limited: at its limit it is taken, beyond not. */
@@ -180,6 +219,8 @@ TEST(any_bytes_that_are_accepted_break_nothing)
             }
         }
         lever_t *hurt = lever_init(&other_memory, &config);
+        state[0] = (uint8_t)(trial % 2u);
+        TEST_ASSERT_TRUE(lever_aircraft(hurt, (state[0] != 0u) ? &aircraft : NULL));
         TEST_ASSERT_TRUE(lever_state_restore(hurt, state));
         lever_t *mine = lever;
         lever = hurt;

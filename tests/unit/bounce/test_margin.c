@@ -170,6 +170,23 @@ TEST(a_loop_without_a_crossing_has_the_greatest_margin_where_it_is_nearest)
     TEST_ASSERT_EQUAL_FLOAT(40.0f, margin().gain);
 }
 
+/* R42 */
+TEST(a_loop_that_may_cross_beyond_the_table_is_not_known_to_be_stable)
+{
+    for (uint32_t end = 0u; end < 3u; end++) {
+        start(0.0f);
+        for (uint32_t i = 0u; i < (uint32_t)POINTS; i++) {
+            wanted[i] = 0.005 * IMAGINARY;
+        }
+        make_aircraft();
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, margin().gain_sigma);
+        const uint32_t at = (end == 0u) ? 0u : ((uint32_t)POINTS - 1u);
+        aircraft.real[at] *= (end == 2u) ? 1.0e38f : 3.0f;
+        aircraft.imaginary[at] *= (end == 2u) ? 1.0e38f : 3.0f;
+        TEST_ASSERT_FALSE(margin().gain_sigma < 40.0f);
+    }
+}
+
 /* Then the slope does not say where to go. */
 TEST(a_loop_along_the_real_axis_stays_where_it_is)
 {

@@ -1,7 +1,5 @@
-/* The state machine of E2E Profile 2, step by step, and what no frame can hold. tests/python/can compares with
- * autosar-e2e over random sequences, and with cantools. */
+/* The state machine of E2E Profile 2, step by step. tests/python/can compares with autosar-e2e over random sequences. */
 #include "can/e2e.h"
-#include "can/messages.h"
 
 #include "test.h"
 
@@ -66,15 +64,4 @@ TEST(a_silence_of_any_length_is_tolerated_by_the_greatest_tolerance)
     e2e_tolerance_t patient = strict;
     patient.max_no_new_or_repeated = 15u;
     ASSERT_CYCLES(patient, cycles);
-}
-
-TEST(a_message_that_does_not_fit_is_not_encoded)
-{
-    lever_frame_t frame;
-    const message_identity_t identity = {.page = (uint8_t)MESSAGE_PAGE_COUNT};
-    const message_pilot_sigma_t sigma = {.model = (uint8_t)LEVER_MODEL_COUNT};
-    const message_health_t health = {.mode = 0xFFu};
-    TEST_ASSERT_FALSE(message_identity_encode(&frame, &identity));
-    TEST_ASSERT_FALSE(message_pilot_sigma_encode(&frame, &sigma));
-    TEST_ASSERT_FALSE(message_health_encode(&frame, &health));
 }

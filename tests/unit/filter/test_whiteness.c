@@ -92,3 +92,12 @@ TEST(innovations_of_nothing_have_no_colour)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, whiteness_correlation(&whiteness));
     TEST_ASSERT_FALSE(whiteness.coloured);
 }
+
+/* Averages of the last seconds: no more than its memory. */
+TEST(it_remembers_so_long_and_no_longer)
+{
+    (void)run(200u, 0.0, 0.0, true);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 200.0f * PERIOD, whiteness.time);
+    (void)run(200u, 0.0, 0.0, true);
+    TEST_ASSERT_EQUAL_FLOAT(5.0f, whiteness.time);
+}

@@ -11,7 +11,7 @@ gpio_t gpioa;
 usart_t usart1;
 nvic_t nvic;
 
-static const clock_rates_t full = {.pll = true, .crystal = true};
+static const clock_rates_t full = {.has_pll = true, .crystal = true};
 
 uint32_t tick_ms(void)
 {

@@ -1,0 +1,90 @@
+"""`lever soak`: ten minutes of it; that its flights are what they say, and that what is wrong shows."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lever_cdkf.host_tools import cli
+from lever_cdkf.host_tools.firmware.library import struct_dtype
+from lever_cdkf.sil.scenarios import inputs
+from lever_cdkf.sil.soak import flights, soak
+
+Content = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Content:
+    folder = tmp_path_factory.mktemp("soak")
+    page, path = folder / "soak.html", folder / "soak.json"
+    assert cli.main(["soak", "--hours", "0.1667", "--json", str(path), "-o", str(page)]) == 0
+    content: Content = json.loads(path.read_text())
+    assert "Consistency by the hour" in page.read_text()
+    return content
+
+
+@pytest.mark.requirement("R54")
+def test_ten_minutes(told: Content) -> None:
+    total = told["total"]
+    assert total["flights"] == 2
+    assert sum(told["faults"].values()) == 6
+    assert told["troubles"] == []
+    assert 0.2 < total["NEES [1]"] < 3.0
+    assert total["NIS [1]"] == pytest.approx(1.0, abs=0.05)
+    assert total["natural_frequency within 2 sigma [%]"] > 80.0
+    assert total["recoveries"] == 0
+
+
+def test_flights_differ_and_repeat() -> None:
+    first, again, other = (flights.draw(1, number)[0] for number in (3, 3, 4))
+    columns = [inputs.prepare(scenario).truth.at(slice(None, None, 5000)) for scenario in (first, again, other)]
+    assert (columns[0].parameters["k_p"] == columns[1].parameters["k_p"]).all()
+    assert not (columns[0].parameters["k_p"] == columns[2].parameters["k_p"]).all()
+    drawn = {fault for number in range(40) for fault in flights.draw(1, number)[1]}
+    assert drawn == set(flights.FAULTS)
+
+
+def judged(relative: float, sigma: float) -> soak.Sums:
+    """A flight in which each estimate is off by so much, and says that it is as uncertain as that; relative."""
+    scenario, _ = flights.draw(1, 0)
+    given = inputs.prepare(scenario)
+    time, truth = given.time[::20], given.truth.at(slice(None, None, 20))
+    estimates = np.zeros(len(time), struct_dtype("lever_estimate_t"))
+    healths = np.zeros(len(time), struct_dtype("lever_health_t"))
+    healths["mode"] = 2
+    estimates["nis"], estimates["nis_size"] = 2.0, 2
+    for index, name in enumerate(soak.PARAMETERS):
+        estimates["parameter"][:, index] = truth.parameters[name] * np.exp(relative)
+        estimates["parameter_sigma"][:, index] = sigma * estimates["parameter"][:, index]
+    for name in ("natural_frequency", "damping_ratio"):
+        estimates[name] = getattr(truth.dynamics, name) * np.exp(relative)
+        estimates[f"{name}_sigma"] = sigma * estimates[name]
+    return soak.judge(scenario, time, truth, estimates, healths)
+
+
+def test_what_is_wrong_shows() -> None:
+    right = judged(0.1, 0.1).row()
+    assert right["NEES [1]"] == pytest.approx(1.0, rel=1e-4)
+    assert right["k_p within 2 sigma [%]"] == 100.0
+    assert right["silent [s]"] == 0.0
+    wrong = judged(0.1, 0.02)
+    assert wrong.row()["NEES [1]"] == pytest.approx(25.0, rel=1e-3)
+    assert wrong.row()["k_p within 2 sigma [%]"] == 0.0
+    assert wrong.silent_s == pytest.approx(wrong.unflagged * 0.02)
+    part = soak.Part(soak.Sums(not_finite=3, in_fault=50), 130.0)
+    troubles = soak.Result([part], 100.0, Counter()).troubles()
+    assert troubles == [
+        "3 estimates were not finite",
+        "the estimator was in fault for 1 s",
+        "memory grew by 30 MiB",
+    ]
+
+
+def test_wrong_hours_are_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for hours in ("0", "-1", "nan", "1e9"):
+        assert cli.main(["soak", f"--hours={hours}"]) == 2
+        assert "above 0, and at most 1000" in capsys.readouterr().err
