@@ -157,6 +157,11 @@ bool instance_is_driving(const lever_t *lever)
            (lever->gate.open && (dither_is_on(&lever->dither) || mitigation_has_damping(lever->bounce.chosen)));
 }
 
+bool lever_is_acting(const lever_t *lever)
+{
+    return instance_is_driving(lever) || (lever->bounce.mitigation.weight > 0.0f);
+}
+
 /* --- commands ----------------------------------------------------------------------------------------------------- */
 
 /* Something that IDENTITY says. */

@@ -171,6 +171,8 @@ def health(picture: Picture, source: Source) -> Table:
         errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]
         table.add_row("TEC, REC", f"{errors[0]}, {errors[1]}; off bus {counts['bus_offs']}")
         table.add_row("machine", f"{counts['overruns']} lost, {counts['dropped']} dropped")
+    if (reset := status.last_reset(picture)) is not None:
+        table.add_row("last reset", reset)
     text = "; ".join(faults) or ("none" if picture.mode else NOTHING)
     table.add_row("faults", Text(text, style=style if picture.mode else "dim"))
     others = [

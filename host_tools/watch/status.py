@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ..can import codec
 from ..firmware.library import enum_names
 from .picture import Picture
 
@@ -51,6 +52,9 @@ PLATFORM_FAULTS = {
 }
 """Conditions of its machine, by enum lever_platform_fault."""
 
+SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector"}
+"""Bits of enum message_self_test (firmware/can/messages.h)."""
+
 SILENT_AFTER = 1.0
 """[s] without a frame after which that is said."""
 
@@ -94,6 +98,21 @@ def bounce(picture: Picture) -> tuple[str, str] | None:
         return level, f"{name}: the margin is not known"
     at = "" if math.isnan(frequency) else f" at {frequency:.1f} Hz"
     return level, f"{name}: gain margin {margin:.1f} ± {sigma:.1f} dB{at}"
+
+
+def last_reset(picture: Picture) -> str | None:
+    """What made the machine start last, and what its self tests have found since; None if it does not say."""
+    if not picture.is_fresh("PLATFORM_RESET"):
+        return None
+    names = ("cause", "resets", "failed", "fault_address")
+    cause, resets, failed, address = (int(picture.field("PLATFORM_RESET", name)) for name in names)
+    causes = codec.message("PLATFORM_RESET").get_signal_by_name("cause").choices or {}
+    parts = [f"{str(causes.get(cause, cause)).replace('_', ' ')}, {resets} since power-on"]
+    if tests := [name for bit, name in SELF_TESTS.items() if failed & bit]:
+        parts.append(f"failed: {', '.join(tests)}")
+    if address:
+        parts.append(f"hard fault at {address:#010x}")
+    return "; ".join(parts)
 
 
 def faults(picture: Picture) -> list[str]:

@@ -53,7 +53,8 @@ and of faults the share of that time with each. Those that warn say that the est
 With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
 is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
 the aircraft of a scenario that has one (`lever aircraft`, lever_can --aircraft), and lever_can with --lock-step;
-bus.log is the same to the byte but for the channel's name.
+trace.csv is the same to the byte, and bus.log but for the channel's name; against a lever_can that goes on from
+another run, bus.log has other counters and CRCs.
 """
 _EPILOG = """\
 examples:

@@ -57,8 +57,8 @@ __attribute__((used, noreturn)) static void fault_record(const uint32_t *frame)
 /* Hands on the stack pointer of what was interrupted, and goes on on a fresh stack: the old one may be the fault. */
 __attribute__((naked)) void fault_interrupt(void)
 {
-    /* NOLINTNEXTLINE(portability-no-assembler): C cannot read a stack pointer */
     /* cppcheck-suppress misra-c2012-17.3 ; D9 */
+    /* NOLINTNEXTLINE(portability-no-assembler): C cannot read a stack pointer */
     __asm__ volatile("tst lr, #4\n\t"
                      "ite eq\n\t"
                      "mrseq r0, msp\n\t"

@@ -170,6 +170,23 @@ def test_health_of_the_machine(flight: Flight) -> None:
     assert status.FAULTS["platform"] not in status.faults(picture)  # which is told in more detail
 
 
+def test_cause_of_the_last_reset() -> None:
+    picture = Picture()
+    assert status.last_reset(picture) is None
+    told = {"cause": "hard_fault", "resets": 3, "failed": 2 | 4, "fault_address": 0x0800_1234}
+    for k, (values, said) in enumerate(
+        [
+            ({"cause": "power_on", "resets": 0, "failed": 0, "fault_address": 0}, "power on, 0 since power-on"),
+            (told, "hard fault, 3 since power-on; failed: RAM, stack; hard fault at 0x08001234"),
+        ]
+    ):
+        data = codec.encode("PLATFORM_RESET", k, values)
+        picture.take([(codec.message("PLATFORM_RESET").frame_id, data)], float(k))
+        assert status.last_reset(picture) == said
+    picture.take([], 10.0)
+    assert status.last_reset(picture) is None
+
+
 # --- counts ----------------------------------------------------------------------------------------------------------
 
 
