@@ -182,7 +182,9 @@ def _excerpt(
 ) -> Excerpt:
     value, sigma = _stated(record, name)
     at = np.arange(0, len(value), max(1, len(value) // points))
-    return Excerpt(name, at * PERIOD * STRIDE, truth[name][at], value[at], sigma[at], flagged[::STRIDE][at])
+    return Excerpt(
+        name, PERIOD * STRIDE * at.astype(np.float64), truth[name][at], value[at], sigma[at], flagged[::STRIDE][at]
+    )
 
 
 def deviation(record: Record, truth: Mapping[str, FloatArray], name: str) -> FloatArray:
