@@ -131,11 +131,14 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance. */
-enum lever_limits { LEVER_MEMORY_BYTES = 1856 };
+/* Room for one instance: 1,856 bytes, and as much more as pointers are longer than 32 bits. */
+typedef struct lever_room {
+    const void *pointers[4];
+    uint8_t rest[1840];
+} lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
-    uint8_t bytes[LEVER_MEMORY_BYTES];
+    lever_room_t room;
 } lever_memory_t;
 
 typedef struct lever lever_t;
@@ -382,6 +385,9 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
  *   - the platform reports none of ROM, SELF_TEST, WATCHDOG.
  * Opening takes dither_fade. */
 
+/* Torque leaves, or will with the next sample; or mitigation adds to the angle. */
+bool lever_is_acting(const lever_t *lever);
+
 /* No sample came for elapsed_us since the last lever_step(), lever_update() or lever_idle(), by the port's own clock
  * [us]. The estimate stays; the gate and the fade of the correction age, and while these are not yet zero MOTOR_COMMAND
  * and CORRECTION become due: fetch them with lever_next_frame(). Call it when no sample has come for about 5 ms, and
@@ -422,7 +428,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1571 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1584 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -37,6 +37,13 @@ def split(text: str) -> tuple[str, str] | None:
     return match and (match[1], match[2])
 
 
+def number_of(text: str) -> float:
+    """A number without a unit; NaN for what is none, or not finite."""
+    parts = split(text)
+    number = float(parts[0]) if parts and not parts[1] else math.nan
+    return number if math.isfinite(number) else math.nan
+
+
 def parse(text: object, unit: str) -> float:
     """Value of `text`, for example "0.1 g", in the SI `unit`, for example "m/s^2". Raises UnitError."""
     quantity = split(text) if isinstance(text, str) else None
@@ -51,12 +58,3 @@ def parse(text: object, unit: str) -> float:
     if not math.isfinite(value):
         raise UnitError(f"{text!r} is too large")
     return value
-
-
-def finite_number(text: str) -> float:
-    """NaN for what is none."""
-    try:
-        number = float(text)
-    except ValueError:
-        return math.nan
-    return number if math.isfinite(number) else math.nan

@@ -9,21 +9,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lever_cdkf.host_tools import units
+from lever_cdkf.host_tools import toml_text, units
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.near_names import did_you_mean
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 SIGNAL = "signal"
 """Unit of a field that is the unit of whatever the table describes: m/s^2 under [[base]], kg under pilot.m_p."""
@@ -96,9 +90,20 @@ def file_of(name_or_path: str) -> str:
 def parse(content: bytes, file: str) -> dict[str, Any]:
     """The table that a file holds. Raises ScenarioError."""
     try:
-        return tomllib.loads(content.decode("utf-8"))
-    except ValueError as error:  # also of text that is not UTF-8, and of a whole number with too many digits
-        raise ScenarioError(f"{file}: not TOML: {error}") from None
+        return toml_text.parse(content)
+    except toml_text.TomlError as error:
+        raise ScenarioError(f"{file}: {error}") from None
+
+
+def value_of(written: str) -> Any:
+    """What KEY=VALUE of a command line gives: TOML when it is TOML, otherwise a string, so that a shell needs no second
+    quotes."""
+    try:
+        return toml_text.parse(f"value = {written}".encode())["value"]
+    except toml_text.NestedError as error:
+        raise ScenarioError(f"{written[:20]}...: {error}") from None
+    except (toml_text.TomlError, UnicodeEncodeError):
+        return written.strip()
 
 
 Reader = Callable[[Any, Place], Any]
@@ -124,7 +129,9 @@ def read_quantity(unit: str, least: float = -math.inf, greatest: float = math.in
             limits = [f"above {above:g}"] if above > -math.inf else []
             limits += [f"at least {least:g}"] if least > -math.inf else []
             limits += [f"at most {greatest:g}"] if greatest < math.inf else []
-            raise place.error(f"{value!r} is out of range; it must be {' and '.join(limits)} {si}")
+            raise place.error(
+                f"{value!r} is out of range; it must be {' and '.join(limits)}{'' if si == '1' else f' {si}'}"
+            )
         return number
 
     return reader

@@ -116,6 +116,9 @@ static void check(
     checked->base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
     checked->grip_force = sample->grip_force;
+    if (torque && monitor_takes_torque(estimator->samples)) {
+        monitor_add_torque(monitor, own_torque, sample->tau_m * estimator->setup.torque_scale);
+    }
     checked->tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
     checked->z_ddot = checked->base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked->z_ddot;
@@ -126,7 +129,7 @@ static void check(
     estimator->faults = 0u;
     note(estimator, !checked->valid[0], LEVER_FAULT_THETA);
     note(estimator, !checked->valid[1], LEVER_FAULT_THETA_DOT);
-    note(estimator, !torque, LEVER_FAULT_TORQUE);
+    note(estimator, !torque || monitor->torque_wrong, LEVER_FAULT_TORQUE);
     note(estimator, !checked->base || monitor->base_wrong, LEVER_FAULT_BASE);
     note(estimator, estimator->communication_fault, LEVER_FAULT_COMMUNICATION);
     estimator->communication_fault = false;

@@ -45,7 +45,7 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
 /* The lesson teaches the parameters: besides, the sensors are right and somebody holds the lever. */
 static bool teaches(const learning_t *learning, const lesson_t *lesson)
 {
-    return lesson->measured && lesson->excited && !learning->monitor.base_wrong &&
+    return lesson->measured && lesson->excited && !learning->monitor.base_wrong && !learning->monitor.torque_wrong &&
            !monitor_has_stuck(&learning->monitor) && !learning->hands.off && (learning->wait <= 0.0f);
 }
 
@@ -185,7 +185,8 @@ static bool judge(
     } else {
         monitor_trust_base(&learning->monitor);
     }
-    const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong || force_wrong;
+    const bool torque_wrong = monitor_judge_torque(&learning->monitor, period, setup->settings->sample_period);
+    const bool fails = monitor_has_just_stuck(&learning->monitor) || base_wrong || torque_wrong || force_wrong;
     if (fails || (held && learning->hands.off)) {
         whiteness_start(&learning->whiteness);
         take_back(learning, cdkf);

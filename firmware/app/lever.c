@@ -157,6 +157,11 @@ bool instance_is_driving(const lever_t *lever)
            (lever->gate.open && (dither_is_on(&lever->dither) || mitigation_has_damping(lever->bounce.chosen)));
 }
 
+bool lever_is_acting(const lever_t *lever)
+{
+    return instance_is_driving(lever) || (lever->bounce.mitigation.weight > 0.0f);
+}
+
 /* --- commands ----------------------------------------------------------------------------------------------------- */
 
 /* Something that IDENTITY says. */
@@ -250,7 +255,7 @@ bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft)
         const margin_t unknown = {.gain = 0.0f};
         lever->bounce.aircraft = aircraft;
         lever->bounce.margin = unknown;
-        lever->bounce.time_us = lever->estimator.time_us - MARGIN_US;
+        lever->bounce.time_us = (aircraft != NULL) ? (lever->estimator.time_us - MARGIN_US) : 0u;
         lever->bounce.state = (uint8_t)LEVER_BOUNCE_UNKNOWN;
     }
     return accepted;

@@ -13,10 +13,15 @@
 #define SPIKE_TIME 0.02f     /* longer than this it is no spike [s] */
 #define BASE_MEMORY 0.5f     /* [s] */
 #define BASE_MEMORY_AGAIN 0.2f
-#define BASE_WRONG 0.4f  /* gain of the base's response below which it is wrong, */
-#define BASE_RIGHT 0.7f  /* and above which it is right again; wrong and right beyond 2 minus these, too */
-#define BASE_SURE 0.1f   /* standard deviation of that gain up to which it counts, */
-#define BASE_AGAIN 0.35f /* and while it is wrong, when the state hardly follows the base */
+#define BASE_WRONG 0.4f    /* gain of the base's response below which it is wrong, */
+#define BASE_RIGHT 0.7f    /* and above which it is right again; wrong and right beyond 2 minus these, too */
+#define BASE_SURE 0.1f     /* standard deviation of that gain up to which it counts, */
+#define BASE_AGAIN 0.35f   /* and while it is wrong, when the state hardly follows the base */
+#define TORQUE_MEMORY 0.5f /* [s] */
+#define TORQUE_LEAST 4e-4f /* mean square of what is asked, from which on it says anything [N^2 m^2] */
+#define TORQUE_OFF 0.35f   /* of the gain from one, */
+#define TORQUE_AGAIN 0.25f /* and while it is wrong; */
+#define TORQUE_SURE 1.6f   /* besides, times torque of other origin over what is asked, both rms */
 
 void monitor_start(monitor_t *monitor)
 {
@@ -98,6 +103,24 @@ bool monitor_step(monitor_t *monitor, const score_t *sudden, float period)
         (void)memset(base, 0, sizeof *base);
     }
     return monitor->base_wrong && !before;
+}
+
+bool monitor_judge_torque(monitor_t *monitor, float period, float sample_period)
+{
+    agreement_t *torque = &monitor->torque;
+    const bool before = monitor->torque_wrong;
+    monitor->torque_wrong = false;
+    if ((torque->asked * sample_period) > (TORQUE_LEAST * (TORQUE_MEMORY / (float)MONITOR_TORQUE_EVERY))) {
+        const float gain = torque->product / torque->asked;
+        const float other = (torque->measured / torque->asked) - (gain * gain); /* torque of other origin, in squares */
+        const float sure = TORQUE_SURE * sqrtf((other > 0.0f) ? other : 0.0f);
+        monitor->torque_wrong = (fabsf(gain - 1.0f) > ((before ? TORQUE_AGAIN : TORQUE_OFF) + sure));
+    }
+    const float keep = 1.0f - share_of(period, TORQUE_MEMORY);
+    torque->asked *= keep;
+    torque->measured *= keep;
+    torque->product *= keep;
+    return monitor->torque_wrong && !before;
 }
 
 void monitor_trust_base(monitor_t *monitor)

@@ -5,6 +5,8 @@
  *   spike    an output far outside of what is expected of it, for some samples; a longer one is believed
  *   base     the response to the base acceleration is not about once what it should be: no sensor, the wrong sign, the
  *            wrong unit. By the innovations: a sudden error of the accelerometer's gain (filter/cdkf.h, score_t)
+ *   torque   the motor torque that is measured does not follow the one that is asked for: gain or sign are wrong, or the
+ *            motor does not do what it is told. By regression on what is asked; other torque makes it less sure
  */
 #ifndef APP_MONITOR_H
 #define APP_MONITOR_H
@@ -25,12 +27,21 @@ typedef struct stillness {
     bool stuck;
 } stillness_t;
 
+/* Of the measured torque with the one that was asked for: sums over samples, with exponential forgetting. */
+typedef struct agreement {
+    float asked;    /* squares [N^2 m^2] */
+    float measured; /* likewise */
+    float product;
+} agreement_t;
+
 typedef struct monitor {
     stillness_t stillness[MONITOR_SIGNALS];
     float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been spikes [s] */
     float surprise;              /* mean of nis / nis_size over 0.1 s; expected 1 */
     score_t base;                /* of CDKF_BASE_GAIN, with exponential forgetting */
-    bool base_wrong;             /* the base acceleration is not used */
+    agreement_t torque;
+    bool base_wrong; /* the base acceleration is not used */
+    bool torque_wrong;
 } monitor_t;
 
 void monitor_start(monitor_t *monitor);
@@ -43,6 +54,25 @@ static inline bool monitor_is_alive(monitor_t *monitor, enum monitor_signal sign
     of->seen = true;
     return !of->stuck;
 }
+
+/* One sample in MONITOR_TORQUE_EVERY says enough. */
+enum monitor_limits { MONITOR_TORQUE_EVERY = 8 };
+static inline bool monitor_takes_torque(uint32_t samples)
+{
+    return (samples % (uint32_t)MONITOR_TORQUE_EVERY) == 0u;
+}
+
+/* A motor torque that its sender calls valid, and the one that was asked for before it [N m]. */
+static inline void monitor_add_torque(monitor_t *monitor, float asked, float measured)
+{
+    agreement_t *torque = &monitor->torque;
+    torque->asked += asked * asked;
+    torque->measured += measured * measured;
+    torque->product += asked * measured;
+}
+
+/* After a block of `period` seconds of samples `sample_period` apart: true when the torque has just been found wrong. */
+bool monitor_judge_torque(monitor_t *monitor, float period, float sample_period);
 
 /* Before the next sample: its value would be that of the last. */
 static inline bool monitor_repeats(const monitor_t *monitor, enum monitor_signal signal, float value)

@@ -140,7 +140,6 @@ static places_t places_of(const loop_t *loop)
                 highest = height;
                 places.crosses = true;
                 places.crossing = ((float)i - 1.0f) + part;
-                places.slope.real = value.real - before.real;
                 places.slope.imaginary = value.imaginary - before.imaginary;
             }
         }

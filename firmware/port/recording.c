@@ -14,9 +14,14 @@ static void send_snapshot(recording_t *recording)
     }
 }
 
+static recording_t *recording_of(void *self)
+{
+    return self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+}
+
 static enum port_result receive(void *self, lever_frame_t *frame)
 {
-    recording_t *recording = self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+    recording_t *recording = recording_of(self);
 
     send_snapshot(recording);
     return recording->machine->receive(recording->machine->self, frame);
@@ -24,35 +29,35 @@ static enum port_result receive(void *self, lever_frame_t *frame)
 
 static enum port_result send(void *self, const lever_frame_t *frame)
 {
-    const port_t *machine = ((recording_t *)self)->machine; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+    const port_t *machine = recording_of(self)->machine;
 
     return machine->send(machine->self, frame);
 }
 
 static bool wait(void *self, bool for_frame, int32_t timeout_ms)
 {
-    const port_t *machine = ((recording_t *)self)->machine; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+    const port_t *machine = recording_of(self)->machine;
 
     return machine->wait(machine->self, for_frame, timeout_ms);
 }
 
 static uint32_t now_us(void *self)
 {
-    const port_t *machine = ((recording_t *)self)->machine; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+    const port_t *machine = recording_of(self)->machine;
 
     return machine->now_us(machine->self);
 }
 
 static void status(void *self, lever_platform_t *report)
 {
-    const port_t *machine = ((recording_t *)self)->machine; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+    const port_t *machine = recording_of(self)->machine;
 
     machine->status(machine->self, report);
 }
 
 static enum port_result restore(void *self)
 {
-    const port_t *machine = ((recording_t *)self)->machine; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+    const port_t *machine = recording_of(self)->machine;
 
     return machine->restore(machine->self);
 }

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 AIRCRAFT = "lever_cdkf.aircraft"
 """Entry point group with one function, which makes the response of an aircraft by its name and what is changed."""
+_OF_PACKAGE = (".toml", ".csv")
+"""Endings of the files that it reads."""
 MAP_HELP = """\
 Signals of other messages: --dbc FILE describes them, and --map says which is what.
   --map theta=LEVER.Angle z_ddot=IMU.AccZ tau_m=MOTOR.Torque
@@ -65,21 +67,30 @@ def check_part(args: argparse.Namespace) -> tuple[float, float]:
 
 def input_files(args: argparse.Namespace) -> list[str]:
     """The files that the options name: settings, database, mappings, aircraft."""
-    aircraft = getattr(args, "aircraft", None)
-    named = [getattr(args, "settings", None), args.dbc, *([aircraft] if aircraft and Path(aircraft).is_file() else [])]
+    aircraft = getattr(args, "aircraft", None) or ""
+    of_aircraft = [each for each in (aircraft, aircraft.partition(",")[0]) if each and Path(each).is_file()]
+    named = [getattr(args, "settings", None), args.dbc, *of_aircraft]
     return [path for path in named if path is not None] + [each for each in args.map if each.lower().endswith(".toml")]
 
 
 def chosen_aircraft(text: str) -> AircraftResponse:
-    """The response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft. Raises LeverError."""
+    """The response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft, where NAME may also be a file
+    that it reads. Raises LeverError."""
     from ..firmware.aircraft import read_response
 
+    if Path(text).is_file() and not text.lower().endswith(_OF_PACKAGE):
+        return read_response(text)
     name, *changes = text.split(",")
     entries = sorted(importlib.metadata.entry_points(group=AIRCRAFT))
-    if not entries or (Path(text).is_file() and not text.lower().endswith(".toml")):
-        return read_response(text)
-    response: AircraftResponse = entries[0].load()(name, changes)
-    return response
+    is_path = Path(name).suffix != "" or Path(name).name != name or Path(name).exists()
+    if entries and (not is_path or name.lower().endswith(_OF_PACKAGE)):
+        response: AircraftResponse = entries[0].load()(name, changes)
+        return response
+    if changes:
+        raise LeverError(
+            f"--aircraft {text}: {name} is a response, with gearing, limits and all: change it in the file"
+        )
+    return read_response(name)
 
 
 def chosen_reading(args: argparse.Namespace, log: str) -> Reading | None:

@@ -4,12 +4,12 @@ reads as well (firmware/port/linux/aircraft.h says what is in it)."""
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
-from ..units import finite_number
+from ..units import number_of
 from .library import ffi, lib
+from .settings_file import lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,10 +55,12 @@ class AircraftResponse:
         phase_sigma: float,
         warning: float = WARNING,
         alarm: float = ALARM,
+        name: str = "an aircraft",
     ) -> None:
         """frequency [Hz], rising; response: vertical acceleration of the cabin over the lever's angle, with gearing,
         delays and actuator [(m/s²)/rad]; how well that is known: gain_sigma relative to it [1], phase_sigma [rad];
-        warning and alarm: limits of the gain margin [dB]. Raises LeverError."""
+        warning and alarm: limits of the gain margin [dB]; name: what it is of, for people. Raises LeverError."""
+        self.name = name
         most = lib.LEVER_AIRCRAFT_POINTS
         if len(frequency) != len(response) or not 3 <= len(frequency) <= most:
             raise LeverError(f"the response of an aircraft has 3 to {most} frequencies, and a value at each")
@@ -84,7 +86,10 @@ class AircraftResponse:
     def text(self) -> str:
         """The content of its file."""
         at = self.pointer
-        lines = ["# frequency [Hz], real and imaginary part of z_ddot over the lever's angle [(m/s^2)/rad]"]
+        lines = [
+            f"# {self.name}",
+            "# frequency [Hz], real and imaginary part of z_ddot over the lever's angle [(m/s^2)/rad]",
+        ]
         lines += [f"{at.frequency[i]:.6g}  {at.real[i]:.6g}  {at.imaginary[i]:.6g}" for i in range(at.count)]
         lines += [f"{name} = {getattr(at, name):.6g}  # {unit}" for name, unit in _NUMBERS.items()]
         return "\n".join(lines) + "\n"
@@ -92,30 +97,26 @@ class AircraftResponse:
 
 def read_response(path: str) -> AircraftResponse:
     """The response of an aircraft in a file. Raises LeverError."""
-    try:
-        content = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise LeverError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
     points: list[list[float]] = []
     numbers: dict[str, float] = {}
-    for place, line in enumerate(content.split("\n"), start=1):
-        text = line.partition("#")[0].strip()
-        name, equals, value = (part.strip() for part in text.partition("="))
-        cells = [finite_number(cell) for cell in (value if equals else text).split()]
-        if text and (
-            len(cells) != (1 if equals else 3) or (equals and name not in _NUMBERS) or any(map(math.isnan, cells))
-        ):
+    for place, text in lines_of(path):
+        name, equals, value = (part.strip(" \t") for part in text.partition("="))
+        cells = [number_of(cell) for cell in ([value] if equals else text.replace("\t", " ").split(" ")) if cell]
+        is_entry = len(cells) == 1 and name in _NUMBERS and name not in numbers
+        if not (is_entry if equals else len(cells) == 3) or any(map(math.isnan, cells)):
             raise LeverError(
-                f"{path}:{place}: neither {', '.join(_NUMBERS)} = number, nor frequency, real and imaginary part"
+                f"{place}: neither {', '.join(_NUMBERS)} = number, each once, nor frequency, real and imaginary part; "
+                "`lever aircraft FILE.csv -o FILE.response` makes such a file of a CSV one"
             )
         if equals:
             numbers[name] = cells[0]
-        elif text:
+        else:
             points.append(cells)
     if lacking := [name for name in ("gain_sigma", "phase_sigma") if name not in numbers]:
         raise LeverError(f"{path}: how well is it known? It needs a line {lacking[0]} = number")
     try:
-        return AircraftResponse([each[0] for each in points], [complex(*each[1:]) for each in points], **numbers)
+        values = [complex(*each[1:]) for each in points]
+        return AircraftResponse([each[0] for each in points], values, **numbers, name=path)
     except LeverError as error:
         raise LeverError(f"{path}: {error}") from None
 

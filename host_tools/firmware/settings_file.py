@@ -10,7 +10,7 @@ the grammar, to the byte. Names are those of settings_table(), in its units unle
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,27 +57,30 @@ def setting_value(row: Setting, text: str) -> float:
 
 def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:
     """What a settings file sets. Raises SettingsError with file and line."""
+    assignments: dict[str, str | float] = {}
+    for place, text in lines_of(path):
+        try:
+            assignments |= dict([parse_assignment(text)])
+        except SettingsError as error:  # noqa: PERF203
+            raise SettingsError(f"{place}: {error}") from None
+    return assignments
+
+
+def lines_of(path: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
+    """The lines of a file, as FILE:LINE and text, without comments, blanks around it and lines of these alone. Raises
+    SettingsError."""
     try:
         content = Path(path).read_bytes()
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read: {error.strerror}") from None
-    assignments: dict[str, str | float] = {}
     for number, line in enumerate(content.removeprefix(_BOM).split(b"\n"), start=1):
-        assignments |= _parse_line(line.removesuffix(b"\r"), f"{path}:{number}")
-    return assignments
-
-
-def _parse_line(line: bytes, place: str) -> dict[str, str | float]:
-    """What a line assigns, if anything. Raises SettingsError."""
-    text = line.partition(b"#")[0].decode(errors="backslashreplace").strip(_BLANK)
-    try:
-        if b"\0" in line:
-            raise SettingsError("is not text")
-        if len(line) > _LINE_BYTES:
-            raise SettingsError(f"the line is longer than {_LINE_BYTES} bytes")
-        return dict([parse_assignment(text)]) if text else {}
-    except SettingsError as error:
-        raise SettingsError(f"{place}: {error}") from None
+        text, place = line.removesuffix(b"\r"), f"{path}:{number}"
+        if b"\0" in text:
+            raise SettingsError(f"{place}: is not text")
+        if len(text) > _LINE_BYTES:
+            raise SettingsError(f"{place}: the line is longer than {_LINE_BYTES} bytes")
+        if kept := text.partition(b"#")[0].decode(errors="backslashreplace").strip(_BLANK):
+            yield place, kept
 
 
 def make_config(assignments: Assignments) -> Config:

@@ -19,7 +19,6 @@ or the same as TOML, a table for each input, and one for each message with E2E p
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -27,13 +26,9 @@ from typing import Any
 
 from ..errors import LeverError
 from ..near_names import did_you_mean
+from ..toml_text import TomlError, parse
 from ..units import split
 from .units import INPUTS, KINDS, factor
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 GRAVITY_CHOICES = ("auto", "included", "none")
 PROTECTED = "protected"
@@ -99,7 +94,10 @@ def read_mapping(entries: Iterable[str]) -> Mapping:
     for entry in entries:
         if "=" not in entry or (entry.lower().endswith(".toml") and Path(entry).is_file()):
             content = _toml(entry)
-            protected |= {name: _protection(name, each) for name, each in content.pop(PROTECTED, {}).items()}
+            tables = content.pop(PROTECTED, {})
+            if not isinstance(tables, dict):
+                raise LeverError(f"--map {entry}: {PROTECTED} is a table of messages, as in [{PROTECTED}.MESSAGE]")
+            protected |= {name: _protection(name, each) for name, each in tables.items()}
             time = _time(content.pop("time", None)) or time
             sources |= {_key(key): _source(key, table) for key, table in content.items()}
             continue
@@ -136,15 +134,18 @@ def _toml(path: str) -> dict[str, Any]:
     if not path.lower().endswith(".toml"):
         raise LeverError(f"--map {path}: it is neither KEY=MESSAGE.SIGNAL nor a .toml file")
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return parse(Path(path).read_bytes())
     except OSError as error:
         raise LeverError(f"cannot read {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise LeverError(f"{path}: not a mapping in TOML: {error}") from None
+    except TomlError as error:
+        raise LeverError(f"{path}: {error}") from None
 
 
 def _time(table: Any) -> str | None:
-    return str(table["signal"]) if isinstance(table, dict) and "signal" in table else table
+    name = table.get("signal") if isinstance(table, dict) else table
+    if name is not None and not isinstance(name, str):
+        raise LeverError('mapping of time: it needs a column, as in time = "t"')
+    return name
 
 
 def _key(key: str) -> str:
@@ -228,6 +229,11 @@ def _protection(name: str, table: Any) -> Protection:
     given = dict(table)
     if isinstance(given.get("data_id"), list):
         given["data_id"] = tuple(given["data_id"])
+    ids = given.get("data_id", 0)
+    if not all(type(each) is int for each in (ids if isinstance(ids, tuple) else (ids, given.get("profile", 1)))):
+        raise LeverError(f"{where}: profile and data_id are whole numbers")
+    if not isinstance(given.get("counter", ""), str):
+        raise LeverError(f"{where}: counter is the name of a signal")
     protection = Protection(**given)
     if protection.profile is None and protection.counter is None:
         raise LeverError(f"{where}: it has neither a profile nor a counter")

@@ -59,8 +59,23 @@ _HEADERS = {
 }
 _LARGEST_MESSAGE = 512  # [bytes] from a page
 _now = time.monotonic
-_MOST_COMMANDS = 20  # a second, of a page
+_MOST_COMMANDS, _MOST_IN_ALL = 20, 100  # a second: of a page; of all, also of one that connects again and again
 _MOST_BEHIND = 50  # messages a page may fail to take in a row before it is let go; it connects again
+
+
+class _Throttle:
+    """So many in a second."""
+
+    def __init__(self, most: int, whose: str) -> None:
+        self._whose = whose
+        self._times: deque[float] = deque(maxlen=most)  # [s]
+
+    def count(self, now: float) -> None:
+        """One more. Raises LeverError."""
+        most = self._times.maxlen
+        if len(self._times) == most and now - self._times[0] < 1.0:
+            raise LeverError(f"{self._whose} may send {most} commands a second: wait a moment")
+        self._times.append(now)
 
 
 class Server:
@@ -71,6 +86,7 @@ class Server:
         self.source, self.config, self.host = source, config, host
         self.state = State(source, config, read_only=read_only)
         self._sender = ThreadPoolExecutor(1, "lever commands")
+        self.commanded = _Throttle(_MOST_IN_ALL, "all pages together")
         self._upkeep: asyncio.Future[None] | None = None
         self.socket = _bind(host, port)
         self.port: int = self.socket.getsockname()[1]
@@ -182,7 +198,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
 
     def initialize(self, server: Server) -> None:
         super().initialize(server)
-        self._commanded: deque[float] = deque(maxlen=_MOST_COMMANDS)  # when [s]
+        self._commanded = _Throttle(_MOST_COMMANDS, "a page")
 
     def prepare(self) -> None:
         super().prepare()
@@ -230,18 +246,13 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
             if not self.server.state.controls:
                 raise LeverError("this page is read-only: no commands")
             command = command_of(json.loads(message), self.server.config)
-            self._count_command(_now())
+            self._commanded.count(_now())
+            self.server.commanded.count(_now())
             await self.server.command(command)
             answer: dict[str, object] = {"sent": command}
         except (LeverError, ValueError) as error:
             answer = {"refused": str(error)}
         await self._send(json.dumps(answer))
-
-    def _count_command(self, now: float) -> None:
-        """So that no page can fill the bus. Raises LeverError."""
-        if len(self._commanded) == _MOST_COMMANDS and now - self._commanded[0] < 1.0:
-            raise LeverError(f"a page may send {_MOST_COMMANDS} commands a second: wait a moment")
-        self._commanded.append(now)
 
 
 def serve(

@@ -44,20 +44,20 @@ class Aircraft:
     """What is constant in a helicopter; the files beside this one are such tables."""
 
     title: str = text("")
-    rotor_speed: float = quantity("rad/s", above=0.0)
-    radius: float = quantity("m", above=0.0)
+    rotor_speed: float = quantity("rad/s", least=5.0, greatest=200.0)
+    radius: float = quantity("m", least=1.5, greatest=25.0)
     blades: int = whole(least=2, greatest=10)
-    blade_inertia: float = quantity("kg m^2", above=0.0)
-    lock_number: float = quantity("1", above=0.0)
-    flap_frequency: float = quantity("1", least=1.0)
-    mass: float = quantity("kg", above=0.0)
-    lift_deficiency: float = quantity("1", 0.7, above=0.0, greatest=1.0)
+    blade_inertia: float = quantity("kg m^2", above=0.0, greatest=1e5)
+    lock_number: float = quantity("1", least=1.0, greatest=20.0)
+    flap_frequency: float = quantity("1", least=1.0, greatest=2.0)
+    mass: float = quantity("kg", least=200.0, greatest=1e5)
+    lift_deficiency: float = quantity("1", 0.7, least=0.1, greatest=1.0)
     delay: float = quantity("s", 0.020, least=0.0, greatest=0.2)
     correction_delay: float = quantity("s", 0.0, least=0.0, greatest=0.2)
-    lever_low_pass: float = quantity("Hz", 0.0, least=0.0)
-    actuator_bandwidth: float = quantity("Hz", 8.0, above=0.0)
-    actuator_rate: float = quantity("rad/s", np.radians(100.0), above=0.0)
-    actuator_travel: float = quantity("rad", np.radians(8.0), above=0.0)
+    lever_low_pass: float = quantity("Hz", 0.0, least=0.0, greatest=1e3)
+    actuator_bandwidth: float = quantity("Hz", 8.0, least=0.1, greatest=1e3)
+    actuator_rate: float = quantity("rad/s", np.radians(100.0), above=0.0, greatest=100.0)
+    actuator_travel: float = quantity("rad", np.radians(8.0), above=0.0, greatest=1.0)
 
     def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """A (3, 3), B (3, 2), C (1, 3), D (1, 2) of the airframe: state [z_dot, beta, beta_dot], input [theta_c, gust],
@@ -89,6 +89,8 @@ class Aircraft:
         return response / (1.0 + s / (2.0 * np.pi * self.lever_low_pass)) if self.lever_low_pass else response
 
 
+GREATEST_GEARING = 10.0
+"""Pitch over the lever's angle [1]: twenty times what is in service."""
 SHELF = Shelf("aircraft", __package__)
 names = SHELF.names
 
@@ -113,8 +115,9 @@ def read_aircraft(values: Any, place: Place) -> Coupled:
         aircraft = load(values["model"], **changes)
     except ScenarioError as error:
         raise place.error(str(error)) from None
-    gearing = read_quantity("1", above=0.0)(values.get("gearing"), place.at("gearing"))
-    return Coupled(aircraft, gearing)
+    gearing = read_quantity("1", above=0.0, greatest=GREATEST_GEARING)(values.get("gearing"), place.at("gearing"))
+    changed = "".join(f", {key} {value}" for key, value in changes.items())
+    return Coupled(aircraft, gearing, f"{values['model']}{changed}, gearing {gearing:g}")
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ class Coupled:
     aircraft: Aircraft
     gearing: float
     """Pitch over the lever's angle [1]."""
+    name: str = "an aircraft"
+    """Which, with what is changed, for people."""
 
     def response(self, s: ComplexArray) -> ComplexArray:
         """z_ddot / delta [m/s^2 per rad] at the complex frequencies s [rad/s], without limits."""

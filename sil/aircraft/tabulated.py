@@ -2,8 +2,8 @@
 firmware's table and the linear analysis. It cannot fly (flight.py): a response has no limits of the actuator.
 
 The file is CSV with a row a frequency, rising: frequency [Hz], real and imaginary part of the cabin's vertical
-acceleration over the lever's angle [(m/s^2)/rad], with gearing, delays and actuator. A first row of names and lines
-that begin with # are passed over.
+acceleration over the lever's angle [(m/s^2)/rad], with gearing, delays and actuator. Lines that begin with #, and
+before the first row of numbers those without any number, are passed over.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.units import finite_number
+from lever_cdkf.host_tools.units import number_of
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Tabulated:
     def load(cls, path: str | Path) -> Tabulated:
         """From a file. Raises LeverError."""
         try:
-            lines = Path(path).read_text(encoding="utf-8").splitlines()
+            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeError) as error:
             raise LeverError(f"{path}: {getattr(error, 'strerror', None) or 'not text in UTF-8'}") from None
         rows: list[list[float]] = []
         for number, line in enumerate(lines, 1):
-            cells = [finite_number(cell) for cell in line.split(",")]
-            if line.startswith("#") or not line.strip() or (not rows and math.isnan(cells[0])):
+            if line.startswith("#") or not line.strip() or (not rows and not any(map(_is_number, line.split(",")))):
                 continue
+            cells = [number_of(cell) for cell in line.split(",")]
             if len(cells) != 3 or any(map(math.isnan, cells)):
                 raise LeverError(f"{path}: line {number}: must be three numbers: frequency [Hz], real, imaginary")
             if cells[0] <= (rows[-1][0] if rows else 0.0):
@@ -55,7 +55,7 @@ class Tabulated:
         return float(self.frequency[0]), float(self.frequency[-1])
 
     def response(self, s: ComplexArray) -> ComplexArray:
-        """At s on the imaginary axis [rad/s]; outside the table its ends."""
+        """At s on the imaginary axis [rad/s], in the band; beyond it, what it is at its ends."""
         frequency = s.imag / (2.0 * np.pi)
         real, imaginary = (np.interp(frequency, self.frequency, part) for part in (self.values.real, self.values.imag))
         response: ComplexArray = real + 1j * imaginary
@@ -64,3 +64,12 @@ class Tabulated:
     def at(self, frequency: FloatArray) -> ComplexArray:
         """At other frequencies [Hz], such as the 24 that the firmware takes."""
         return self.response(2j * np.pi * frequency.astype(np.complex128))
+
+
+def _is_number(cell: str) -> bool:
+    """Also one that is not finite, which is no name."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

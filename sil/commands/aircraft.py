@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ Prints the response of a helicopter to its collective lever, from 1.5 to 8 Hz, a
 those that there are.
 
 AIRCRAFT is one of them, or a .toml file with the keys of theirs. KEY=VALUE after it changes one (delay=30 ms), and says
-  gearing                  pitch of the blades over the lever's angle (default: 1)
+  gearing                  pitch of the blades over the lever's angle (default: 0.5; in service 0.3 to 0.6)
   gain_sigma, phase_sigma  how well the response is known [1, rad] (default: 0.05)
   warning, alarm           gain margins below which there is one [dB] (default: 5, 4)
 
@@ -28,7 +29,7 @@ examples:
   lever aircraft uh60_like gearing=0.5 -o uh60.response
   lever replay session.log --aircraft uh60.response -o out/session
 """
-_SAID = ("gain_sigma", "phase_sigma", "warning", "alarm")
+_SAID = {"gain_sigma": "1", "phase_sigma": "rad", "warning": "dB", "alarm": "dB"}
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -64,26 +65,53 @@ def run(args: argparse.Namespace) -> int:
 def response(name: str, changes: list[str]) -> AircraftResponse:
     """Of an aircraft by its name or .toml file, or by its response in a .csv file. Raises LeverError."""
     from lever_cdkf.host_tools.errors import LeverError
+    from lever_cdkf.host_tools.firmware.native import Config, Estimator
 
-    from ..aircraft.aircraft import Coupled, read_aircraft
-    from ..aircraft.known import known
+    from ..aircraft.aircraft import read_aircraft
+    from ..aircraft.known import BAND, known
     from ..aircraft.tabulated import Tabulated
-    from ..toml_tables import Place
+    from ..toml_tables import Place, value_of
 
-    given = {key.strip(): value.strip() for key, _, value in (change.partition("=") for change in changes)}
-    said: dict[str, float] = {}
-    for key in _SAID:
-        if key in given:
-            try:
-                said[key] = float(given.pop(key))
-            except ValueError:
-                raise LeverError(f"{key} must be a number") from None
-    coupled: Coupled | Tabulated
-    if name.endswith(".csv"):
+    given = _assignments(changes)
+    said = {key: _quantity(key, given.pop(key), unit) for key, unit in _SAID.items() if key in given}
+    if name.lower().endswith(".csv"):
         if given:
             raise LeverError(f"{name}: a response has no {next(iter(given))}; it may have {', '.join(_SAID)}")
-        coupled = Tabulated.load(name)
+        measured = Tabulated.load(name)
+        of, band = measured.response, measured.band
+        whole = name
     else:
-        gearing = given.pop("gearing", "1")
-        coupled = read_aircraft({"model": name, **given, "gearing": f"{gearing} 1"}, Place("aircraft"))
-    return known(coupled.response, **said)
+        gearing = _quantity("gearing", given.pop("gearing", "0.5"), "1")
+        values = {key: value_of(value) for key, value in given.items()}
+        coupled = read_aircraft({"model": name, **values, "gearing": f"{gearing!r} 1"}, Place("aircraft"))
+        of, band, whole = coupled.response, BAND, coupled.name
+    try:
+        made = known(of, band, name=whole, **said)
+        Estimator(Config()).watch(made)  # which refuses what it cannot use
+    except LeverError as error:
+        raise LeverError(f"{whole}: {error}") from None
+    return made
+
+
+def _assignments(changes: list[str]) -> dict[str, str]:
+    """Raises LeverError."""
+    from lever_cdkf.host_tools.errors import LeverError
+
+    given: dict[str, str] = {}
+    for change in changes:
+        key, equals, value = (part.strip() for part in change.partition("="))
+        if not equals or key in given:
+            raise LeverError(f"{change}: {f'{key} is given twice' if equals else 'must be KEY=VALUE'}")
+        given[key] = value
+    return given
+
+
+def _quantity(key: str, written: str, unit: str) -> float:
+    """A number in `unit`, or with one of its units. Raises LeverError."""
+    from lever_cdkf.host_tools import units
+    from lever_cdkf.host_tools.errors import LeverError
+
+    try:
+        return units.parse(written if math.isnan(units.number_of(written)) else f"{written} {unit}", unit)
+    except units.UnitError as error:
+        raise LeverError(f"{key}: {error}") from None

@@ -53,7 +53,8 @@ and of faults the share of that time with each. Those that warn say that the est
 With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
 is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
 the aircraft of a scenario that has one (`lever aircraft`, lever_can --aircraft), and lever_can with --lock-step;
-bus.log is the same to the byte but for the channel's name.
+trace.csv is the same to the byte, and bus.log but for the channel's name; against a lever_can that goes on from
+another run, bus.log has other counters and CRCs.
 """
 _EPILOG = """\
 examples:
@@ -249,7 +250,7 @@ def _simulate(
     with ExitStack() as stack:
         progress, bus = stack.enter_context(Progress(scenario.name)), None
         if interface != "lever" or bus_options:
-            bus = stack.enter_context(open_bus(scenario, interface, channel, bus_options))
+            bus = stack.enter_context(open_bus(scenario, interface, channel, {**bus_options, **_snapshots(args)}))
         result = simulate(
             *(scenario, bus, args.out),
             channel=channel,
@@ -268,6 +269,11 @@ def _simulate(
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)
     return 1
+
+
+def _snapshots(args: argparse.Namespace) -> dict[str, float]:
+    """As an option of the bus; only that of the firmware in this process has it."""
+    return {} if args.snapshots is None else {"snapshots": args.snapshots}
 
 
 def open_bus(

@@ -32,8 +32,8 @@ is wrong.
 """
 _EPILOG = """\
 examples:
-  lever soak --hours 0.5                      ten seconds
-  lever soak --json soak.json -o soak.html    a day: ten minutes
+  lever soak --hours 0.5                      some seconds
+  lever soak --json soak.json -o soak.html    a day: a minute or two
 """
 
 

@@ -24,7 +24,13 @@ GONE = (
 SIGMAS = 3.0
 """An error of more is wrong, unless it is flagged."""
 SILENT = 1.0
-"""Wrong without a flag for so long [s] makes a row silent."""
+"""Wrong without a flag for so long [s] is too long,"""
+RIGHT = 99.0
+"""and so is less than this of the samples without a flag right [%]."""
+BACK = 2.0
+"""So long after a fault the firmware learns again [s]: it takes a second to settle after an outage."""
+ERROR = 3.0
+"""rms of f_n in the last AT_LAST [%]: that of a flight without a fault, and as much again for what was not learnt."""
 UNHEARD = 20
 """Samples without an answer, from which on the silence of the bus is a flag."""
 CALM = 0.5
@@ -35,23 +41,34 @@ AT_LAST = 5.0
 
 @dataclass(frozen=True)
 class Must:
-    """What a row demands. Besides, of every row: estimates are finite, each sample is answered, torque keeps within the
-    gate's limits, and the firmware is back in the end."""
+    """What a row demands. Besides, of every row: estimates are finite and not wrong without a flag, each sample is
+    answered, torque keeps within the gate's limits, and the firmware is back in the end."""
 
     flags: tuple[str, ...] = ()
     """One of these shows in the fault,"""
     within: int = 1
     """so many samples after its begin."""
+    after: tuple[str, ...] = ()
+    """One of these shows in the first two samples after its end."""
     unaffected: bool = False
     """Every estimate is that of a flight without the fault, bit for bit."""
     mode: tuple[str, ...] = ("run",)
     """That of the last sample in the fault."""
     torque_ends: float | None = None
     """Torque is zero from so long after its begin [s] to its end."""
-    back: float = 2.0
-    """So long after its end it learns again [s]."""
-    error: float = 3.0
-    """rms of f_n in the last AT_LAST [%]."""
+
+
+@dataclass(frozen=True)
+class Excerpt:
+    """One quantity of a flight, for a chart."""
+
+    quantity: str
+    time: FloatArray
+    """[s]"""
+    truth: FloatArray
+    value: FloatArray
+    sigma: FloatArray
+    flagged: BoolArray
 
 
 @dataclass
@@ -60,6 +77,8 @@ class Verdict:
 
     measured: dict[str, float] = field(default_factory=dict)
     broken: list[str] = field(default_factory=list)
+    excerpt: Excerpt | None = None
+    """Of what was longest wrong without a flag."""
 
     def hold(self, name: str, value: float, most: float) -> None:
         """Notes a figure and whether it keeps its limit; NaN does not."""
@@ -82,13 +101,16 @@ def judge(must: Must, record: Record, plain: Record, truth: Mapping[str, FloatAr
     if must.flags:
         shown = (faults[begin:end] & fault_mask(*must.flags)) != 0
         verdict.hold("to flag", float(shown.argmax()) + 1 if shown.any() else math.inf, must.within)
+    if must.after:
+        shown = (faults[end : end + 3] & fault_mask(*must.after)) != 0
+        verdict.hold("to flag after", float(shown.argmax()) + 1 if shown.any() else math.inf, 2)
     mode = enum_names("lever_mode")[int(modes[end - 1])]
     if mode not in must.mode:
         verdict.broken.append(f"mode {mode}")
     flagged = is_flagged(record)
     away = ((faults & fault_mask(*GONE)) != 0) | (modes != lib.LEVER_MODE_RUN)
-    verdict.hold("back", _back(away, end), must.back)
-    _judge_errors(must, record, truth, flagged, begin, verdict)
+    verdict.hold("back", _back(away, end), BACK)
+    _judge_errors(record, truth, flagged, begin, verdict)
     return verdict
 
 
@@ -134,36 +156,53 @@ def _back(away: BoolArray, end: int) -> float:
 
 
 def _judge_errors(
-    must: Must, record: Record, truth: Mapping[str, FloatArray], flagged: BoolArray, begin: int, verdict: Verdict
+    record: Record, truth: Mapping[str, FloatArray], flagged: BoolArray, begin: int, verdict: Verdict
 ) -> None:
     """From the begin of the fault on."""
     first = begin // STRIDE
     shown = ~flagged[::STRIDE]
     shown[:first] = False
-    silent, covered = 0.0, 100.0
+    silent, covered = dict.fromkeys(QUANTITIES, 0.0), 100.0
     for name in QUANTITIES:
         wrong = deviation(record, truth, name) > SIGMAS
-        silent = max(silent, longest(wrong & shown) * PERIOD * STRIDE)
+        silent[name] = longest(wrong & shown) * PERIOD * STRIDE
         if shown.any():
             covered = min(covered, 100.0 * float(np.mean(~wrong[shown])))
-    verdict.measured["silent"], verdict.measured["covered"] = silent, covered
+    worst = max(silent, key=silent.__getitem__)
+    verdict.hold("silent", silent[worst], SILENT)
+    verdict.measured["covered"] = covered
+    verdict.excerpt = _excerpt(record, truth, flagged, worst)
     last = round(AT_LAST / PERIOD / STRIDE)
     relative = (record.estimate["natural_frequency"] / truth["f_n"] - 1.0)[-last:]
-    verdict.hold("error after", 100.0 * math.sqrt(float(np.mean(relative.astype(np.float64) ** 2))), must.error)
+    verdict.hold("error after", 100.0 * math.sqrt(float(np.mean(relative.astype(np.float64) ** 2))), ERROR)
+
+
+def _excerpt(
+    record: Record, truth: Mapping[str, FloatArray], flagged: BoolArray, name: str, points: int = 400
+) -> Excerpt:
+    value, sigma = _stated(record, name)
+    at = np.arange(0, len(value), max(1, len(value) // points))
+    return Excerpt(
+        name, PERIOD * STRIDE * at.astype(np.float64), truth[name][at], value[at], sigma[at], flagged[::STRIDE][at]
+    )
 
 
 def deviation(record: Record, truth: Mapping[str, FloatArray], name: str) -> FloatArray:
     """Size of the error in standard deviations that the firmware states."""
-    estimate = record.estimate
-    if name in ("f_n", "zeta"):
-        of = {"f_n": "natural_frequency", "zeta": "damping_ratio"}[name]
-        value, sigma = estimate[of], estimate[f"{of}_sigma"]
-    else:
-        i = QUANTITIES.index(name) - 2
-        value, sigma = estimate["parameter"][:, i], estimate["parameter_sigma"][:, i]
+    value, sigma = _stated(record, name)
     with np.errstate(all="ignore"):
         size: FloatArray = np.abs(value - truth[name]) / sigma
     return size
+
+
+def _stated(record: Record, name: str) -> tuple[FloatArray, FloatArray]:
+    """Estimate and standard deviation of a quantity."""
+    estimate = record.estimate
+    if name in ("f_n", "zeta"):
+        of = {"f_n": "natural_frequency", "zeta": "damping_ratio"}[name]
+        return estimate[of], estimate[f"{of}_sigma"]
+    i = QUANTITIES.index(name) - 2
+    return estimate["parameter"][:, i], estimate["parameter_sigma"][:, i]
 
 
 def longest(true: BoolArray) -> int:

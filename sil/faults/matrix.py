@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from lever_cdkf.host_tools.firmware.config import Config
 
 from .flight import Pilot, Record
-from .judge import SILENT, Verdict, judge
+from .judge import RIGHT, SILENT, Verdict, judge
 from .rows import MOTION, Row
 
 Show = Callable[[int, int, str], None]
@@ -25,7 +25,8 @@ class Result:
     @property
     def broken(self) -> list[str]:
         """What the row demands and some flight did not keep."""
-        return list(dict.fromkeys(what for verdict in self.verdicts for what in verdict.broken))
+        broken = list(dict.fromkeys(what for verdict in self.verdicts for what in verdict.broken))
+        return broken if self.covered >= RIGHT else [*broken, "right"]
 
     @property
     def silent(self) -> bool:
@@ -35,6 +36,11 @@ class Result:
     def worst(self, figure: str) -> float:
         """Of all flights."""
         return max(verdict.measured[figure] for verdict in self.verdicts)
+
+    @property
+    def shown(self) -> Verdict:
+        """The flight that was wrong longest without a flag, or else farthest off at its end."""
+        return max(self.verdicts, key=lambda each: (each.measured["silent"], each.measured["error after"]))
 
     @property
     def covered(self) -> float:

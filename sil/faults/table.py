@@ -10,15 +10,22 @@ from lever_cdkf.host_tools.tables import Row
 
 from . import judge
 from .matrix import Result
+from .rows import KNOWN
 
 HOLDS, MISSED, SILENT = "holds", "MISSED", "SILENT"
+_WORD = {"silent": "wrong without a flag", "right": "too rarely right"}
 
 
 def state(result: Result) -> str:
     """In a word."""
-    if result.broken:
-        return MISSED
-    return SILENT if result.silent else HOLDS
+    if result.silent:
+        return SILENT
+    return MISSED if result.broken else HOLDS
+
+
+def missed(result: Result) -> str:
+    """What it does not keep."""
+    return ", ".join(_WORD.get(what, what) for what in result.broken)
 
 
 def demands(must: judge.Must) -> str:
@@ -27,13 +34,13 @@ def demands(must: judge.Must) -> str:
     if must.unaffected:
         parts.append("not a bit changes")
     if must.flags:
-        parts.append(f"{' or '.join(must.flags)} within {must.within} samples")
+        parts.append(f"{' or '.join(must.flags)} within {must.within} sample{'s' if must.within > 1 else ''}")
+    if must.after:
+        parts.append(f"{' or '.join(must.after)} at its end")
     if not must.unaffected:
         parts.append(f"mode {' or '.join(must.mode)}")
     if must.torque_ends is not None:
         parts.append(f"no torque after {must.torque_ends:g} s")
-    if not must.unaffected:
-        parts += [f"back in {must.back:g} s", f"f_n to {must.error:g} %"]
     return ", ".join(parts)
 
 
@@ -43,7 +50,7 @@ def lines(results: Sequence[Result]) -> list[Row]:
         {
             "fault": result.row.name,
             "result": state(result),
-            "missed": ", ".join(result.broken),
+            "missed": missed(result),
             "to flag": _whole(result, "to flag"),
             "back [s]": _number(result.worst("back")),
             "error after [%]": _number(result.worst("error after")),
@@ -76,6 +83,7 @@ def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
             "must": demands(result.row.must),
             "result": state(result),
             "broken": result.broken,
+            "known": KNOWN.get(result.row.name),
             "covered": _number(result.covered),
             "worst": {name: _number(result.worst(name)) for name in result.verdicts[0].measured if name != "covered"},
         }
@@ -84,9 +92,16 @@ def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
 
 
 def counts(results: Sequence[Result]) -> dict[str, int]:
-    """How many rows there are, how many miss what they must, and in how many the firmware was silently wrong."""
+    """How many rows there are, how many miss what they must, how many of these are not known to, and in how many the
+    firmware was silently wrong."""
     return {
         "count": len(results),
         "missed": sum(bool(result.broken) for result in results),
+        "unexpected": len(unexpected(results)),
         "silent": sum(result.silent for result in results),
     }
+
+
+def unexpected(results: Sequence[Result]) -> list[str]:
+    """Rows that miss what they must, and are not known to."""
+    return [result.row.name for result in results if result.broken and result.row.name not in KNOWN]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +26,7 @@ from lever_cdkf.host_tools.firmware.native import Config, enum_names, settings_t
 from lever_cdkf.host_tools.firmware.settings_file import setting_value
 from lever_cdkf.host_tools.near_names import near_names
 from lever_cdkf.host_tools.results.trace import CONVERGED_AFTER
+from lever_cdkf.host_tools.toml_text import MOST_NESTED
 from lever_cdkf.host_tools.units import UnitError
 
 from ..aircraft.aircraft import Coupled, read_aircraft
@@ -49,6 +51,7 @@ from ..toml_tables import (
     table,
     tables,
     text,
+    value_of,
     whole,
 )
 from . import random_streams
@@ -171,7 +174,7 @@ class Scenario:
     @cached_property
     def known_aircraft(self) -> AircraftResponse | None:
         """What the estimator is given of the aircraft, so that it watches the margin."""
-        return None if self.aircraft is None else known(self.aircraft.response)
+        return None if self.aircraft is None else known(self.aircraft.response, name=self.aircraft.name)
 
     @cached_property
     def period(self) -> float:
@@ -248,24 +251,24 @@ SHELF = Shelf("scenario", __package__)
 names = SHELF.names
 
 
-def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
+def load(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scenario:
     """The scenario of that name, or in the file of that path (ending in .toml), with "key.subkey=value" overrides.
 
     Raises ScenarioError.
     """
-    return from_toml(SHELF.content(name_or_path), name_or_path, overrides)
+    if not isinstance(name_or_path, (str, os.PathLike)):
+        raise ScenarioError(f"{name_or_path!r} is no scenario: give its name, or the path of a .toml file")
+    name = os.fspath(name_or_path)
+    return from_toml(SHELF.content(name), name, overrides)
 
 
 def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
     """As load(), of what the file holds."""
     file = file_of(name_or_path)
-    try:
-        values = parse(content, file)
-        for override in overrides:
-            _override(values, override)
-        scenario = dataclasses.replace(read(Scenario, values, Place(file)), name=Path(file).stem, file=file)
-    except RecursionError:
-        raise ScenarioError(f"{file}: its tables or lists, or those of --set, are nested too deeply") from None
+    values = parse(content, file)
+    for override in overrides:
+        _override(values, override)
+    scenario = dataclasses.replace(read(Scenario, values, Place(file)), name=Path(file).stem, file=file)
     scenario.check()
     return scenario
 
@@ -277,10 +280,10 @@ def _override(values: dict[str, Any], override: str) -> None:
     """
     key, equals, written = override.partition("=")
     *parents, last = key.strip().split(".")
-    if not equals or not last:
+    if not equals or not last or len(parents) > MOST_NESTED:
         raise ScenarioError(f"--set {override}: must be KEY=VALUE, such as duration='10 s' or settings.m_p='3 kg'")
     target: Any = values
-    if not parents and last in CHOICES and isinstance(_value(written), str):
+    if not parents and last in CHOICES and isinstance(value_of(written), str):
         parents = ["estimator"]
     elif not parents and last not in Scenario.__dataclass_fields__:
         parents = ["settings"] if near_names(last, (row.name for row in settings_table())) else []
@@ -288,16 +291,8 @@ def _override(values: dict[str, Any], override: str) -> None:
         for parent in parents:
             target = target[int(parent)] if isinstance(target, list) else target.setdefault(parent, {})
         if isinstance(target, list):
-            target[int(last)] = _value(written)
+            target[int(last)] = value_of(written)
         else:
-            target[last] = _value(written)
+            target[last] = value_of(written)
     except (AttributeError, IndexError, TypeError, ValueError):
         raise ScenarioError(f"--set {override}: the scenario has no {key.strip()!r}") from None
-
-
-def _value(written: str) -> Any:
-    """As TOML when it is TOML, otherwise a string, so that a shell needs no second quotes."""
-    try:
-        return parse(f"value = {written}".encode(), "")["value"]
-    except ScenarioError:
-        return written.strip()

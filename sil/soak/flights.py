@@ -72,7 +72,7 @@ def _pilot(rng: np.random.Generator, grips: np.ndarray[Any, Any], off: float) ->
         return {"kind": "sequence", "at": [f"{at} s" for at in grips], "parts": parts}
 
     mass = float(np.exp(rng.uniform(np.log(1.5), np.log(4.5))))
-    pilot = {
+    pilot: Values = {
         "m_p": f"{mass} kg",
         "c_p": drifting("N s/m", 25.0, 90.0, rng.uniform(0.005, 0.03)),
         "k_p": drifting("N/m", 800.0, 3200.0, rng.uniform(0.005, 0.03)),

@@ -217,7 +217,7 @@ def _nees(values: dict[str, FloatArray], estimates: NDArray[Any]) -> FloatArray:
     nees = np.full(len(estimate), np.nan)
     solved = np.linalg.solve(correlation[usable], scaled[usable][:, :, np.newaxis])[:, :, 0]
     nees[usable] = (scaled[usable] * solved).sum(axis=1) / 3.0
-    return np.nan_to_num(nees, nan=0.0)
+    return np.where(np.isnan(nees), 0.0, nees)
 
 
 def _stretches(wrong: BoolArray) -> int:

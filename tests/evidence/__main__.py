@@ -1,9 +1,13 @@
 """Gathers what proves the firmware: build/evidence/evidence.json, and EVIDENCE.html for a reviewer.
 
-    python tests/evidence BUILD [--mutants FILE]
+    python tests/evidence BUILD
 
-Runs the tests of firmware/REQUIREMENTS.md, measures coverage, proves by Eva, and flies the fault matrix; FILE holds the
-verdicts on mutants, as tests/mutation writes them. Exit status: 0 when each requirement has a test that passed.
+Proves by Eva, flies the fault matrix and a day of soak, fuzzes, measures coverage, runs the tests of
+firmware/REQUIREMENTS.md and SECURITY.md and all mutants of the core. Both files are there when all of it could be
+gathered; until then there is neither.
+
+Exit status: 0 when each requirement has tests that passed, no fault is missed that is not known to be, and Eva, soak
+and fuzzers find nothing; 1 when not, which the page shows; 2 when a part could not be gathered, and nothing is written.
 """
 
 from __future__ import annotations
@@ -11,8 +15,11 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import subprocess
 import sys
-from collections.abc import Callable
+import tempfile
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,86 +28,143 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from covered import __main__ as covered
 from covered import measuring
 from evidence import page, results
+from evidence.results import EvidenceError
+from fuzz import libfuzzer
+from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.files import Outputs
 from lever_cdkf.host_tools.provenance import provenance
 from proof import eva
 from quality import tools, tracing
 
 Content = dict[str, Any]
+TOOLS = (eva.PROGRAM, measuring.COMPILER, measuring.MERGER, measuring.READER)
+FUZZED = 60
+"""[s] a target."""
+FILES = ("evidence.json", "EVIDENCE.html")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="evidence", description=__doc__.splitlines()[0])
     parser.add_argument("build", type=lambda path: Path(path).resolve())
-    parser.add_argument("--mutants", type=Path, metavar="FILE", help="verdicts on mutants")
-    args = parser.parse_args()
-    folder = args.build / "evidence"
-    folder.mkdir(exist_ok=True)
-    parts: dict[str, Callable[[], Content]] = {
-        "requirements": lambda: _requirements(args.build, folder),
-        "coverage": lambda: _coverage(args.build),
-        "eva": _eva,
-        "fault_rows": lambda: _faults(args.build, folder),
-        "mutants": lambda: _mutants(args.mutants),
-    }
+    build = parser.parse_args().build
+    folder = build / "evidence"
+    for name in FILES:
+        (folder / name).unlink(missing_ok=True)
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            content = gather(build, Path(scratch))
+        with Outputs(folder) as out:
+            text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+            out.path("evidence.json").write_text(text, encoding="utf-8")
+            out.path("EVIDENCE.html").write_text(page.build(content), encoding="utf-8")
+            out.finish()
+    except (EvidenceError, LeverError, measuring.CoverageError, eva.EvaError) as error:
+        print(f"evidence: error: {error}; nothing is written", file=sys.stderr)
+        return 2
+    print(f"{page.verdict(content)}\nWritten to {folder}: {', '.join(FILES)}")
+    return 0 if page.holds(content) else 1
+
+
+def gather(build: Path, scratch: Path) -> Content:
+    """All of it, the shortest part first. Raises EvidenceError, CoverageError or EvaError."""
+    if missing := [tool for tool in TOOLS if shutil.which(tool) is None]:
+        packages = tools.ROOT / "tests/setup/debian-packages.txt"
+        raise EvidenceError(f"no {', '.join(missing)} here: install the packages of {packages}")
     content: Content = {}
-    for name, gather in parts.items():
-        print(f"-- {name}", flush=True)
-        content[name] = gather()
-    content["eva_alarms"] = content["eva"].pop("alarms", None)
+    parts: dict[str, Callable[[], Content]] = {
+        "eva": _eva,
+        "fault_rows": lambda: _faults(build, scratch / "faults.json"),
+        "soak": lambda: _soak(build, scratch / "soak.json"),
+        "fuzz": lambda: _fuzz(build),
+        "coverage": lambda: _coverage(build),
+        "requirements": lambda: _requirements(build, scratch / "pytest.xml"),
+        "mutants": lambda: _mutants(build / "tests/mutation", scratch / "mutants.json"),
+    }
+    seconds = {}
+    for i, (name, part) in enumerate(parts.items()):
+        print(f"-- {i + 1} of {len(parts)}: {name}", flush=True)
+        start = time.monotonic()
+        content[name] = part()
+        seconds[name] = round(time.monotonic() - start, 1)
+    content["eva_alarms"] = content["eva"].pop("alarms")
+    content["seconds"] = seconds
     content["provenance"] = asdict(provenance())
-    (folder / "evidence.json").write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    (folder / "EVIDENCE.html").write_text(page.build(content), encoding="utf-8")
-    untested = content["requirements"]["untested"]
-    print(f"Written to {folder}: evidence.json, EVIDENCE.html; requirements without a test that passed: {untested}")
-    return 1 if untested else 0
+    return content
 
 
-def _requirements(build: Path, folder: Path) -> Content:
-    """Each with its tests and what they said."""
-    required = tracing.requirements((tools.FIRMWARE / "REQUIREMENTS.md").read_text(encoding="utf-8"))
-    said = results.of_python(folder / "pytest.xml") | results.of_c(build)
-    rows = []
-    for number, words in required.items():
-        tests = [trace for trace in tracing.traces() if trace.requirement == number]
-        shown = {f"{trace.path}::{trace.test}": said.get((trace.path, trace.test), "not run") for trace in tests}
-        rows.append({"number": number, "requirement": words, "tests": shown})
-    untested = sum(set(row["tests"].values()) != {"passed"} for row in rows)  # type: ignore[attr-defined]
-    return {"count": len(rows), "untested": untested, "rows": rows}
+def _run(command: Sequence[str | Path]) -> int:
+    """A part that is a program; what it says is progress. Returns its status, which may be 1, "something is missed".
+    Raises EvidenceError for another."""
+    status = subprocess.run([str(word) for word in command], cwd=tools.ROOT, check=False).returncode
+    if status not in (0, 1):
+        raise EvidenceError(f"{Path(command[0]).name} {Path(command[1]).name} ended with status {status}")
+    return status
+
+
+def _read(file: Path) -> Content:
+    if not file.exists():
+        raise EvidenceError(f"{file.name} was not written")
+    content: Content = json.loads(file.read_text(encoding="utf-8"))
+    return content
+
+
+def _eva() -> Content:
+    proofs = {name: eva.prove(name) for name in eva.SOURCES}
+    modules = [
+        {"harness": name, "files": list(eva.SOURCES[name]), "alarms": proof.alarms, "reached": proof.reached}
+        for name, proof in proofs.items()
+    ]
+    return {"alarms": sum(proof.alarms for proof in proofs.values()), "modules": modules}
+
+
+def _faults(build: Path, file: Path) -> Content:
+    """The matrix as `lever faults` has it."""
+    _run([build / "venv/bin/lever", "faults", "--json", file])
+    content = _read(file)
+    return {name: content[name] for name in ("count", "missed", "silent", "rows")}
+
+
+def _soak(build: Path, file: Path) -> Content:
+    """A day without a reset, as `lever soak` has it."""
+    _run([build / "venv/bin/lever", "soak", "--out", file.with_suffix(".html"), "--json", file])
+    content = _read(file)
+    return {name: content[name] for name in ("total", "memory_growth_mib", "troubles")} | {
+        "hours": len(content["hours"])
+    }
+
+
+def _fuzz(build: Path) -> Content:
+    """Each fuzz target for a while."""
+    command = [sys.executable, tools.ROOT / "tests/fuzz", "--seconds", str(FUZZED), "--build", build / "fuzz"]
+    return {"targets": list(libfuzzer.SOURCES), "seconds": FUZZED, "found": _run(command)}
 
 
 def _coverage(build: Path) -> Content:
-    if shutil.which(measuring.READER) is None:
-        return {"missing": f"no {measuring.READER} here"}
     found = measuring.measure(covered.sources(build), build / "covered")
     shares = {kind: round(found.share(kind), 2) for kind in found.count}
     excluded = [str(each) for each in found.missing if each.number]
     return {**shares, "counts": found.count, "excluded": excluded, "open": [str(each) for each in found.open]}
 
 
-def _eva() -> Content:
-    if shutil.which(eva.PROGRAM) is None:
-        return {"missing": f"no {eva.PROGRAM} here"}
-    proofs = {name: eva.prove(name) for name in eva.SOURCES}
-    alarms = sum(proof.alarms for proof in proofs.values())
-    return {"alarms": alarms, "modules": {name: list(eva.SOURCES[name]) for name in proofs}}
+def _requirements(build: Path, report: Path) -> Content:
+    """Each with its tests and what they said."""
+    required = tracing.requirements()
+    said = results.of_c(build) | results.of_python(report)
+    traced = tracing.traces()
+    rows: list[Content] = []
+    for number, words in required.items():
+        keys = [(trace.path, trace.test) for trace in traced if trace.requirement == number]
+        tests = [{"test": "::".join(key), **asdict(said.get(key, results.Said("not run")))} for key in keys]
+        rows.append({"number": number, "requirement": words, "tests": tests})
+    untested = sum({test["verdict"] for test in row["tests"]} != {"passed"} for row in rows)
+    return {"count": len(rows), "untested": untested, "rows": rows}
 
 
-def _faults(build: Path, folder: Path) -> Content:
-    """The matrix as `lever faults` has it."""
-    rows = folder / "faults.json"
-    result = tools.run([build / "venv/bin/lever", "faults", "--json", rows])
-    if result.returncode not in (0, 1):
-        raise RuntimeError(result.stdout)
-    content: Content = json.loads(rows.read_text(encoding="utf-8"))
-    return {name: content[name] for name in ("count", "missed", "silent", "rows")}
-
-
-def _mutants(file: Path | None) -> Content:
-    if file is None:
-        return {"missing": "not run"}
-    verdicts = json.loads(file.read_text(encoding="utf-8"))
-    survivors = [each["mutant"] for each in verdicts if not each["killer"]]
-    return {"valid": len(verdicts), "killed": len(verdicts) - len(survivors), "survivors": survivors}
+def _mutants(build: Path, file: Path) -> Content:
+    _run([sys.executable, tools.ROOT / "tests/mutation", build, "--json", file])
+    content = _read(file)
+    survivors = [each["mutant"] for each in content["verdicts"] if not each["killer"]]
+    return {**{name: content[name] for name in ("valid", "killed", "equivalent")}, "survivors": survivors}
 
 
 if __name__ == "__main__":

@@ -1,20 +1,43 @@
-"""Building and running the fuzz targets of this folder: each `<name>.c`, with libFuzzer, AddressSanitizer and UBSan."""
+"""Building and running the fuzz targets of this folder: each `<name>.c`, with libFuzzer, AddressSanitizer and UBSan.
+
+A target begins with the inputs of `<name>.seeds`, each under a line `=== what it is`; those of HEXADECIMAL are that.
+Words that are worth trying are in `<name>.dict`.
+"""
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
 import subprocess
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
-FIRMWARE = FOLDER.parents[1] / "firmware"
-SOURCES = {"slcan": ("port/slcan/slcan.c",)}
-"""What each target runs, of firmware/."""
-FLAGS = ("-std=c99", "-g", "-O1", "-fno-omit-frame-pointer", "-fsanitize=fuzzer,address,undefined")
+ROOT = FOLDER.parents[1]
+CORE = tuple(
+    str(source.relative_to(ROOT))
+    for folder in ("math", "model", "filter", "can", "app", "bounce")
+    for source in sorted((ROOT / "firmware" / folder).glob("*.c"))
+)
+SOURCES = {
+    "app": CORE,
+    "slcan": ("firmware/port/slcan/slcan.c",),
+    "candump": ("host_tools/firmware/c/candump.c",),
+    "settings": ("firmware/port/linux/settings.c", "firmware/app/settings.c"),
+    "aircraft": ("firmware/port/linux/aircraft.c", "firmware/port/linux/settings.c", "firmware/app/settings.c"),
+}
+"""What each target runs."""
+HEXADECIMAL = ("app",)
+FLAGS = (
+    *("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-g", "-O1", "-fno-omit-frame-pointer"),
+    *("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"),
+    *(f"-I{ROOT / folder}" for folder in ("firmware", "host_tools/firmware/c", "tests/fuzz")),
+)
 COMPILERS = "clang-19|clang"
-FAST_UNITS = "-timeout=5"
+FAST_UNITS = "-timeout=60"
 """An input that takes longer than so many seconds is a finding, too."""
 
 
@@ -29,27 +52,57 @@ class Result:
     found: bool
     text: str
 
+    def count(self, name: str) -> int:
+        """What it says of `stat::name`; 0 where it says nothing."""
+        said = re.search(rf"stat::{name}: +(\d+)", self.text)
+        return int(said[1]) if said else 0
 
-def build(name: str, folder: Path, sources: Sequence[Path] = ()) -> Path:
-    """The fuzzer of a target, in `folder`; `sources` take the place of the firmware's. Raises FuzzError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    program = folder / name
+
+def build(name: str, folder: Path, replaced: Sequence[tuple[str, Path]] = ()) -> Path:
+    """The fuzzer of a target, in `folder`; `replaced`: sources in whose place others are taken, beside the objects
+    that are there from the build before. Raises FuzzError."""
+    objects = folder / f"{name}.objects"
+    objects.mkdir(parents=True, exist_ok=True)
     compiler = next((path for each in COMPILERS.split("|") if (path := shutil.which(each))), None)
     if compiler is None:
         raise FuzzError("no clang here: apt install clang-19 libclang-rt-19-dev")
-    files = [FOLDER / f"{name}.c", *(sources or [FIRMWARE / source for source in SOURCES[name]])]
-    command = [compiler, *FLAGS, "-I", str(FIRMWARE), *map(str, files), "-o", str(program)]
+    others = dict(replaced)
+    kept = [ROOT / source for source in (f"tests/fuzz/{name}.c", *SOURCES[name]) if source not in others]
+    steps = {objects / f"{source.parent.name}_{source.stem}.o": source for source in kept}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for done in [
+            pool.submit(_run, [compiler, *FLAGS, "-c", str(source), "-o", str(into)])
+            for into, source in steps.items()
+            if not (replaced and into.exists())
+        ]:
+            done.result()
+    program = folder / name
+    _run([compiler, *FLAGS, *map(str, others.values()), *map(str, steps), "-lm", "-o", str(program)])
+    return program
+
+
+def _run(command: Sequence[str]) -> None:
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
-        raise FuzzError(f"{compiler} cannot build {name} (its runtime is in libclang-rt-19-dev):\n{result.stderr}")
-    return program
+        words = f"{' '.join(command)[:200]} fails (its runtime is in libclang-rt-19-dev):\n{result.stderr}"
+        raise FuzzError(words)
+
+
+def seeds(name: str) -> list[bytes]:
+    """The inputs that a target begins with."""
+    file = FOLDER / f"{name}.seeds"
+    blocks = re.split(r"^=== .*\n", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:] if file.exists() else []
+    return [bytes.fromhex(block) if name in HEXADECIMAL else block.encode() for block in blocks]
 
 
 def run(program: Path, corpus: Path, options: Sequence[str]) -> Result:
     """Fuzzes with, and adds to, the inputs in `corpus`; findings are written beside the program."""
     corpus.mkdir(parents=True, exist_ok=True)
+    for number, seed in enumerate(seeds(program.name)):
+        (corpus / f"seed{number}").write_bytes(seed)
     dictionary = FOLDER / f"{program.name}.dict"
+    words = [f"-dict={dictionary}"] if dictionary.exists() else []
     found = f"-artifact_prefix={program}-"
-    command = [str(program), FAST_UNITS, f"-dict={dictionary}", found, "-print_final_stats=1", *options, str(corpus)]
+    command = [str(program), FAST_UNITS, *words, found, "-print_final_stats=1", *options, str(corpus)]
     result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
     return Result(result.returncode != 0, result.stdout)

@@ -29,7 +29,7 @@ HOOK = Path(__file__).resolve().parent / "hook"
 EQUIVALENT = Path(__file__).with_name("python_equivalent.txt")
 """Mutants that change nothing that can be seen: the reason after #, their names below it."""
 MUTATED = ("host_tools", "sil")
-TESTS = ("tests/python", "tests/accuracy", "tests/slcan")
+TESTS = ("tests/python", "tests/accuracy", "tests/slcan", "tests/target/slcan")
 PATIENCE = 10
 """A mutant hangs when a test file takes so many times as long as without."""
 GRACE = 60.0

@@ -19,6 +19,7 @@ PROGRAM = "frama-c"
 SOURCES = {
     "codec": ("can/layout.c", "can/messages.c", "can/messages_sample.c"),
     "e2e": ("can/e2e.c",),
+    "kernels": ("math/trigonometry.c",),
     "slcan": ("port/slcan/slcan.c",),
     "torque_gate": ("app/torque_gate.c",),
 }

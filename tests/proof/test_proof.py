@@ -1,4 +1,5 @@
-"""No execution of codec, E2E, SLCAN and torque gate has undefined behaviour; and what is put there is found."""
+"""No execution of codec, E2E, SLCAN, torque gate and numeric kernels has undefined behaviour; and what is put there is
+found."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ from proof import eva
 SEEDED = {
     "e2e": ("can/e2e.c", "(size_t)FRAME_BYTES - 1u", "(size_t)FRAME_BYTES"),
     "codec": ("can/layout.c", "i < layout->codes", "i <= layout->codes"),
+    "kernels": ("math/trigonometry.c", "(fabsf(angle) <= 30.0f) ? angle : 0.0f", "angle"),
     "slcan": ("port/slcan/slcan.c", "((uint32_t)SLCAN_LINE_BYTES - 1u)", "((uint32_t)SLCAN_LINE_BYTES + 8u)"),
     "torque_gate": ("app/torque_gate.c", "(share < 1.0f) ? share : 1.0f", "(float)(int32_t)(share * 1.0e9f)"),
 }
@@ -18,7 +20,7 @@ SEEDED = {
 
 @pytest.mark.requires(eva.PROGRAM)
 @pytest.mark.parametrize("name", eva.SOURCES)
-@pytest.mark.requirement("R14")
+@pytest.mark.requirement("R14", "S6")
 def test_there_is_no_alarm(name: str) -> None:
     proof = eva.prove(name)
     assert proof.alarms == 0, proof.text

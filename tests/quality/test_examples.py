@@ -22,6 +22,7 @@ NOT_RUN = {
 }
 SHORTER = {
     r"--seeds \d+": "--seeds 1",
+    r"--only (bode|alarm) \w+": r"--only \1",
     r"(lever compare --(scenarios|models))": r"lever compare --duration 2 --scenarios step_up --\2",
     r"(lever (envelope|bounce) --quick)": r"\1 --seeds 1",
     r"--start 60 --length 120": "--length 22",

@@ -1,4 +1,4 @@
-"""Requirements of firmware/REQUIREMENTS.md, and the tests that carry their numbers."""
+"""Requirements of firmware/REQUIREMENTS.md and SECURITY.md, and the tests that carry their numbers."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-_ROW = re.compile(r"^\| (R\d+) \| (.+) \|$", re.MULTILINE)
-_C_TEST = re.compile(r"/\* (R\d+(?: R\d+)*) \*/\nTEST(?:_EACH)?\((?:.*?, )?(\w+)\)")
+_ROW = re.compile(r"^\| ([RS]\d+) \| (.+) \|$", re.MULTILINE)
+_C_TEST = re.compile(r"/\* ([RS]\d+(?: [RS]\d+)*) \*/\nTEST(?:_EACH)?\((?:.*?, )?(\w+)\)")
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,10 @@ class Trace:
     test: str
 
 
-def requirements(text: str) -> dict[str, str]:
+def requirements() -> dict[str, str]:
     """Number and words of each."""
-    found = _ROW.findall(text)
+    texts = ((ROOT / "firmware" / name).read_text(encoding="utf-8") for name in ("REQUIREMENTS.md", "SECURITY.md"))
+    found = [row for text in texts for row in _ROW.findall(text)]
     assert len(dict(found)) == len(found), "a number stands twice"
     return dict(found)
 

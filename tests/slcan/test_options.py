@@ -120,6 +120,11 @@ def test_what_is_no_settings_file(content: bytes, said: str, program: str, tmp_p
         ("gain_sigma = 0.1 0.2\n", ":1: neither"),
         ("# none\n1.5 nan 2\n", ":2: neither"),
         (25 * "1 2 3\n", ":25: neither"),
+        ("gain_sigma = 0.1\ngain_sigma = 0.2\n", ":2: neither"),
+        ("gain_sigma = 0x1p-3\n", ":1: neither"),
+        ("1_0 2 3\n", ":1: neither"),
+        ("1 2 3\r2 3 4\r", ":1: neither"),
+        ("#" * 511, ":1: the line is longer than 510 bytes"),
         ("1 2 3\n2 3 4\n3 4 5\ngain_sigma = 0.1\n", ": how well is it known?"),
     ],
 )

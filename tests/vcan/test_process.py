@@ -15,6 +15,7 @@ from pathlib import Path
 import can
 import pytest
 from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.bus import LeverBus
 from vcan import rig
 
 SAMPLES = 250
@@ -206,6 +207,66 @@ def test_a_full_receive_buffer_is_counted(start: rig.Starter, interface: str, ho
     totals = process.stop()
     assert totals["overflowed"] > 0
     assert totals["frames in"] + totals["overflowed"] == flood + 2 * host.samples_sent
+
+
+@pytest.mark.requires("cangen")
+@pytest.mark.requirement("R50")
+def test_a_flood_does_not_keep_samples_from_their_answers(start: rig.Starter, interface: str, host: rig.Host) -> None:
+    """Frames of half the length, as fast as they can be sent, each of which the estimator has to refuse."""
+    process = start()
+    flood = 5000
+    words = ["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "4", "-n", str(flood)]
+    with subprocess.Popen(words) as generator:
+        while generator.poll() is None:
+            host.reach()
+    host.reach()
+    totals = process.stop()
+    assert totals["frames in"] + totals["overflowed"] == flood + 2 * host.samples_sent
+    assert totals["corrupt"] <= flood <= totals["corrupt"] + totals["overflowed"]
+    assert totals["samples"] > 0
+
+
+@pytest.mark.requirement("R50")
+def test_another_takes_over_from_one_that_is_killed(start: rig.Starter, host: rig.Host) -> None:
+    """In the middle of a sample; the other starts as with the first sample that it gets."""
+    first = start()
+    host.run(SAMPLES)
+    host.send(next(rig.samples(host.samples_sent, 1))[0])
+    first.process.kill()
+    first.process.wait(rig.PATIENCE_S)
+    host.rest()
+    second = start()
+    answers = host.run(SAMPLES)
+    with LeverBus(settings=rig.SETTINGS) as bus:
+        fresh = rig.Host(bus)
+        fresh.samples_sent = SAMPLES
+        assert answers == fresh.run(SAMPLES)
+    assert second.stop()["samples"] == SAMPLES
+
+
+@pytest.mark.requirement("R50")
+def test_two_on_one_bus_both_answer_and_both_say_so(
+    build_dir: Path, start: rig.Starter, interface: str, host: rig.Host, tmp_path: Path
+) -> None:
+    first = start()
+    (tmp_path / "second").mkdir()
+    answers: list[rig.Frame] = []
+    with rig.LeverCan(build_dir / "lever_can", interface, [], tmp_path / "second") as second:
+        for frames in rig.samples(0, SAMPLES):
+            for frame in frames:
+                host.send(frame)
+            answers += host.answer() + host.answer()
+        answers += host.rest()
+        for process in (first, second):
+            totals = process.stop()
+            assert totals["samples"] == SAMPLES
+            assert totals["frames in"] > 2 * SAMPLES  # IDENTITY of the other
+            assert totals["lost"] == totals["corrupt"] == totals["late"] == totals["overflowed"] == 0
+    estimates = [frame for frame in answers if frame[0] == rig.STATE_ESTIMATE]
+    alone = [frame for frame in rig.in_process(SAMPLES) if frame[0] == rig.STATE_ESTIMATE]
+    assert sorted(estimates) == sorted(2 * alone)
+    told = [codec.decode(*frame)[1]["fault_duplicate"] for frame in answers if frame[0] == HEALTH]
+    assert sum(told) >= 2
 
 
 def test_a_change_of_the_bus_condition_is_told_once(start: rig.Starter, interface: str) -> None:

@@ -5,9 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define BLANK " \t\r\n"
+#define BLANK " \t"
+#define WARNING 5.0f /* where nothing else is said [dB] */
+#define ALARM 4.0f
 
-enum { LINE_BYTES = 512, COLUMNS = 3, NAMES = 4 };
+enum { COLUMNS = 3, NAMES = 4 };
 
 /* A line "name = number", and where the number goes. */
 typedef struct entry {
@@ -25,13 +27,12 @@ static const entry_t entries[NAMES] = {
 /* A number at the beginning of a text, which then begins after it and the blanks that follow; NaN if there is none. */
 static float next_number(const char **text)
 {
-    char *end = NULL;
-    const float number = strtof(*text, &end);
-    const bool is_word = (end != *text) && (*end != '\0') && (strchr(BLANK, *end) == NULL);
-    const bool good = (end != *text) && !is_word && isfinite(number);
+    const char *end = settings_number_end(*text);
+    const bool good = (end != *text) && ((*end == '\0') || (strchr(BLANK, *end) != NULL));
+    const float number = good ? (float)strtod(*text, NULL) : NAN;
 
     *text = end + strspn(end, BLANK);
-    return good ? number : NAN;
+    return isfinite(number) ? number : NAN;
 }
 
 static bool take_point(lever_aircraft_t *aircraft, const char *text)
@@ -53,54 +54,53 @@ static bool take_point(lever_aircraft_t *aircraft, const char *text)
     return false;
 }
 
+/* Of equal names the second is refused. */
 static bool take_entry(lever_aircraft_t *aircraft, const char *text, const char *equals)
 {
-    const size_t length = strcspn(text, "= \t");
+    const size_t length = strcspn(text, "=" BLANK);
     const char *rest = equals + 1;
+    rest += strspn(rest, BLANK);
     const float number = next_number(&rest);
 
     for (uint32_t i = 0u; i < (uint32_t)NAMES; i++) {
         if ((strlen(entries[i].name) == length) && (strncmp(text, entries[i].name, length) == 0)) {
-            (void)memcpy((uint8_t *)aircraft + entries[i].offset, &number, sizeof number);
-            return isfinite(number) && (*rest == '\0');
+            uint8_t *place = (uint8_t *)aircraft + entries[i].offset;
+            float before = 0.0f;
+            (void)memcpy(&before, place, sizeof before);
+            (void)memcpy(place, &number, sizeof number);
+            return isnan(before) && isfinite(number) && (*rest == '\0');
         }
     }
     return false;
 }
 
-/* Whether a line, without its comment, is one of those that a file has. */
-static bool take_line(lever_aircraft_t *aircraft, char *line)
+static bool take_line(void *context, const char *text, settings_error_t *error)
 {
-    line[strcspn(line, "#")] = '\0';
-    const char *text = line + strspn(line, BLANK);
+    lever_aircraft_t *aircraft = context;
     const char *equals = strchr(text, '=');
 
-    if (*text == '\0') {
+    if ((equals != NULL) ? take_entry(aircraft, text, equals) : take_point(aircraft, text)) {
         return true;
     }
-    return (equals != NULL) ? take_entry(aircraft, text, equals) : take_point(aircraft, text);
+    (void)snprintf(error->text, sizeof error->text,
+        "neither gain_sigma, phase_sigma, warning or alarm = number, each once, nor frequency, real and imaginary part "
+        "(of %d at most)",
+        LEVER_AIRCRAFT_POINTS);
+    return false;
 }
 
 bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, settings_error_t *error)
 {
-    char line[LINE_BYTES];
-    unsigned number = 0u;
-
-    *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = 5.0f, .alarm = 4.0f};
-    while (fgets(line, (int)sizeof line, file) != NULL) {
-        number++;
-        if (!take_line(aircraft, line)) {
-            (void)snprintf(error->text, sizeof error->text,
-                "%.200s:%u: neither gain_sigma, phase_sigma, warning or alarm = number, nor frequency, real and "
-                "imaginary part (of %d at most)",
-                path, number, LEVER_AIRCRAFT_POINTS);
-            return false;
-        }
+    *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = NAN, .alarm = NAN};
+    if (!settings_lines(file, path, take_line, aircraft, error)) {
+        return false;
     }
     if (!isfinite(aircraft->gain_sigma) || !isfinite(aircraft->phase_sigma)) {
         (void)snprintf(error->text, sizeof error->text,
             "%.200s: how well is it known? It needs the lines gain_sigma = number and phase_sigma = number", path);
         return false;
     }
+    aircraft->warning = isnan(aircraft->warning) ? WARNING : aircraft->warning;
+    aircraft->alarm = isnan(aircraft->alarm) ? ALARM : aircraft->alarm;
     return true;
 }

@@ -113,8 +113,7 @@ static const char *after_sign(const char *text)
     return ((*text == '+') || (*text == '-')) ? (text + 1) : text;
 }
 
-/* The end of the number of the grammar that a text begins with, the text itself if it does not; strtod() takes more. */
-static const char *after_number(const char *text)
+const char *settings_number_end(const char *text)
 {
     const char *begin = after_sign(text);
     const char *end = after_digits(begin);
@@ -161,7 +160,7 @@ static const char *unit_names(const char *of, char *text, size_t size)
 static bool set_number(lever_config_t *config, uint32_t index, const char *value, settings_error_t *error)
 {
     const lever_setting_t *setting = lever_setting(index);
-    const char *end = after_number(value);
+    const char *end = settings_number_end(value);
     const char *spelling = end + strspn(end, BLANK);
     const double factor = unit_factor(setting->unit, spelling);
     char names[128];
@@ -245,8 +244,8 @@ static bool read_line(FILE *file, line_t *line)
     return byte != EOF;
 }
 
-/* Takes what one line says; `is_first`: it may begin with a byte order mark. */
-static bool take_line(lever_config_t *config, line_t *line, bool is_first, settings_error_t *error)
+/* Gives on what one line says; `is_first`: it may begin with a byte order mark. */
+static bool take_line(line_t *line, bool is_first, settings_take_t take, void *context, settings_error_t *error)
 {
     const size_t skipped = (is_first && (strncmp(line->text, BOM, BOM_BYTES) == 0)) ? (size_t)BOM_BYTES : 0u;
     char *text = &line->text[skipped];
@@ -264,10 +263,10 @@ static bool take_line(lever_config_t *config, line_t *line, bool is_first, setti
     text[length] = '\0';
     text[strcspn(text, "#")] = '\0';
     text = trim(text);
-    return (*text == '\0') || settings_assign(config, text, error);
+    return (*text == '\0') || take(context, text, error);
 }
 
-bool settings_read(lever_config_t *config, FILE *file, const char *path, settings_error_t *error)
+bool settings_lines(FILE *file, const char *path, settings_take_t take, void *context, settings_error_t *error)
 {
     line_t line;
     settings_error_t reason;
@@ -277,11 +276,21 @@ bool settings_read(lever_config_t *config, FILE *file, const char *path, setting
     while (is_more) {
         is_more = read_line(file, &line);
         number++;
-        if (!take_line(config, &line, number == 1u, &reason)) {
+        if (!take_line(&line, number == 1u, take, context, &reason)) {
             return refuse(error, "%.200s:%u: %.280s", path, number, reason.text);
         }
     }
     return (ferror(file) == 0) || refuse(error, "%.200s: cannot be read", path);
+}
+
+static bool assign_line(void *context, const char *text, settings_error_t *error)
+{
+    return settings_assign(context, text, error);
+}
+
+bool settings_read(lever_config_t *config, FILE *file, const char *path, settings_error_t *error)
+{
+    return settings_lines(file, path, assign_line, config, error);
 }
 
 bool settings_choice_names(const char *choice, char *text, size_t size)

@@ -43,8 +43,18 @@ bool settings_set(lever_config_t *config, const char *name, const char *value, s
 /* The same for a text "name = value", as in --set and in a line of a file. */
 bool settings_assign(lever_config_t *config, const char *text, settings_error_t *error);
 
-/* Reads a whole file; `path` is only for the messages, which say path:line. Stops at the first error, when `config`
- * already has what came before. */
+/* What takes a line of a file: without comment and blanks around it, never empty. False, with `error` filled in, if it
+ * cannot. */
+typedef bool (*settings_take_t)(void *context, const char *text, settings_error_t *error);
+
+/* Gives the lines of a file to `take` until it refuses one, or the file is not of lines of the grammar; `path` is only
+ * for the messages, which say path:line. */
+bool settings_lines(FILE *file, const char *path, settings_take_t take, void *context, settings_error_t *error);
+
+/* The end of the number of the grammar that a text begins with; the text itself if it does not. strtod() takes more. */
+const char *settings_number_end(const char *text);
+
+/* Reads a whole file, as settings_lines(). Stops at the first error, when `config` already has what came before. */
 bool settings_read(lever_config_t *config, FILE *file, const char *path, settings_error_t *error);
 
 /* The names that a choice ("model") can take, as "fixed, trim", in `text` of `size` bytes; false if it is no choice. */

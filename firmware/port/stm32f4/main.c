@@ -6,6 +6,7 @@
 #include "can/messages.h"
 #include "lever_build.h"
 #include "lever_cdkf.h"
+#include "port/command_guard.h"
 #include "port/embedded/self_test.h"
 #include "port/loop.h"
 #include "port/stm32f4/clock.h"
@@ -101,8 +102,10 @@ static uint32_t now_us(void *self)
     return 1000u * tick_ms();
 }
 
+static command_guard_t guard = {.receive = transport_receive};
 static const port_t port = {
-    .receive = transport_receive,
+    .self = &guard,
+    .receive = command_guard_receive,
     .send = transport_send,
     .wait = wait_frame,
     .now_us = now_us,
@@ -207,6 +210,8 @@ int main(void)
     transport_start(&rates);
     watchdog_tighten(); /* not before: at 16 MHz lever_init() may take longer than the loop may */
     if (lever != NULL) {
+        guard.lever = lever;
+        guard.takes_commands = transport_takes_commands();
         loop_init(&loop, &port, lever, LOOP_DROP);
         while (loop_turn(&loop) == PORT_DONE) {
             each_millisecond();

@@ -31,6 +31,9 @@ void transport_poll(uint32_t now_ms);
  * has just become due; false for long says that they come no more. */
 bool transport_is_served(void);
 
+/* Whether COMMANDs may change anything: port/command_guard.h. */
+bool transport_takes_commands(void);
+
 /* Fills in the state of the bus, and what has been lost since the start. */
 void transport_status(lever_platform_t *status);
 

@@ -46,6 +46,11 @@ bool transport_is_served(void)
     return usart_is_served();
 }
 
+bool transport_takes_commands(void)
+{
+    return true; /* a serial line is a bench */
+}
+
 void transport_status(lever_platform_t *status)
 {
     status->overruns = (uint16_t)usart_overruns();

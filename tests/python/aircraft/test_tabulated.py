@@ -45,6 +45,8 @@ def test_its_margins_are_those_of_the_aircraft_it_is_of(file: Path) -> None:
     [
         ("f, re, im\n1, 2, 3\n2, 3\n", "line 3: must be three numbers"),
         ("1, 2, 3\n2, 3, nan\n", "line 2: must be three numbers"),
+        ("nan, 2, 3\n2, 3, 4\n", "line 1: must be three numbers"),
+        ("f, re, im\nfrequency, re, im\n1, 2\n", "line 3: must be three numbers"),
         ("1, 2, 3\n1, 3, 4\n", "line 2: the frequencies must rise"),
         ("0, 2, 3\n1, 3, 4\n", "line 1: the frequencies must rise"),
         ("1, 2, 3\n2, 3, 4\n", "2 frequencies; a response has at least 3"),
@@ -72,3 +74,22 @@ def test_its_response_is_one_for_the_firmware(file: Path) -> None:
     assert np.array(list(pointer.imaginary)) == pytest.approx(exact.imag, abs=0.005 * np.abs(exact).max())
     with pytest.raises(LeverError, match="a response has no gearing"):
         response(str(file), ["gearing=0.5"])
+
+
+def rows(*frequencies: float) -> str:
+    return "".join(f"{each},31,-26\n" for each in frequencies)
+
+
+def test_the_table_is_of_what_is_known(tmp_path: Path) -> None:
+    """A spreadsheet writes a byte order mark first, which takes no row with it."""
+    path = tmp_path / "some.csv"
+    path.write_text(rows(1.8, 3.0, 5.0, 7.2), encoding="utf-8-sig")
+    assert list(response(str(path), []).pointer.frequency)[::23] == pytest.approx([1.8, 7.2])
+
+
+@pytest.mark.parametrize("frequencies", [(1.5, 2.0, 2.9), (20.0, 40.0, 80.0), (2.5, 4.0, 8.0), (1.0, 3.0, 6.5)])
+def test_frequencies_that_lack_the_crossing_are_refused(frequencies: tuple[float, ...], tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    path.write_text(rows(*frequencies))
+    with pytest.raises(LeverError, match=rf"from {frequencies[0]:g} to {frequencies[-1]:g} Hz; the margin .* needs it"):
+        response(str(path), [])

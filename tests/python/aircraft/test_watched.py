@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet
@@ -23,7 +24,7 @@ from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.commands.aircraft import response
 from lever_cdkf.sil.scenarios import scenario
 from python.aircraft.loops import loop_of
-from python.conftest import Refused, Session
+from python.conftest import Refused, Run, Session
 from python.report.reading import figures, read
 
 SAME = ("sim", "replay")
@@ -61,7 +62,7 @@ def test_every_file_has_it(out: Path) -> None:
     summary = json.loads((out / "summary.json").read_text())
     assert summary["stability"]["warning_db"] == 30.0
     assert summary["stability"]["states_s"]["warning"] > 1.0
-    assert "The gain margin to collective bounce was least at" in summary["verdict"]
+    assert "With uh60_like, gearing 0.5, the gain margin to collective bounce was least at" in summary["verdict"]
     assert set(pyarrow.parquet.read_table(out / "trace.parquet")["bounce"].to_pylist()) >= {"warning"}
     assert "figure-stability" in figures(read(out / "report.html"))
     assert cli.main(["replay", str(out / "trace.parquet"), "-o", str(out.parent / "again")]) == 0
@@ -82,13 +83,34 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def trace_of(folder: Path) -> Any:
+    return np.genfromtxt(folder / "trace.csv", delimiter=",", names=True)
+
+
+def test_a_loop_that_is_unstable_is_told(lever: Run) -> None:
+    overrides = ("duration=2 s", "aircraft.gearing=5 1", "limits={}")
+    said = lever("sim", "bounce", *(part for each in overrides for part in ("--set", each)))[1]
+    assert "In truth the loop was unstable for 2 s, by up to 1" in said
+
+
+@pytest.mark.parametrize(
+    "change", ["base.0.rms=1e300 g", "disturbance=[{kind='sine',rms='1e30 N m',frequency='3 Hz'}]"]
+)
+def test_a_run_beyond_all_bounds_is_one_line(change: str, refused: Refused) -> None:
+    said = refused("sim", "bounce", "--set", change, "--set", "duration=2 s")
+    assert "grows beyond all bounds" in said
+
+
 def test_a_simulation_has_what_a_replay_of_its_log_has(flown: Path) -> None:
     of_sim, of_replay = (np.genfromtxt(flown / each / "trace.csv", delimiter=",", names=True) for each in SAME)
     for column in ("bounce", "gain_margin_dB", "gain_margin_sigma_dB", "modulus", "correction_rad"):
         assert np.array_equal(of_sim[column], of_replay[column], equal_nan=True)
     assert np.count_nonzero(of_sim["correction_rad"]) > 5000
     of_sim, of_replay = (json.loads((flown / each / "summary.json").read_text())["stability"] for each in SAME)
-    assert of_sim == of_replay
+    truth = {"least_true_margin_db": None, "unstable_s": None}
+    assert of_sim | truth == of_replay
+    assert of_sim["least_true_margin_db"] == pytest.approx(np.nanmin(trace_of(flown / "sim")["gain_margin_true_dB"]))
+    assert of_sim["unstable_s"] == 0.0
     assert of_sim["greatest_correction_rad"] > 1e-3
     assert "figure-stability" in figures(read(flown / "sim" / "report.html"))
 
@@ -144,6 +166,11 @@ def test_a_file_holds_the_response(tmp_path: Path, capsys: pytest.CaptureFixture
         ("gain_sigma = 0.1\n1 2\n", ":2: neither"),
         ("gain = 0.1\n", ":1: neither"),
         ("gain_sigma = much\n", ":1: neither"),
+        ("gain_sigma = 0.1\ngain_sigma = 0.2\n", ":2: neither"),
+        ("gain_sigma = 0x1p-3\n", ":1: neither"),
+        ("1_0 2 3\n", ":1: neither"),
+        ("1 2 3\r2 3 4\r", ":1: neither"),
+        ("#" * 511, ":1: the line is longer than 510 bytes"),
         ("gain_sigma = 0.1\nphase_sigma = 0.1\n1 2 3\n", "has 3 to 24 frequencies"),
         ("gain_sigma = 0.1\nphase_sigma = 0.1\n1 2 3\n2 3 4\n2 3 4\n", "frequencies must rise"),
     ],
@@ -155,7 +182,51 @@ def test_what_is_no_response(content: str, said: str, session: Session, tmp_path
 
 def test_what_is_no_aircraft(session: Session, refused: Refused) -> None:
     assert "no aircraft 'uh61'" in refused("replay", session.log, "--aircraft", "uh61")
-    assert "gain_sigma must be a number" in refused("replay", session.log, "--aircraft", "uh60_like,gain_sigma=x")
+    assert "gain_sigma: 'x' is not a quantity" in refused("replay", session.log, "--aircraft", "uh60_like,gain_sigma=x")
+
+
+def test_a_path_is_told_from_a_name(session: Session, tmp_path: Path, refused: Refused) -> None:
+    own = tmp_path / "own.response"
+    for missing in (own, tmp_path):
+        assert f"{missing}: cannot be read" in refused("replay", session.log, "--aircraft", missing)
+    own.write_text("")
+    assert "change it in the file" in refused("replay", session.log, "--aircraft", f"{own},gearing=0.4")
+    (tmp_path / "own.csv").write_text("1,2,3\n2,3,4\n3,4,5\n")
+    assert "needs it from 2 to 7 Hz" in refused("replay", session.log, "--aircraft", tmp_path / "own.csv")
+
+
+@pytest.mark.parametrize(
+    "change",
+    "gain_sigma=-1 gain_sigma=nan phase_sigma=3 alarm=9 gearing=1e39 blades=4.5 blades".split(),  # noqa: SIM905
+)
+def test_what_nothing_would_read_is_not_written(change: str, tmp_path: Path, refused: Refused) -> None:
+    said = refused("aircraft", "uh60_like", change, "-o", tmp_path / "it")
+    assert change.partition("=")[0] in said or "sigmas lie between 0 and 1" in said
+    assert "mass: '7.4 kg' is out of range" in refused("aircraft", "uh60_like", "mass=7.4 kg", "-o", tmp_path / "it")
+    assert "given twice" in refused("aircraft", "uh60_like", "mass=7 kg", "mass=8 kg", "-o", tmp_path / "it")
+    assert not (tmp_path / "it").exists()
+
+
+def test_values_are_written_as_in_a_scenario() -> None:
+    plain = response("uh60_like", ["gearing=0.4", "gain_sigma=0.1", "phase_sigma=0.1", "rotor_speed=27.0 rad/s"])
+    with_units = ["gearing=40 %", "gain_sigma=10 %", "phase_sigma=100 mrad", "rotor_speed=257.8310078 rpm", "blades=4"]
+    for changes in (with_units, ["gearing=0.4 1", "gain_sigma=0.1 1", "phase_sigma=0.1 rad", "alarm=3.5 dB"]):
+        same = response("uh60_like", changes).pointer
+        for name in ("real", "imaginary"):
+            assert list(getattr(same, name)) == pytest.approx(list(getattr(plain.pointer, name)))
+        assert same.gain_sigma == pytest.approx(0.1)
+        assert same.phase_sigma == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("arguments", [("aircraft",), ("campaign",), ("sim",), ("replay", "--map")])
+def test_a_file_that_is_nested_too_deeply_is_one_line(
+    arguments: tuple[str, ...], session: Session, tmp_path: Path, refused: Refused
+) -> None:
+    path = tmp_path / "deep.toml"
+    for content in ("a = " + "[" * 100_000, "z_ddot" + ".a" * 3000 + " = 1"):
+        path.write_text(content)
+        said = refused(arguments[0], *([session.log] if "replay" in arguments else []), *arguments[1:], path)
+        assert "deep.toml: its tables or lists are nested too deeply" in said
 
 
 def test_the_contract_has_a_word_for_each_state() -> None:

@@ -87,6 +87,7 @@ def test_text_is_read_as_python_can_reads_it(tmp_path: Path) -> None:
         "\x00\xff\xfe",
     ],
 )
+@pytest.mark.requirement("S11")
 def test_a_line_that_is_no_frame_is_counted(line: str, tmp_path: Path) -> None:
     log = tmp_path / "damaged.log"
     log.write_bytes(f"(1.0) can0 123#00\n{line}\n\n(2.0) can0 124#00\n".encode("latin-1"))
@@ -164,6 +165,7 @@ GARBAGE = np.random.default_rng(0).bytes(200_000)
 
 @pytest.mark.parametrize("suffix", ["log", "log.gz", "asc", "blf", "csv", "mf4", "trc", "db"])
 @pytest.mark.parametrize("content", [b"", GARBAGE], ids=["empty", "garbage"])
+@pytest.mark.requirement("S11")
 def test_what_is_no_log_is_one_line(content: bytes, suffix: str, tmp_path: Path, refused: Refused) -> None:
     path = tmp_path / f"bad.{suffix}"
     path.write_bytes(content)
@@ -225,6 +227,7 @@ print(ours, traffic.frames, sum(traffic.others.values()), (after - before) // 10
 """
 
 
+@pytest.mark.requirement("S11")
 def test_foreign_frames_without_end_take_no_memory(session: Session, tmp_path: Path) -> None:
     """Through a named pipe: what is read cannot be kept anywhere but in memory."""
     pipe = tmp_path / "pipe"

@@ -106,7 +106,7 @@ def test_every_command_is_tried_here(shown: Shown) -> None:
         "bounce --only alarm fault_clock --seeds 1 --out {folder}",
         "envelope --only rest_20s base_stuck --seeds 1 --out {folder}",
         "faults --only theta_stuck lever_crc --seeds 1",
-        "compare --scenarios step_up --seeds 2 --duration 2",
+        "compare --scenarios step_up --seeds 1 --duration 2",
         "compare --envelope --scenarios steady base_stuck --seeds 1 --estimators firmware",
         "monitor --scenario demo --once --duration 1",
     ],
@@ -117,13 +117,13 @@ def test_tables_fit(command: str, shown: Shown, tmp_path: Path) -> None:
 
 def test_what_is_made_of_a_log_fits(shown: Shown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    shown("sim", "demo", "--set", "duration=30 s", "--out", "out")
+    shown("sim", "demo", "--set", "duration=21 s", "--out", "out")
     for command in (
         "replay out/bus.log",
         "replay out/trace.csv",
         "replay out/bus.log out/trace.csv --each",
         "map out/trace.csv",
-        "tune out/bus.log",
+        "tune out/bus.log --keep m_p_walk --keep c_p_walk --keep k_p_walk",
         "monitor --once out/bus.log",
     ):
         assert_fits(shown(*command.split()))
@@ -182,7 +182,7 @@ def test_a_pipe_has_a_row_in_each_line_and_a_terminal_its_width(tmp_path: Path) 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 def test_an_encoding_that_has_not_all_letters(encoding: str) -> None:
     environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0", "LC_ALL": "C"}
-    for command in ("--help", "figures --list", "envelope --list", "monitor --once --scenario demo --duration 0.3"):
+    for command in ("--help", "envelope --list", "monitor --once --scenario demo --duration 0.3"):
         done = subprocess.run([LEVER, *command.split()], capture_output=True, check=False, env=environment)
         assert (done.returncode, done.stderr) == (0, b""), command
 

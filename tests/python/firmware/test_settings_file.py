@@ -66,6 +66,7 @@ def test_comments_order_and_spaces(tmp_path: Path) -> None:
         ("preload = 1", "preload = '1' is not known; allowed: fixed, trim"),
     ],
 )
+@pytest.mark.requirement("S12")
 def test_errors_name_file_and_line(tmp_path: Path, line: str, error: str) -> None:
     path = tmp_path / "my.settings"
     path.write_text(f"c_p = 50\n{line}\n", encoding="utf-8")
@@ -163,6 +164,7 @@ def test_python_and_c_take_the_corpus_as_it_says(reader: Path, tmp_path: Path) -
 
 
 @pytest.mark.requires("cc|gcc|clang")
+@pytest.mark.requirement("S12")
 def test_python_and_c_read_random_files_alike(reader: Path, tmp_path: Path) -> None:
     generator = random.Random(1)
     good, bad = ([content for verdict, content in corpus() if (verdict == "bad") == is_bad] for is_bad in (False, True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ def test_what_is_wrong_shows() -> None:
     assert wrong.row()["k_p within 2 sigma [%]"] == 0.0
     assert wrong.silent_s == pytest.approx(wrong.unflagged * 0.02)
     part = soak.Part(soak.Sums(not_finite=3, in_fault=50), 130.0)
-    troubles = soak.Result([part], 100.0, soak.Counter()).troubles()
+    troubles = soak.Result([part], 100.0, Counter()).troubles()
     assert troubles == [
         "3 estimates were not finite",
         "the estimator was in fault for 1 s",

@@ -341,14 +341,14 @@ def test_list_names_every_figure_and_writes_nothing(
 
 
 def test_only_makes_what_is_asked_for(lever: Run, tmp_path: Path) -> None:
-    status, out, err = lever("figures", "--only", "states", "excitation", "--seed", "3", "--out", str(tmp_path))
+    status, out, err = lever("figures", "--only", "states", "excitation", "--seed", str(SEED), "--out", str(tmp_path))
     assert (status, err) == (0, "")
     pictures = [f"{name}.{kind}" for name in ("excitation", "states") for kind in ("png", "svg", "pdf", "csv")]
     names = [*pictures, "figures.html", "captions.md", "provenance.json"]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert out == f"Written to {tmp_path}: {', '.join(names)}\n"
     assert read(tmp_path / "figures.html").ids("section") == ["excitation", "states"]
-    assert catalogue.FIGURES["states"](3, SHORT).caption in (tmp_path / "captions.md").read_text(encoding="utf-8")
+    assert made("states").caption in (tmp_path / "captions.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

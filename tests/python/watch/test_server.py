@@ -143,6 +143,7 @@ class Visitor:
 # --- who is let in ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.requirement("S7")
 def test_a_host_of_another_name_is_turned_away(on_server: Callable[..., FlightSource]) -> None:
     """DNS rebinding: the browser connects to this computer, but names the attacker's site."""
 
@@ -163,6 +164,7 @@ def test_a_host_of_another_name_is_turned_away(on_server: Callable[..., FlightSo
     on_server(story)
 
 
+@pytest.mark.requirement("S7")
 def test_pages_of_others_get_no_socket(on_server: Callable[..., FlightSource]) -> None:
     async def story(server: Server) -> None:
         own = f"127.0.0.1:{server.port}"
@@ -178,6 +180,7 @@ def test_pages_of_others_get_no_socket(on_server: Callable[..., FlightSource]) -
     on_server(story)
 
 
+@pytest.mark.requirement("S7")
 def test_a_post_from_anywhere_does_nothing(on_server: Callable[..., FlightSource]) -> None:
     async def story(server: Server) -> None:
         for path in ("", "socket", "command"):
@@ -189,6 +192,7 @@ def test_a_post_from_anywhere_does_nothing(on_server: Callable[..., FlightSource
     assert on_server(story).commanded == []
 
 
+@pytest.mark.requirement("S7")
 def test_the_page_cannot_be_framed_and_fetches_nothing_from_elsewhere(on_server: Callable[..., FlightSource]) -> None:
     async def story(server: Server) -> None:
         for path in ("", "page.js", "axes.js", "charts.js", "page.css", "colours.css"):
@@ -294,6 +298,7 @@ def test_the_past_that_is_kept_is_bounded(flight: Flight) -> None:
     assert len(state.start()) < 300_000
 
 
+@pytest.mark.requirement("S9")
 def test_a_page_that_does_not_read_piles_nothing_up(on_server: Callable[..., FlightSource]) -> None:
     async def story(server: Server) -> None:
         with socket.create_connection(("127.0.0.1", server.port)) as deaf:
@@ -387,6 +392,7 @@ def test_a_full_bus_keeps_nobody_waiting_but_who_asked(on_server: Callable[..., 
     on_server(story)
 
 
+@pytest.mark.requirement("S9")
 def test_a_page_cannot_fill_the_bus(on_server: Callable[..., FlightSource], monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
     monkeypatch.setattr("lever_cdkf.host_tools.watch.server._now", lambda: clock[0])
@@ -404,6 +410,25 @@ def test_a_page_cannot_fill_the_bus(on_server: Callable[..., FlightSource], monk
             assert await flooding.hear("sent") == {"request": "run"}
 
     assert len(on_server(story).commanded) == 22
+
+
+@pytest.mark.requirement("S9")
+def test_a_page_that_connects_anew_cannot_fill_the_bus_either(
+    on_server: Callable[..., FlightSource], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lever_cdkf.host_tools.watch.server._now", lambda: 0.0)
+
+    async def story(server: Server) -> None:
+        for _ in range(5):
+            async with Visitor(server) as page:
+                for _ in range(20):
+                    await page.ask('{"request": "run"}')
+                    await page.hear("sent")
+        async with Visitor(server) as page:
+            await page.ask('{"request": "run"}')
+            assert await page.hear("refused") == "all pages together may send 100 commands a second: wait a moment"
+
+    assert len(on_server(story).commanded) == 100
 
 
 def test_a_command_that_the_estimator_refuses_is_told(on_server: Callable[..., FlightSource], flight: Flight) -> None:
@@ -440,6 +465,7 @@ def test_a_command_that_makes_no_sense_is_refused(message: str, text: str) -> No
         command_of(json.loads(message), Config())
 
 
+@pytest.mark.requirement("S10")
 def test_what_is_refused_is_told_and_changes_nothing(on_server: Callable[..., FlightSource]) -> None:
     async def story(server: Server) -> None:
         async with Visitor(server) as visitor:
@@ -456,6 +482,7 @@ def test_what_is_refused_is_told_and_changes_nothing(on_server: Callable[..., Fl
     assert on_server(story).commanded == []
 
 
+@pytest.mark.requirement("S8")
 def test_read_only_sends_nothing(on_server: Callable[..., FlightSource]) -> None:
     async def story(server: Server) -> None:
         async with Visitor(server) as visitor:
@@ -501,6 +528,7 @@ def test_ends_cleanly_when_interrupted(number: int, start_lever: Callable[..., s
     assert process.returncode == 130
 
 
+@pytest.mark.requirement("S8")
 def test_an_open_port_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
     quick = ["--scenario", "steady", "--port", "0", "--duration", "0.1", "--host", "0.0.0.0"]
     assert cli.main(["live", *quick]) == 0

@@ -438,6 +438,40 @@ static void go_round(void)
     ROUND_TRIP(command_ack, MESSAGE_COMMAND_ACK_ID)
     ROUND_TRIP(link_health, MESSAGE_LINK_HEALTH_ID)
     ROUND_TRIP(correction, MESSAGE_CORRECTION_ID)
+    ROUND_TRIP(snapshot, MESSAGE_SNAPSHOT_ID)
+}
+
+/* --- state -------------------------------------------------------------------------------------------------------- */
+
+/* Its bytes, and those of an instance that goes on from it. */
+static void save_states(void)
+{
+    static const char *const names[] = {"lever", "linear_physical", "linear_black_box", "hand"};
+    lever_config_t config;
+    lever_config_default(&config);
+    for (uint32_t model = 0u; model < (uint32_t)LEVER_MODEL_COUNT; model++) {
+        lever_memory_t memory[2];
+        uint8_t state[LEVER_STATE_BYTES];
+        config.model = (uint8_t)model;
+        if (begin_run("state", names[model])) {
+            arm_t arm = arm_start(model);
+            lever_t *lever = lever_init(&memory[0], &config);
+            for (uint32_t ms = 0u; ms < 1500u; ms++) {
+                const lever_sample_t sample = arm_sample(&arm, ms);
+                (void)lever_update(lever, &sample);
+                if (ms == 1000u) {
+                    lever_state_save(lever, state);
+                    lever = lever_init(&memory[1], &config);
+                    put_word(lever_state_restore(lever, state) ? lever_state_layout() : 0u);
+                }
+            }
+            lever_state_save(lever, state);
+            for (uint32_t i = 0u; i < (uint32_t)LEVER_STATE_BYTES; i++) {
+                put_word(state[i]);
+            }
+            end_run();
+        }
+    }
 }
 
 int main(int argc, char **argv)
@@ -456,6 +490,7 @@ int main(int argc, char **argv)
     fly_random_settings();
     talk_on_the_bus();
     fly_scenes();
+    save_states();
     if (begin_run("self", "test")) {
         lever_memory_t memory;
         put_word(self_test(&memory) ? 1u : 0u);

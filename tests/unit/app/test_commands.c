@@ -140,6 +140,11 @@ TEST(a_reset_leaves_nothing_of_what_was)
     expected.z_ddot = now->z_ddot;
     expected.tau_m = now->tau_m;
     TEST_ASSERT_EQUAL_MEMORY(&expected, now, sizeof expected);
+    for (uint32_t i = 0u; i < (sizeof value / sizeof value[0]); i++) {
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, *value[i]);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0u, now->faults);
+    TEST_ASSERT_TRUE((no_dither.low_pass == 0.0f) && (no_dither.low_pass_rate == 0.0f) && (no_dither.slope == 0.0f));
     TEST_ASSERT_EQUAL_MEMORY(&no_dither, &lever->dither, sizeof no_dither);
 }
 

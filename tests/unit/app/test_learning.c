@@ -1,4 +1,5 @@
 /* When the parameters learn, and when they must not: their own rate, frozen, without excitation, with hands off. */
+#include "app/alignment.h"
 #include "app/instance.h"
 #include "rig.h"
 
@@ -218,10 +219,10 @@ TEST_EACH(2, a_change_soon_after_another_is_followed_unless_the_hands_may_be_off
 }
 
 /* The lever rests at another angle after a grip; only where the trim is followed is that to be learnt anew. A trunk on
- * its seat goes on moving. */
-TEST_EACH(3, a_new_grip_moves_the_level_of_a_trim_that_is_followed)
+ * its seat goes on moving; where there is none, the base's velocity until now is part of the step. */
+TEST_EACH(4, a_new_grip_moves_the_level_of_a_trim_that_is_followed)
 {
-    config = config_of(0u);
+    config = config_of((test_round == 3u) ? (uint32_t)LEVER_MODEL_HAND : 0u);
     config.preload = (uint8_t)((test_round == 0u) ? LEVER_PRELOAD_FIXED : LEVER_PRELOAD_TRIM);
     config.settings.seat_frequency = (test_round == 2u) ? 4.5f : 0.0f;
     start();
@@ -235,6 +236,51 @@ TEST_EACH(3, a_new_grip_moves_the_level_of_a_trim_that_is_followed)
     TEST_ASSERT_EQUAL(test_round != 0u, estimator->cdkf.acting > (uint32_t)CDKF_STEP);
     TEST_ASSERT_EQUAL(test_round == 2u, fabsf(estimator->base_motion.seat_dot) > 1.0e-6f);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, estimator->learning.gripping);
+    (void)run(40u); /* no change is reported, so the step is over */
+    TEST_ASSERT_EQUAL_UINT32(CDKF_CALIBRATION, estimator->cdkf.acting);
+}
+
+/* From where they are: deviations from the levels, of outputs that are valid; of others the prediction. */
+TEST_EACH(4, levels_begin_anew_where_the_lever_is)
+{
+    start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    (void)run(2000u);
+    estimator_t *estimator = &lever->estimator;
+    checked_t sample = {.y = {0.1f, 0.2f}, .valid = {(test_round & 1u) != 0u, (test_round & 2u) != 0u}};
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
+        estimator->cdkf.x[i] = 0.3f + (0.1f * (float)i);
+        estimator->trim.ahead[i] = 0.05f;
+        estimator->trim.origin[i] = 0.35f;
+    }
+    estimator->cdkf.considered[CDKF_STEP].x[0] = 1.0f;
+    alignment_begin_grip(estimator, &sample);
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
+        const float deviation = sample.valid[i] ? sample.y[i] : (0.3f + (0.1f * (float)i));
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.4f + deviation, estimator->trim.origin[i]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, estimator->trim.ahead[i]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, estimator->cdkf.x[i]);
+    }
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, estimator->cdkf.considered[CDKF_STEP].x[0]);
+}
+
+/* What the errors have done to the state stays, by way of the parameters as well. */
+TEST(parameters_that_are_opened_have_nothing_in_common_with_errors_of_sensors)
+{
+    start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    (void)run(5000u);
+    cdkf_t *cdkf = &lever->estimator.cdkf;
+    const considered_t before = cdkf->considered[CDKF_BASE_GAIN];
+    float by_parameters = 0.0f;
+    for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
+        by_parameters += cdkf->s[((uint32_t)PARAMETERS * PARAMETERS) + i] * before.w[i];
+    }
+    TEST_ASSERT_TRUE((by_parameters != 0.0f) && (before.w[0] != 0.0f));
+    cdkf_open(cdkf);
+    const considered_t after = cdkf->considered[CDKF_BASE_GAIN];
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f * fabsf(before.x[0]), before.x[0] + by_parameters, after.x[0]);
+    for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, after.w[i]);
+    }
 }
 
 /* Its sign is wrong: it is said within a second, nothing is learnt of it, and once it is right it is trusted again. */

@@ -210,3 +210,60 @@ TEST(the_verdict_on_the_base_has_hysteresis)
         TEST_ASSERT_TRUE(monitor.base_wrong);
     }
 }
+
+/* Two seconds of samples of 1 ms in blocks of 20: asked is a sine of 3 Hz, measured a gain times that and a sine of 4 Hz.
+ * Returns after how many blocks it was wrong, 0: never. */
+static uint32_t torque_wrong_after(monitor_t *of, double amplitude, double gain, double other)
+{
+    uint32_t after = 0u;
+    for (uint32_t block = 1u; block <= 100u; block++) {
+        for (uint32_t k = 0u; k < 20u; k++) {
+            const double time = 1.0e-3 * (double)((20u * block) + k);
+            const double asked = amplitude * sin(6.283185307 * 3.0 * time);
+            const double measured = (gain * asked) + (other * sin(6.283185307 * 4.0 * time));
+            if (monitor_takes_torque(k)) {
+                monitor_add_torque(of, (float)asked, (float)measured);
+            }
+        }
+        if (monitor_judge_torque(of, 0.02f, 1.0e-3f) && (after == 0u)) {
+            after = block;
+        }
+    }
+    return after;
+}
+
+TEST(a_torque_that_does_not_follow_what_is_asked_is_wrong)
+{
+    static const struct {
+        double amplitude;
+        double gain;
+        double other;
+        bool wrong;
+    } row[] = {{0.3, 1.0, 0.0, false}, {0.3, 0.8, 0.0, false}, {0.3, 1.25, 0.0, false}, {0.3, 0.5, 0.0, true},
+        {0.3, 2.0, 0.0, true}, {0.3, -1.0, 0.0, true}, {0.3, 0.0, 0.0, true}, {0.3, 1.0, 0.6, false},
+        {0.3, 0.0, 0.3, false}, {0.02, -1.0, 0.0, false}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        monitor_t fresh;
+        monitor_start(&fresh);
+        TEST_ASSERT_EQUAL_UINT32(0u, torque_wrong_after(&fresh, row[i].amplitude, 1.0, 0.0));
+        TEST_ASSERT_EQUAL(row[i].wrong, torque_wrong_after(&fresh, row[i].amplitude, row[i].gain, row[i].other) != 0u);
+        TEST_ASSERT_EQUAL(row[i].wrong, fresh.torque_wrong);
+    }
+}
+
+TEST(a_torque_that_follows_again_is_right_and_without_dither_nothing_is_said)
+{
+    monitor_t fresh;
+    monitor_start(&fresh);
+    (void)torque_wrong_after(&fresh, 0.3, 1.0, 0.0);
+    TEST_ASSERT_LESS_THAN_UINT32(60u, torque_wrong_after(&fresh, 0.3, 2.0, 0.0));
+    TEST_ASSERT_TRUE(fresh.torque_wrong);
+    (void)torque_wrong_after(&fresh, 0.3, 1.0, 0.0);
+    TEST_ASSERT_FALSE(fresh.torque_wrong);
+    (void)torque_wrong_after(&fresh, 0.3, -1.0, 0.0);
+    TEST_ASSERT_TRUE(fresh.torque_wrong);
+    for (uint32_t k = 0u; k < 5u; k++) {
+        (void)torque_wrong_after(&fresh, 0.0, 0.0, 0.2);
+    }
+    TEST_ASSERT_FALSE(fresh.torque_wrong);
+}

@@ -132,6 +132,18 @@ TEST(other_settings_or_an_aircraft_on_one_side_are_refused)
     TEST_ASSERT_TRUE(lever_state_restore(watching, state));
 }
 
+TEST(without_an_aircraft_it_is_the_same_whether_that_was_said_or_not)
+{
+    uint8_t unsaid[LEVER_STATE_BYTES];
+    start_bus();
+    fly(50u);
+    lever_state_save(lever, unsaid);
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    TEST_ASSERT_TRUE(lever_aircraft(lever, NULL));
+    lever_state_save(lever, state);
+    TEST_ASSERT_EQUAL_MEMORY(unsaid, state, sizeof state);
+}
+
 /* What indexes, chooses or counts bits, written out: a value beyond would be one beyond an array. */
 TEST(limits_are_those_of_what_they_index)
 {

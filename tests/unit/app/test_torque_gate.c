@@ -44,7 +44,7 @@ static lever_settings_t random_settings(void)
     return settings;
 }
 
-/* R36 */
+/* R36 S4 */
 TEST(no_request_passes_a_limit_at_any_settings)
 {
     uint32_t open = 0u;
@@ -67,7 +67,7 @@ TEST(no_request_passes_a_limit_at_any_settings)
 }
 
 /* Gaps, silence that the port tells of, outputs that are missing, clocks that stand, commands that end: at random. */
-/* R36 */
+/* R36 S4 */
 TEST(no_course_of_events_passes_a_limit)
 {
     for (uint32_t run = 0u; run < RUNS; run++) {

@@ -1,0 +1,94 @@
+#include "port/command_guard.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "can/messages.h"
+
+enum { FRAME_BYTES = 8, FRESHNESS_BYTES = 3 };
+
+/* Nothing changes but that dither may end. */
+static bool is_harmless(const lever_command_t *command)
+{
+    const uint8_t keep = (uint8_t)LEVER_KEEP;
+
+    return (command->request == (uint8_t)LEVER_REQUEST_NONE) && (command->model == keep) &&
+           (command->preload == keep) && (command->estimator == keep) && (command->adaptation == keep) &&
+           (command->mitigation == keep) &&
+           ((command->dither_rms >= (float)LEVER_KEEP) || (command->dither_rms <= 0.0f));
+}
+
+/* Writes a number into so many bytes, most significant first. */
+static void put(uint8_t *bytes, uint32_t count, uint64_t value)
+{
+    uint64_t rest = value;
+
+    for (uint32_t i = count; i > 0u; i--) {
+        bytes[i - 1u] = (uint8_t)rest;
+        rest >>= 8u;
+    }
+}
+
+/* With the authenticator that came before it, which serves once. */
+static bool is_authentic(command_guard_t *guard, const lever_frame_t *frame)
+{
+    const command_authentication_t *const by = guard->authentication;
+    const uint8_t *const code = guard->authenticator;
+    const uint32_t low = ((uint32_t)code[0] << 16u) | ((uint32_t)code[1] << 8u) | (uint32_t)code[2];
+    uint8_t data[COMMAND_GUARD_DATA];
+    uint64_t freshness = 0u;
+    bool authentic = false;
+
+    if (guard->has_authenticator && (frame->length == (uint8_t)FRAME_BYTES) &&
+        by->freshness(by->self, low, &freshness)) {
+        put(data, 2u, frame->id);
+        (void)memcpy(&data[2], frame->data, FRAME_BYTES);
+        put(&data[10], 8u, freshness);
+        authentic = by->verify(by->self, data, &code[FRESHNESS_BYTES]);
+    }
+    guard->has_authenticator = false;
+    if (authentic) {
+        by->accepted(by->self, freshness);
+    }
+    return authentic;
+}
+
+static bool may_pass(command_guard_t *guard, const lever_frame_t *frame)
+{
+    lever_command_t command;
+    bool passes = (guard->authentication == NULL) || is_authentic(guard, frame);
+
+    if (passes && message_command_decode(&command, frame) &&
+        !is_harmless(&command)) { /* else the estimator refuses it */
+        passes = guard->takes_commands && !lever_is_acting(guard->lever) &&
+                 ((guard->is_safe == NULL) || guard->is_safe(guard->self));
+    }
+    guard->refused += passes ? 0u : 1u;
+    return passes;
+}
+
+static bool is_authenticator(command_guard_t *guard, const lever_frame_t *frame)
+{
+    const bool is = (guard->authentication != NULL) && (frame->id == guard->authentication->id);
+
+    if (is) {
+        guard->has_authenticator = (frame->length == (uint8_t)FRAME_BYTES);
+        (void)memcpy(guard->authenticator, frame->data, FRAME_BYTES);
+    }
+    return is;
+}
+
+enum port_result command_guard_receive(void *self, lever_frame_t *frame)
+{
+    command_guard_t *const guard = self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+
+    enum port_result result;
+    bool passes;
+
+    do { /* no bus brings frames faster than they are looked at */
+        result = guard->receive(guard->self, frame);
+        passes = (result != PORT_DONE) || (!is_authenticator(guard, frame) &&
+                                              ((frame->id != (uint32_t)MESSAGE_COMMAND_ID) || may_pass(guard, frame)));
+    } while (!passes);
+    return result;
+}
