@@ -207,6 +207,7 @@ def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path: Path) -> Non
 
 def test_a_simulation_runs_in_real_time_and_obeys() -> None:
     source, picture = SimulationSource(load("steady", [f"duration={PATIENCE} s"])), Picture()
+    assert source.truth(FREQUENCIES) is None, "it has not begun"
     source.start()
     try:
         while picture.mode != "run" or picture.traffic["STATE_ESTIMATE"].frames < 2000:
