@@ -279,6 +279,7 @@ def test_before_the_first_estimate_nothing_is_made_up(flight: Flight) -> None:
     assert update["bode"] is None
     assert update["coherence"] is None
     assert update["silence"] is None
+    assert [update[name] for name in ("foreign", "error_frames", "unseen")] == [0, 0, 0]
     assert update["mode"] is None
     assert set(update["row"][1:7]) == {None}
     assert (update["level"], update["condition"]) == ("watch", "no frame has come yet")
