@@ -51,11 +51,11 @@ def write_texts(texts: Mapping[Path, str]) -> None:
 
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raises LeverError where whole() could not write: before work that would be lost."""
-    final = Path(os.path.realpath(path))
+    final = Path(path)
     if final.is_dir():
         raise LeverError(f"cannot write {path}: it is a folder")
     if final.is_file() or not final.exists():
-        with writing(Path(path)), tempfile.TemporaryFile(dir=final.parent):
+        with writing(final), tempfile.TemporaryFile(dir=Path(os.path.realpath(path)).parent):
             pass
 
 

@@ -265,7 +265,7 @@ def _value(kind: Any, content: Any) -> Any:
     if dataclasses.is_dataclass(kind):
         return of(typing.cast("type[Any]", kind), content)
     of_items: Any = typing.get_origin(kind)
-    allowed = {float: (float, int), Any: object}.get(kind, of_items or kind)
+    allowed: Any = {float: (float, int), Any: object}.get(kind, of_items or kind)
     if not isinstance(content, allowed) or (isinstance(content, bool) and kind in (int, float)):
         raise TypeError(f"{content!r} is not of {kind}")
     if of_items is dict:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,8 @@ class Excerpt:
     """[m/s^2]"""
     correction: FloatArray
     """[deg]"""
+    moments: Mapping[str, float] = field(default_factory=dict)
+    """What happened when [s]."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,9 @@ def relaxing(craft: str, seed: int) -> Measured:
         "ahead of spectrum": min(spectrum, float(notes[-1])) - alarm,
         "margin at the alarm": float(flown.margins(10)[at // 10]) if math.isfinite(alarm) else math.nan,
     }
-    return Measured(figures | _margins(flown), excerpt(flown))
+    moments = {"alarm": alarm, "vibration doubled": doubled if doubled < notes[-1] else math.inf}
+    known = {name: moment for name, moment in moments.items() if math.isfinite(moment)}
+    return Measured(figures | _margins(flown), replace(excerpt(flown), moments=known))
 
 
 def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:

@@ -319,11 +319,12 @@ def _tables(result: Result) -> Tables:
         "wall time [s]": summary.wall_time_s,
         "firmware": summary.firmware.version,
     }
-    near: list[Row] = []
-    if summary.stability is not None:
-        near = [{"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}]
-        near[0] |= {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}
-    return {summary.scenario.title: rows, "run": [run_row], **({"collective bounce": near} if near else {})}
+    tables: Tables = {summary.scenario.title: rows, "run": [run_row]}
+    if summary.stability is None:
+        return tables
+    states = {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}
+    least = {"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}
+    return {**tables, "collective bounce": [{**least, **states}]}
 
 
 def _times(times: Sequence[float | None]) -> str:

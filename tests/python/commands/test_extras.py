@@ -129,7 +129,15 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
     """Files that need an extra are left out, and those of an earlier run do not stay."""
     (tmp_path / "sim").mkdir()
     (tmp_path / "sim/report.html").touch()
-    listings = ("--help", "settings", "dbc", "sim --list", "bounce --list", "envelope --list", "sim steady --help")
+    listings: tuple[str, ...] = (
+        "--help",
+        "settings",
+        "dbc",
+        "sim --list",
+        "bounce --list",
+        "envelope --list",
+        "sim steady --help",
+    )
     listings += ("campaign --list", "compare --list", "figures --list")
     short = "--set duration=3s --set limits={} --out sim"
     lines = (

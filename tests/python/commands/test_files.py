@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from lever_cdkf.host_tools import files, progress
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import write_texts
+from lever_cdkf.host_tools.files import check_writable, write_texts
 from lever_cdkf.host_tools.tables import Tables, print_tables
 from processes import full_disk
 from python.conftest import Refused
@@ -112,3 +112,9 @@ def test_of_several_files_all_are_written_or_none(tmp_path: Path) -> None:
         write_texts({small: "new", large: "x" * 1000})
     assert [path.name for path in tmp_path.iterdir()] == ["small"]
     assert small.read_text() == "before"
+
+
+def test_what_is_no_file_can_be_written() -> None:
+    for end in os.pipe():
+        check_writable(f"/dev/fd/{end}")
+        os.close(end)

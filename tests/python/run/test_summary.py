@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -272,7 +273,14 @@ def test_that_of_any_run_is_read_back(name: str) -> None:
     made = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
     content = json.loads(text(made))
     assert of(SimulationSummary, content) == made
-    for wrong in ({"samples": "x"}, {"passed": 1}, {"scenario": None}, {"modes_s": []}, {"missed": [1]}):
+    wrongs: tuple[dict[str, Any], ...] = (
+        {"samples": "x"},
+        {"passed": 1},
+        {"scenario": None},
+        {"modes_s": []},
+        {"missed": [1]},
+    )
+    for wrong in wrongs:
         with pytest.raises(TypeError):
             of(SimulationSummary, content | wrong)
 
