@@ -537,6 +537,8 @@ static void must_come_back(bench_t *bench)
             fly(bench, 1u, true);
         }
         REQUIRE(bench->health.mode == LEVER_MODE_RUN);
+        fly(bench, 1u, true);
+        REQUIRE((bench->health.mode == LEVER_MODE_RUN) || (bench->health.mode == LEVER_MODE_COAST));
     }
 }
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 from fuzz import libfuzzer
 
-RUNS = {"app": 400, "slcan": 100_000, "candump": 15_000, "settings": 15_000, "aircraft": 30_000}
+RUNS = {"app": 250, "slcan": 80_000, "candump": 15_000, "settings": 15_000, "aircraft": 30_000}
 """Of each target, at most two seconds."""
 SEED = "-seed=1"
 
