@@ -135,7 +135,14 @@ def _soak(build: Path, file: Path) -> Content:
 
 def _fuzz(build: Path) -> Content:
     """Each fuzz target for a while."""
-    command = [sys.executable, tools.ROOT / "tests/fuzz", "--seconds", str(FUZZED), "--build", build / "fuzz"]
+    command: list[str | Path] = [
+        sys.executable,
+        tools.ROOT / "tests/fuzz",
+        "--seconds",
+        str(FUZZED),
+        "--build",
+        str(build / "fuzz"),
+    ]
     return {"targets": list(libfuzzer.SOURCES), "seconds": FUZZED, "found": _run(command)}
 
 
