@@ -58,11 +58,11 @@ def _table(results: Sequence[Result]) -> str:
         "",
         "must",
         "result",
-        "to flag [samples]",
-        "back [s]",
-        "error after [%]",
-        "silent [s]",
-        "right [%]",
+        "to flag<br>[samples]",
+        "back<br>[s]",
+        "error after<br>[%]",
+        "silent<br>[s]",
+        "right<br>[%]",
     )
     return table(header, (_cells(result) for result in results))
 

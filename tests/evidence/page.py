@@ -126,7 +126,7 @@ def _proof(modules: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _soak(content: Mapping[str, Any]) -> str:
-    rows = [[html.escape(name), html.escape(str(value))] for name, value in content["total"].items() if name != "hour"]
+    rows = [[html.escape(name), f"{value:.4g}"] for name, value in content["total"].items() if name != "hour"]
     rows += [["hours", str(content["hours"])], ["memory growth [MiB]", f"{content['memory_growth_mib']:g}"]]
     return table(("", ""), rows) + _listed("Troubles", content["troubles"])
 

@@ -3,6 +3,7 @@ found."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,10 @@ SEEDED = {
 @pytest.mark.requires(eva.PROGRAM)
 @pytest.mark.parametrize("name", eva.SOURCES)
 @pytest.mark.requirement("R14", "S6")
-def test_there_is_no_alarm(name: str) -> None:
+def test_there_is_no_alarm(name: str, record_property: Callable[[str, object], None]) -> None:
     proof = eva.prove(name)
+    record_property("alarms", proof.alarms)
+    record_property("statements reached [%]", proof.reached)
     assert proof.alarms == 0, proof.text
     assert proof.reached >= 98
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,9 @@ QUICK = {
 
 
 @pytest.mark.requirement("R1", "R6", "R32", "R34")
-def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_reduced_table_holds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], record_property: Callable[[str, object], None]
+) -> None:
     status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
@@ -40,6 +43,8 @@ def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[s
             for over in ("all runs", "median", "worst")
         }
         assert row["measured"].items() <= of.items()
+        for figure, value in row["measured"].items():
+            record_property(f"{name}, {figure}", f"{value:.3g}")
         assert name in printed
         assert f'id="chart-{name}"' in written
     assert {name: row["measured"] for name, row in rows.items() if not row["ok"]} == {}

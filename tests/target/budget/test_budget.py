@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,7 +13,10 @@ pytestmark = pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm")
 
 
 @pytest.mark.requirement("R48")
-def test_limits_hold(budget: dict[str, Any]) -> None:
+def test_limits_hold(budget: dict[str, Any], record_property: Callable[[str, object], None]) -> None:
+    numbers = golden.numbers(budget)
+    for name, limit in golden.LIMITS.items():
+        record_property(name, f"{numbers[name]:g} of {limit}")
     beyond = golden.beyond_limits(budget)
     assert not beyond, "\n".join(beyond)
 
