@@ -81,3 +81,13 @@ TEST(a_value_that_does_not_fit_is_not_available)
         TEST_ASSERT_EQUAL(i == 0u, isfinite(read.parameter[0]));
     }
 }
+
+TEST(what_a_port_says_of_its_reset_comes_as_it_went)
+{
+    const message_platform_reset_t said = {.fault_address = 0x0800ABCDu, .cause = 3u, .resets = 250u, .failed = 5u};
+    message_platform_reset_t read = {.fault_address = 0u};
+    lever_frame_t frame;
+    TEST_ASSERT_TRUE(message_platform_reset_encode(&frame, &said) && message_platform_reset_decode(&read, &frame));
+    TEST_ASSERT_TRUE((read.fault_address == said.fault_address) && (read.cause == said.cause));
+    TEST_ASSERT_TRUE((read.resets == said.resets) && (read.failed == said.failed));
+}
