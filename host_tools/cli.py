@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import argparse
 import codecs
+import errno
 import importlib.metadata
 import io
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from . import interrupts
 from .errors import LeverError
 from .exit_status import INTERRUPTED, MESSAGE
 from .extras import hide_mf4, reveal_mf4
+from .files import check_writable
 from .help_text import HelpFormatter
 from .provenance import version
 
@@ -70,6 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         try:
             args = _parser().parse_args(argv)
+            _check_json(args)
             with interrupts.heard():
                 status: int = args.run(args) or 0
         except SystemExit as stop:  # --help and --version
@@ -85,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception as error:
         if not isinstance(error, _expected()):
             raise
-        print(f"lever: error: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"lever: error: {' '.join(_said(error).split())}", file=sys.stderr)
         return 2
     finally:
         reveal_mf4()
@@ -103,6 +107,22 @@ def _has_streams() -> bool:
         is_utf8 = codecs.lookup(sys.stdout.encoding).name == "utf-8"
         sys.stdout.reconfigure(errors="surrogateescape" if is_utf8 else "replace")
     return True
+
+
+def _check_json(args: argparse.Namespace) -> None:
+    """Before a command has worked for --json FILE; a folder that it makes itself, by --out, need not be there yet."""
+    path, out = getattr(args, "json", None), getattr(args, "out", None)
+    if path is not None:
+        made = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
+        if Path(path).absolute().parent not in made or Path(path).parent.exists():
+            check_writable(path)
+
+
+def _said(error: Exception) -> str:
+    """Of an error of the system that names no file: of standard output, where it is full."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG) and error.filename is None:
+        return f"cannot write standard output: {error.strerror}"
+    return str(error)
 
 
 def _expected() -> tuple[type[Exception], ...]:

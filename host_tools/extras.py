@@ -21,15 +21,21 @@ PACKAGES = {
 }
 """What each extra brings; imported by the same names."""
 
-_FILES = {"report.html": "report", "signals.mf4": "mf4", "signals.mcap": "files", "trace.parquet": "files"}
-"""Files of a run that need an extra. Without it they are left out."""
+_FILES = {
+    "report.html": ("report",),
+    "signals.mf4": ("mf4",),
+    "signals.mcap": ("files", "mcap"),
+    "trace.parquet": ("files", "pyarrow"),
+}
+"""Files of a run that need an extra, and the packages of it that they need if not all. Without it they are left out."""
 
 
-def missing(extra: str) -> str:
-    """Which packages of an extra are not installed, and how to get them; empty if all are."""
-    if "asammdf" in PACKAGES[extra]:
+def missing(extra: str, *packages: str) -> str:
+    """Which packages of an extra, or of these alone, are not installed, and how to get them; empty if all are."""
+    needed = packages or PACKAGES[extra]
+    if "asammdf" in needed:
         reveal_mf4()
-    absent = [package for package in PACKAGES[extra] if not _is_installed(package)]
+    absent = [package for package in needed if not _is_installed(package)]
     return f"this needs {' and '.join(absent)}: {pip_install(f'lever-cdkf[{extra}]')}" if absent else ""
 
 
@@ -38,15 +44,15 @@ def pip_install(requirement: str) -> str:
     return f'{shlex.quote(sys.executable)} -m pip install "{requirement}"'
 
 
-def require(extra: str) -> None:
-    """Raises LeverError where an extra is missing."""
-    if reason := missing(extra):
+def require(extra: str, *packages: str) -> None:
+    """Raises LeverError where an extra, or these of its packages, are missing."""
+    if reason := missing(extra, *packages):
         raise LeverError(reason)
 
 
 def missing_of_file(name: str) -> str:
     """missing() of the extra that a file of a run needs."""
-    return missing(_FILES[name]) if name in _FILES else ""
+    return missing(*_FILES[name]) if name in _FILES else ""
 
 
 def require_for_file(name: str) -> None:

@@ -6,8 +6,8 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -37,8 +37,26 @@ def shared_library(name: str) -> str:
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Writes `text` as UTF-8, as whole() does. Raises LeverError."""
-    with whole(path) as target:
-        target.write_text(text, encoding="utf-8")
+    write_texts({Path(path): text})
+
+
+def write_texts(texts: Mapping[Path, str]) -> None:
+    """Writes files, all or none, but for what fails when all are written. Raises LeverError."""
+    with ExitStack() as stack:
+        for path, text in texts.items():
+            target = stack.enter_context(whole(path))
+            with writing(path):
+                target.write_text(text, encoding="utf-8")
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raises LeverError where whole() could not write: before work that would be lost."""
+    final = Path(path)
+    if final.is_dir():
+        raise LeverError(f"cannot write {path}: it is a folder")
+    if final.is_file() or not final.exists():
+        with writing(final), tempfile.TemporaryFile(dir=Path(os.path.realpath(path)).parent):
+            pass
 
 
 @contextmanager

@@ -129,7 +129,9 @@ def read_quantity(unit: str, least: float = -math.inf, greatest: float = math.in
             limits = [f"above {above:g}"] if above > -math.inf else []
             limits += [f"at least {least:g}"] if least > -math.inf else []
             limits += [f"at most {greatest:g}"] if greatest < math.inf else []
-            raise place.error(f"{value!r} is out of range; it must be {' and '.join(limits)} {si}")
+            raise place.error(
+                f"{value!r} is out of range; it must be {' and '.join(limits)}{'' if si == '1' else f' {si}'}"
+            )
         return number
 
     return reader

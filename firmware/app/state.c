@@ -120,7 +120,8 @@ const state_row_t *state_row(uint32_t index)
 /* Bytes of the state for a value. */
 static uint32_t width_of(const state_row_t *row)
 {
-    return (row->most <= ANY_BYTE) ? 1u : ((row->most <= ANY_HALF) ? 2u : 4u);
+    const uint32_t wide = (row->most <= ANY_HALF) ? 2u : 4u;
+    return (row->most <= ANY_BYTE) ? 1u : wide;
 }
 
 /* --- values in memory and in the state ---------------------------------------------------------------------------- */

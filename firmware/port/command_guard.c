@@ -21,8 +21,11 @@ static bool is_harmless(const lever_command_t *command)
 /* Writes a number into so many bytes, most significant first. */
 static void put(uint8_t *bytes, uint32_t count, uint64_t value)
 {
-    for (uint32_t i = 0u; i < count; i++) {
-        bytes[i] = (uint8_t)(value >> (8u * (count - 1u - i)));
+    uint64_t rest = value;
+
+    for (uint32_t i = count; i > 0u; i--) {
+        bytes[i - 1u] = (uint8_t)rest;
+        rest >>= 8u;
     }
 }
 
@@ -77,7 +80,7 @@ static bool is_authenticator(command_guard_t *guard, const lever_frame_t *frame)
 
 enum port_result command_guard_receive(void *self, lever_frame_t *frame)
 {
-    command_guard_t *const guard = self;
+    command_guard_t *const guard = self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
 
     enum port_result result;
     bool passes;

@@ -16,7 +16,9 @@ static void send_snapshot(recording_t *recording)
 
 static recording_t *recording_of(void *self)
 {
-    return self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+    recording_t *recording = self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
+
+    return recording;
 }
 
 static enum port_result receive(void *self, lever_frame_t *frame)

@@ -30,7 +30,7 @@ class Mcap:
     """Written a piece at a time; complete after close()."""
 
     def __init__(self, path: Path, head: Head) -> None:
-        require("files")
+        require("files", "mcap")
         from mcap.writer import Writer
 
         self._path, self._head = path, head

@@ -25,7 +25,7 @@ class Parquet:
     """Written a piece at a time; complete after close()."""
 
     def __init__(self, path: Path, head: Head) -> None:
-        require("files")
+        require("files", "pyarrow")
         import pyarrow
         from pyarrow import parquet
 

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import FloatArray
 from ..errors import LeverError
+from ..slope import in_degrees
 from .library import struct_dtype
 
 _GREATEST = {"theta": (math.pi, "rad"), "theta_dot": (20.0, "rad/s")}
 """Of a lever; a column that is beyond it in more than _OUTLIERS of its values is in degrees."""
 _OUTLIERS = 0.01
+_COMPARED = 60_000
+"""Samples whose rates are compared with the slope of their angles."""
 _OTHER_UNIT = 30.0
 """Between two sample periods, as a factor: more is another unit of time."""
 
@@ -44,6 +49,7 @@ def sample_array(samples: Mapping[str, Any], period: float) -> NDArray[Any]:
         taken[f"{name}_valid"] = columns.get(f"{name}_valid", ~np.isnan(columns[name]))
     for name, (greatest, unit) in _GREATEST.items():
         _check_angle(name, taken[name][taken[f"{name}_valid"]], greatest, unit)
+    _check_slope(taken, columns["time_us"], period)
     return taken
 
 
@@ -51,8 +57,12 @@ def _column(name: str, column: Any) -> NDArray[Any]:
     values = np.asarray(column)
     if values.ndim != 1:
         raise LeverError(f"samples: {name} has {values.ndim} dimensions; it must be one column")
-    if values.dtype.kind not in "biuf":
+    if values.dtype.kind not in ("biuf" if name.endswith("_valid") else "iuf"):
         raise LeverError(f"samples: {name} is no column of numbers")
+    if values.dtype.kind == "f" and name != "time_us":
+        beyond = np.flatnonzero(np.isfinite(values) & (np.abs(values) > np.finfo(np.float32).max))
+        if len(beyond):
+            raise LeverError(f"samples: {name} is {values[beyond[0]]:g} at index {beyond[0]}: more than a float holds")
     return values
 
 
@@ -72,6 +82,24 @@ def _time_us(values: NDArray[Any], period: float) -> NDArray[np.int64]:
                 "microseconds?"
             )
     return time_us
+
+
+@dataclass(frozen=True)
+class _Signal:
+    time: FloatArray
+    values: FloatArray
+
+
+def _check_slope(taken: NDArray[Any], time_us: NDArray[Any], period: float) -> None:
+    """Small angles and rates in degrees: seen by one being the slope of the other."""
+    taken = taken[:_COMPARED]
+    steps = np.diff(_time_us(time_us[:_COMPARED], period)).astype(np.int32)
+    if (steps <= 0).any():  # of no recording that is in order
+        return
+    time = 1e-6 * np.concatenate(([0.0], np.cumsum(steps, dtype=np.float64)))
+    theta, rate = (_Signal(time, np.where(taken[f"{name}_valid"], taken[name], np.nan)) for name in _GREATEST)
+    if found := in_degrees(theta, rate):
+        raise LeverError(f"samples: {found[1]}: numpy.radians() converts")
 
 
 def _check_angle(name: str, values: NDArray[Any], greatest: float, unit: str) -> None:

@@ -50,6 +50,10 @@ class Stability:
     """Of the lever's angle, by mitigation; None without."""
     aircraft: str = ""
     """Which, with its gearing, or its file."""
+    least_true_margin_db: float | None = None
+    """Of the simulated pilot; below 0 the loop is unstable."""
+    unstable_s: float | None = None
+    """Seconds for which it is."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +124,8 @@ class Firmware:
     version: str | None
     contract: int | None
     settings_as_scenario: bool | None
+    aircraft_as_scenario: bool | None = True
+    """None: on a bus, where nothing says so."""
 
 
 @dataclass(frozen=True)
@@ -236,23 +242,32 @@ def read(path: str | Path) -> SimulationSummary | ReplaySummary:
         if content["schema"] != SCHEMA:
             raise LeverError(f"{path}: schema {content['schema']}, not {SCHEMA}: of another version")
         return of(ReplaySummary, content) if "recording" in content else of(SimulationSummary, content)
-    except (ValueError, TypeError, KeyError) as error:
+    except OSError as error:
+        raise LeverError(f"cannot read {path}: {error.strerror}") from None
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise LeverError(f"{path}: not a summary of this version: {error!r}") from None
 
 
 def of(kind: type[_Content], content: Mapping[str, Any]) -> _Content:
     """A dataclass of JSON's dictionaries and lists. Raises TypeError for a field that is unknown or missing."""
+    if not isinstance(content, Mapping):
+        raise TypeError(f"{content!r} is not of {kind}")
     hints = typing.get_type_hints(kind)
     return kind(**{name: _value(hints.get(name, object), each) for name, each in content.items()})
 
 
 def _value(kind: Any, content: Any) -> Any:
-    if isinstance(kind, types.UnionType):
+    is_optional = isinstance(kind, types.UnionType)
+    if is_optional:
         (kind,) = (each for each in kind.__args__ if each is not type(None))
-    if content is None:
+    if content is None and (is_optional or kind in (Any, object)):
         return None
     if dataclasses.is_dataclass(kind):
         return of(typing.cast("type[Any]", kind), content)
-    if typing.get_origin(kind) is dict:
+    of_items: Any = typing.get_origin(kind)
+    allowed: Any = {float: (float, int), Any: object}.get(kind, of_items or kind)
+    if not isinstance(content, allowed) or (isinstance(content, bool) and kind in (int, float)):
+        raise TypeError(f"{content!r} is not of {kind}")
+    if of_items is dict:
         return {name: _value(kind.__args__[1], each) for name, each in content.items()}
-    return content
+    return [_value(kind.__args__[0], each) for each in content] if of_items is list else content

@@ -10,13 +10,13 @@ import numpy as np
 from ..errors import LeverError
 from ..firmware.config import Config
 from ..firmware.estimator import run_samples
+from ..slope import in_degrees
 from .arrays import columns_of, signals_by_input
 from .inputs import recorded_samples, understood
 from .mapping import Source
 from .recorded import Signal
 from .resample import at_period
 from .result import Result
-from .slope import slope_ratio
 from .units import KINDS, guess
 
 
@@ -66,15 +66,10 @@ def _check_units(signals: Mapping[str, Signal]) -> None:
     for key in ("theta", "theta_dot", "z_ddot"):
         if key in unsaid and np.isfinite(unsaid[key].values).any():
             _check_unit(key, unsaid[key])
-    if {"theta", "theta_dot"} <= unsaid.keys():
-        ratio = slope_ratio(signals["theta"], signals["theta_dot"])
-        for low, high, key in ((40.0, 80.0, "theta_dot"), (0.0125, 0.025, "theta")):
-            if low < abs(ratio) < high:
-                unit = {"theta": "deg", "theta_dot": "deg/s"}[key]
-                raise LeverError(
-                    f"theta_dot is {abs(ratio):.3g} times the slope of theta: {key} looks like degrees: "
-                    f"units={{'{key}': '{unit}'}} says so"
-                )
+    if {"theta", "theta_dot"} <= unsaid.keys() and (found := in_degrees(signals["theta"], signals["theta_dot"])):
+        key, why = found
+        unit = {"theta": "deg", "theta_dot": "deg/s"}[key]
+        raise LeverError(f"{why}: units={{'{key}': '{unit}'}} says so")
 
 
 def _check_unit(key: str, signal: Signal) -> None:

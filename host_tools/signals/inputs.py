@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
+from ..slope import slope_ratio
 from ..units import GRAVITY
 from .mapping import Source
 from .recorded import Signal
 from .resample import Samples, sample
-from .slope import slope_ratio
 from .units import KINDS, check_plausible, factor, gravity_in, guess, level_in
 
 _FASTER = 1.5

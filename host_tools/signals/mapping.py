@@ -94,7 +94,10 @@ def read_mapping(entries: Iterable[str]) -> Mapping:
     for entry in entries:
         if "=" not in entry or (entry.lower().endswith(".toml") and Path(entry).is_file()):
             content = _toml(entry)
-            protected |= {name: _protection(name, each) for name, each in content.pop(PROTECTED, {}).items()}
+            tables = content.pop(PROTECTED, {})
+            if not isinstance(tables, dict):
+                raise LeverError(f"--map {entry}: {PROTECTED} is a table of messages, as in [{PROTECTED}.MESSAGE]")
+            protected |= {name: _protection(name, each) for name, each in tables.items()}
             time = _time(content.pop("time", None)) or time
             sources |= {_key(key): _source(key, table) for key, table in content.items()}
             continue
@@ -139,7 +142,10 @@ def _toml(path: str) -> dict[str, Any]:
 
 
 def _time(table: Any) -> str | None:
-    return str(table["signal"]) if isinstance(table, dict) and "signal" in table else table
+    name = table.get("signal") if isinstance(table, dict) else table
+    if name is not None and not isinstance(name, str):
+        raise LeverError('mapping of time: it needs a column, as in time = "t"')
+    return name
 
 
 def _key(key: str) -> str:
@@ -223,6 +229,11 @@ def _protection(name: str, table: Any) -> Protection:
     given = dict(table)
     if isinstance(given.get("data_id"), list):
         given["data_id"] = tuple(given["data_id"])
+    ids = given.get("data_id", 0)
+    if not all(type(each) is int for each in (ids if isinstance(ids, tuple) else (ids, given.get("profile", 1)))):
+        raise LeverError(f"{where}: profile and data_id are whole numbers")
+    if not isinstance(given.get("counter", ""), str):
+        raise LeverError(f"{where}: counter is the name of a signal")
     protection = Protection(**given)
     if protection.profile is None and protection.counter is None:
         raise LeverError(f"{where}: it has neither a profile nor a counter")

@@ -16,10 +16,10 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..errors import LeverError
+from ..slope import STEP, slope_likeness, together
 from ..units import GRAVITY
 from .mapping import Mapping, Source
 from .recorded import Signal
-from .slope import STEP, slope_likeness, together
 from .units import INPUTS, factor, fitting, is_unit
 
 _UNIT_FITS, _NO_UNIT, _UNIT_DOES_NOT = 4.0, 2.0, -8.0

@@ -118,7 +118,7 @@ def _text(path: str, time: str | None) -> list[Signal]:
 
 
 def _parquet(path: str, time: str | None) -> list[Signal]:
-    require("files")
+    require("files", "pyarrow")
     from pyarrow import parquet
 
     table = parquet.read_table(path)
@@ -167,9 +167,9 @@ def _npz(path: str, time: str | None) -> list[Signal]:
 
 
 def _mat(path: str, time: str | None) -> list[Signal]:
-    require("files")
     with open(path, "rb") as file:
         is_hdf = b"MATLAB 7.3" in file.read(128) or (file.seek(0) == 0 and file.read(8) == b"\x89HDF\r\n\x1a\n")
+    require("files", "h5py" if is_hdf else "scipy")
     arrays: dict[str, Any] = {}
     if is_hdf:
         import h5py

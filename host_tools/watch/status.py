@@ -106,7 +106,7 @@ def last_reset(picture: Picture) -> str | None:
         return None
     names = ("cause", "resets", "failed", "fault_address")
     cause, resets, failed, address = (int(picture.field("PLATFORM_RESET", name)) for name in names)
-    causes = codec.message("PLATFORM_RESET").get_signal_by_name("cause").choices or {}
+    causes = dict(codec.message("PLATFORM_RESET").get_signal_by_name("cause").choices or ())
     parts = [f"{str(causes.get(cause, cause)).replace('_', ' ')}, {resets} since power-on"]
     if tests := [name for bit, name in SELF_TESTS.items() if failed & bit]:
         parts.append(f"failed: {', '.join(tests)}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from lever_cdkf.host_tools.firmware.aircraft import ALARM, WARNING
 from lever_cdkf.host_tools.report.figure import Figure, axis, band, line, time_axis
 from lever_cdkf.host_tools.report.page import Page
 
@@ -32,9 +33,9 @@ def build(results: Sequence[Result], seeds: int) -> str:
 
 
 def _chart(shown: Excerpt, flight: str) -> Figure:
-    """The margin, what the lever does, and what the cabin does."""
-    rows = [axis("gain margin [dB]", range=[-5.0, _MOST]), axis("lever [°]"), axis("cabin [m/s²]")]
-    figure = Figure(rows, time_axis(float(shown.time[-1])), height=420)
+    """The margin with the limits of warning and alarm, what the lever does, what the cabin does, and when what came."""
+    rows = [axis("margin [dB]", range=[-5.0, _MOST], weight=1.5), axis("lever [°]"), axis("cabin [m/s²]")]
+    figure = Figure(rows, time_axis(float(shown.time[-1])), height=480)
     margin = np.minimum(shown.margin, _MOST)
     low, high = margin - 2.0 * shown.sigma, np.minimum(margin + 2.0 * shown.sigma, _MOST)
     figure.add(*band(shown.time, low, high, "estimate ±2σ", "estimate-band"))
@@ -46,5 +47,9 @@ def _chart(shown: Excerpt, flight: str) -> Figure:
         line(shown.time, shown.theta, "θ", "text", 1), line(shown.time, shown.correction, "correction", "good", 1)
     )
     figure.add(line(shown.time, shown.z_ddot, "z̈", "torque", 2))
-    figure.level(0.0)
+    figure.level(0.0, WARNING, ALARM)
+    figure.mark(list(shown.moments.values()))
+    for place, (name, moment) in enumerate(shown.moments.items()):
+        side = {"xanchor": "right" if place == 0 else "left", "yanchor": "bottom", "showarrow": False}
+        figure.annotations.append({"x": moment, "y": 1.0, "yref": "paper", "text": name} | side)
     return figure

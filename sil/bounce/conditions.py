@@ -55,14 +55,14 @@ _ALARMS = (
     ),
     Condition(
         "baselines",
-        "the same flights: alarm before those of two detectors without a model",
+        "c_p from 42 to 18 N s/m in 30 s: alarm before those of two detectors without a model",
         measure.relaxing,
         (_least("ahead of ROVER", 2.0, "worst"), _least("ahead of spectrum", 2.0, "worst")),
         ("ROVER lead", "spectrum lead"),
     ),
     Condition(
         "margin",
-        "the same flights: the gain margin",
+        "c_p from 42 to 18 N s/m in 30 s: the gain margin",
         measure.relaxing,
         (_COVERED, _most("margin rms", 1.0)),
         ("margin stated",),
@@ -84,7 +84,7 @@ _ALARMS = (
     ),
     Condition(
         "false_alarms_short",
-        "the same, 67 s each",
+        "67 s each of pilots who drift, grip or move, gain margin 6 dB or more",
         partial(measure.stable, duration=67.0),
         (_most("false alarms", 0.0),),
         ("flight time", "ROVER false alarms", "spectrum false alarms"),
@@ -92,7 +92,7 @@ _ALARMS = (
     ),
     Condition(
         "false_alarms_3db",
-        "the same, gain margin 3 dB or more",
+        "67 s each of pilots who drift, grip or move, gain margin 3 dB or more",
         partial(measure.stable, duration=67.0, ratio=0.708),
         (),
         ("false alarms", "flight time", "ROVER false alarms", "spectrum false alarms"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,8 @@ class Excerpt:
     """[m/s^2]"""
     correction: FloatArray
     """[deg]"""
+    moments: Mapping[str, float] = field(default_factory=dict)
+    """What happened when [s]."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,9 @@ def relaxing(craft: str, seed: int) -> Measured:
         "ahead of spectrum": min(spectrum, float(notes[-1])) - alarm,
         "margin at the alarm": float(flown.margins(10)[at // 10]) if math.isfinite(alarm) else math.nan,
     }
-    return Measured(figures | _margins(flown), excerpt(flown))
+    moments = {"alarm": alarm, "vibration doubled": doubled if doubled < notes[-1] else math.inf}
+    known = {name: moment for name, moment in moments.items() if math.isfinite(moment)}
+    return Measured(figures | _margins(flown), replace(excerpt(flown), moments=known))
 
 
 def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:
@@ -189,6 +193,7 @@ def stable(craft: str, seed: int, *, duration: float, ratio: float = STABLE) -> 
 _JUDGED = (40.0, 60.0)
 """When vibration is [s]."""
 _LEAST, _COARSE, _FINE, _MOST = 0.5, 1.5, 2, 13.0
+_SOUGHT_TO = 12.8  # eight coarse steps up
 
 
 def _slack(craft: str, seed: int, mitigation: str, **changes: Any) -> Plan:
@@ -384,7 +389,9 @@ FIGURES: Mapping[str, Figure] = {
     "spectrum level": Figure("m/s²", "greatest level of the recursive Fourier transform", largest),
     "ROVER false alarms": Figure("1", "flights in which the ROVER-like detector raises an alarm", _total),
     "spectrum false alarms": Figure("1", "flights in which the recursive Fourier transform does", _total),
-    "gearing ÷ critical": Figure("1", f"largest with {LOUD:g} × the vibration without the lever at most", least, False),
+    "gearing ÷ critical": Figure(
+        "1", f"largest with {LOUD:g} × the vibration without the lever at most", least, False, _SOUGHT_TO
+    ),
     "involuntary cancelled": Figure("%", "of the power of θ by cabin and motor, 2 to 8 Hz", mean, False),
     "back after a grip": Figure("s", "until 80 % of two seconds are cancelled again", largest),
     "gain changed": Figure("%", f"of the pilot's input at {VOLUNTARY:g} Hz", largest),

@@ -10,6 +10,7 @@ from .judged import JudgedCommand, Show
 if TYPE_CHECKING:
     from ..bounce.campaign import Result
     from ..bounce.conditions import Condition
+    from ..judged.result import Figure
 
 _DESCRIPTION = """\
 Flies three helicopters in gusts, each with random pilots whose arm may close the loop of collective bounce through
@@ -42,6 +43,11 @@ class _Bounce(JudgedCommand["Condition"]):
         from ..bounce.conditions import CONDITIONS
 
         return CONDITIONS
+
+    def figures(self) -> Mapping[str, Figure]:
+        from ..bounce.measure import FIGURES
+
+        return FIGURES
 
     def measure(self, chosen: Sequence[Condition], seeds: int, show: Show) -> Sequence[Result]:
         from ..bounce import campaign

@@ -70,7 +70,8 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """`lever campaign`."""
-    require("campaign")
+    if not args.list:
+        require("campaign")
 
     from lever_cdkf.host_tools.tables import print_tables
 

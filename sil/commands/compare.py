@@ -77,9 +77,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """`lever compare`."""
-    require("study")
-
     from lever_cdkf.host_tools.tables import print_tables
+
+    if args.list and not args.envelope:
+        print_tables(_listed(), args.json)
+        return 0
+    require("study")
 
     from ..study.compare import campaign, evaluation, table, verdicts
     from ..study.compare.cases import Plan
@@ -89,9 +92,6 @@ def run(args: argparse.Namespace) -> int:
 
         _check(args.seeds, args.duration, args.jobs)
         return compare_envelope.run(args)
-    if args.list:
-        print_tables(_listed(), args.json)
-        return 0
     names, estimators = _cases(args), _estimators(args)
     seeds = args.seeds if args.seeds is not None else (_QUICK_SEEDS if args.quick else _SEEDS)
     duration = args.duration if args.duration is not None else (_QUICK_DURATION if args.quick else None)

@@ -10,6 +10,7 @@ from .judged import JudgedCommand, Show
 if TYPE_CHECKING:
     from ..envelope.campaign import Result
     from ..envelope.condition import Condition
+    from ..judged.result import Figure
 
 _DESCRIPTION = """\
 Runs the firmware in the conditions that a collective meets: a pilot who moves the lever, lets go or tightens the grip,
@@ -43,6 +44,11 @@ class _Envelope(JudgedCommand["Condition"]):
         from ..envelope.conditions import CONDITIONS
 
         return CONDITIONS
+
+    def figures(self) -> Mapping[str, Figure]:
+        from ..envelope.measure import FIGURES
+
+        return FIGURES
 
     def measure(self, chosen: Sequence[Condition], seeds: int, show: Show) -> Sequence[Result]:
         from ..envelope import campaign

@@ -74,7 +74,8 @@ def seed(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    require("study")
+    if not args.list:
+        require("study")
 
     from ..study.figures.catalogue import chosen
 

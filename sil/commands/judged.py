@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
-from lever_cdkf.host_tools.files import make_folder, write_text
+from lever_cdkf.host_tools.files import check_writable, make_folder, write_texts
 from lever_cdkf.host_tools.layout import say
 
 from .names import check_names
 
 if TYPE_CHECKING:
-    from ..judged.result import Judged, Result
+    from ..judged.result import Figure, Judged, Limit, Result
 
 Row = TypeVar("Row", bound="Judged")
 Show = Callable[[int, int, str], None]
@@ -39,6 +39,10 @@ class JudgedCommand(ABC, Generic[Row]):
     @abstractmethod
     def conditions(self) -> Mapping[str, Row]:
         """All by name, in the order of the table."""
+
+    @abstractmethod
+    def figures(self) -> Mapping[str, Figure]:
+        """All that are measured, by name."""
 
     @abstractmethod
     def measure(self, chosen: Sequence[Row], seeds: int, show: Show) -> Sequence[Result]:
@@ -80,7 +84,8 @@ class JudgedCommand(ABC, Generic[Row]):
         from ..judged import table
 
         if args.list:
-            print_tables({"conditions": [_listed(condition) for condition in self.conditions().values()]}, args.json)
+            listed = [_listed(condition, self.figures()) for condition in self.conditions().values()]
+            print_tables({"conditions": listed}, args.json)
             return 0
         require("report")
         chosen = self._chosen(args)
@@ -88,15 +93,15 @@ class JudgedCommand(ABC, Generic[Row]):
         if not 1 <= seeds <= 1000:
             raise LeverError(f"--seeds {seeds}: must be from 1 to 1000")
         make_folder(args.out)  # before a campaign that could then not be kept
+        check_writable(args.out / f"{self.name}.html")
         with Progress(self.name) as progress:
             results = self.measure(chosen, seeds, progress.show)
-        print_tables({f"{seeds} random {self.each} a condition": table.lines(results)})
+        each = self.each if seeds > 1 else self.each.replace("pilots", "pilot")
+        print_tables({f"{seeds} random {each} a condition": table.lines(results)})
         missed = [result.condition.name for result in results if not result.ok]
         judged = sum(bool(result.condition.limits) for result in results)
-        say(
-            f"{judged - len(missed)} of {judged} conditions hold."
-            + (f" Missed: {', '.join(missed)}." if missed else "")
-        )
+        held = f"{judged - len(missed)} of {judged} conditions hold." if judged else "None of these has limits."
+        say(held + (f" Missed: {', '.join(missed)}." if missed else ""))
         self._write(args, results, seeds)
         return 1 if missed else 0
 
@@ -110,10 +115,11 @@ class JudgedCommand(ABC, Generic[Row]):
         from ..judged import table
 
         origin = provenance()
+        files = {args.out / f"{self.name}.html": with_provenance(self.page(results, seeds), origin)}
         if args.json is not None:
             content = {"rows": table.rows(results), "provenance": asdict(origin)}
-            write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-        write_text(args.out / f"{self.name}.html", with_provenance(self.page(results, seeds), origin))
+            files[Path(args.json)] = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        write_texts(files)
         say(f"Written to {args.out}: {self.name}.html")
 
     def _chosen(self, args: argparse.Namespace) -> list[Row]:
@@ -125,8 +131,10 @@ class JudgedCommand(ABC, Generic[Row]):
         return [condition for condition in conditions.values() if condition.quick or not args.quick]
 
 
-def _listed(condition: Judged) -> dict[str, str | bool]:
-    limits = ", ".join(f"{limit.figure} {limit}" for limit in condition.limits)
-    instead = ", ".join(f"{limit.figure} {limit}" for limit in condition.unless)
+def _listed(condition: Judged, known: Mapping[str, Figure]) -> dict[str, str | bool]:
+    def spelled(each: Sequence[Limit]) -> str:
+        return ", ".join(f"{limit.figure} {limit} {known[limit.figure].unit}".removesuffix(" 1") for limit in each)
+
+    limits, instead = spelled(condition.limits), spelled(condition.unless)
     text = f"{limits}; or {instead}" if instead else limits or "reported only"
     return {"name": condition.name, "quick": condition.quick, "title": condition.title, "must": text}

@@ -53,7 +53,8 @@ and of faults the share of that time with each. Those that warn say that the est
 With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
 is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
 the aircraft of a scenario that has one (`lever aircraft`, lever_can --aircraft), and lever_can with --lock-step;
-bus.log is the same to the byte but for the channel's name.
+trace.csv is the same to the byte, and bus.log but for the channel's name; against a lever_can that goes on from
+another run, bus.log has other counters and CRCs.
 """
 _EPILOG = """\
 examples:
@@ -318,11 +319,12 @@ def _tables(result: Result) -> Tables:
         "wall time [s]": summary.wall_time_s,
         "firmware": summary.firmware.version,
     }
-    near: list[Row] = []
-    if summary.stability is not None:
-        near = [{"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}]
-        near[0] |= {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}
-    return {summary.scenario.title: rows, "run": [run_row], **({"collective bounce": near} if near else {})}
+    tables: Tables = {summary.scenario.title: rows, "run": [run_row]}
+    if summary.stability is None:
+        return tables
+    states = {f"{state} [s]": seconds for state, seconds in summary.stability.states_s.items()}
+    least = {"least gain margin [dB]": summary.stability.least_margin_db, "sigma": summary.stability.its_sigma_db}
+    return {**tables, "collective bounce": [{**least, **states}]}
 
 
 def _times(times: Sequence[float | None]) -> str:

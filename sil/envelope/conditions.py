@@ -51,9 +51,13 @@ _MOVEMENT = (
     ),
     Condition("sway_1deg_0.5hz", "the pilot moves the lever, ±1° at 0.5 Hz", Motion(sway=(1.0, 0.5)), _right(2.0)),
     Condition("wander_1deg", "random movement, 0.05–0.5 Hz, 1° rms", Motion(wander=1.0), _right(1.5)),
-    Condition("wander_1deg_base_only", "the same, no dither", replace(_NO_DITHER, wander=1.0), _right(1.5)),
+    Condition(
+        "wander_1deg_base_only", "random movement, 1° rms, no dither", replace(_NO_DITHER, wander=1.0), _right(1.5)
+    ),
     Condition("wander_3deg", "random movement, 0.05–0.5 Hz, 3° rms", Motion(wander=3.0), _right(3.0)),
-    Condition("wander_3deg_base_only", "the same, no dither", replace(_NO_DITHER, wander=3.0), _right(3.0)),
+    Condition(
+        "wander_3deg_base_only", "random movement, 3° rms, no dither", replace(_NO_DITHER, wander=3.0), _right(3.0)
+    ),
     Condition("retrim", "re-trim by 8° in 4 s", Motion(retrim=8.0), (_most("f_n rms", 1.2),), quick=True),
     Condition(
         "grip_step",
@@ -198,9 +202,9 @@ _FAULTS = (
     _missing("only_theta", "only θ from the start", "theta_dot"),
     replace(_missing("only_rate", "only θ̇ from the start", "theta"), quick=True),
     _hands_off("hands_off", "hands off for 10 s, then on", 0.3),
-    _hands_off("hands_off_base_only", "the same, no dither", 0.0),
+    _hands_off("hands_off_base_only", "hands off for 10 s, then on, no dither", 0.0),
     _next_pilot("next_pilot_0.3s", "hands off for 0.3 s, then on by a pilot twice or half as stiff", 0.3),
-    _next_pilot("next_pilot_2s", "the same for 2 s", 2.0),
+    _next_pilot("next_pilot_2s", "hands off for 2 s, then on by a pilot twice or half as stiff", 2.0),
 )
 
 
@@ -253,7 +257,7 @@ _CALIBRATION = (
         settings={"z_ddot_gain": 1.05, "z_ddot_delay": 3e-3, "tau_m_gain": 0.9, "lever_friction": 0.2},
     ),
     _drawn("calibration_drawn", "gains, delay and friction drawn from their stated σ", 0.3),
-    _drawn("calibration_drawn_base_only", "the same, no dither", 0.0),
+    _drawn("calibration_drawn_base_only", "gains, delay and friction drawn from their stated σ, no dither", 0.0),
 )
 
 

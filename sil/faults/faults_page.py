@@ -19,8 +19,9 @@ _FEW = 12
 """Of so few faults all have a chart."""
 _STYLE = """
 .missed { color: var(--bad); }
-#table :is(td, th):nth-child(-n+4) { text-align: left; white-space: normal; vertical-align: top; }
-#table td:nth-child(n+2):nth-child(-n+3) { min-width: 14rem; }
+#table :is(td, th):nth-child(-n+4) { text-align: left; white-space: normal; }
+#table :is(td, th) { vertical-align: top; }
+#table td:nth-child(n+2):nth-child(-n+4) { min-width: 10rem; }
 """
 _NAMES = {"f_n": "natural frequency [Hz]", "zeta": "damping ratio", "m_p": "m_p [kg]", "c_p": "c_p [N s/m]",
           "k_p": "k_p [N/m]"}  # fmt: skip

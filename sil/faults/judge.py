@@ -182,7 +182,8 @@ def _excerpt(
 ) -> Excerpt:
     value, sigma = _stated(record, name)
     at = np.arange(0, len(value), max(1, len(value) // points))
-    return Excerpt(name, at * PERIOD * STRIDE, truth[name][at], value[at], sigma[at], flagged[::STRIDE][at])
+    time = PERIOD * STRIDE * at.astype(np.float64)
+    return Excerpt(name, time, truth[name][at], value[at], sigma[at], flagged[::STRIDE][at])
 
 
 def deviation(record: Record, truth: Mapping[str, FloatArray], name: str) -> FloatArray:

@@ -34,7 +34,7 @@ def demands(must: judge.Must) -> str:
     if must.unaffected:
         parts.append("not a bit changes")
     if must.flags:
-        parts.append(f"{' or '.join(must.flags)} within {must.within} samples")
+        parts.append(f"{' or '.join(must.flags)} within {must.within} sample{'s' if must.within > 1 else ''}")
     if must.after:
         parts.append(f"{' or '.join(must.after)} at its end")
     if not must.unaffected:

@@ -59,6 +59,8 @@ class Figure:
     pool: Callable[[Values], float]
     """All runs as one number."""
     more_is_worse: bool = True
+    sought_to: float = math.inf
+    """Where it is that much it may be more."""
 
     def worst(self, values: Values) -> float:
         """Of all runs."""

@@ -54,7 +54,9 @@ def _shown(result: Result, name: str, column: str, value: float) -> str:
     limits = [limit for limit in both if (limit.figure, limit.over) == (name, over)]
     texts = (f"{value:.{digits}g}" for digits in range(3, 18))
     shown = (text for text in texts if all(limit.holds(float(text)) == limit.holds(value) for limit in limits))
-    return "never" if math.isinf(value) else next(shown)
+    if math.isinf(value):
+        return "never"
+    return f"≥ {next(shown)}" if value >= result.known[name].sought_to else next(shown)
 
 
 def _problem(result: Result) -> Row:

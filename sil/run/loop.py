@@ -79,6 +79,8 @@ class Recording:
     misplaced: int = 0
     """Estimates that belong to another sample than the one that was to be answered."""
     identity: Identity = field(default_factory=Identity)
+    has_aircraft: bool = True
+    """Whether the estimator is known to watch the scenario's aircraft, or to watch none where that has none."""
 
     def frames(self) -> Frames:
         """All frames, with the time of their sample."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import can
 import numpy as np
 from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.exports.signal_files import SignalFiles
 from lever_cdkf.host_tools.extras import missing
 from lever_cdkf.host_tools.files import Outputs, make_folder, write_text, writing
@@ -25,10 +26,13 @@ from ..scenarios.scenario import Scenario
 from . import buslog, in_process, loop, summary
 from .buslog import Frames
 from .columns import columns_of, published
-from .loop import Progress
+from .loop import Progress, Recording
 
 if TYPE_CHECKING:
     from lever_cdkf.host_tools.report.page import Story
+
+_BOUND = 1e9
+"""[m/s^2, rad, rad/s, N m]"""
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,8 @@ def simulate(
                 LeverBus(channel, config=config, aircraft=aircraft, snapshots=snapshots)
             )
             recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
+            recording.has_aircraft = isinstance(estimator, LeverBus)
+    _check_bounded(recording)
     frames = recording.frames()
     columns = columns_of(recording, frames)
     untimed = summary.build(recording, columns)
@@ -81,6 +87,19 @@ def simulate(
         files = _Files(out_dir, channel, formats, inputs, story)
         files.write(Result(columns, untimed, frames), published(recording, frames), start)
     return Result(columns, untimed.timed(clock.perf_counter() - start), frames)
+
+
+def _check_bounded(recording: Recording) -> None:
+    """Raises LeverError for a run that no arithmetic can judge."""
+    inputs = recording.inputs
+    signals = {"z_ddot": inputs.z_ddot, "theta": recording.theta, "theta_dot": recording.theta_dot}
+    for name, signal in (signals | {"tau_m": recording.tau_m}).items():
+        beyond = np.flatnonzero(~(np.abs(signal) < _BOUND))
+        if len(beyond):
+            raise LeverError(
+                f"{recording.scenario.file}: {name} grows beyond all bounds at {inputs.time[beyond[0]]:.4g} s: what "
+                "acts there, the pilot or the aircraft is out of scale (a wrong unit?)"
+            )
 
 
 @dataclass(frozen=True)

@@ -105,9 +105,11 @@ def _truth(recording: Recording) -> Truth:
 
 
 def _firmware(recording: Recording) -> Firmware:
-    identity = recording.identity
-    same = None if identity.settings_crc is None else identity.settings_crc == recording.scenario.config.settings_crc
-    return Firmware(identity.version, identity.contract, same)
+    identity, scenario = recording.identity, recording.scenario
+    same = None if identity.settings_crc is None else identity.settings_crc == scenario.config.settings_crc
+    return Firmware(
+        identity.version, identity.contract, same, True if recording.has_aircraft or not scenario.aircraft else None
+    )
 
 
 def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
@@ -237,6 +239,7 @@ def _verdict(summary: SimulationSummary) -> str:
             whiteness.verdict(summary.whiteness),
             bounce.verdict(summary.stability),
             _verdict_settings(summary),
+            _verdict_aircraft(summary),
         )
         if sentence
     )
@@ -258,6 +261,13 @@ def _verdict_settings(summary: SimulationSummary) -> str:
     if summary.firmware.settings_as_scenario is not None:
         return ""
     return "The estimator has not sent its settings (IDENTITY): those of the scenario are assumed."
+
+
+def _verdict_aircraft(summary: SimulationSummary) -> str:
+    """No frame tells which one an estimator watches."""
+    if summary.firmware.aircraft_as_scenario:
+        return ""
+    return "Which aircraft the estimator on the bus watches is not known: it should be that of the scenario."
 
 
 def _verdict_truth(summary: SimulationSummary) -> str:

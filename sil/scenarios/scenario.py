@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -250,12 +251,15 @@ SHELF = Shelf("scenario", __package__)
 names = SHELF.names
 
 
-def load(name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:
+def load(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scenario:
     """The scenario of that name, or in the file of that path (ending in .toml), with "key.subkey=value" overrides.
 
     Raises ScenarioError.
     """
-    return from_toml(SHELF.content(name_or_path), name_or_path, overrides)
+    if not isinstance(name_or_path, (str, os.PathLike)):
+        raise ScenarioError(f"{name_or_path!r} is no scenario: give its name, or the path of a .toml file")
+    name = os.fspath(name_or_path)
+    return from_toml(SHELF.content(name), name, overrides)
 
 
 def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:

@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -71,8 +71,8 @@ def gather(build: Path, scratch: Path) -> Content:
         packages = tools.ROOT / "tests/setup/debian-packages.txt"
         raise EvidenceError(f"no {', '.join(missing)} here: install the packages of {packages}")
     content: Content = {}
-    parts = {
-        "eva": lambda: _eva(),
+    parts: dict[str, Callable[[], Content]] = {
+        "eva": _eva,
         "fault_rows": lambda: _faults(build, scratch / "faults.json"),
         "soak": lambda: _soak(build, scratch / "soak.json"),
         "fuzz": lambda: _fuzz(build),
@@ -135,7 +135,14 @@ def _soak(build: Path, file: Path) -> Content:
 
 def _fuzz(build: Path) -> Content:
     """Each fuzz target for a while."""
-    command = [sys.executable, tools.ROOT / "tests/fuzz", "--seconds", str(FUZZED), "--build", build / "fuzz"]
+    command: list[str | Path] = [
+        sys.executable,
+        tools.ROOT / "tests/fuzz",
+        "--seconds",
+        str(FUZZED),
+        "--build",
+        str(build / "fuzz"),
+    ]
     return {"targets": list(libfuzzer.SOURCES), "seconds": FUZZED, "found": _run(command)}
 
 
@@ -151,7 +158,7 @@ def _requirements(build: Path, report: Path) -> Content:
     required = tracing.requirements()
     said = results.of_c(build) | results.of_python(report)
     traced = tracing.traces()
-    rows = []
+    rows: list[Content] = []
     for number, words in required.items():
         keys = [(trace.path, trace.test) for trace in traced if trace.requirement == number]
         tests = [{"test": "::".join(key), **asdict(said.get(key, results.Said("not run")))} for key in keys]

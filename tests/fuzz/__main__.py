@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import sys
 import time
 from datetime import datetime, timezone
@@ -59,6 +60,8 @@ def _fuzz(program: Path, corpus: Path, seconds: int, steps: int) -> dict[str, in
     began = time.monotonic()
     row = {"first_seed": first, "runs": 0, "executions": 0, "steps": 0, "seconds": 0, "findings": 0}
     while not row["findings"] and (row["runs"] == 0 or row["steps"] < steps):
+        if steps:  # from the seeds again: what was kept would be run again in each run
+            shutil.rmtree(corpus, ignore_errors=True)
         result = libfuzzer.run(program, corpus, [f"-seed={seed}", f"-max_total_time={seconds}"])
         seed += 1
         row["runs"] += 1

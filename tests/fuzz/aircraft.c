@@ -1,5 +1,5 @@
-/* Any bytes as the file of an aircraft's response: one with finite numbers, or one line that says what is wrong. What is
- * after a # never counts. */
+/* Any bytes as the file of an aircraft's response: one with finite numbers, or one line that says what is wrong. What
+ * is after a # never counts. */
 #define _POSIX_C_SOURCE 200809L /* fmemopen */
 
 #include <math.h>

@@ -230,9 +230,9 @@ static float noise(bench_t *bench)
     return ((float)(bench->noise >> 8u) * (2.0f / 16777216.0f)) - 1.0f;
 }
 
-/* A lever that swings on a bouncing base, in the grip of a hand, whose force is what the lever as shipped needs for that.
- * Of the shape, the lower four bits are its frequency, from
- * 3 Hz on, the next two the amplitude; then that of the noise. */
+/* A lever that swings on a bouncing base, in the grip of a hand, whose force is what the lever as shipped needs for
+ * that. Of the shape, the lower four bits are its frequency, from 3 Hz on, the next two the amplitude; then that of the
+ * noise. */
 static lever_sample_t flight_sample(bench_t *bench)
 {
     const float omega = 19.0f + (float)(bench->shape & 15u);
@@ -404,6 +404,47 @@ static void report_platform(bench_t *bench, input_t *input)
     check(bench);
 }
 
+/* What an instance does with bytes from anywhere as its state: any estimate, but no harm. */
+static void use(bench_t *bench, lever_t *lever)
+{
+    lever_estimate_t estimate;
+    lever_health_t health;
+    lever_frame_t frame;
+    for (uint32_t i = 0u; i < 8u; i++) {
+        lever_sample_t sample = flight_sample(bench);
+        sample.time_us += i * bench->period_us;
+        (void)lever_update(lever, &sample);
+        lever_idle(lever, 100u);
+        lever_estimate(lever, &estimate);
+        lever_health(lever, &health);
+        for (uint32_t k = 0u; lever_next_frame(lever, &frame); k++) {
+            REQUIRE(k <= (uint32_t)OUTPUTS);
+        }
+    }
+}
+
+/* As it is, the state of an instance makes another one the same. */
+static void move_state(bench_t *bench, input_t *input)
+{
+    static lever_memory_t memory;
+    uint8_t state[LEVER_STATE_BYTES];
+    uint8_t again[LEVER_STATE_BYTES];
+    lever_t *other = lever_init(&memory, &bench->config);
+    (void)lever_aircraft(other, bench->lever->bounce.aircraft);
+    lever_state_save(bench->lever, state);
+    REQUIRE(lever_state_restore(other, state));
+    lever_state_save(other, again);
+    REQUIRE(memcmp(state, again, sizeof state) == 0);
+    const uint8_t changed = take_byte(input) & 7u;
+    for (uint32_t i = 0u; i < changed; i++) {
+        const uint32_t at = take_byte(input) | ((uint32_t)take_byte(input) << 8u);
+        state[at % (uint32_t)LEVER_STATE_BYTES] = take_byte(input);
+    }
+    if (lever_state_restore(other, state)) {
+        use(bench, other);
+    }
+}
+
 static void ask_feedthrough(const bench_t *bench, input_t *input)
 {
     lever_feedthrough_t feedthrough;
@@ -413,17 +454,17 @@ static void ask_feedthrough(const bench_t *bench, input_t *input)
 static void give_next(bench_t *bench, input_t *input)
 {
     const uint8_t what = take_byte(input);
-    switch (what % 12u) {
+    switch (what % 13u) {
     case 0:
     case 1:
-        fly(bench, (uint32_t)take_byte(input) << ((what / 12u) % 5u), (what % 12u) == 1u);
+        fly(bench, (uint32_t)take_byte(input) << ((what / 13u) % 5u), (what % 13u) == 1u);
         break;
     case 2:
         give_any_sample(bench, input);
         break;
     case 3:
     case 4:
-        give_any_frame(bench, input, (what % 12u) == 4u);
+        give_any_frame(bench, input, (what % 13u) == 4u);
         break;
     case 5:
         give_command(bench, input);
@@ -444,6 +485,9 @@ static void give_next(bench_t *bench, input_t *input)
         bench->faults = take_byte(input);
         bench->shape = take_byte(input);
         ask_feedthrough(bench, input);
+        break;
+    case 12:
+        move_state(bench, input);
         break;
     default:
         bench->time_us += take_word(input) >> (take_byte(input) & 31u);

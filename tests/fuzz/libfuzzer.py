@@ -27,7 +27,7 @@ SOURCES = {
     "slcan": ("firmware/port/slcan/slcan.c",),
     "candump": ("host_tools/firmware/c/candump.c",),
     "settings": ("firmware/port/linux/settings.c", "firmware/app/settings.c"),
-    "aircraft": ("firmware/port/linux/aircraft.c",),
+    "aircraft": ("firmware/port/linux/aircraft.c", "firmware/port/linux/settings.c", "firmware/app/settings.c"),
 }
 """What each target runs."""
 HEXADECIMAL = ("app",)

@@ -1,5 +1,5 @@
-/* Any bytes as a settings file: a configuration in its ranges, which written and read again is the same, or one line that
- * says what is wrong. */
+/* Any bytes as a settings file: a configuration in its ranges, which written and read again is the same, or one line
+ * that says what is wrong. */
 #define _POSIX_C_SOURCE 200809L /* fmemopen */
 
 #include <math.h>

@@ -1,4 +1,5 @@
-/* Any bytes on the serial line: the SLCAN peer keeps its promises, and what either end reads is what the other would write.
+/* Any bytes on the serial line: the SLCAN peer keeps its promises, and what either end reads is what the other would
+ * write.
  *
  * The first byte says how much room the sink has, the rest is what comes over the line. */
 #include <stdbool.h>

@@ -63,8 +63,8 @@ FAULTS = {
         "settings", f"{LINUX}/settings.c", "(sizeof line->text - 1u)", "(sizeof line->text + 8u)"
     ),
     "a setting out of range": Fault("settings", f"{LINUX}/settings.c", "(rounded <= setting->greatest)", "true"),
-    "a comment that goes on in the next line": Fault(
-        "aircraft", f"{LINUX}/aircraft.c", "(byte != '\\n'); length++", "(byte != '\\n') && (length < 512u); length++"
+    "a number beyond those of float": Fault(
+        "aircraft", f"{LINUX}/aircraft.c", "good = isfinite(numbers[i]);", "good = true;"
     ),
     "a point too many": Fault(
         "aircraft",

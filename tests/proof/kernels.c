@@ -1,5 +1,5 @@
 /* The numeric kernels: exponential and trigonometry of any float but NaN (Eva 25 does not decide comparisons with it),
- * logarithm and rounding over their ranges, and the factors of any finite elements in the dimensions that the filter has.
+ * logarithm and rounding over their ranges, and the factors of any finite elements in the dimensions of the filter.
  *
  * No alarm says that no conversion is out of range and no element outside of its matrix. How exact they are is for
  * tests/unit/math. */

@@ -41,7 +41,8 @@ def test_with_an_aircraft_the_margin_is_on_the_bus(build_dir: Path, tmp_path: Pa
     assert len(sent) > 50
     assert sent == again
     snapshots = json.loads((tmp_path / "again/summary.json").read_text())["snapshots"]
-    assert (snapshots["equal"], snapshots["different"], snapshots["begun_at_s"]) == (7, 0, None)
+    assert snapshots["equal"] >= 7
+    assert (snapshots["different"], snapshots["begun_at_s"]) == (0, None)
 
 
 def test_frames_and_estimates_are_those_of_a_run_in_one_process(build_dir: Path, tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ static float next_number(const char **text)
 
 static bool take_point(lever_aircraft_t *aircraft, const char *text)
 {
-    float numbers[COLUMNS];
+    float numbers[COLUMNS] = {0};
     bool good = aircraft->count < (uint8_t)LEVER_AIRCRAFT_POINTS;
 
     for (uint32_t i = 0u; good && (i < (uint32_t)COLUMNS); i++) {

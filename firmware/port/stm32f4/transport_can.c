@@ -2,6 +2,10 @@
 #include "port/stm32f4/registers.h"
 #include "port/stm32f4/transport.h"
 
+#ifndef LEVER_COMMANDS
+#define LEVER_COMMANDS 0 /* CMakeLists.txt says it */
+#endif
+
 DEVICE_VECTORS = {[INTERRUPT_CAN1_TX] = can_transmit_interrupt,
     [INTERRUPT_CAN1_RX0] = can_receive_interrupt,
     [INTERRUPT_CAN1_SCE] = can_error_interrupt};

@@ -129,6 +129,17 @@ from ..data import Estimates
 def guess(batch, at):
     raise NotImplementedError
 '''
+CHART = '''
+"""The rate of the lever."""
+
+from ..figure import Figure, axis, line, time_axis
+
+
+def rate(run):
+    figure = Figure([axis("rate [rad/s]")], time_axis(run.end), 200)
+    figure.add(line(run.time, run.column("theta_dot_estimate_rad_s"), "rate", "estimate"))
+    return figure
+'''
 COMMAND = '''
 """`lever hello`."""
 
@@ -205,6 +216,18 @@ def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Copy:
         "def _wrong_noise() -> Iterator[Case]:\n",
         'def _wrong_noise() -> Iterator[Case]:\n    yield WrongNoise(name="wronger", title="wronger")\n',
     )
+    clock = "    clock = readings.clock\n"
+    made.change("sil/faults/rows.py", clock, f'    yield Row("sulk", "it sulks")\n{clock}')
+    made.change(
+        "sil/bounce/conditions.py", "\n_ALARMS = (", '\n_ALARMS = (\n    Condition("mild", "mild", measure.relaxing),'
+    )
+    shutil.copy(root / "sil/campaign/specs/quick.toml", made.folder / "lever_cdkf/sil/campaign/specs/slow.toml")
+    made.file("host_tools/report/charts/speed.py", CHART)
+    page = "host_tools/report/page.py"
+    made.change(page, "import comparison, health,", "import comparison, health, speed,")
+    section = 'page.section("speed", "Speed", "Speed", page.figure("figure-speed", speed.rate(run), "It."))'
+    made.change(page, "    _health(page, run)\n", f"    {section}\n    _health(page, run)\n")
+    made.change("host_tools/can/logs.py", '_CANDUMP = (".log",', '_CANDUMP = (".dump", ".log",')
     made.file("sil/commands/hello.py", COMMAND)
     entries = made.folder / "hello-1.dist-info"
     entries.mkdir()
@@ -222,8 +245,11 @@ def test_a_scenario_with_a_new_plant_trajectory_excitation_fault_and_column_runs
     header, *rows = (copy.folder / "out/trace.csv").read_text().splitlines()
     gap = header.split(",").index("gap")
     assert rows[-1].split(",")[gap] == "0.000000"
-    assert "a seesaw, which nobody expected" in (copy.folder / "out/report.html").read_text()
-    copy.lever("replay", "out/bus.log", "--out", "again")
+    report = (copy.folder / "out/report.html").read_text()
+    assert "a seesaw, which nobody expected" in report
+    assert "figure-speed" in report
+    (copy.folder / "out/bus.log").rename(copy.folder / "bus.dump")
+    copy.lever("replay", "bus.dump", "--out", "again")
     assert ",gap," in (copy.folder / "again/trace.csv").read_text().splitlines()[0]
 
 
@@ -233,8 +259,12 @@ def test_an_estimator_and_a_case_are_compared(copy: Copy) -> None:
     assert "wronger" in listed
 
 
-def test_a_condition_is_part_of_the_envelope(copy: Copy) -> None:
-    assert "calm" in copy.lever("envelope", "--list")
+@pytest.mark.parametrize(
+    ("command", "name"), [("envelope", "calm"), ("bounce", "mild"), ("faults", "sulk"), ("campaign", "slow")]
+)
+def test_a_row_or_a_file_is_listed(command: str, name: str, copy: Copy) -> None:
+    """A condition of the envelope or of the flights, a fault, a campaign."""
+    assert f"{name} " in copy.lever(command, "--list")
 
 
 def test_a_command_is_one_of_levers(copy: Copy) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ LEVER = lever_plant.Lever.from_settings(Config().settings)
 FREQUENCY = np.geomspace(1.5, 8.0, 24)
 
 
-def table(coupled: Coupled, gain_sigma: float = 0.0, phase_sigma: float = 0.0, **limits: float) -> AircraftResponse:
+def table(coupled: Coupled, gain_sigma: float = 0.0, phase_sigma: float = 0.0, **limits: Any) -> AircraftResponse:
     response = coupled.response(2j * np.pi * FREQUENCY.astype(np.complex128))
     return AircraftResponse(
         FREQUENCY.tolist(), response.tolist(), gain_sigma=gain_sigma, phase_sigma=phase_sigma, **limits
@@ -152,7 +153,7 @@ def test_a_loop_that_never_turns_has_the_largest_margin() -> None:
     ],
 )
 def test_a_table_that_is_not_usable_is_refused(
-    frequency: list[float], response: list[complex], options: dict[str, float]
+    frequency: list[float], response: list[complex], options: dict[str, Any]
 ) -> None:
     estimator = Estimator(Config())
     good = table(Coupled(aircraft.load("uh60_like"), 0.5))

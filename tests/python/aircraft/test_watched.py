@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet
@@ -23,7 +24,7 @@ from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.commands.aircraft import response
 from lever_cdkf.sil.scenarios import scenario
 from python.aircraft.loops import loop_of
-from python.conftest import Refused, Session
+from python.conftest import Refused, Run, Session
 from python.report.reading import figures, read
 
 SAME = ("sim", "replay")
@@ -82,13 +83,34 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def trace_of(folder: Path) -> Any:
+    return np.genfromtxt(folder / "trace.csv", delimiter=",", names=True)
+
+
+def test_a_loop_that_is_unstable_is_told(lever: Run) -> None:
+    overrides = ("duration=2 s", "aircraft.gearing=5 1", "limits={}")
+    said = lever("sim", "bounce", *(part for each in overrides for part in ("--set", each)))[1]
+    assert "In truth the loop was unstable for 2 s, by up to 1" in said
+
+
+@pytest.mark.parametrize(
+    "change", ["base.0.rms=1e300 g", "disturbance=[{kind='sine',rms='1e30 N m',frequency='3 Hz'}]"]
+)
+def test_a_run_beyond_all_bounds_is_one_line(change: str, refused: Refused) -> None:
+    said = refused("sim", "bounce", "--set", change, "--set", "duration=2 s")
+    assert "grows beyond all bounds" in said
+
+
 def test_a_simulation_has_what_a_replay_of_its_log_has(flown: Path) -> None:
     of_sim, of_replay = (np.genfromtxt(flown / each / "trace.csv", delimiter=",", names=True) for each in SAME)
     for column in ("bounce", "gain_margin_dB", "gain_margin_sigma_dB", "modulus", "correction_rad"):
         assert np.array_equal(of_sim[column], of_replay[column], equal_nan=True)
     assert np.count_nonzero(of_sim["correction_rad"]) > 5000
     of_sim, of_replay = (json.loads((flown / each / "summary.json").read_text())["stability"] for each in SAME)
-    assert of_sim == of_replay
+    truth = {"least_true_margin_db": None, "unstable_s": None}
+    assert of_sim | truth == of_replay
+    assert of_sim["least_true_margin_db"] == pytest.approx(np.nanmin(trace_of(flown / "sim")["gain_margin_true_dB"]))
+    assert of_sim["unstable_s"] == 0.0
     assert of_sim["greatest_correction_rad"] > 1e-3
     assert "figure-stability" in figures(read(flown / "sim" / "report.html"))
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import lever_cdkf
 import pytest
+from lever_cdkf.host_tools.errors import LeverError
 
 PUBLIC = ["Config", "Estimator", "Result", "estimate", "load_scenario", "run_samples", "simulate"]
 
@@ -23,6 +25,13 @@ def test_importing_loads_nothing_of_it() -> None:
     listed = "import sys, lever_cdkf; print(*(name for name in sys.modules if name.startswith('lever_cdkf.')))"
     done = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_what_is_no_scenario(root: Path) -> None:
+    for nothing in (5, None):
+        with pytest.raises(LeverError, match="is no scenario: give its name"):
+            lever_cdkf.load_scenario(nothing)  # type: ignore[arg-type]
+    assert lever_cdkf.load_scenario(root / "sil" / "scenarios" / "steady.toml").title
 
 
 def test_a_scenario_runs_without_a_bus() -> None:

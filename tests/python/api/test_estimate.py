@@ -86,6 +86,15 @@ def test_it_is_right_and_equal_to_the_samples_fed_directly(columns: Columns, res
     assert result.config.settings["sample_period"] == 2e-3
 
 
+@pytest.mark.parametrize("name", ["theta", "theta_dot"])
+def test_small_degrees_are_seen_in_samples_fed_directly(name: str, columns: Columns) -> None:
+    time_us = np.rint(columns["time"] * 1e6).astype(np.int64)
+    little = {each: 0.1 * (columns[each] - np.mean(columns[each])) for each in ("theta", "theta_dot")}
+    raw = {"time_us": time_us, "z_ddot": 0.1 * columns["z_ddot"], **little, name: np.degrees(little[name])}
+    with pytest.raises(LeverError, match=f"slope of theta: {name} looks like degrees: numpy.radians"):
+        run_samples(Config(settings={"sample_period": 2e-3}), raw)
+
+
 def test_units_that_are_said(columns: Columns, result: Result) -> None:
     said = {
         "t": 1e3 * columns["time"],

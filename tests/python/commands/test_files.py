@@ -12,7 +12,10 @@ from pathlib import Path
 import pytest
 from lever_cdkf.host_tools import files, progress
 from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.host_tools.files import check_writable, write_texts
 from lever_cdkf.host_tools.tables import Tables, print_tables
+from processes import full_disk
+from python.conftest import Refused
 
 TABLES: Tables = {
     "pilots": [
@@ -88,3 +91,30 @@ def test_json_has_the_same_rows(tmp_path: Path) -> None:
     content = json.loads(path.read_text(encoding="utf-8"))
     assert content.pop("provenance")["software"] == "lever-cdkf"
     assert content == {"pilots": rows, "empty": []}
+
+
+def test_json_that_cannot_be_written_is_told_before_the_work(tmp_path: Path, refused: Refused) -> None:
+    for path, said in ((tmp_path / "none" / "x.json", "No such file"), (tmp_path, "it is a folder")):
+        for command in (
+            ("bounce", "-o", tmp_path / "b"),
+            ("envelope", "-o", tmp_path / "b"),
+            ("faults",),
+            ("compare",),
+        ):
+            assert f"cannot write {path}: {said}" in refused(*command, "--json", path)
+    assert not (tmp_path / "b").exists()
+
+
+def test_of_several_files_all_are_written_or_none(tmp_path: Path) -> None:
+    small, large = tmp_path / "small", tmp_path / "large"
+    small.write_text("before")
+    with full_disk(100), pytest.raises(LeverError, match=f"cannot write {large}"):
+        write_texts({small: "new", large: "x" * 1000})
+    assert [path.name for path in tmp_path.iterdir()] == ["small"]
+    assert small.read_text() == "before"
+
+
+def test_what_is_no_file_can_be_written() -> None:
+    for end in os.pipe():
+        check_writable(f"/dev/fd/{end}")
+        os.close(end)

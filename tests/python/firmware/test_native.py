@@ -235,6 +235,8 @@ def test_run_samples_takes_any_column_of_numbers(column: Any) -> None:
         ({"theta_valid": np.ones(3, np.bool_)}, "samples: theta_valid has 3 values, time_us has 200"),
         ({"z_ddot": np.zeros((200, 1))}, "samples: z_ddot has 2 dimensions; it must be one column"),
         ({"theta": polars.Series(["0.3"] * 200)}, "samples: theta is no column of numbers"),
+        ({"theta": np.ones(200, np.bool_)}, "samples: theta is no column of numbers"),
+        ({"z_ddot": np.full(200, 1e300)}, "samples: z_ddot is 1e+300 at index 0: more than a float holds"),
         ({"tau": np.zeros(200)}, "unknown columns of samples: tau; they may be time_us, theta, "),
     ],
 )

@@ -33,7 +33,7 @@ def values_of(name: str, calculate: Callable[[], dict[str, Array]]) -> dict[str,
         values = calculate()
         file.parent.mkdir(parents=True, exist_ok=True)
         part = file.with_suffix(f".{os.getpid()}.npz")
-        np.savez(part, **values)
+        np.savez(part, allow_pickle=False, **values)
         part.rename(file)  # whole, whoever else writes it
     with np.load(file) as kept:
         return dict(kept)

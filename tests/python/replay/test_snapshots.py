@@ -34,7 +34,7 @@ def flight(scenario: Scenario) -> list[str]:
 
 @pytest.fixture(scope="module")
 def lines() -> list[str]:
-    return flight(load("re_trim", ["duration=6 s", "converged_after=1 s"]))
+    return flight(load("re_trim", ["duration=5.8 s", "converged_after=1 s"]))
 
 
 def counts(lines: list[str], folder: Path, **options: Any) -> tuple[Counts, Summary]:
@@ -156,7 +156,7 @@ def test_a_part_by_its_time(lines: list[str], tmp_path: Path) -> None:
     found, summary = counts(lines, tmp_path, start=3.3)
     assert summary["recording"]["commands"] > 0
     assert found.begun_at_s == pytest.approx(0.2, abs=0.002)
-    assert (found.equal, found.different) == (4, 0)
+    assert (found.equal, found.different) == (3, 0)
 
 
 def test_a_log_without_any_is_as_before(lines: list[str], tmp_path: Path) -> None:

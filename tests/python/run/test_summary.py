@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -257,7 +258,8 @@ def test_white_residuals_are_no_proof_of_the_model() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", ["{", "[]", "{}", '{"schema": 1, "scenario": {}}', '{"schema": 0}', '{"schema": 1, "x": 2}']
+    "wrong",
+    ["{", "[]", "{}", '{"schema": 1, "scenario": {}}', '{"schema": 0}', '{"schema": 1, "x": 2}', "[" * 100_000],
 )
 def test_what_is_no_summary_is_refused_in_a_line(wrong: str, tmp_path: Path) -> None:
     file = tmp_path / "summary.json"
@@ -269,7 +271,32 @@ def test_what_is_no_summary_is_refused_in_a_line(wrong: str, tmp_path: Path) -> 
 @pytest.mark.parametrize("name", ["two_dof", "steady"])
 def test_that_of_any_run_is_read_back(name: str) -> None:
     made = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
-    assert of(SimulationSummary, json.loads(text(made))) == made
+    content = json.loads(text(made))
+    assert of(SimulationSummary, content) == made
+    wrongs: tuple[dict[str, Any], ...] = (
+        {"samples": "x"},
+        {"passed": 1},
+        {"scenario": None},
+        {"modes_s": []},
+        {"missed": [1]},
+    )
+    for wrong in wrongs:
+        with pytest.raises(TypeError):
+            of(SimulationSummary, content | wrong)
+
+
+def test_a_summary_that_is_not_there_is_a_line(tmp_path: Path) -> None:
+    with pytest.raises(LeverError, match=r"cannot read .*summary.json: No such file"):
+        read(tmp_path / "summary.json")
+
+
+def test_the_aircraft_of_another_process_is_not_known(load: Callable[..., Scenario]) -> None:
+    scenario = load(TEXT, "aircraft={model='uh60_like',gearing='0.5 1'}", "limits={}")
+    recording = loop.Recording(scenario, inputs.prepare(scenario))
+    trace = perfect(recording)
+    for own, said in ((True, False), (False, True)):
+        recording.has_aircraft = own
+        assert ("Which aircraft the estimator on the bus watches" in summary.build(recording, trace).verdict) == said
 
 
 @pytest.mark.parametrize(("rms", "shown"), [(5.4, "5.4"), (5.01, "5.01"), (5.0004, "5.0004"), (12.345, "12.3")])

@@ -173,13 +173,10 @@ def test_health_of_the_machine(flight: Flight) -> None:
 def test_cause_of_the_last_reset() -> None:
     picture = Picture()
     assert status.last_reset(picture) is None
-    told = {"cause": "hard_fault", "resets": 3, "failed": 2 | 4, "fault_address": 0x0800_1234}
-    for k, (values, said) in enumerate(
-        [
-            ({"cause": "power_on", "resets": 0, "failed": 0, "fault_address": 0}, "power on, 0 since power-on"),
-            (told, "hard fault, 3 since power-on; failed: RAM, stack; hard fault at 0x08001234"),
-        ]
-    ):
+    first: dict[str, codec.Value] = {"cause": "power_on", "resets": 0, "failed": 0, "fault_address": 0}
+    second: dict[str, codec.Value] = {"cause": "hard_fault", "resets": 3, "failed": 2 | 4, "fault_address": 0x0800_1234}
+    says = "hard fault, 3 since power-on; failed: RAM, stack; hard fault at 0x08001234"
+    for k, (values, said) in enumerate([(first, "power on, 0 since power-on"), (second, says)]):
         data = codec.encode("PLATFORM_RESET", k, values)
         picture.take([(codec.message("PLATFORM_RESET").frame_id, data)], float(k))
         assert status.last_reset(picture) == said

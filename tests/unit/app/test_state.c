@@ -28,7 +28,8 @@ void setUp(void)
 
 static uint32_t width_of(const state_row_t *row)
 {
-    return (row->most < 0x100u) ? 1u : ((row->most < 0x10000u) ? 2u : 4u);
+    const uint32_t wide = (row->most < 0x10000u) ? 2u : 4u;
+    return (row->most < 0x100u) ? 1u : wide;
 }
 
 TEST(its_rows_fill_it)
@@ -178,7 +179,7 @@ TEST(a_value_beyond_its_range_is_refused)
         const state_row_t *row = state_row(i);
         const uint32_t width = width_of(row);
         for (uint32_t k = 0u; k < row->count; k++) {
-            const uint32_t greatest = (width == 1u) ? 0xFFu : ((width == 2u) ? 0xFFFFu : UINT32_MAX);
+            const uint32_t greatest = UINT32_MAX >> (8u * (4u - width));
             for (uint32_t beyond = 0u; (row->most < greatest) && (beyond < 2u); beyond++) {
                 lever_state_save(lever, state);
                 const uint32_t value = row->most + beyond;

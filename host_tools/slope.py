@@ -2,15 +2,35 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from ..arrays import FloatArray
-from .recorded import Signal
+from .arrays import FloatArray
 
 STEP = 0.02
 """[s] of a mean."""
 _LONGEST = 60.0  # [s] that are compared
 _ALIKE = 0.8  # correlation from which on a ratio says something
+_IN_DEGREES = {"theta_dot": (40.0, 80.0), "theta": (0.0125, 0.025)}  # of slope_ratio(), where the other is in rad
+
+
+class Signal(Protocol):
+    """Values at times [s], which rise."""
+
+    @property
+    def time(self) -> FloatArray: ...
+    @property
+    def values(self) -> FloatArray: ...
+
+
+def in_degrees(theta: Signal, theta_dot: Signal) -> tuple[str, str] | None:
+    """Which of the two looks like degrees where the other is in radians, and why."""
+    ratio = abs(slope_ratio(theta, theta_dot))
+    for name, (low, high) in _IN_DEGREES.items():
+        if low < ratio < high:
+            return name, f"theta_dot is {ratio:.3g} times the slope of theta: {name} looks like degrees"
+    return None
 
 
 def together(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
