@@ -19,8 +19,6 @@ COMPILER, MERGER, READER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERAGE = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
 FLIGHTS = ROOT / "tests/quality/embedded"
 EXCLUSIONS = ROOT / "firmware/COVERAGE.md"
-PYTHON = ("firmware/test_configuration.py",)
-"""Tests below tests/python that run the core, too."""
 
 
 class CoverageError(Exception):
@@ -84,7 +82,7 @@ class Sources:
     tests: Sequence[Path]
     flags: Sequence[str]
     build: Path | None = None
-    """With the cases of the float64 oracle and the environment of the tests in Python; None: neither is run."""
+    """With the cases of the float64 oracle; None: neither these nor the flights are run."""
 
 
 def measure(sources: Sources, folder: Path) -> Coverage:
@@ -101,7 +99,6 @@ def measure(sources: Sources, folder: Path) -> Coverage:
     if sources.build is not None:
         programs.append(_with_flights(sources, archive, folder))
         programs.append(_with_oracle(sources, core, folder))
-        programs.append(_with_python(sources.build, core, folder))
     merged = folder / "all.profdata"
     _run([MERGER, "merge", "-sparse", *folder.glob("*.profraw"), "-o", merged])
     objects = [word for program in programs[1:] for word in ("-object", program)]
@@ -126,17 +123,6 @@ def _with_oracle(sources: Sources, core: Sequence[Path], folder: Path) -> Path:
     cases = sorted((sources.build / "tests/mutation/cases").glob("*.case"))
     _each(cases, lambda case: _profiled([program, case], folder))
     return program
-
-
-def _with_python(build: Path, core: Sequence[Path], folder: Path) -> Path:
-    """The shared library, which takes the place of the installed one in tests of Python."""
-    library = folder / "liblever_cdkf.so"
-    _run([COMPILER, *COVERAGE[:1], "-shared", f"-Wl,-soname,{library.name}", *core, "-lm", "-o", library])
-    environment = {"LEVER_CDKF_LIBRARY_DIR": str(folder)}
-    files = [str(ROOT / "tests/python" / name) for name in PYTHON]
-    command: list[str | Path] = [build / "venv/bin/python", "-m", "pytest", "-q", *files]
-    _run(command, LLVM_PROFILE_FILE=str(folder / "python-%m-%p.profraw"), **environment)
-    return library
 
 
 def _with_headers(core: Sequence[Path]) -> list[Path]:

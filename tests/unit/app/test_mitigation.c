@@ -250,3 +250,14 @@ TEST(each_fault_of_sensors_clock_or_hands_closes_it)
         TEST_ASSERT_EQUAL(fault[i] == 0u, lever->bounce.mitigation.open);
     }
 }
+
+TEST(a_correction_acts_without_the_motor_until_it_has_faded)
+{
+    TEST_ASSERT_FALSE(lever_is_acting(lever));
+    (void)deliver_many(3000u);
+    TEST_ASSERT_FALSE(instance_is_driving(lever));
+    TEST_ASSERT_TRUE(lever_is_acting(lever));
+    choose(LEVER_MITIGATION_NONE);
+    (void)deliver_many(200u);
+    TEST_ASSERT_FALSE(lever_is_acting(lever));
+}

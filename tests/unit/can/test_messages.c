@@ -31,27 +31,40 @@ TEST(a_message_that_does_not_fit_is_not_encoded)
 
 /* With another length, or another identifier; and nothing is read. */
 #define ASSERT_REFUSED(message, identifier)                                                                            \
-    for (uint32_t k = 0u; k < 2u; k++) {                                                                               \
-        const lever_frame_t frame = {.id = (identifier) - k, .length = (k == 0u) ? 7u : 8u};                           \
-        message_##message##_t read;                                                                                    \
-        message_##message##_t before;                                                                                  \
-        (void)memset(&read, 0, sizeof read);                                                                           \
-        (void)memset(&before, 0, sizeof before);                                                                       \
-        TEST_ASSERT_FALSE(message_##message##_decode(&read, &frame));                                                  \
-        TEST_ASSERT_EQUAL_MEMORY(&before, &read, sizeof before);                                                       \
-    }
+    do {                                                                                                               \
+        for (uint32_t k = 0u; k < 2u; k++) {                                                                           \
+            const lever_frame_t frame = {.id = (identifier) - k, .length = (k == 0u) ? 7u : 8u};                       \
+            message_##message##_t read;                                                                                \
+            message_##message##_t before;                                                                              \
+            (void)memset(&read, 0, sizeof read);                                                                       \
+            (void)memset(&before, 0, sizeof before);                                                                   \
+            TEST_ASSERT_FALSE(message_##message##_decode(&read, &frame));                                              \
+            TEST_ASSERT_EQUAL_MEMORY(&before, &read, sizeof before);                                                   \
+        }                                                                                                              \
+    } while (false)
 
-TEST(a_frame_of_another_length_or_identifier_is_refused){ASSERT_REFUSED(lever_sample, MESSAGE_LEVER_SAMPLE_ID)
-        ASSERT_REFUSED(base_sample, MESSAGE_BASE_SAMPLE_ID) ASSERT_REFUSED(grip_sample, MESSAGE_GRIP_SAMPLE_ID)
-            ASSERT_REFUSED(command, MESSAGE_COMMAND_ID) ASSERT_REFUSED(state_estimate, MESSAGE_STATE_ESTIMATE_ID)
-                ASSERT_REFUSED(pilot_parameters, MESSAGE_PILOT_PARAMETERS_ID) ASSERT_REFUSED(
-                    pilot_sigma, MESSAGE_PILOT_SIGMA_ID) ASSERT_REFUSED(pilot_dynamics, MESSAGE_PILOT_DYNAMICS_ID)
-                    ASSERT_REFUSED(feedthrough, MESSAGE_FEEDTHROUGH_ID) ASSERT_REFUSED(stability, MESSAGE_STABILITY_ID)
-                        ASSERT_REFUSED(correction, MESSAGE_CORRECTION_ID) ASSERT_REFUSED(health, MESSAGE_HEALTH_ID)
-                            ASSERT_REFUSED(motor_command, MESSAGE_MOTOR_COMMAND_ID) ASSERT_REFUSED(platform_health,
-                                MESSAGE_PLATFORM_HEALTH_ID) ASSERT_REFUSED(identity, MESSAGE_IDENTITY_ID)
-                                ASSERT_REFUSED(command_ack, MESSAGE_COMMAND_ACK_ID) ASSERT_REFUSED(
-                                    link_health, MESSAGE_LINK_HEALTH_ID) ASSERT_REFUSED(snapshot, MESSAGE_SNAPSHOT_ID)}
+TEST(a_frame_of_another_length_or_identifier_is_refused)
+{
+    ASSERT_REFUSED(lever_sample, MESSAGE_LEVER_SAMPLE_ID);
+    ASSERT_REFUSED(base_sample, MESSAGE_BASE_SAMPLE_ID);
+    ASSERT_REFUSED(grip_sample, MESSAGE_GRIP_SAMPLE_ID);
+    ASSERT_REFUSED(command, MESSAGE_COMMAND_ID);
+    ASSERT_REFUSED(state_estimate, MESSAGE_STATE_ESTIMATE_ID);
+    ASSERT_REFUSED(pilot_parameters, MESSAGE_PILOT_PARAMETERS_ID);
+    ASSERT_REFUSED(pilot_sigma, MESSAGE_PILOT_SIGMA_ID);
+    ASSERT_REFUSED(pilot_dynamics, MESSAGE_PILOT_DYNAMICS_ID);
+    ASSERT_REFUSED(feedthrough, MESSAGE_FEEDTHROUGH_ID);
+    ASSERT_REFUSED(stability, MESSAGE_STABILITY_ID);
+    ASSERT_REFUSED(correction, MESSAGE_CORRECTION_ID);
+    ASSERT_REFUSED(health, MESSAGE_HEALTH_ID);
+    ASSERT_REFUSED(motor_command, MESSAGE_MOTOR_COMMAND_ID);
+    ASSERT_REFUSED(platform_health, MESSAGE_PLATFORM_HEALTH_ID);
+    ASSERT_REFUSED(platform_reset, MESSAGE_PLATFORM_RESET_ID);
+    ASSERT_REFUSED(identity, MESSAGE_IDENTITY_ID);
+    ASSERT_REFUSED(command_ack, MESSAGE_COMMAND_ACK_ID);
+    ASSERT_REFUSED(link_health, MESSAGE_LINK_HEALTH_ID);
+    ASSERT_REFUSED(snapshot, MESSAGE_SNAPSHOT_ID);
+}
 
 TEST(a_part_page_or_model_that_is_not_known_is_refused)
 {
@@ -80,4 +93,14 @@ TEST(a_value_that_does_not_fit_is_not_available)
             message_pilot_parameters_encode(&frame, &parameters) && message_pilot_parameters_decode(&read, &frame));
         TEST_ASSERT_EQUAL(i == 0u, isfinite(read.parameter[0]));
     }
+}
+
+TEST(what_a_port_says_of_its_reset_comes_as_it_went)
+{
+    const message_platform_reset_t said = {.fault_address = 0x0800ABCDu, .cause = 3u, .resets = 250u, .failed = 5u};
+    message_platform_reset_t read = {.fault_address = 0u};
+    lever_frame_t frame;
+    TEST_ASSERT_TRUE(message_platform_reset_encode(&frame, &said) && message_platform_reset_decode(&read, &frame));
+    TEST_ASSERT_TRUE((read.fault_address == said.fault_address) && (read.cause == said.cause));
+    TEST_ASSERT_TRUE((read.resets == said.resets) && (read.failed == said.failed));
 }
