@@ -35,7 +35,7 @@ MAY_IMPORT = {
         *("judged", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
         *("firmware", "models", "report"),
     },
-    "sil/faults": {"fast", "envelope", "firmware", "can"},
+    "sil/faults": {"fast", "envelope", "firmware", "can", "report"},
     "sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "sil/study": {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
