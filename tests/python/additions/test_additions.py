@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -270,3 +271,22 @@ def test_a_row_or_a_file_is_listed(command: str, name: str, copy: Copy) -> None:
 def test_a_command_is_one_of_levers(copy: Copy) -> None:
     assert "says hello" in copy.lever("--help")
     assert copy.lever("hello") == "hello\n"
+
+
+@pytest.mark.parametrize(
+    ("page", "pattern"),
+    [
+        ("firmware/can/README.md", r'"STABILITY"|(MESSAGE|OUTPUT|message)_STABILITY|\bSTABILITY,'),
+        ("firmware/model/README.md", r"LEVER_MODEL_LINEAR_BLACK_BOX|model_linear_black_box|\bb21\b"),
+        ("firmware/README.md", r"\bdamping_gain\b"),
+    ],
+    ids=["message", "model", "setting"],
+)
+def test_a_page_names_every_file_that_has_to_know(page: str, pattern: str, root: Path) -> None:
+    """Of a message, a model and a setting that there are: what has their names in it."""
+    said = (root / page).read_text(encoding="utf-8")
+    files = [each for folder in ("firmware", "host_tools") for each in (root / folder).rglob("*") if each.is_file()]
+    knowing = [each for each in files if each.suffix in (".c", ".h", ".py", ".def")]
+    knowing = [each for each in knowing if re.search(pattern, each.read_text(encoding="utf-8"))]
+    assert len(knowing) > 1
+    assert [str(each.relative_to(root)) for each in knowing if each.name not in said] == []

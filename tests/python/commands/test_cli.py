@@ -183,7 +183,7 @@ def test_dbc_path(capsys: pytest.CaptureFixture[str]) -> None:
         (["settings", "--set", "m_p=100"], "m_p = 100.0 is out of range: it must be a number from 0.3 to 10 kg ("),
         (["settings", "--settings", "/none/x"], "/none/x: cannot be read: No such file or directory"),
         (["settings", "--json", "/none/x"], "cannot write /none/x: No such file or directory"),
-        (["dbc", "--json", "/"], "cannot write /: Is a directory"),
+        (["dbc", "--json", "/"], "cannot write /: it is a folder"),
         (["dbc", "--path", "--json", "x"], "argument --json: not allowed with argument --path"),
     ],
 )
