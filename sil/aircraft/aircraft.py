@@ -89,7 +89,7 @@ class Aircraft:
         return response / (1.0 + s / (2.0 * np.pi * self.lever_low_pass)) if self.lever_low_pass else response
 
 
-GREATEST_GEARING = 10.0
+GREATEST_GEARING = 100.0
 """Pitch over the lever's angle [1]: twenty times what is in service."""
 SHELF = Shelf("aircraft", __package__)
 names = SHELF.names
