@@ -90,8 +90,7 @@ class Aircraft:
 
 
 GREATEST_GEARING = 100.0
-"""Pitch over the lever's angle [1]: 200 times what is in service; `lever bounce` looks for the limit up to 13 times the
-critical one."""
+"""Pitch over the lever's angle [1]: 200 times what is in service. `lever bounce` goes beyond 10."""
 SHELF = Shelf("aircraft", __package__)
 names = SHELF.names
 
