@@ -197,7 +197,7 @@ static void after_sample(bench_t *bench, enum lever_mode mode)
     check(bench);
     REQUIRE(mode == bench->health.mode);
     if (was_open && bench->health.gate_open && in_time) { /* else it may have been closed in between */
-        const float slew = 1.001f * bench->config.settings.torque_slew * bench->config.settings.sample_period;
+        const float slew = 1.001e-6f * bench->config.settings.torque_slew * (float)bench->period_us;
         REQUIRE(fabsf(bench->health.torque - torque_before) <= (slew + 1.0e-6f));
     }
 }
