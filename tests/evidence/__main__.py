@@ -121,7 +121,7 @@ def _faults(build: Path, file: Path) -> Content:
     """The matrix as `lever faults` has it."""
     _run([build / "venv/bin/lever", "faults", "--json", file])
     content = _read(file)
-    return {name: content[name] for name in ("count", "missed", "silent", "rows")}
+    return {name: content[name] for name in ("count", "missed", "unexpected", "silent", "rows")}
 
 
 def _soak(build: Path, file: Path) -> Content:
