@@ -23,10 +23,10 @@
  *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent. Cost.
- * Every call is bounded; lever_update() is the expensive one: 2,490 instructions and 3,920 cycles on a Cortex-M4F on
- * average (lever model, as shipped), 7,300 instructions when the parameters learn (once a learn_period), 17,400 at the
- * first sample after a gap; with an aircraft and a mitigation 3,370 on average, and 18,200 at a sample with a margin (25
- * a second). 37 KiB of code, 1.79 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
+ * Every call is bounded; lever_update() is the expensive one: 2,500 instructions and 3,940 cycles on a Cortex-M4F on
+ * average (lever model, as shipped), 7,400 instructions when the parameters learn (once a learn_period), 17,500 at the
+ * first sample after a gap; with an aircraft and a mitigation 3,470 on average, and 18,400 at a sample with a margin
+ * (25 a second). 37 KiB of code, 1.80 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
 #ifndef LEVER_CDKF_H
@@ -236,8 +236,8 @@ typedef struct lever_estimate {
 void lever_estimate(const lever_t *lever, lever_estimate_t *estimate);
 
 /* Biodynamic feedthrough theta/z_ddot at one frequency, of the model linearised about the trim. The standard deviations
- * are those of the error along the phasor (the gain's) and across it (the phase's), by the covariance of the parameters:
- * they do not contain what the model itself cannot do, of which LEVER_FAULT_MISMATCH warns. */
+ * are those of the error along the phasor (the gain's) and across it (the phase's), by the covariance of the
+ * parameters: they do not contain what the model itself cannot do, of which LEVER_FAULT_MISMATCH warns. */
 typedef struct lever_feedthrough {
     float real;        /* [rad/(m/s^2)] */
     float imaginary;   /* negative where theta lags */
@@ -290,8 +290,8 @@ typedef struct lever_stability {
 bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft);
 
 /* As of the last publish_period, or 40 ms where that is shorter; all but `state` is 0 before the first. A state is
- * entered when the margin is below its limit with a probability of 80 %, and left when it is above with that. ALARM stays
- * while nothing better is known. */
+ * entered when the margin is below its limit with a probability of 80 %, and left when it is above with that. ALARM
+ * stays while nothing better is known. */
 void lever_stability(const lever_t *lever, lever_stability_t *stability);
 
 /* What mitigation adds to the lever's angle, until the next sample: pitch = gearing (theta - trim + angle). */
@@ -423,7 +423,7 @@ enum lever_mode lever_step(lever_t *lever);
  * replaced by newer ones. */
 bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 
-/* --- logs that begin anywhere -------------------------------------------------------------------------------------- */
+/* --- logs that begin anywhere ------------------------------------------------------------------------------------- */
 
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
@@ -441,8 +441,8 @@ void lever_state_save(const lever_t *lever, uint8_t state[LEVER_STATE_BYTES]);
  * the two has an aircraft and the other has none. Bytes that are accepted may make any estimate, but no harm. */
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES]);
 
-/* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and its
- * digest. A replay of such a log may begin anywhere, and proves itself equal to the bit at each snapshot
+/* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and
+ * its digest. A replay of such a log may begin anywhere, and proves itself equal to the bit at each snapshot
  * (host_tools/replay). All memory is the caller's; cost: firmware/can/README.md.
  *
  *     lever_recorder_t recorder;
@@ -451,8 +451,8 @@ bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
  *     lever_recorder_step(&recorder, lever);
  *     while (lever_recorder_next_frame(&recorder, &tx)) { transmit(&tx); }
  *
- * What reaches an instance other than by frames (lever_idle(), lever_platform(), lever_command()) is not in a log, and a
- * replay differs until the next snapshot where it matters. */
+ * What reaches an instance other than by frames (lever_idle(), lever_platform(), lever_command()) is not in a log, and
+ * a replay differs until the next snapshot where it matters. */
 typedef struct lever_recorder {
     uint8_t state[LEVER_STATE_BYTES];
     uint8_t counter;     /* E2E */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import sys
@@ -10,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from .. import host_tools
 from . import interrupts
@@ -38,6 +40,11 @@ def shared_library(name: str) -> str:
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Writes `text` as UTF-8, as whole() does. Raises LeverError."""
     write_texts({Path(path): text})
+
+
+def json_text(content: Any) -> str:
+    """A file of JSON. Raises ValueError for NaN and infinity, which JSON does not have."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_texts(texts: Mapping[Path, str]) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 
-from .files import write_text
+from .files import json_text, write_text
 from .layout import UNLIMITED, terminal_width, wrapped
 from .provenance import provenance
 from .table_layout import Column, table_lines, upright_lines
@@ -63,7 +62,7 @@ def write_json(path: str, tables: Tables, inputs: Iterable[str | os.PathLike[str
     """Writes the tables as {title: [row, …]}, and their provenance; NaN and infinity become null. Raises LeverError."""
     rows = {title: [_json_row(row) for row in rows] for title, rows in tables.items()}
     content = {**rows, "provenance": provenance(inputs).content()}
-    write_text(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(path, json_text(content))
 
 
 def _is_number(cell: Cell) -> bool:

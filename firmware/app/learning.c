@@ -95,8 +95,8 @@ static void begin_grip(learning_t *learning, bool held_again)
     learning->held_again = held_again;
 }
 
-/* With his grip the pilot mostly moves the lever: from then on it rests at another angle, for the model a constant torque
- * that nobody knows. */
+/* With his grip the pilot mostly moves the lever: from then on it rests at another angle, for the model a constant
+ * torque that nobody knows. */
 static void follow_grip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float period)
 {
     if (learning->changed <= 0.0f) {
@@ -112,8 +112,9 @@ static void follow_grip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf
     }
 }
 
-/* Another change soon after one is followed as well, if innovations were as expected in between: otherwise it may be noise
- * that has grown. But not while it may be that nobody holds the lever any more: then the hands are to be judged first. */
+/* Another change soon after one is followed as well, if innovations were as expected in between: otherwise it may be
+ * noise that has grown. But not while it may be that nobody holds the lever any more: then the hands are to be judged
+ * first. */
 static bool may_follow(const learning_t *learning, const lever_settings_t *s)
 {
     const hands_t *hands = &learning->hands;

@@ -8,11 +8,11 @@
  *   - with an authentication none passes that is not authentic and new, whatever it says.
  * What is refused is counted and gets no COMMAND_ACK. Other frames pass.
  *
- * Authentication is that of AUTOSAR SecOC with the authenticator in a frame of its own: COMMAND has no room for it. A frame
- * with the identifier `id`, which the integrator chooses, precedes its COMMAND: 8 bytes, the low 24 bits of the freshness
- * value and then the first 40 bits of the MAC, most significant byte first. The MAC is over identifier (2 bytes), data
- * (8 bytes) and full freshness value (8 bytes) of the COMMAND, in the same order of bytes. Key, algorithm and freshness
- * are the integrator's, by callbacks: this module has no cryptography.
+ * Authentication is that of AUTOSAR SecOC with the authenticator in a frame of its own: COMMAND has no room for it. A
+ * frame with the identifier `id`, which the integrator chooses, precedes its COMMAND: 8 bytes, the low 24 bits of the
+ * freshness value and then the first 40 bits of the MAC, most significant byte first. The MAC is over identifier (2
+ * bytes), data (8 bytes) and full freshness value (8 bytes) of the COMMAND, in the same order of bytes. Key, algorithm
+ * and freshness are the integrator's, by callbacks: this module has no cryptography.
  *
  *     port.receive = command_guard_receive, port.self = &guard;    // callbacks of the port get guard.self
  */
@@ -53,8 +53,8 @@ typedef struct command_guard {
     uint32_t refused; /* COMMANDs */
 } command_guard_t;
 
-/* receive of port.h, with a command_guard_t as `self`. A frame that is refused is received, but not handed on: the next is
- * looked at. */
+/* receive of port.h, with a command_guard_t as `self`. A frame that is refused is received, but not handed on: the next
+ * is looked at. */
 enum port_result command_guard_receive(void *self, lever_frame_t *frame);
 
 #endif

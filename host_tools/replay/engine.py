@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
@@ -19,7 +18,7 @@ from ..can.logs import Recording
 from ..can.traffic import Traffic
 from ..exports.signal_files import calendar
 from ..extras import missing
-from ..files import Outputs, write_text
+from ..files import Outputs, json_text, write_text
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
@@ -284,8 +283,7 @@ class _Replay:
         if not missing("report"):
             run = RecordedRun(self.kept, of(ReplaySummary, summary))
             write_page(run, folder.outputs.path("report.html"))
-        text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
-        write_text(folder.outputs.path(SUMMARY), text + "\n")
+        write_text(folder.outputs.path(SUMMARY), json_text(summary))
         folder.outputs.finish()
         return summary
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import LeverError
+from ..files import json_text
 from ..provenance import Provenance
 from .nis import Nis
 from .whiteness import Whiteness
@@ -232,7 +233,7 @@ class ReplaySummary(Summary):
 
 def text(summary: Summary) -> str:
     """The content of summary.json."""
-    return json.dumps(dataclasses.asdict(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json_text(dataclasses.asdict(summary))
 
 
 def read(path: str | Path) -> SimulationSummary | ReplaySummary:

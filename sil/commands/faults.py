@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
-from lever_cdkf.host_tools.files import make_folder, write_text
+from lever_cdkf.host_tools.files import json_text, make_folder, write_texts
 from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 
@@ -97,7 +97,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
     """The files that were asked for."""
-    import json
     from dataclasses import asdict
 
     from lever_cdkf.host_tools.provenance import provenance, with_provenance
@@ -105,10 +104,11 @@ def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> N
     from ..faults import faults_page, table
 
     origin = provenance()
+    files = {args.out / "faults.html": with_provenance(faults_page.build(results, seeds), origin)}
     if args.json is not None:
         content = {"rows": table.rows(results), **table.counts(results), "provenance": asdict(origin)}
-        write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-    write_text(args.out / "faults.html", with_provenance(faults_page.build(results, seeds), origin))
+        files[Path(args.json)] = json_text(content)
+    write_texts(files)
     say(f"Written to {args.out}: faults.html")
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
-from lever_cdkf.host_tools.files import check_writable, make_folder, write_texts
+from lever_cdkf.host_tools.files import check_writable, json_text, make_folder, write_texts
 from lever_cdkf.host_tools.layout import say
 
 from .names import check_names
@@ -107,7 +107,6 @@ class JudgedCommand(ABC, Generic[Row]):
 
     def _write(self, args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
         """The files that were asked for."""
-        import json
         from dataclasses import asdict
 
         from lever_cdkf.host_tools.provenance import provenance, with_provenance
@@ -118,7 +117,7 @@ class JudgedCommand(ABC, Generic[Row]):
         files = {args.out / f"{self.name}.html": with_provenance(self.page(results, seeds), origin)}
         if args.json is not None:
             content = {"rows": table.rows(results), "provenance": asdict(origin)}
-            files[Path(args.json)] = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+            files[Path(args.json)] = json_text(content)
         write_texts(files)
         say(f"Written to {args.out}: {self.name}.html")
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.extras import require
-from lever_cdkf.host_tools.files import write_text
+from lever_cdkf.host_tools.files import check_writable, json_text, write_texts
 from lever_cdkf.host_tools.layout import say
 from lever_cdkf.host_tools.progress import Progress
 
@@ -50,7 +51,6 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """`lever soak`."""
-    import json
     from dataclasses import asdict
 
     from lever_cdkf.host_tools.provenance import provenance, with_provenance
@@ -60,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.out is not None:
         require("report")
+        check_writable(args.out)
     if not (math.isfinite(args.hours) and 0.0 < args.hours <= 1000.0):
         raise LeverError(f"--hours {args.hours:g}: must be above 0, and at most 1000")
     with Progress("soak") as progress:
@@ -69,13 +70,15 @@ def run(args: argparse.Namespace) -> int:
     print_tables({"hours": [*hours, total]})
     say(verdict := _verdict(result))
     troubles = result.troubles()
+    origin, files = provenance(), {}
     if args.json is not None:
         faults = dict(sorted(result.faults.items()))
         content = {"hours": hours, "total": total, "memory_growth_mib": result.growth, "faults": faults}
-        content |= {"troubles": troubles, "provenance": asdict(provenance())}
-        write_text(args.json, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        files[Path(args.json)] = json_text(content | {"troubles": troubles, "provenance": asdict(origin)})
     if args.out is not None:
-        write_text(args.out, with_provenance(soak_page.build(result, [*hours, total], verdict), provenance()))
+        files[Path(args.out)] = with_provenance(soak_page.build(result, [*hours, total], verdict), origin)
+    write_texts(files)
+    if args.out is not None:
         say(f"Written to {args.out}")
     if troubles:
         print(f"lever: soak: {'; '.join(troubles)}", file=sys.stderr)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.library import enum_names, lib
+from lever_cdkf.host_tools.report.series import runs
 
 from ..envelope.measure import FLAGS, QUANTITIES, fault_mask
 from ..envelope.motions import PERIOD, STRIDE
@@ -206,5 +207,4 @@ def _stated(record: Record, name: str) -> tuple[FloatArray, FloatArray]:
 
 def longest(true: BoolArray) -> int:
     """Most in a row."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], true.astype(np.int8), [0]))))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    return max((last - first + 1 for first, last in runs(true)), default=0)

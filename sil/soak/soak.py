@@ -15,6 +15,7 @@ from lever_cdkf.host_tools.arrays import BoolArray, FloatArray
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.firmware.estimator import Estimator
 from lever_cdkf.host_tools.firmware.library import lib
+from lever_cdkf.host_tools.report.series import runs
 from numpy.typing import NDArray
 
 from ..envelope.measure import fault_mask
@@ -222,6 +223,5 @@ def _nees(values: dict[str, FloatArray], estimates: NDArray[Any]) -> FloatArray:
 
 def _stretches(wrong: BoolArray) -> int:
     """Looks in stretches that last longer than WRONG."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], wrong.astype(np.int8), [0]))))
-    lengths = edges[1::2] - edges[::2]
-    return int(lengths[lengths * STRIDE > WRONG].sum())
+    lengths = (last - first + 1 for first, last in runs(wrong))
+    return sum(length for length in lengths if length * STRIDE > WRONG)

@@ -31,7 +31,7 @@ from evidence import page, results
 from evidence.results import EvidenceError
 from fuzz import libfuzzer
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import Outputs
+from lever_cdkf.host_tools.files import Outputs, json_text
 from lever_cdkf.host_tools.provenance import provenance
 from proof import eva
 from quality import tools, tracing
@@ -54,8 +54,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as scratch:
             content = gather(build, Path(scratch))
         with Outputs(folder) as out:
-            text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-            out.path("evidence.json").write_text(text, encoding="utf-8")
+            out.path("evidence.json").write_text(json_text(content), encoding="utf-8")
             out.path("EVIDENCE.html").write_text(page.build(content), encoding="utf-8")
             out.finish()
     except (EvidenceError, LeverError, measuring.CoverageError, eva.EvaError) as error:
