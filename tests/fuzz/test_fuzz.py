@@ -4,6 +4,7 @@ What is run here is what there is time for; `python -m fuzz` and the workflow `e
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,8 @@ from fuzz import libfuzzer
 RUNS = {"app": 250, "slcan": 80_000, "candump": 15_000, "settings": 15_000, "aircraft": 30_000}
 """Of each target, at most two seconds."""
 SEED = "-seed=1"
+SECONDS = int(os.environ.get("LEVER_FUZZ_SECONDS", "0"))
+"""Of each target, beyond those."""
 
 
 class Fault(NamedTuple):
@@ -94,6 +97,9 @@ def test_nothing_is_found(name: str, folder: Path) -> None:
     result = libfuzzer.run(build(name, folder), folder / f"{name}.corpus", [SEED, f"-runs={RUNS[name]}"])
     assert not result.found, result.text[-4000:]
     assert result.count("number_of_executed_units") >= RUNS[name]
+    if SECONDS:
+        longer = libfuzzer.run(folder / name, folder / f"{name}.corpus", [SEED, f"-max_total_time={SECONDS}"])
+        assert not longer.found, longer.text[-4000:]
 
 
 @pytest.mark.parametrize("name", FAULTS)
