@@ -38,7 +38,7 @@ NEEDED = {
 }
 """By blocks with these words in them."""
 SHORTER = {
-    r"lever tune \S+": r"\g<0> --keep m_p_walk --keep c_p_walk --keep k_p_walk",
+    **readmes.SHORTER_TUNE,
     r"--seeds 4": "--seeds 2",
     r"lever compare --scenarios step_up": r"\g<0> --duration 3",
     r"lever campaign quick(?= -o)": "lever campaign quick.toml --workers 1",
