@@ -20,6 +20,7 @@ from lever_cdkf.host_tools.formats import FORMATS
 from lever_cdkf.host_tools.replay import engine, reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
 from lever_cdkf.host_tools.replay.summary import verdict
+from lever_cdkf.host_tools.results.summary import ReplaySummary, of
 from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
 
@@ -313,10 +314,11 @@ def test_the_verdict_begins_with_what_is_wrong(
     part: str, key: str, value: object, words: str, replay: tuple[Path, Summary]
 ) -> None:
     summary = replay[1]
-    assert words not in verdict(summary)
-    assert words in verdict(summary | {part: summary[part] | {key: value}})
+    assert words not in verdict(of(ReplaySummary, summary))
+    assert words in verdict(of(ReplaySummary, summary | {part: summary[part] | {key: value}}))
     for step in (0.71e-3, 1.39e-3, 0.0):
-        assert "Samples come" not in verdict(summary | {"recording": summary["recording"] | {"typical_step_s": step}})
+        recording = summary["recording"] | {"typical_step_s": step}
+        assert "Samples come" not in verdict(of(ReplaySummary, summary | {"recording": recording}))
 
 
 # --- the files -------------------------------------------------------------------------------------------------------
