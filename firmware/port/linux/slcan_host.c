@@ -54,7 +54,7 @@ static enum port_result send_frame(void *self, const lever_frame_t *frame)
     slcan_host_t *host = self;
     const slcan_frame_t sent = {.frame = *frame};
     char text[SLCAN_LINE_BYTES];
-    const size_t length = slcan_write_frame(&sent, SLCAN_NO_TIME, text);
+    const uint32_t length = slcan_write_frame(&sent, SLCAN_NO_TIME, text);
 
     if ((PORT_GOES_STALE(frame->id) && tty_is_slow(&host->tty)) || !tty_put(&host->tty, text, length)) {
         return PORT_NOTHING;
