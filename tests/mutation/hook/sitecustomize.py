@@ -12,10 +12,12 @@ import os
 import sys
 import threading
 from importlib.machinery import SourceFileLoader
+from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
 _get_code = SourceFileLoader.get_code
+_reached: set[CodeType] = set()
 
 
 def _code_with_mutant(loader: SourceFileLoader, name: str) -> CodeType | None:
@@ -26,25 +28,32 @@ def _code_with_mutant(loader: SourceFileLoader, name: str) -> CodeType | None:
         return compile(file.read(), path, "exec", dont_inherit=True)
 
 
-def _note_functions() -> None:
-    reached: set[CodeType] = set()
-    folders = tuple(os.environ["REACHED_UNDER"].split(os.pathsep))
+def _called(frame: FrameType, event: str, argument: Any) -> None:
+    _reached.add(frame.f_code)
 
-    def called(frame: FrameType, event: str, argument: Any) -> None:
-        reached.add(frame.f_code)
 
-    def write() -> None:
-        sys.settrace(None)
-        places = {(os.path.realpath(code.co_filename), code.co_firstlineno) for code in list(reached)}
-        with open(os.path.join(os.environ["REACHED"], str(os.getpid())), "a", encoding="utf-8") as file:
-            file.writelines(f"{path}:{line}\n" for path, line in places if path.startswith(folders))
+def note_in(folder: str) -> str:
+    """What runs from now on, here and in processes started here, is noted in this folder; returns that of before."""
+    before = os.environ["REACHED"]
+    under = tuple(os.environ["REACHED_UNDER"].split(os.pathsep))
+    codes = list(_reached)
+    _reached.clear()
+    places = {(os.path.realpath(code.co_filename), code.co_firstlineno) for code in codes}
+    with open(os.path.join(before, str(os.getpid())), "a", encoding="utf-8") as file:
+        file.writelines(f"{path}:{line}\n" for path, line in places if path.startswith(under))
+    Path(folder).mkdir(exist_ok=True)
+    os.environ["REACHED"] = folder
+    return before
 
-    atexit.register(write)
-    threading.settrace(called)
-    sys.settrace(called)
+
+def _note_the_last() -> None:
+    sys.settrace(None)
+    note_in(os.environ["REACHED"])
 
 
 if "MUTANT_OF" in os.environ:
     SourceFileLoader.get_code = _code_with_mutant  # type: ignore[method-assign,assignment]
 if "REACHED" in os.environ:
-    _note_functions()
+    atexit.register(_note_the_last)
+    threading.settrace(_called)
+    sys.settrace(_called)
