@@ -45,11 +45,11 @@ class Reach:
     def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef[object]) -> Generator[None, object, object]:
         if fixturedef.scope == "function":
             return (yield)
-        before = note_in(self._whole)
+        test = note_in(self._whole)
         try:
             return (yield)
         finally:
-            note_in(before)
+            note_in(test)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.when == "call" and report.passed:

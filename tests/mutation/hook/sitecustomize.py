@@ -7,17 +7,19 @@ REACHED and REACHED_UNDER: a folder for the notes, and the folders whose functio
 
 from __future__ import annotations
 
-import atexit
 import os
 import sys
 import threading
+from functools import cache
 from importlib.machinery import SourceFileLoader
-from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
 _get_code = SourceFileLoader.get_code
-_reached: set[CodeType] = set()
+_noted: dict[int, CodeType] = {}
+_folder = os.environ.get("REACHED", "")
+_under = tuple(os.environ.get("REACHED_UNDER", "").split(os.pathsep))
+_open, _real_path = open, cache(os.path.realpath)
 
 
 def _code_with_mutant(loader: SourceFileLoader, name: str) -> CodeType | None:
@@ -29,31 +31,31 @@ def _code_with_mutant(loader: SourceFileLoader, name: str) -> CodeType | None:
 
 
 def _called(frame: FrameType, event: str, argument: Any) -> None:
-    _reached.add(frame.f_code)
+    code = frame.f_code
+    if id(code) in _noted:
+        return
+    path = _real_path(code.co_filename)
+    if path.startswith(_under):
+        try:
+            with _open(f"{_folder}/{os.getpid()}", "a", encoding="utf-8") as file:
+                file.write(f"{path}:{code.co_firstlineno}\n")
+        except OSError:  # a test lets no file grow
+            return
+    _noted[id(code)] = code
 
 
 def note_in(folder: str) -> str:
     """What runs from now on, here and in processes started here, is noted in this folder; returns that of before."""
-    before = os.environ["REACHED"]
-    under = tuple(os.environ["REACHED_UNDER"].split(os.pathsep))
-    codes = list(_reached)
-    _reached.clear()
-    places = {(os.path.realpath(code.co_filename), code.co_firstlineno) for code in codes}
-    with open(os.path.join(before, str(os.getpid())), "a", encoding="utf-8") as file:
-        file.writelines(f"{path}:{line}\n" for path, line in places if path.startswith(under))
-    Path(folder).mkdir(exist_ok=True)
-    os.environ["REACHED"] = folder
+    global _folder
+    before = _folder
+    os.makedirs(folder, exist_ok=True)
+    os.environ["REACHED"] = _folder = folder
+    _noted.clear()
     return before
-
-
-def _note_the_last() -> None:
-    sys.settrace(None)
-    note_in(os.environ["REACHED"])
 
 
 if "MUTANT_OF" in os.environ:
     SourceFileLoader.get_code = _code_with_mutant  # type: ignore[method-assign,assignment]
 if "REACHED" in os.environ:
-    atexit.register(_note_the_last)
     threading.settrace(_called)
     sys.settrace(_called)
