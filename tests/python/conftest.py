@@ -179,14 +179,14 @@ def samples() -> Samples:
 @pytest.fixture
 def make_bus() -> Iterator[Callable[..., LeverBus]]:
     """LeverBus, shut down after the test."""
-    made: list[LeverBus] = []
+    buses: list[LeverBus] = []
 
     def make(*args: object, **kwargs: object) -> LeverBus:
-        made.append(LeverBus(*args, **kwargs))  # type: ignore[arg-type]
-        return made[-1]
+        buses.append(LeverBus(*args, **kwargs))  # type: ignore[arg-type]
+        return buses[-1]
 
     yield make
-    for bus in made:
+    for bus in buses:
         bus.shutdown()
 
 
@@ -253,8 +253,8 @@ class Session:
 
 def simulated(name: str, folder: Path, *overrides: str) -> Session:
     """A short run of a scenario."""
-    made = scenario.load(name, [*SHORT, *overrides])
-    return Session(simulate(made, out_dir=folder), folder, made.config)
+    short = scenario.load(name, [*SHORT, *overrides])
+    return Session(simulate(short, out_dir=folder), folder, short.config)
 
 
 @pytest.fixture(scope="session")

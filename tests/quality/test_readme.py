@@ -97,8 +97,8 @@ def run_here(block: Block, scratch: Path) -> None:
     else:
         command = [tools.python_tool("python"), "-W", "error", "-c", content]
     tools.assert_silent(["timeout", TIME_LIMIT, *command], cwd=scratch)
-    made = {path.name for path in set(scratch.iterdir()) - there}
-    assert language != "sh" or made <= IGNORED, "what a command makes belongs into a folder that git ignores"
+    written = {path.name for path in set(scratch.iterdir()) - there}
+    assert language != "sh" or written <= IGNORED, "what a command makes belongs into a folder that git ignores"
 
 
 def test_whatever_a_page_has_been_built_with_makes_lever_can() -> None:

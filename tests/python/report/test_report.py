@@ -129,8 +129,8 @@ def test_the_headline_is_good_only_if_errors_sigma_and_whiteness_are(
     entries = {
         key: replace(entry, rms_percent=error, coverage_2sigma=covered) for key, entry in summary.parameters.items()
     }
-    made = replace(summary, passed=passed, parameters=entries, whiteness=replace(summary.whiteness, white=white))
-    assert f'class="verdict {mood}"' in summary_html.verdict(Run(result.trace, made))
+    changed = replace(summary, passed=passed, parameters=entries, whiteness=replace(summary.whiteness, white=white))
+    assert f'class="verdict {mood}"' in summary_html.verdict(Run(result.trace, changed))
 
 
 def test_all_settings_are_shown(page: Reader, result: Result) -> None:
@@ -292,16 +292,16 @@ def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Re
 
 
 def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, result: Result) -> None:
-    told = result.summary.whiteness
-    assert told is not None
+    stated = result.summary.whiteness
+    assert stated is not None
     bars = traces(page, "figure-whiteness", "residual of the rate")[0]
-    np.testing.assert_allclose(unpack(bars["y"]), told.autocorrelation, rtol=1e-6)
+    np.testing.assert_allclose(unpack(bars["y"]), stated.autocorrelation, rtol=1e-6)
     assert unpack(bars["x"]) == pytest.approx(20.0 * np.arange(1, 26))
     lower, upper = (unpack(trace["y"]) for trace in traces(page, "figure-whiteness", "chance alone"))
-    assert (lower[0], upper[0]) == pytest.approx((-told.band_of_all, told.band_of_all))
+    assert (lower[0], upper[0]) == pytest.approx((-stated.band_of_all, stated.band_of_all))
     values = {row[0]: row[1] for row in page.tables[2][1:]}
-    assert float(values["largest correlation of residuals"]) == pytest.approx(told.largest, rel=5e-3)
-    assert ("are white" in "".join(page.text)) == (max(map(abs, told.autocorrelation)) <= upper[0])
+    assert float(values["largest correlation of residuals"]) == pytest.approx(stated.largest, rel=5e-3)
+    assert ("are white" in "".join(page.text)) == (max(map(abs, stated.autocorrelation)) <= upper[0])
 
 
 def test_health_names_what_happened_when_it_happened(page: Reader) -> None:

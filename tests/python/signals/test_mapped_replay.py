@@ -32,8 +32,8 @@ def fed_directly(flight: Flight, period: float = 2e-3) -> float:
     """The last frequency that the firmware finds in the same values, without any log."""
     samples = {"theta": flight.theta, "theta_dot": flight.theta_dot, "z_ddot": flight.z_ddot}
     time_us = np.rint(flight.time * 1e6).astype(np.int64)
-    made = run_samples(Config(settings={"sample_period": period}), {"time_us": time_us, **samples})
-    return float(made["natural_frequency"][-1])
+    estimated = run_samples(Config(settings={"sample_period": period}), {"time_us": time_us, **samples})
+    return float(estimated["natural_frequency"][-1])
 
 
 @pytest.mark.parametrize("suffix", ["blf", "asc", "mf4", "csv", "trc", "log"])
@@ -95,9 +95,9 @@ def test_the_same_as_a_log_of_lever_dbc_to_the_bit(folder: Path, tmp_path: Path)
         np.genfromtxt(tmp_path / each / "trace.csv", delimiter=",", names=True) for each in ("own", "mapped")
     )
     torque = next(bit for bit, name in enum_names("lever_fault").items() if name == "torque")
-    known = np.isfinite(own["faults"])
-    assert (own["faults"][known].astype(int) & torque).any()
-    np.testing.assert_array_equal(mapped["faults"][known], own["faults"][known].astype(int) & ~torque)
+    finite = np.isfinite(own["faults"])
+    assert (own["faults"][finite].astype(int) & torque).any()
+    np.testing.assert_array_equal(mapped["faults"][finite], own["faults"][finite].astype(int) & ~torque)
     for column in set(own.dtype.names or ()) - {"faults"}:
         np.testing.assert_array_equal(mapped[column], own[column])
 

@@ -107,11 +107,11 @@ class Browser:
                 return result
 
     def _note(self, message: dict[str, Any]) -> None:
-        told = message.get("params", {})
+        params = message.get("params", {})
         if message.get("method") == "Runtime.exceptionThrown":
-            self.complaints.append(told["exceptionDetails"]["exception"].get("description", "exception"))
-        elif message.get("method") == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
-            self.complaints.append(told["entry"]["text"])
+            self.complaints.append(params["exceptionDetails"]["exception"].get("description", "exception"))
+        elif message.get("method") == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
+            self.complaints.append(params["entry"]["text"])
 
     def open(self, url: str) -> None:
         """Opens a page and waits until it is there with all that belongs to it."""

@@ -28,9 +28,9 @@ def address(process: subprocess.Popen[str]) -> str:
     """Of the page, which the command prints first."""
     assert process.stdout is not None
     line = process.stdout.readline()
-    found = re.search(r"http://\S+/", line)
-    assert found, line
-    return found[0]
+    match = re.search(r"http://\S+/", line)
+    assert match, line
+    return match[0]
 
 
 def end(process: subprocess.Popen[str]) -> None:
