@@ -167,34 +167,3 @@ TEST(a_command_serves_for_a_second_and_a_sample_for_20_ms)
         TEST_ASSERT_EQUAL(late == 0u, gate.open);
     }
 }
-
-/* A clock that stands counts as 5 ms, or a period that is longer; what was counted before counts once. */
-TEST(a_clock_that_stands_takes_a_known_time)
-{
-    static const struct {
-        float sample_period;
-        uint32_t idle_us;
-        uint32_t left_us;
-    } row[] = {{1.0e-3f, 0u, 995001u}, {1.0e-3f, 3000u, 995001u}, {5.001e-3f, 0u, 995000u}};
-    const torque_sample_t stands = {0u, false, true, true};
-    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
-        torque_gate_t gate;
-        config.settings.sample_period = row[i].sample_period;
-        torque_gate_init(&gate, &config.settings);
-        torque_gate_keep_alive(&gate);
-        torque_gate_idle(&gate, row[i].idle_us);
-        torque_gate_step(&gate, 0.0f, &stands);
-        TEST_ASSERT_EQUAL_UINT32(row[i].left_us, gate.command_left);
-    }
-}
-
-/* After longer than its memory the mean square is the square. */
-TEST(a_long_silence_leaves_the_last_torque_as_the_mean)
-{
-    torque_gate_t gate;
-    torque_gate_init(&gate, &config.settings);
-    gate.mean_square = 0.75f;
-    gate.torque = 0.5f;
-    torque_gate_idle(&gate, 300000u);
-    TEST_ASSERT_EQUAL_FLOAT(0.25f, gate.mean_square);
-}

@@ -131,13 +131,3 @@ TEST(a_level_takes_the_straight_line_to_a_sample_that_is_back)
         TEST_ASSERT_FLOAT_WITHIN(2.0e-6f, (float)deviation, y[0]);
     }
 }
-
-/* The last samples are those of the outputs still. */
-TEST(levels_that_begin_anew_leave_the_last_samples)
-{
-    const float x[MODEL_STATES] = {0.1f, 0.2f};
-    trim.last[0] = 0.4f;
-    trim_begin(&trim, x);
-    TEST_ASSERT_TRUE((trim.last[0] == 0.4f) && (trim.begin_rate == 0.2f));
-    TEST_ASSERT_EQUAL_FLOAT(0.45f, trim_angle(&trim));
-}
