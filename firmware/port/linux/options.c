@@ -223,10 +223,10 @@ bool options_read(options_t *options, int argc, char *argv[], settings_error_t *
     optind = 0; /* from the start, also when called again */
     int option = getopt_long(argc, argv, ":", known, &which);
     while (option != -1) {
-        if (option == (int)':') {
+        if (option == ':') {
             return refuse(error, "a value is missing after ", argv[optind - 1]);
         }
-        if (option == (int)'?') {
+        if (option == '?') {
             return refuse(error, "unknown option (see --help): ", argv[optind - 1]);
         }
         if (!read_option(options, option, known[which].name, optarg, error)) {

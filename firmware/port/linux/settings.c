@@ -235,7 +235,7 @@ static bool read_line(FILE *file, line_t *line)
     int byte = getc(file);
 
     (void)memset(line, 0, sizeof *line);
-    while ((byte != EOF) && (byte != (int)'\n')) {
+    while ((byte != EOF) && (byte != '\n')) {
         if (line->length < (sizeof line->text - 1u)) {
             line->text[line->length] = (char)byte;
         }
