@@ -272,21 +272,3 @@ TEST(time_may_wrap_at_2_to_the_32)
     TEST_ASSERT_EQUAL_MEMORY(&plain, &wrapped, sizeof plain);
     TEST_ASSERT_EQUAL_UINT32(0u, health_of(other).lost + health_of(other).late);
 }
-
-/* After more than 20.5 ms its level has to settle; in between the state has noise for it, and less for a wrong one. */
-TEST_EACH(2, a_base_that_is_back_has_to_settle_after_20_ms)
-{
-    const uint32_t missing = 20u + test_round;
-    (void)run(3005u); /* not to the end of a block */
-    for (uint32_t k = 0u; k < missing; k++) {
-        lever_sample_t sample = sample_after(1u);
-        invalidate(&sample, 3u);
-        (void)lever_update(lever, &sample);
-    }
-    TEST_ASSERT_EQUAL_FLOAT(10.0f * config.settings.theta_dot_process_noise, lever->estimator.cdkf.disturbance);
-    (void)run(1u);
-    TEST_ASSERT_EQUAL(test_round == 1u, has_fault(LEVER_FAULT_SETTLING));
-    lever->estimator.learning.monitor.base_wrong = true;
-    (void)run(1u);
-    TEST_ASSERT_EQUAL_FLOAT(3.0f * config.settings.theta_dot_process_noise, lever->estimator.cdkf.disturbance);
-}

@@ -147,23 +147,3 @@ TEST(settings_become_times_and_slopes)
         TEST_ASSERT_FLOAT_WITHIN(1.0e-4f * row[i].slope, row[i].slope, gate.amplitude_slope);
     }
 }
-
-/* To the microsecond. */
-TEST(a_command_serves_for_a_second_and_a_sample_for_20_ms)
-{
-    for (uint32_t late = 0u; late < 2u; late++) {
-        torque_gate_t gate;
-        const torque_sample_t sample = {1000u, true, true, true};
-        torque_gate_init(&gate, &config.settings);
-        torque_gate_keep_alive(&gate);
-        torque_gate_idle(&gate, 999999u + late);
-        TEST_ASSERT_FALSE(torque_gate_is_abandoned(&gate));
-        torque_gate_idle(&gate, 1u);
-        TEST_ASSERT_EQUAL(late == 1u, torque_gate_is_abandoned(&gate));
-        torque_gate_keep_alive(&gate);
-        torque_gate_step(&gate, 0.0f, &sample);
-        TEST_ASSERT_TRUE(gate.open);
-        torque_gate_idle(&gate, 20000u + late);
-        TEST_ASSERT_EQUAL(late == 0u, gate.open);
-    }
-}
