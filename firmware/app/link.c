@@ -113,11 +113,12 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     return LEVER_FRAME_SAMPLE;
 }
 
-/* The sequence of commands: a second after the last accepted one it may start anywhere. A refused one leaves it. */
+/* The sequence of commands: a second after the last accepted one it may start anywhere, but not with the same counter,
+ * which is that of a sender that hangs. A refused one leaves the sequence. */
 static bool is_in_sequence(lever_t *lever, const lever_frame_t *frame)
 {
     e2e_receiver_t *receiver = &lever->link.command_receiver;
-    if (torque_gate_is_abandoned(&lever->gate)) {
+    if (torque_gate_is_abandoned(&lever->gate) && (e2e_counter(frame) != receiver->last_counter)) {
         e2e_receiver_init(receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, command_tolerance);
     }
     const e2e_receiver_t before = *receiver;
@@ -157,15 +158,28 @@ static bool is_intact(const lever_frame_t *frame, enum message_data_id data_id)
     return e2e_check(&receiver, frame) == E2E_INITIAL;
 }
 
+static void answer(link_t *link, const lever_frame_t *command, uint8_t result)
+{
+    link->command_counter = e2e_counter(command);
+    link->command_result = result;
+    link->due |= (uint16_t)BIT(OUTPUT_COMMAND_ACK);
+}
+
+void link_refuse(lever_t *lever, const lever_frame_t *command, uint8_t result)
+{
+    if (is_intact(command, MESSAGE_COMMAND_DATA_ID)) {
+        answer(&lever->link, command, result);
+    }
+    lever->estimator.corrupt++;
+    lever->estimator.communication_fault = true;
+}
+
 static enum lever_frame_result on_command(lever_t *lever, const lever_frame_t *frame)
 {
-    link_t *link = &lever->link;
     enum lever_frame_result outcome = LEVER_FRAME_REFUSED;
     if (is_intact(frame, MESSAGE_COMMAND_DATA_ID)) {
         const enum message_result result = obey(lever, frame);
-        link->command_counter = e2e_counter(frame);
-        link->command_result = (uint8_t)result;
-        link->due |= (uint16_t)BIT(OUTPUT_COMMAND_ACK);
+        answer(&lever->link, frame, (uint8_t)result);
         outcome = (result == MESSAGE_RESULT_ACCEPTED) ? LEVER_FRAME_TAKEN : LEVER_FRAME_REFUSED;
     } else {
         lever->estimator.corrupt++;

@@ -286,6 +286,10 @@ enum message_result {
     MESSAGE_RESULT_UNKNOWN_VALUE = 1,
     MESSAGE_RESULT_SEQUENCE = 2,   /* repeated, or too old */
     MESSAGE_RESULT_FAULT_MODE = 3, /* in LEVER_MODE_FAULT only a reset is accepted */
+    MESSAGE_RESULT_DISABLED = 4,   /* by command_guard.h, as the rest: the build takes no changes */
+    MESSAGE_RESULT_ACTING = 5,     /* torque or a correction acts on the lever */
+    MESSAGE_RESULT_NOT_SAFE = 6,   /* so says the machine */
+    MESSAGE_RESULT_NOT_AUTHENTIC = 7,
     MESSAGE_RESULT_COUNT
 };
 

@@ -142,9 +142,11 @@ def _counters() -> Iterator[Row]:
     yield Row("counters_by_two", "all samples: the counter skips every second number", Must(), by_two)
     back = bus.counting(bus.SAMPLES, lambda i: -i)
     yield Row("counters_backwards", "all samples: the counter runs backwards", Must(_COMMUNICATION, 20), back)
-    stands = bus.commands(lambda _: bus.command(0))
     hangs = Must(_COMMUNICATION, 251, torque_ends=_ABANDONED_ENDS)
-    yield Row("command_counter_frozen", "COMMAND: the counter stands", hangs, stands)
+    yield Row("command_counter_frozen", "COMMAND: the last one again and again", hangs, bus.hanging_command())
+    other = bus.commands(lambda _: bus.command(0))
+    once = replace(hangs, torque_ends=_ABANDONED_ENDS + 1.25)  # its first one is that of a new sender
+    yield Row("command_counter_elsewhere", "COMMAND: the counter jumps and then stands", once, other)
     ahead = bus.commands(lambda i: bus.command(5 * i))
     yield Row("command_counter_skips", "COMMAND: the counter skips four of five", Must(), ahead)
 
@@ -320,7 +322,6 @@ _SATURATED = "the value is one that a sensor may have; it is believed for 20 ms,
 _BASE = "seen by its effect on the innovations alone, which takes that long"
 _CLOCK = "time is that of the samples: the firmware has no clock to compare it with"
 KNOWN: dict[str, str] = {
-    "command_counter_frozen": "a second after the last accepted COMMAND the next may have any counter",
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
     "theta_saturated": _SATURATED,
     "theta_gain_drift": _TWO_RATES,
