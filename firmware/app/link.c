@@ -2,6 +2,7 @@
 
 #include "app/instance.h"
 
+#include <math.h>
 #include <stddef.h>
 
 #define BIT(output) ((uint32_t)1u << (uint32_t)(output))
@@ -86,6 +87,12 @@ static enum lever_frame_result on_grip_sample(link_t *link, const lever_frame_t 
     return LEVER_FRAME_TAKEN;
 }
 
+/* At an end of its range a sender has saturated: what it measures is beyond. */
+static bool is_measured(bool valid, float value, float most)
+{
+    return valid && (fabsf(value) < most);
+}
+
 /* Completes the sample with the LEVER_SAMPLE and GRIP_SAMPLE of the same counter, as far as they have come. */
 static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
 {
@@ -97,13 +104,13 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     lever_sample_t *sample = &link->sample;
     sample->time_us = base.time_us;
     sample->z_ddot = base.z_ddot;
-    sample->z_ddot_valid = base.z_ddot_valid;
+    sample->z_ddot_valid = is_measured(base.z_ddot_valid, base.z_ddot, MESSAGE_Z_DDOT_MOST);
     sample->theta = lever->theta;
     sample->theta_dot = lever->theta_dot;
     sample->tau_m = lever->tau_m;
-    sample->theta_valid = paired && lever->theta_valid;
-    sample->theta_dot_valid = paired && lever->theta_dot_valid;
-    sample->tau_m_valid = paired && lever->tau_m_valid;
+    sample->theta_valid = paired && is_measured(lever->theta_valid, lever->theta, MESSAGE_THETA_MOST);
+    sample->theta_dot_valid = paired && is_measured(lever->theta_dot_valid, lever->theta_dot, MESSAGE_THETA_DOT_MOST);
+    sample->tau_m_valid = paired && is_measured(lever->tau_m_valid, lever->tau_m, MESSAGE_TAU_M_MOST);
     sample->grip_force = link->grip_sample.grip_force;
     sample->grip_force_valid = gripped && link->grip_sample.grip_force_valid;
     estimator->lost += paired ? 0u : 1u;

@@ -75,6 +75,12 @@ enum message_data_id {
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
 
+/* The greatest values that a sample can carry, and the least with a minus. */
+#define MESSAGE_THETA_MOST 3.2767f      /* [rad] */
+#define MESSAGE_THETA_DOT_MOST 16.3835f /* [rad/s] */
+#define MESSAGE_TAU_M_MOST 32.767f      /* [N m] */
+#define MESSAGE_Z_DDOT_MOST 32.767f     /* [m/s^2] */
+
 typedef struct message_lever_sample {
     float theta;     /* [rad] */
     float theta_dot; /* [rad/s] */

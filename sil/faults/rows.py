@@ -263,7 +263,7 @@ def _readings() -> Iterator[Row]:
         faults = {
             "invalid": ("marked invalid", readings.reads(signal, math.nan), gone),
             "not_available": ("NaN-coded but marked valid", readings.reads(signal, math.inf), gone),
-            "saturated": ("saturated", readings.reads(signal, readings.GREATEST[signal]), still),
+            "saturated": ("saturated", readings.reads(signal, readings.GREATEST[signal]), still if grip else gone),
             "stuck": ("stuck", readings.stuck(signal), still),
             "zero": ("zero", readings.reads(signal, 0.0), still),
             "step": ("off by a step", readings.step(signal), Must()),
@@ -318,21 +318,16 @@ ROWS = {row.name: row for row in _table()}
 """All by name, in the order of the table."""
 
 _TWO_RATES = "angle and rate are not compared with each other; the arm that fits both is another one"
-_SATURATED = "the value is one that a sensor may have; it is believed for 20 ms, and its level passes the high-passes"
 _BASE = "seen by its effect on the innovations alone, which takes that long"
 _CLOCK = "time is that of the samples: the firmware has no clock to compare it with"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
-    "theta_saturated": _SATURATED,
     "theta_gain_drift": _TWO_RATES,
-    "theta_dot_saturated": _SATURATED,
     "theta_dot_step": "for some pilots, an offset is mistaken for a change of the arm",
     "theta_dot_gain_half": _TWO_RATES,
     "theta_dot_gain_double": _TWO_RATES,
-    "tau_m_saturated": "what is measured without regard to what is asked may be torque of other origin",
     "tau_m_stuck": "shows by the dither that it does not follow, after a second",
     "tau_m_zero": "as tau_m_stuck",
-    "z_ddot_saturated": _SATURATED,
     "z_ddot_step": "for some pilots, an offset is mistaken for a change of the arm",
     "z_ddot_gain_half": _BASE,
     "z_ddot_gain_double": _BASE,
