@@ -51,7 +51,7 @@ def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
 
 
 def command(counter: int, **values: codec.Value) -> Frame:
-    keep = {"request": "none", "dither_rms": math.inf, **dict.fromkeys(CHOICES, "keep")}
+    keep: dict[str, codec.Value] = {"request": "none", "dither_rms": math.inf, **dict.fromkeys(CHOICES, "keep")}
     return Frame(COMMAND, codec.encode("COMMAND", counter, keep | values))
 
 
