@@ -28,6 +28,8 @@ ARITHMETIC: dict[type[ast.operator], type[ast.operator]] = {
     ast.Pow: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.LShift: ast.RShift, ast.RShift: ast.LShift,
     ast.BitXor: ast.BitAnd, ast.MatMult: ast.Mult,
 }  # fmt: skip
+SYMMETRIC = {"max", "min", "np.maximum", "np.minimum"}
+"""The same whichever argument comes first."""
 UNTOUCHED = {"annotation", "returns", "format_spec", "decorator_list", "type_comment"}
 """Fields of a node that decide nothing."""
 
@@ -65,7 +67,7 @@ def _operators(node: ast.AST) -> Iterator[ast.AST]:
         yield ast.BoolOp(ast.Or() if isinstance(node.op, ast.And) else ast.And(), node.values)
     elif isinstance(node, ast.UnaryOp):
         yield node.operand
-    elif isinstance(node, ast.Call) and len(node.args) > 1:
+    elif isinstance(node, ast.Call) and len(node.args) > 1 and ast.unparse(node.func) not in SYMMETRIC:
         first, second, *rest = node.args
         if ast.dump(first) != ast.dump(second) and not isinstance(second, ast.Starred):
             yield ast.Call(node.func, [second, first, *rest], node.keywords)

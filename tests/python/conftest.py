@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import can
 import pytest
@@ -22,6 +22,9 @@ from lever_cdkf.host_tools.firmware.native import Config
 from lever_cdkf.sil.run.runner import Result, simulate
 from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.scenarios.scenario import Scenario
+
+if TYPE_CHECKING:
+    from python.watch.browser import Browser
 
 
 class PuppetBus(can.BusABC):
@@ -216,6 +219,15 @@ def installed() -> str:
         return metadata.version("lever-cdkf")
     except metadata.PackageNotFoundError:
         pytest.skip("the package is not installed: pip install .")
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Of all tests, each of which begins anew."""
+    from python.watch.browser import Browser
+
+    with Browser() as started:
+        yield started
 
 
 SHORT = ["duration=6 s", "converged_after=2 s", "limits={}"]

@@ -382,22 +382,6 @@ sys.exit(f"imports {slow}" if slow else 0)
 
 
 @BROWSER
-@pytest.mark.parametrize("width", [1280, 500])
-def test_renders_without_complaint_and_without_sideways_scrolling(report: Path, tmp_path: Path, width: int) -> None:
-    probe = "<script>window.addEventListener('load', () => setTimeout(() => { document.title = 'width ' + "
-    probe += "document.documentElement.scrollWidth + ' of ' + document.documentElement.clientWidth; }, 3000));</script>"
-    copy = tmp_path / "probed.html"
-    copy.write_text(report.read_text(encoding="utf-8").replace("</body>", f"{probe}</body>"), encoding="utf-8")
-    size = f"--window-size={width},900"
-    result = screenshot.browse(copy.as_uri(), "--dump-dom", "--enable-logging=stderr", size)
-    assert [line for line in result.stderr.splitlines() if "CONSOLE" in line] == []
-    drawn = re.findall(r'class="chart[^"]*js-plotly-plot[^"]*"', result.stdout)
-    assert len(drawn) == len(FIGURES)
-    wanted, present = map(int, re.search(r"width (\d+) of (\d+)", result.stdout).groups())  # type: ignore[union-attr]
-    assert wanted <= present
-
-
-@BROWSER
 def test_the_picture_for_a_readme_is_a_png(report: Path, tmp_path: Path) -> None:
     assert screenshot.main([str(report), str(tmp_path / "picture.png")]) == 0
     head = (tmp_path / "picture.png").read_bytes()[:24]

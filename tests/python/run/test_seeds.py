@@ -89,7 +89,10 @@ def test_troubles_name_their_seeds() -> None:
     assert seeds.troubles(runs) == ["samples without an answer with seed 4", "the estimator in fault with seed 4"]
 
 
-def test_a_run_in_a_process_is_the_single_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_in_a_process_is_the_single_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(interrupts, "START", 0.0)
     tasks = [seeds.Task("steady", seed, SHORT) for seed in (5, 6)]
     calls: list[tuple[int, int, str]] = []
     apart = seeds.run(tasks, jobs=2, progress=lambda *progress: calls.append(progress))
