@@ -133,8 +133,9 @@ def _make(names: Sequence[str], maps: Mapping[str, MapFigure], args: argparse.Na
             progress.show(done, len(names))
             figure = maps[name] if name in maps else FIGURES[name](args.seed, Extent())
             figures.append(figure)
+            sheet = printed.sheet(figure, args.width)
             for kind in pictures.KINDS:
-                keep(f"{name}.{kind}", printed.render(figure, kind, args.width, origin))
+                keep(f"{name}.{kind}", pictures.render(sheet, kind, figure.title, origin))
             keep(f"{name}.csv", data.table(figure).encode())
         keep(_PAGE, with_provenance(figures_page.build(figures), origin).encode())
         keep(_CAPTIONS, _captions(figures).encode())
