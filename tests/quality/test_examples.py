@@ -30,7 +30,6 @@ SHORTER = {
     r"lever compare --models": "lever compare --duration 2 --scenarios step_up --models",
     r"--start 60 --length 120": "--length 20.5",
     **readmes.SHORTER,
-    r"lever sim sudden_grip": 'lever sim sudden_grip --set "limits={}"',
 }
 """The same command, with less to calculate."""
 USERS_FILES = """
