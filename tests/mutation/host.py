@@ -46,7 +46,7 @@ class Test:
     name: str
     seconds: float
     reached: frozenset[str]
-    """path:line of the functions it calls."""
+    """path:name() of the functions it calls."""
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def _called(frame: FrameType, event: str, argument: Any) -> None:
     if path.startswith(_under):
         try:
             with _open(f"{_folder}/{os.getpid()}", "a", encoding="utf-8") as file:
-                file.write(f"{path}:{code.co_firstlineno}\n")
+                file.write(f"{path}:{code.co_name}()\n")
         except OSError:  # a test lets no file grow
             return
     _noted[id(code)] = code
