@@ -127,7 +127,7 @@ BROKEN: dict[str, tuple[judge.Must, Callable[[Record], Record]]] = {
     "unanswered": (judge.Must(), lambda right: replace(right, unanswered=1)),
     "torque": (
         judge.Must(),
-        lambda right: replace(right, asked=np.where(right.asked == right.asked.max(), 2.001, 0.0)),
+        lambda right: replace(right, asked=2.001 * (right.asked == right.asked.max())),
     ),
     "torque rms": (judge.Must(), lambda right: replace(right, asked=np.full_like(right.asked, 1.001))),
     "torque left": (judge.Must(torque_ends=0.06), lambda right: right),
