@@ -74,6 +74,15 @@ def test_frames_arrive_as_the_fault_says() -> None:
     assert arrive(bus.stale("BASE_SAMPLE"))[5:8] == [(2, 2, 1), (3, 3, 0), (3, 2, 1)]
 
 
+@pytest.mark.parametrize(("usual", "expected"), [(False, []), (True, [250, 500])])
+def test_other_commands_come_beside_the_usual_ones_or_instead(usual: bool, expected: list[int]) -> None:
+    sent = bus.Bus(1000, 1e-3, False, 0.3, np.random.default_rng(1))
+    bus.commands(bus.unknown_command, 100, usual)(sent, (0.2, 0.6))
+    frames = sent.delivered()
+    at = frames["at"][frames["id"] == 0x120].tolist()
+    assert at == sorted([0, 200, 300, 400, 500, 750, *expected])
+
+
 def test_readings_are_spoilt_as_the_fault_says() -> None:
     def spoilt(fault: readings.Fault) -> readings.Readings:
         right = readings.Readings.right(6, 1e-3, np.random.default_rng(1))
