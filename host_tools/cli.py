@@ -113,8 +113,8 @@ def _check_json(args: argparse.Namespace) -> None:
     """Before a command has worked for --json FILE; a folder that it makes itself, by --out, need not be there yet."""
     path, out = getattr(args, "json", None), getattr(args, "out", None)
     if path is not None:
-        made = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
-        if Path(path).absolute().parent not in made or Path(path).parent.exists():
+        folders = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
+        if Path(path).absolute().parent not in folders or Path(path).parent.exists():
             check_writable(path)
 
 

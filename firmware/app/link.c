@@ -1,6 +1,7 @@
 #include "app/link.h"
 
 #include "app/instance.h"
+#include "math/elapsed.h"
 
 #include <stddef.h>
 
@@ -44,10 +45,8 @@ static void start_session(link_t *link)
 
 void link_init(link_t *link, const lever_settings_t *settings)
 {
-    const float period_us = (settings->sample_period * 1.0e6f) + 0.5f;
-    const float publish_us = (settings->publish_period * 1.0e6f) + 0.5f;
-    link->period_us = (uint32_t)period_us;
-    link->publish_us = (uint32_t)publish_us;
+    link->period_us = microseconds_of(settings->sample_period);
+    link->publish_us = microseconds_of(settings->publish_period);
     link->identity_us = LONG_AGO_US;
     link->frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;
     link->settings_crc = lever_settings_crc(settings);
@@ -245,7 +244,7 @@ static void pass_time(link_t *link, uint32_t time_us)
     link->time_us = time_us;
     link->set_us += elapsed_us;
     link->identity_us += elapsed_us;
-    link->duplicate_us -= (elapsed_us < link->duplicate_us) ? elapsed_us : link->duplicate_us;
+    link->duplicate_us = time_left(link->duplicate_us, elapsed_us);
     if (link->identity_us >= IDENTITY_US) {
         link->identity_us = 0u;
         link->pages = (uint8_t)EVERY_PAGE;
@@ -283,7 +282,7 @@ enum lever_mode link_step(lever_t *lever)
 void link_idle(lever_t *lever, uint32_t elapsed_us)
 {
     link_t *link = &lever->link;
-    link->duplicate_us -= (elapsed_us < link->duplicate_us) ? elapsed_us : link->duplicate_us;
+    link->duplicate_us = time_left(link->duplicate_us, elapsed_us);
     if (instance_is_driving(lever)) {
         link->due |= (uint16_t)BIT(OUTPUT_MOTOR_COMMAND);
     }

@@ -104,4 +104,4 @@ def test_a_seeded_fault_is_found(name: str, folder: Path, tmp_path: Path) -> Non
     mutant = tmp_path / "mutant.c"
     mutant.write_text(source.replace(fault.right, fault.wrong), encoding="utf-8")
     program = build(fault.target, folder, (fault.path, mutant))
-    assert libfuzzer.run(program, tmp_path / "corpus", [SEED, f"-runs={RUNS[fault.target]}"]).found
+    assert libfuzzer.run(program, tmp_path / "corpus", [SEED, f"-runs={8 * RUNS[fault.target]}"]).found

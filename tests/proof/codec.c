@@ -67,7 +67,7 @@ static void prove_all(float f)
 
 void main(void)
 {
-    prove_all(Frama_C_float_interval(-3.4028235e38f, 3.4028235e38f));
+    prove_all(any_finite());
     prove_all(INFINITY);
     prove_all(-INFINITY);
 }

@@ -24,7 +24,7 @@ void main(void)
             //@ assert frame.frame.length <= 8;
         }
         const slcan_frame_t sent = {any_frame(), any_bool(), any_bool()};
-        (void)slcan_send(&slcan, &sent, Frama_C_unsigned_int_interval(0u, UINT32_MAX));
+        (void)slcan_send(&slcan, &sent, any_word());
         if (any_bool()) {
             slcan_hang_up(&slcan);
         }

@@ -1,5 +1,4 @@
-"""No execution of codec, E2E, SLCAN, torque gate and numeric kernels has undefined behaviour; and what is put there is
-found."""
+"""No execution of what the harnesses run has undefined behaviour; and what is put there is found."""
 
 from __future__ import annotations
 
@@ -13,6 +12,7 @@ SEEDED = {
     "e2e": ("can/e2e.c", "(size_t)FRAME_BYTES - 1u", "(size_t)FRAME_BYTES"),
     "codec": ("can/layout.c", "i < layout->codes", "i <= layout->codes"),
     "kernels": ("math/trigonometry.c", "(fabsf(angle) <= 30.0f) ? angle : 0.0f", "angle"),
+    "link": ("app/link.c", "for (; link->parts < (uint8_t)PARTS; link", "for (; link->parts <= (uint8_t)PARTS; link"),
     "slcan": ("port/slcan/slcan.c", "((uint32_t)SLCAN_LINE_BYTES - 1u)", "((uint32_t)SLCAN_LINE_BYTES + 8u)"),
     "torque_gate": ("app/torque_gate.c", "(share < 1.0f) ? share : 1.0f", "(float)(int32_t)(share * 1.0e9f)"),
 }

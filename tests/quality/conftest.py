@@ -80,7 +80,7 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same lever as an aircraft records it that knows nothing of lever.dbc: a database, and logs."""
     folder = tmp_path_factory.mktemp("aircraft")
     (folder / "aircraft.dbc").write_text(AIRCRAFT, encoding="ascii")
-    flight = simulated(tmp_path_factory.mktemp("flight"), 25)
+    flight = simulated(tmp_path_factory.mktemp("flight"), 21)
     shutil.copy(flight / "bus.log", folder / "flight.log")
     trace = np.genfromtxt(flight / "trace.csv", delimiter=",", names=True)
     rows = np.column_stack((trace["time_s"], trace["theta_measured_rad"], trace["z_ddot_measured_m_s2"] / 9.80665 + 1))

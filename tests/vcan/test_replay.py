@@ -31,12 +31,12 @@ class Log:
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Log:
     folder = tmp_path_factory.mktemp("log")
-    made = Log(folder / "inputs.log", folder / "settings")
-    made.settings.write_text(lever("sim", *SCENARIO, "--settings"))
+    recording = Log(folder / "inputs.log", folder / "settings")
+    recording.settings.write_text(lever("sim", *SCENARIO, "--settings"))
     lever("sim", *SCENARIO, "--out", folder / "sim")
     lines = (folder / "sim/bus.log").read_text().splitlines(keepends=True)
-    made.path.write_text("".join(line for line in lines if line.split()[2][:3] in INPUTS))
-    return made
+    recording.path.write_text("".join(line for line in lines if line.split()[2][:3] in INPUTS))
+    return recording
 
 
 def play(log: Log, interface: str) -> None:
@@ -63,10 +63,10 @@ def test_the_process_answers_a_played_log_as_the_replay_does(
     lever("replay", log.path, "--settings", log.settings, "-o", tmp_path / "replay")
     assert answers(tmp_path / "replay/bus.log") == answers(recorded)
 
-    told = lever("replay", recorded, "--settings", log.settings, "-o", tmp_path / "again")
+    output = lever("replay", recorded, "--settings", log.settings, "-o", tmp_path / "again")
     assert answers(tmp_path / "again/bus.log") == answers(recorded)
-    assert "PILOT" not in told
-    assert "others" not in told
+    assert "PILOT" not in output
+    assert "others" not in output
 
 
 @pytest.mark.requires("canplayer", "cansend")

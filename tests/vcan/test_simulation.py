@@ -13,7 +13,7 @@ from processes import lever
 from vcan import rig
 
 SHORTENED = {
-    "steady": {"duration": "3 s"},
+    "steady": {"duration": "2 s"},
     "fixed_preload": {"duration": "0.5 s"},
     "sensor_dropout": {
         "duration": "2 s",

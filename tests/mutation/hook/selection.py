@@ -17,7 +17,7 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from sitecustomize import note_in
+from sitecustomize import note_in  # type: ignore[import-not-found]
 
 IMPORTING = 300.0
 """[s] An interpreter that has not begun with its tests by then hangs."""

@@ -264,9 +264,9 @@ def test_an_estimator_that_does_not_tell_its_contract_is_told(flight: Flight) ->
     picture = Picture()
     for _ in range(40):
         picture.take([frame for frame in flight.frames(100) if frame[0] != 0x217], flight.sample * 1e-3)
-        told = status.condition(picture)
-        assert (told[0] == "bad") is (picture.now > 3.1 + 1e-9)
-    assert told[1].startswith("the estimator does not send its version (IDENTITY): ")
+        shown = status.condition(picture)
+        assert (shown[0] == "bad") is (picture.now > 3.1 + 1e-9)
+    assert shown[1].startswith("the estimator does not send its version (IDENTITY): ")
 
 
 def test_a_second_estimator_on_the_bus_is_told(make_flight: Callable[..., Flight]) -> None:

@@ -22,10 +22,10 @@ URGENT = Frame(0x010, b"\x55" * 8)
 @pytest.mark.parametrize(
     ("name", "changes"),
     [
-        ("steady", ["duration=3 s"]),
-        ("steady", ["duration=1 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
-        ("linear_black_box", ["duration=1 s", "estimator.estimator=joint"]),
-        ("linear_physical", ["duration=1 s", "settings={}"]),  # the image has its own
+        ("steady", ["duration=1.5 s"]),
+        ("steady", ["duration=0.6 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
+        ("linear_black_box", ["duration=0.6 s", "estimator.estimator=joint"]),
+        ("linear_physical", ["duration=0.6 s", "settings={}"]),  # the image has its own
     ],
 )
 def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(

@@ -270,9 +270,11 @@ TEST(off_is_obeyed_in_any_order)
     lever_command_t off = command_none();
     const lever_frame_t on = dither_frame(0.3f);
     TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_ACCEPTED, answer_to(&on).result);
+    command_counter = (uint8_t)(command_counter + 9u); /* a sender that has started again */
+    const lever_frame_t more = dither_frame(0.5f);
+    TEST_ASSERT_EQUAL_FLOAT(0.3f, answer_to(&more).dither_rms);
     off.request = (uint8_t)LEVER_REQUEST_FREEZE;
     off.dither_rms = 0.0f;
-    command_counter = (uint8_t)(command_counter + 9u); /* a sender that has started again */
     const lever_frame_t frame = command_frame(&off);
     const message_command_ack_t ack = answer_to(&frame);
     TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_SEQUENCE, ack.result);

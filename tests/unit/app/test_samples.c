@@ -1,4 +1,5 @@
 /* Single samples: what is missing, invalid, implausible, late, twice; time that wraps or starts anew. */
+#include "app/instance.h"
 #include "model/model.h"
 #include "rig.h"
 
@@ -217,6 +218,65 @@ TEST(late_samples_that_do_not_advance_are_no_new_clock)
     TEST_ASSERT_EQUAL_UINT32(1005u, health().samples);
 }
 
+/* Samples so many milliseconds before the last good one; of a clock that starts anew they advance by gap_limit on end,
+ * from one to the next by no more. A good one (0) begins it again, as does one that stands. */
+TEST(a_new_clock_advances_by_gap_limit_on_end)
+{
+    static const struct {
+        uint32_t before_us[5];
+        enum lever_mode mode;
+    } row[] = {{{10000000u, 9500000u}, LEVER_MODE_ALIGN}, {{10000000u, 9500001u}, LEVER_MODE_RUN},
+        {{10000000u, 9499999u, 9000000u}, LEVER_MODE_RUN}, {{10000000u, 9600000u, 9500000u}, LEVER_MODE_ALIGN},
+        {{10000000u, 0u, 9600000u, 9450000u}, LEVER_MODE_RUN},
+        {{10000000u, 9600000u, 9600000u, 9450000u}, LEVER_MODE_RUN}};
+    (void)run(1000u);
+    const lever_memory_t before = memory;
+    const uint32_t then_us = time_us;
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        enum lever_mode mode = LEVER_MODE_RUN;
+        memory = before;
+        for (uint32_t k = 0u; (k < 5u) && ((k < 2u) || (row[i].before_us[k] != 0u)); k++) {
+            lever_sample_t sample = sample_after(0u);
+            sample.time_us = (row[i].before_us[k] == 0u) ? (then_us + 1000u) : (then_us - row[i].before_us[k]);
+            mode = lever_update(lever, &sample);
+        }
+        TEST_ASSERT_EQUAL(row[i].mode, mode);
+    }
+}
+
+/* A sample that is half a turn ahead is as well behind: late. One of a quarter of a period is not too early. */
+TEST(time_is_judged_to_the_microsecond)
+{
+    for (uint32_t i = 0u; i < 2u; i++) {
+        config.settings.sample_period = 4.0e-3f;
+        start();
+        (void)run(500u);
+        lever_sample_t sample = sample_after(0u);
+        sample.time_us += 0x80000000u - i;
+        (void)lever_update(lever, &sample);
+        TEST_ASSERT_EQUAL_UINT32(1u - i, health().late);
+    }
+    for (uint32_t i = 0u; i < 2u; i++) {
+        start();
+        (void)run(500u);
+        lever_sample_t sample = sample_after(0u);
+        sample.time_us += 1000u - i;
+        (void)lever_update(lever, &sample);
+        TEST_ASSERT_EQUAL(i == 1u, has_fault(LEVER_FAULT_CLOCK));
+    }
+}
+
+/* There is nothing to extrapolate from. */
+TEST(the_first_base_acceleration_is_taken_as_it_is_whatever_the_delay)
+{
+    config.settings.z_ddot_delay = 5.0e-3f;
+    start();
+    lever_sample_t sample = sample_after(1u);
+    sample.z_ddot = 2.0f;
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_EQUAL_FLOAT(2.0f, lever->estimator.last_z_ddot);
+}
+
 /* R30 */
 TEST(time_may_wrap_at_2_to_the_32)
 {
@@ -233,4 +293,34 @@ TEST(time_may_wrap_at_2_to_the_32)
     wrapped.time_us = plain.time_us;
     TEST_ASSERT_EQUAL_MEMORY(&plain, &wrapped, sizeof plain);
     TEST_ASSERT_EQUAL_UINT32(0u, health_of(other).lost + health_of(other).late);
+}
+
+/* After more than 20.5 ms its level has to settle; in between the state has noise for it, and less for a wrong one. */
+TEST_EACH(2, a_base_that_is_back_has_to_settle_after_20_ms)
+{
+    const uint32_t missing = 20u + test_round;
+    (void)run(3005u); /* not to the end of a block */
+    for (uint32_t k = 0u; k < missing; k++) {
+        lever_sample_t sample = sample_after(1u);
+        invalidate(&sample, 3u);
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_EQUAL_FLOAT(10.0f * config.settings.theta_dot_process_noise, lever->estimator.cdkf.disturbance);
+    (void)run(1u);
+    TEST_ASSERT_EQUAL(test_round == 1u, has_fault(LEVER_FAULT_SETTLING));
+    lever->estimator.learning.monitor.base_wrong = true;
+    (void)run(1u);
+    TEST_ASSERT_EQUAL_FLOAT(3.0f * config.settings.theta_dot_process_noise, lever->estimator.cdkf.disturbance);
+}
+
+/* Not twice as far, as while levels settle: here the last moment of that is over. */
+TEST(a_spike_is_one_as_soon_as_the_levels_have_settled)
+{
+    (void)run(3000u);
+    lever->estimator.trim.unsettled = 0.0f;
+    lever->estimator.averages.innovation = 1.0f;
+    lever_sample_t sample = sample_after(1u);
+    sample.theta += 12.0f * config.settings.theta_noise;
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_EQUAL_UINT32(1u, health().corrupt);
 }

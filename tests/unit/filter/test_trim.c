@@ -96,6 +96,48 @@ TEST(a_prediction_that_is_none_does_not_reach_the_level)
     for (uint32_t k = 0u; k < 4u; k++) {
         setUp();
         (void)run_without(1u, 5u, wild[k]);
-        TEST_ASSERT_TRUE(trim_angle(&trim) == 0.35f);
+        TEST_ASSERT_TRUE((trim_angle(&trim) == 0.35f) && (trim.ahead[0] == 0.0f));
     }
+    (void)run_without(1u, 1u, 25.0f); /* the greatest angle that is one */
+    TEST_ASSERT_TRUE(trim.ahead[0] > 0.0f);
+}
+
+/* The level takes the line in steps of a sample period, rounded, but at most 24. In double precision. */
+TEST(a_level_takes_the_straight_line_to_a_sample_that_is_back)
+{
+    static const struct {
+        double missing; /* [sample periods] */
+        uint32_t steps;
+    } row[] = {{1.3, 2u}, {1.6, 3u}, {15.0, 16u}, {100.0, 24u}};
+    static const double damping[TRIM_SECTIONS] = {1.9318516526, 1.4142135624, 0.5176380902};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        const float x[MODEL_STATES] = {0.0f, 0.0f};
+        const bool valid[MODEL_STATES] = {true, true};
+        float y[MODEL_STATES] = {1.35f, 0.0f};
+        double section[TRIM_SECTIONS][2] = {{0.35, 0.0}}; /* level and slope */
+        double deviation = 0.0;
+        const double turn = 6.283185307 * 1.0e-4 * (row[i].missing + 1.0) / (double)row[i].steps;
+        for (uint32_t k = 1u; k <= row[i].steps; k++) {
+            deviation = 0.35 + ((double)k / (double)row[i].steps);
+            for (uint32_t n = 0u; n < (uint32_t)TRIM_SECTIONS; n++) {
+                deviation -= section[n][0];
+                section[n][1] += turn * deviation;
+                section[n][0] += turn * (section[n][1] + (damping[n] * deviation));
+            }
+        }
+        setUp();
+        trim.missing[0] = (float)(1.0e-4 * row[i].missing);
+        (void)trim_outputs(&trim, x, y, valid, 1.0e-4f);
+        TEST_ASSERT_FLOAT_WITHIN(2.0e-6f, (float)deviation, y[0]);
+    }
+}
+
+/* The last samples are those of the outputs still. */
+TEST(levels_that_begin_anew_leave_the_last_samples)
+{
+    const float x[MODEL_STATES] = {0.1f, 0.2f};
+    trim.last[0] = 0.4f;
+    trim_begin(&trim, x);
+    TEST_ASSERT_TRUE((trim.last[0] == 0.4f) && (trim.begin_rate == 0.2f));
+    TEST_ASSERT_EQUAL_FLOAT(0.45f, trim_angle(&trim));
 }
