@@ -33,7 +33,7 @@ TESTS = ("tests/python", "tests/accuracy", "tests/slcan", "tests/target/slcan")
 IMPORTED = "<module>()"
 PATIENCE = 10
 """A mutant hangs when a test takes so many times as long as without."""
-GRACE = 60.0
+GRACE = 240.0
 NO_TESTS = 5
 """Exit status of pytest."""
 IMPORTING = 300.0
