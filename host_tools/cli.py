@@ -50,7 +50,7 @@ a first session:
 command ran, but what it checks does not hold (limits of a scenario, no estimate from a log, …); 2 with one line on
 standard error when the command line or an input is wrong; 130, with one line too, after Ctrl-C.
 
-Tables fold at the width of the terminal. In a pipe or file each row is one line, unless COLUMNS says how wide.
+Tables wrap at the width of the terminal. In a pipe or file each row is one line, unless COLUMNS says how wide.
 """
 
 

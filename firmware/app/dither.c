@@ -90,7 +90,7 @@ void dither_set(dither_t *dither, float rms, bool at_once)
     if (at_once) {
         dither->slope = change;
     } else if ((target < dither->target) || (target > dither->target)) { /* the same again goes on as it does */
-        dither->slope = (dither->fade > 1.0f) ? (change / dither->fade) : change;
+        dither->slope = change / greater(dither->fade, 1.0f);
     } else {
         /* repeated */
     }

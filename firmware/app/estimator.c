@@ -117,10 +117,10 @@ static void check(
     checked->base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
     checked->grip_force = sample->grip_force;
-    if (torque && monitor_takes_torque(estimator->samples)) {
-        monitor_add_torque(monitor, own_torque, sample->tau_m * estimator->setup.torque_scale);
-    }
     checked->tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
+    if (torque && monitor_takes_torque(estimator->samples)) {
+        monitor_add_torque(monitor, own_torque, checked->tau_m);
+    }
     checked->z_ddot = checked->base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked->z_ddot;
     estimator->last_tau_m = checked->tau_m;

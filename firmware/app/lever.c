@@ -303,6 +303,11 @@ enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *fram
     return link_on_frame(lever, frame);
 }
 
+void lever_refuse(lever_t *lever, const lever_frame_t *command, uint8_t result)
+{
+    link_refuse(lever, command, result);
+}
+
 enum lever_mode lever_step(lever_t *lever)
 {
     return link_step(lever);

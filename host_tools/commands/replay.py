@@ -24,7 +24,7 @@ _DESCRIPTION = f"""\
 Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints its estimates; with --out also
 writes into DIR
 
-  bus.log        what the estimator got and what it answered, in the format of candump, on recorded time
+  bus.log        frames to and from the estimator, in the format of candump, in recorded time
   trace.csv      measured, estimated, standard deviations and health, a row for each sample
   signals.mf4    the same signals with units and comments, for asammdf, PlotJuggler and the like
   signals.mcap   with --format mcap: the same as messages, for Foxglove
@@ -34,13 +34,13 @@ writes into DIR
 
 LOG is a log of candump -L (.log, or - for standard input), or .blf, .asc, .mf4, .trc, .csv or .db, compressed (.gz) or
 not, or a file of columns (see below). Several logs are taken one after another in the order of their first frames, or
-with --each as recordings of their own. Whatever else is in a log, other messages, other buses, damaged lines, is
-counted and left out. If it holds estimates too, of the firmware that ran when it was recorded, and of this version of
-lever.dbc (IDENTITY says so), they are compared with the new ones, signal by signal.
+with --each as separate recordings. Other messages, other buses and damaged lines are counted and left out. If the log
+also holds estimates, of the firmware that ran when it was recorded and by this version of lever.dbc (IDENTITY says so),
+they are compared with the new ones, signal by signal.
 
 {MAP_HELP}
-The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
-choice (model, preload, estimator, adaptation, mitigation) that is made here. sample_period is that of mapped signals.
+The settings are the firmware's defaults, changed by --settings and --set. COMMAND frames in the log are obeyed, except
+for a choice (model, preload, estimator, adaptation, mitigation) that is made here. Mapped signals set sample_period.
 """
 _EPILOG = """\
 examples:
@@ -60,11 +60,11 @@ standard error.
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
-        "replay", help="estimate again from recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
+        "replay", help="run the firmware on recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log; several are one recording in pieces")
     parser.add_argument(
-        "--each", action="store_true", help="every LOG is a recording of its own: one table, one page, a row for each"
+        "--each", action="store_true", help="every LOG is a separate recording: one table, one page, a row for each"
     )
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     parser.add_argument(

@@ -40,7 +40,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("aircraft", nargs="?", metavar="AIRCRAFT", help="a name, or a .toml or .csv file")
-    parser.add_argument("changes", nargs="*", metavar="KEY=VALUE", help="what is other than there")
+    parser.add_argument("changes", nargs="*", metavar="KEY=VALUE", help="values to change")
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write it into FILE")
 
 

@@ -203,6 +203,16 @@ def commands(data: Callable[[int], bytes], every: int = KEEP_ALIVE, usual: bool 
     return spoil
 
 
+def hanging_command() -> Fault:
+    """The last COMMAND before is sent again and again, as by a mailbox that nobody writes to any more."""
+
+    def spoil(bus: Bus, time: Interval) -> None:
+        later = bus.sent("COMMAND", time)
+        bus.frames["change"][later] = bus.frames["change"][bus.sent("COMMAND", (0.0, time[0]))[-1]]
+
+    return spoil
+
+
 def flood(values: Sequence[Mapping[str, codec.Value]], last: Mapping[str, codec.Value], each: int = 1) -> Fault:
     """A new COMMAND in each sample, or several, which take turns; then one that sets things right again."""
 

@@ -142,9 +142,11 @@ def _counters() -> Iterator[Row]:
     yield Row("counters_by_two", "all samples: the counter skips every second number", Must(), by_two)
     back = bus.counting(bus.SAMPLES, lambda i: -i)
     yield Row("counters_backwards", "all samples: the counter runs backwards", Must(_COMMUNICATION, 20), back)
-    stands = bus.commands(lambda _: bus.command(0))
     hangs = Must(_COMMUNICATION, 251, torque_ends=_ABANDONED_ENDS)
-    yield Row("command_counter_frozen", "COMMAND: the counter stands", hangs, stands)
+    yield Row("command_counter_frozen", "COMMAND: the last one again and again", hangs, bus.hanging_command())
+    other = bus.commands(lambda _: bus.command(0))
+    once = replace(hangs, torque_ends=_ABANDONED_ENDS + 1.25)  # its first one is that of a new sender
+    yield Row("command_counter_elsewhere", "COMMAND: the counter jumps and then stands", once, other)
     ahead = bus.commands(lambda i: bus.command(5 * i))
     yield Row("command_counter_skips", "COMMAND: the counter skips four of five", Must(), ahead)
 
@@ -261,7 +263,7 @@ def _readings() -> Iterator[Row]:
         faults = {
             "invalid": ("marked invalid", readings.reads(signal, math.nan), gone),
             "not_available": ("NaN-coded but marked valid", readings.reads(signal, math.inf), gone),
-            "saturated": ("saturated", readings.reads(signal, readings.GREATEST[signal]), still),
+            "saturated": ("saturated", readings.reads(signal, readings.GREATEST[signal]), still if grip else gone),
             "stuck": ("stuck", readings.stuck(signal), still),
             "zero": ("zero", readings.reads(signal, 0.0), still),
             "step": ("off by a step", readings.step(signal), Must()),
@@ -316,22 +318,16 @@ ROWS = {row.name: row for row in _table()}
 """All by name, in the order of the table."""
 
 _TWO_RATES = "angle and rate are not compared with each other; the arm that fits both is another one"
-_SATURATED = "the value is one that a sensor may have; it is believed for 20 ms, and its level passes the high-passes"
 _BASE = "seen by its effect on the innovations alone, which takes that long"
 _CLOCK = "time is that of the samples: the firmware has no clock to compare it with"
 KNOWN: dict[str, str] = {
-    "command_counter_frozen": "a second after the last accepted COMMAND the next may have any counter",
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
-    "theta_saturated": _SATURATED,
     "theta_gain_drift": _TWO_RATES,
-    "theta_dot_saturated": _SATURATED,
     "theta_dot_step": "for some pilots, an offset is mistaken for a change of the arm",
     "theta_dot_gain_half": _TWO_RATES,
     "theta_dot_gain_double": _TWO_RATES,
-    "tau_m_saturated": "what is measured without regard to what is asked may be torque of other origin",
     "tau_m_stuck": "shows by the dither that it does not follow, after a second",
     "tau_m_zero": "as tau_m_stuck",
-    "z_ddot_saturated": _SATURATED,
     "z_ddot_step": "for some pilots, an offset is mistaken for a change of the arm",
     "z_ddot_gain_half": _BASE,
     "z_ddot_gain_double": _BASE,

@@ -45,7 +45,7 @@ FAULTS = {
         "app", "firmware/app/torque_gate.c", "clamped(gate->gain * asked, gate->limit)", "(gate->gain * asked)"
     ),
     "torque that stays in silence": Fault(
-        "app", "firmware/app/torque_gate.c", "gate->output_left = left_of(gate->output_left, elapsed_us);", ""
+        "app", "firmware/app/torque_gate.c", "gate->output_left = time_left(gate->output_left, elapsed_us);", ""
     ),
     "a counter that stands": Fault(
         "app", "firmware/app/link.c", "(uint8_t)((link->counter[output] + 1u) & 15u)", "link->counter[output]"

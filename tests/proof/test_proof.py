@@ -14,7 +14,7 @@ SEEDED = {
     "kernels": ("math/trigonometry.c", "(fabsf(angle) <= 30.0f) ? angle : 0.0f", "angle"),
     "link": ("app/link.c", "for (; link->parts < (uint8_t)PARTS; link", "for (; link->parts <= (uint8_t)PARTS; link"),
     "slcan": ("port/slcan/slcan.c", "((uint32_t)SLCAN_LINE_BYTES - 1u)", "((uint32_t)SLCAN_LINE_BYTES + 8u)"),
-    "torque_gate": ("app/torque_gate.c", "(share < 1.0f) ? share : 1.0f", "(float)(int32_t)(share * 1.0e9f)"),
+    "torque_gate": ("app/torque_gate.c", "lesser(share, 1.0f)", "(float)(int32_t)(share * 1.0e9f)"),
 }
 """An overflow in a file of each harness: what is replaced by what."""
 

@@ -29,7 +29,7 @@ SHORTER = {
     r"--seeds \d+": "--seeds 1",
     r"lever compare --models": "lever compare --duration 2 --scenarios step_up --models",
     r"--start 60 --length 120": "--length 20.5",
-    r"lever tune flight\.\w+": r"\g<0> --keep m_p_walk --keep c_p_walk --keep k_p_walk",
+    **readmes.SHORTER_TUNE,
 }
 """The same command, with less to calculate."""
 USERS_FILES = """

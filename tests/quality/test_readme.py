@@ -38,12 +38,13 @@ NEEDED = {
 }
 """By blocks with these words in them."""
 SHORTER = {
-    r"lever tune \S+": r"\g<0> --keep m_p_walk --keep c_p_walk --keep k_p_walk",
+    **readmes.SHORTER_TUNE,
     r"--seeds 4": "--seeds 2",
     r"lever compare --scenarios step_up": r"\g<0> --duration 3",
     r"lever campaign quick(?= -o)": "lever campaign quick.toml --workers 1",
     r"lever campaign quick(?= --run)": "lever campaign quick.toml",
     r'duration="1 s"': 'duration="0.5 s"',
+    r'duration="40 s"': 'duration="21 s"',
 }
 """The same command, with less to calculate."""
 

@@ -91,7 +91,8 @@ def _run_inside(session: pytest.Session) -> Reports:
     config = session.config
     items = [item for item in session.items if _belongs_inside(item)]
     tests = [str(config.rootpath / item.nodeid) for item in items]
-    pytest_here = [sys.executable, "-m", "pytest", "--quiet", "-p", "no:cacheprovider", f"--rootdir={config.rootpath}"]
+    options = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest", f"--rootdir={config.rootpath}")
+    pytest_here = [sys.executable, "-m", "pytest", "--quiet", *options]
     found: Reports = defaultdict(list)
     with tempfile.TemporaryDirectory(prefix="lever-vcan-") as folder, open(f"{folder}/output", "w+b") as output:
         reports = Path(folder, "reports")

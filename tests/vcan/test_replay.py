@@ -11,7 +11,7 @@ import pytest
 from processes import LEVER, lever
 from vcan import rig
 
-SCENARIO = ("steady", "--set=duration=2 s", "--set=converged_after=1 s", "--set=limits={}")
+SCENARIO = ("steady", "--set=duration=1.2 s", "--set=converged_after=0.6 s", "--set=limits={}")
 INPUTS = ("110", "111", "120")
 """Identifiers of what the estimator takes."""
 
@@ -60,10 +60,11 @@ def test_the_process_answers_a_played_log_as_the_replay_does(
     assert not [name for name in ("overflowed", "unsent", "outages", "corrupt") if totals[name]]
     assert [frame for frame in rig.frames(recorded) if frame[:3] in INPUTS] == rig.frames(log.path)
 
-    lever("replay", log.path, "--settings", log.settings, "-o", tmp_path / "replay")
+    replay = ("--settings", log.settings, "--format", "csv", "-o")
+    lever("replay", log.path, *replay, tmp_path / "replay")
     assert answers(tmp_path / "replay/bus.log") == answers(recorded)
 
-    output = lever("replay", recorded, "--settings", log.settings, "-o", tmp_path / "again")
+    output = lever("replay", recorded, *replay, tmp_path / "again")
     assert answers(tmp_path / "again/bus.log") == answers(recorded)
     assert "PILOT" not in output
     assert "others" not in output
@@ -89,5 +90,5 @@ def test_record_has_every_frame_of_a_real_bus(log: Log, start: rig.Starter, inte
     assert ", 0 lost, 0 corrupt, 1 error frames, " in said
     assert "1 overflows of the controller" in said
     assert [frame for frame in rig.frames(path) if frame[:3] in INPUTS] == rig.frames(log.path)
-    lever("replay", path, "--settings", log.settings, "-o", tmp_path / "replay")
+    lever("replay", path, "--settings", log.settings, "--format", "csv", "-o", tmp_path / "replay")
     assert answers(tmp_path / "replay/bus.log") == answers(path)

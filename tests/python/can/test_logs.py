@@ -182,6 +182,7 @@ def test_other_failures_are_one_line_each(tmp_path: Path, refused: Refused) -> N
     error = refused("replay", foreign)
     assert "no sample" in error
     assert "can0, can1" in error
+    assert f"{foreign}: given twice" in refused("replay", foreign, tmp_path / "." / "foreign.log")
 
 
 @pytest.mark.requires("setpriv")

@@ -33,8 +33,8 @@ def make_board(can_image: Path) -> Iterator[Callable[..., Board]]:
 
 @pytest.fixture
 def board(make_board: Callable[..., Board]) -> Board:
-    """A board whose image is on the bus."""
-    new_board = make_board()
+    """A board whose image is on the bus, as if it had been built to take COMMANDs, which tests send."""
+    new_board = make_board(takes_commands=True)
     new_board.start()
     return new_board
 

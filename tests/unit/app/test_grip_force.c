@@ -57,7 +57,7 @@ static uint32_t judge(uint32_t blocks, float measured, float driven)
 /* Noise that the filter is given for a force over a step; negative: it is not used. */
 static float used_noise(void)
 {
-    static const float error[CDKF_CONSIDERED];
+    static const float error[CDKF_CONSIDERED] = {[CDKF_STEP] = 1.0f};
     const float force = 5.0f;
     const model_step_t step = {.period = 1.0e-3f, .trim_cosine = 0.94f};
     cdkf_grip_t seen = {.error = {[CDKF_STEP] = 1.0f}};
@@ -91,6 +91,7 @@ TEST(a_force_is_wrong_beyond_what_is_tolerated_and_two_standard_deviations)
     run_gripped(SETTLED, 0.0f);
     for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         grip->wrong = false;
+        grip->settling = 0.0f;
         grip->missing = row[i].missing;
         grip->means = (grip_comparison_t){.time = 10.0f,
             .measured = 1.5f,

@@ -93,9 +93,9 @@ TEST(a_value_is_plausible_up_to_its_limit)
 /* In whole periods, rounded; a clock that advances by less than a quarter of one as good as stands. */
 TEST(time_that_passes_is_counted_in_periods)
 {
-    static const uint32_t elapsed_us[] = {1400u, 1600u, 2300u, 2600u, 300u, 200u};
-    static const uint32_t lost[] = {0u, 1u, 1u, 2u, 0u, 0u};
-    for (uint32_t k = 0u; k < 6u; k++) {
+    static const uint32_t elapsed_us[] = {1400u, 1600u, 2300u, 2600u, 300u, 200u, 1500u, 250u};
+    static const uint32_t lost[] = {0u, 1u, 1u, 2u, 0u, 0u, 0u, 0u};
+    for (uint32_t k = 0u; k < 8u; k++) {
         start();
         (void)run(400u);
         lever_sample_t sample = sample_after(1u);
@@ -146,11 +146,11 @@ TEST(without_measured_torque_the_torque_asked_for_counts)
 /* R30 */
 TEST(a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothing)
 {
-    const uint32_t older_us[] = {0u, 5000u, 1800000000u}; /* half a turn of the clock is 36 minutes */
-    run_both(1501u);                                      /* settled */
+    const uint32_t older_us[] = {0u, 5000u, 1800000000u, 0x80000000u}; /* half a turn of the clock is 36 minutes */
+    run_both(1501u);                                                   /* settled */
     lever_sample_t sample = sample_after(0u);
     sample.theta += 0.1f;
-    for (uint32_t k = 0u; k < 3u; k++) {
+    for (uint32_t k = 0u; k < 4u; k++) {
         sample.time_us = time_us - older_us[k];
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
         TEST_ASSERT_EQUAL_UINT32(k + 1u, health().late);
@@ -244,28 +244,6 @@ TEST(a_new_clock_advances_by_gap_limit_on_end)
     }
 }
 
-/* A sample that is half a turn ahead is as well behind: late. One of a quarter of a period is not too early. */
-TEST(time_is_judged_to_the_microsecond)
-{
-    for (uint32_t i = 0u; i < 2u; i++) {
-        config.settings.sample_period = 4.0e-3f;
-        start();
-        (void)run(500u);
-        lever_sample_t sample = sample_after(0u);
-        sample.time_us += 0x80000000u - i;
-        (void)lever_update(lever, &sample);
-        TEST_ASSERT_EQUAL_UINT32(1u - i, health().late);
-    }
-    for (uint32_t i = 0u; i < 2u; i++) {
-        start();
-        (void)run(500u);
-        lever_sample_t sample = sample_after(0u);
-        sample.time_us += 1000u - i;
-        (void)lever_update(lever, &sample);
-        TEST_ASSERT_EQUAL(i == 1u, has_fault(LEVER_FAULT_CLOCK));
-    }
-}
-
 /* There is nothing to extrapolate from. */
 TEST(the_first_base_acceleration_is_taken_as_it_is_whatever_the_delay)
 {
@@ -293,34 +271,4 @@ TEST(time_may_wrap_at_2_to_the_32)
     wrapped.time_us = plain.time_us;
     TEST_ASSERT_EQUAL_MEMORY(&plain, &wrapped, sizeof plain);
     TEST_ASSERT_EQUAL_UINT32(0u, health_of(other).lost + health_of(other).late);
-}
-
-/* After more than 20.5 ms its level has to settle; in between the state has noise for it, and less for a wrong one. */
-TEST_EACH(2, a_base_that_is_back_has_to_settle_after_20_ms)
-{
-    const uint32_t missing = 20u + test_round;
-    (void)run(3005u); /* not to the end of a block */
-    for (uint32_t k = 0u; k < missing; k++) {
-        lever_sample_t sample = sample_after(1u);
-        invalidate(&sample, 3u);
-        (void)lever_update(lever, &sample);
-    }
-    TEST_ASSERT_EQUAL_FLOAT(10.0f * config.settings.theta_dot_process_noise, lever->estimator.cdkf.disturbance);
-    (void)run(1u);
-    TEST_ASSERT_EQUAL(test_round == 1u, has_fault(LEVER_FAULT_SETTLING));
-    lever->estimator.learning.monitor.base_wrong = true;
-    (void)run(1u);
-    TEST_ASSERT_EQUAL_FLOAT(3.0f * config.settings.theta_dot_process_noise, lever->estimator.cdkf.disturbance);
-}
-
-/* Not twice as far, as while levels settle: here the last moment of that is over. */
-TEST(a_spike_is_one_as_soon_as_the_levels_have_settled)
-{
-    (void)run(3000u);
-    lever->estimator.trim.unsettled = 0.0f;
-    lever->estimator.averages.innovation = 1.0f;
-    lever_sample_t sample = sample_after(1u);
-    sample.theta += 12.0f * config.settings.theta_noise;
-    (void)lever_update(lever, &sample);
-    TEST_ASSERT_EQUAL_UINT32(1u, health().corrupt);
 }

@@ -158,7 +158,7 @@ TEST(limits_are_those_of_what_they_index)
         {offsetof(struct lever, estimator.mode), 5u}, {offsetof(struct lever, estimator.nis_size), 2u},
         {offsetof(struct lever, link.due), 0x1FFFu}, /* 13 messages */
         {offsetof(struct lever, link.pages), 7u}, {offsetof(struct lever, link.counter), 15u},
-        {offsetof(struct lever, link.command_result), 3u}, {offsetof(struct lever, bounce.chosen), 5u},
+        {offsetof(struct lever, link.command_result), 7u}, {offsetof(struct lever, bounce.chosen), 5u},
         {offsetof(struct lever, bounce.state), 3u}};
     for (uint32_t i = 0u; i < (uint32_t)(sizeof limits / sizeof limits[0]); i++) {
         uint32_t row = 0u;

@@ -3,7 +3,6 @@
 
 #include <complex.h>
 #include <math.h>
-#include <string.h>
 
 #include "test.h"
 
@@ -203,29 +202,6 @@ TEST(an_arm_that_is_not_stable_is_refused)
         TEST_ASSERT_FALSE(involuntary_step(&motion, &unstable[i], &lever, &step, (float)CORNER));
         TEST_ASSERT_EQUAL_FLOAT(0.0f, motion.theta);
         TEST_ASSERT_EQUAL_FLOAT(0.0f, motion.theta_dot);
-    }
-}
-
-/* None is longer than 20 ms, but there are no more than five. */
-TEST(a_long_step_is_as_many_short_ones)
-{
-    static const struct {
-        float period;
-        uint32_t steps;
-    } row[] = {{0.02f, 1u}, {0.021f, 2u}, {0.035f, 2u}, {0.1f, 5u}, {0.12f, 6u}};
-    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
-        involuntary_t parts;
-        model_step_t step = about;
-        setUp();
-        involuntary_start(&parts, 0.0f);
-        step.z_ddot = 1.0f;
-        step.period = row[i].period;
-        TEST_ASSERT_TRUE(involuntary_step(&motion, &arm, &lever, &step, (float)CORNER));
-        step.period = row[i].period / (float)row[i].steps;
-        for (uint32_t k = 0u; k < row[i].steps; k++) {
-            TEST_ASSERT_TRUE(involuntary_step(&parts, &arm, &lever, &step, (float)CORNER));
-        }
-        TEST_ASSERT_EQUAL(row[i].steps <= 5u, memcmp(&parts, &motion, sizeof parts) == 0);
     }
 }
 

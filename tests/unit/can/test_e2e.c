@@ -44,16 +44,6 @@ TEST(frames_are_used_again_once_so_many_have_come_in_order)
 }
 
 /* R17 */
-TEST(one_frame_of_synchronisation_is_one)
-{
-    static const cycle_t cycles[] = {
-        {1, E2E_INITIAL, 0u}, {1, E2E_OK, 0u}, {5, E2E_WRONG_SEQUENCE, 0u}, {1, E2E_SYNC, 0u}, {1, E2E_OK, 0u}};
-    e2e_tolerance_t once = strict;
-    once.sync_counter = 1u;
-    ASSERT_CYCLES(once, cycles);
-}
-
-/* R17 */
 TEST(without_synchronisation_a_sequence_goes_on_where_it_was)
 {
     static const cycle_t cycles[] = {{1, E2E_INITIAL, 0u}, {1, E2E_OK, 0u}, {3, E2E_WRONG_SEQUENCE, 0u},

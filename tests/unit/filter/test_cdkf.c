@@ -78,6 +78,17 @@ TEST(a_state_that_starts_anew_is_independent_of_w_and_drops_what_is_pending)
     TEST_ASSERT_TRUE((cdkf->s_xx[2] == 0.0f) && (cdkf->s[9] == 0.0f) && (cdkf->s[14] == 0.0f));
 }
 
+TEST(an_output_that_is_not_valid_has_no_innovation)
+{
+    const float y[N] = {1.0f, 1.0f};
+    const bool valid[N] = {false, false};
+    const innovation_t none = {.inverse_variance = 1.0f};
+    innovation_t innovation[N] = {{1.0f, 2.0f, 3.0f, 4.0f}, {1.0f, 2.0f, 3.0f, 4.0f}};
+    cdkf_measurement_update(cdkf, y, valid, true, innovation);
+    TEST_ASSERT_EQUAL_MEMORY(&none, &innovation[0], sizeof none);
+    TEST_ASSERT_EQUAL_MEMORY(&none, &innovation[1], sizeof none);
+}
+
 /* --- learning and walk at their limits ---------------------------------------------------------------------------- */
 
 TEST(w_is_held_at_its_bounds_and_said_to_rest_there)

@@ -30,22 +30,6 @@ TEST(a_force_is_taken_up_to_eight_standard_deviations)
     }
 }
 
-/* Error c acts by a unit of c + 1 through base (3), torque (1.7) or as an acceleration; the force takes 0.5 of each. */
-TEST(a_force_sees_every_error_that_acts)
-{
-    static const float error[CDKF_CONSIDERED] = {1.0f, 2.0f, 3.0f, 4.0f, 5.0f};
-    static const float expected[CDKF_CONSIDERED] = {2.5f, 5.5f, 4.6f, 6.3f, -0.495f};
-    const cdkf_grip_t grip = {.error = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f}};
-    model_response_t by_base = response;
-    grip_seen_t seen;
-    by_base.base = 3.0f;
-    cdkf = (cdkf_t){.acting = (uint32_t)CDKF_CONSIDERED};
-    grip_see(&cdkf, &by_base, error, &grip, PERIOD, &seen);
-    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
-        TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, expected[c], seen.considered[c]);
-    }
-}
-
 /* An output that sees 1 of the first error and 3 of the second, in halves of its standard deviation; the third does not
  * act. Whether the base is wrong must not depend on the force. */
 TEST(a_force_says_of_the_errors_what_it_sees_of_them)

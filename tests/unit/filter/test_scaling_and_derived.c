@@ -70,20 +70,6 @@ TEST(w_is_kept_within_its_bounds)
     }
 }
 
-TEST(a_pair_of_sigma_points_is_a_ratio_on_the_logarithmic_scale)
-{
-    static const float offset[L] = {0.0f, 1.0f, 0.5f};
-    float plus[L];
-    float minus[L];
-    start(0u);
-    scaling_pair(&scaling, priors[0].guess, offset, plus, minus);
-    for (uint32_t i = 0u; i < (uint32_t)L; i++) {
-        const double guess = (double)priors[0].guess[i];
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * guess, guess * exp((double)offset[i]), (double)plus[i]);
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * guess, guess * exp(-(double)offset[i]), (double)minus[i]);
-    }
-}
-
 /* --- derived ------------------------------------------------------------------------------------------------------ */
 
 /* A falling lever, or one without a spring, has no natural frequency, but answers the base. */
