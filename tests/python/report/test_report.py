@@ -40,7 +40,11 @@ def page(report: Path) -> Reader:
 def test_sections_and_figures_are_all_there_in_order(page: Reader) -> None:
     assert page.ids("section") == SECTIONS
     assert page.ids("div") == FIGURES
-    assert list(figures(page)) == FIGURES
+    drawn = figures(page)
+    assert list(drawn) == FIGURES
+    for key, figure in drawn.items():
+        rows = sum(axis.startswith("yaxis") for axis in figure["layout"])
+        assert 140 * rows <= figure["layout"]["height"] <= 400 * rows, key
     assert [attributes["href"] for tag, attributes in page.tags if tag == "a"] == [f"#{key}" for key in SECTIONS]
     assert page.open == []
 

@@ -32,7 +32,7 @@ def test_the_unit_is_that_of_the_size(key: str, value: float, unit: str) -> None
 
 
 DEGREE = math.pi / 180.0
-SPELLINGS = {
+SPELLINGS: dict[str, dict[float, tuple[str, ...]]] = {
     "theta": {
         1.0: ("rad", "Radians", "[rad]"),
         1e-3: ("mrad", "milliradian"),

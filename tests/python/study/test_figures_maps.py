@@ -51,7 +51,7 @@ def test_no_label_lies_on_another(width: str) -> None:
 def test_of_many_values_four_are_written_with_both_ends() -> None:
     steps = Scale("noise [mrad]", tuple(float(value) for value in range(1, 11)))
     chart = Chart(np.ones((10, 3)), None)
-    one = replace(made(), columns=NAMED, rows=("dual",), y=steps, charts=((chart, chart),))
+    one = replace(map_figure(), columns=NAMED, rows=("dual",), y=steps, charts=((chart, chart),))
     (axes, *_) = printed.sheet(one, "double").axes
     assert [text.get_text() for text in axes.get_yticklabels()] == ["1", "4", "7", "10"]
 
