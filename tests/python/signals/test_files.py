@@ -107,7 +107,9 @@ def test_a_packed_table_is_a_table(tmp_path: Path) -> None:
     assert angle.values.tolist() == [1.0, 2.0]
 
 
-@pytest.mark.parametrize("content", [gzip.compress(b"time,a\n")[:15], gzip.compress(b"")[:10] + b"\xff" * 20])
+@pytest.mark.parametrize(
+    "content", [gzip.compress(b"time,a\n")[:15], gzip.compress(b"")[:10] + b"\xff" * 20], ids=["cut", "damaged"]
+)
 def test_a_packed_table_that_is_damaged_is_one_line(content: bytes, tmp_path: Path, refused: Refused) -> None:
     path = tmp_path / "flight.csv.gz"
     path.write_bytes(content)
