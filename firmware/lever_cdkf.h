@@ -414,6 +414,10 @@ enum lever_frame_result {
  * GRIP_SAMPLE, so send these first. */
 enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *frame);
 
+/* A COMMAND that a port does not hand on is counted as refused, and answered by a COMMAND_ACK with this result, of enum
+ * message_result in can/messages.h, if its CRC is correct. */
+void lever_refuse(lever_t *lever, const lever_frame_t *command, uint8_t result);
+
 /* lever_update() with the sample that lever_on_frame() has completed; without one it does nothing. Returns the mode. */
 enum lever_mode lever_step(lever_t *lever);
 

@@ -50,7 +50,7 @@ a first session:
 command ran, but what it checks does not hold (limits of a scenario, no estimate from a log, …); 2 with one line on
 standard error when the command line or an input is wrong; 130, with one line too, after Ctrl-C.
 
-Tables fold at the width of the terminal. In a pipe or file each row is one line, unless COLUMNS says how wide.
+Tables wrap at the width of the terminal. In a pipe or file each row is one line, unless COLUMNS says how wide.
 """
 
 
@@ -113,8 +113,8 @@ def _check_json(args: argparse.Namespace) -> None:
     """Before a command has worked for --json FILE; a folder that it makes itself, by --out, need not be there yet."""
     path, out = getattr(args, "json", None), getattr(args, "out", None)
     if path is not None:
-        made = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
-        if Path(path).absolute().parent not in made or Path(path).parent.exists():
+        folders = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
+        if Path(path).absolute().parent not in folders or Path(path).parent.exists():
             check_writable(path)
 
 

@@ -77,9 +77,14 @@ def hide_mf4(arguments: Sequence[str]) -> None:
         sys.modules.setdefault("asammdf", None)  # type: ignore[arg-type]
 
 
+def mf4_is_hidden() -> bool:
+    """Whether hide_mf4() holds."""
+    return sys.modules.get("asammdf", sys) is None
+
+
 def reveal_mf4() -> None:
     """From here on `import asammdf` works again."""
-    if sys.modules.get("asammdf", sys) is None:
+    if mf4_is_hidden():
         del sys.modules["asammdf"]
 
 

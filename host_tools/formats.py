@@ -1,4 +1,4 @@
-"""The option --format of commands that write the signals of a run."""
+"""The option --format of commands that write the signals of a run, by exports/. Log formats are read by can/logs.py."""
 
 from __future__ import annotations
 

@@ -9,15 +9,22 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from .exit_status import exit_at_once
+from .extras import hide_mf4, mf4_is_hidden
 
 if TYPE_CHECKING:
     from multiprocessing.pool import Pool
 
+_Task = TypeVar("_Task")
+_Done = TypeVar("_Done")
+
+START = 0.5
+"""What worker processes take to start [s]."""
 _came = False
 
 
@@ -61,14 +68,31 @@ def forget() -> None:
     _came = False
 
 
+def in_processes(function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
+    """function(task) of all tasks, in their order, from `jobs` processes; what is done before they would have started,
+    in this one. Interrupted, it leaves no process behind."""
+    done, end = 0, time.monotonic() + START
+    while done < len(tasks) and (jobs == 1 or done == len(tasks) - 1 or time.monotonic() < end):
+        yield function(tasks[done])
+        done += 1
+    if done < len(tasks):
+        with worker_pool(min(jobs, len(tasks) - done)) as pool:
+            yield from pool.imap(function, tasks[done:])
+
+
 def worker_pool(processes: int) -> Pool:
-    """Processes that leave Ctrl-C to this one, from their first moment on."""
+    """Processes that leave Ctrl-C to this one, from their first moment on, and hide what packages this one hides."""
     import multiprocessing
 
-    ignore: Any = (signal.signal, (signal.SIGINT, signal.SIG_IGN))
     context = multiprocessing.get_context("spawn")
     with masked():
-        return context.Pool(processes, *ignore)
+        return context.Pool(processes, _begin, (mf4_is_hidden(),))
+
+
+def _begin(without_mf4: bool) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if without_mf4:
+        hide_mf4(())
 
 
 @contextmanager

@@ -60,14 +60,14 @@ class Provenance:
 
     def comment(self) -> str:
         """As lines that begin with #."""
-        made = f"{SOFTWARE} {self.version}{f' ({self.revision})' if self.revision else ''}, {self.created}"
+        generator = f"{SOFTWARE} {self.version}{f' ({self.revision})' if self.revision else ''}, {self.created}"
         hashes = [f"{path} {digest or '(not a file)'}" for path, digest in self.inputs.items()]
-        return "".join(f"# {line}\n" for line in (made, self.command, *hashes))
+        return "".join(f"# {line}\n" for line in (generator, self.command, *hashes))
 
     def properties(self, **more: Any) -> dict[str, str]:
         """Name and text of each property, for formats that keep pairs of text; `more` are further ones, as JSON."""
-        known = {name: value for name, value in asdict(self).items() if value}
-        return {"software": SOFTWARE} | {name: _as_text(value) for name, value in (known | more).items()}
+        given = {name: value for name, value in asdict(self).items() if value}
+        return {"software": SOFTWARE} | {name: _as_text(value) for name, value in (given | more).items()}
 
 
 def provenance(inputs: Iterable[str | os.PathLike[str]] = ()) -> Provenance:
@@ -89,8 +89,8 @@ def with_provenance(page: str, origin: Provenance | None) -> str:
         return page
     properties = origin.properties()
     items = "".join(f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in properties.items())
-    made = html.escape(f"{properties['software']} {properties['version']}, {properties['created']}")
-    shown = f'<footer><details class="origin"><summary>{made}</summary><dl>{items}</dl></details></footer>'
+    generator = html.escape(f"{properties['software']} {properties['version']}, {properties['created']}")
+    shown = f'<footer><details class="origin"><summary>{generator}</summary><dl>{items}</dl></details></footer>'
     content = json.dumps(properties, ensure_ascii=False).replace("</", "<\\/")
     kept = f'<script type="application/json" id="provenance">{content}</script>\n'
     head, end, tail = page.rpartition("</body>" if "</body>" in page else "</html>")
@@ -136,10 +136,10 @@ def revision() -> str | None:
         "--match=",
     ]
     try:
-        told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10.0)
+        described = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10.0)
     except (OSError, subprocess.SubprocessError):
         return None
-    return told.stdout.strip() or None
+    return described.stdout.strip() or None
 
 
 @cache

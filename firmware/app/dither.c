@@ -1,5 +1,7 @@
 #include "app/dither.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -62,7 +64,7 @@ void dither_init(dither_t *dither, float low, float high, float period, float rm
 {
     const float highest = HIGHEST / period;
     dither->low = (HIGH_PASS_TURN * period) * low; /* 2 Hz of at least 50 samples a second */
-    dither->high = (HIGH_PASS_TURN * period) * ((high < highest) ? high : highest);
+    dither->high = (HIGH_PASS_TURN * period) * lesser(high, highest);
     dither->scale = sqrtf(3.0f / band_variance(dither)); /* uniform() has a variance of 1/3 */
     dither->rms_most = rms_most;
     dither->fade = fade / period;
@@ -83,12 +85,12 @@ void dither_reset(dither_t *dither)
 
 void dither_set(dither_t *dither, float rms, bool at_once)
 {
-    const float target = (rms < dither->rms_most) ? rms : dither->rms_most;
+    const float target = lesser(rms, dither->rms_most);
     const float change = fabsf(target - dither->level);
     if (at_once) {
         dither->slope = change;
     } else if ((target < dither->target) || (target > dither->target)) { /* the same again goes on as it does */
-        dither->slope = (dither->fade > 1.0f) ? (change / dither->fade) : change;
+        dither->slope = change / greater(dither->fade, 1.0f);
     } else {
         /* repeated */
     }

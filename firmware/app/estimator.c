@@ -1,6 +1,7 @@
 #include "app/estimator.h"
 #include "app/alignment.h"
 #include "app/prediction.h"
+#include "math/bounds.h"
 #include "math/share.h"
 
 #include <math.h>
@@ -116,10 +117,10 @@ static void check(
     checked->base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
     checked->grip_force = sample->grip_force;
-    if (torque && monitor_takes_torque(estimator->samples)) {
-        monitor_add_torque(monitor, own_torque, sample->tau_m * estimator->setup.torque_scale);
-    }
     checked->tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
+    if (torque && monitor_takes_torque(estimator->samples)) {
+        monitor_add_torque(monitor, own_torque, checked->tau_m);
+    }
     checked->z_ddot = checked->base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked->z_ddot;
     estimator->last_tau_m = checked->tau_m;
@@ -178,14 +179,13 @@ static void average(estimator_t *estimator, float elapsed)
     const float share = share_of(elapsed, time);
     const float square = squared(estimator->cdkf.x[1]);
     averages->excitation_square += share * (square - averages->excitation_square);
-    averages->motion_square +=
-        ((elapsed < MOTION_TIME) ? (elapsed * (1.0f / MOTION_TIME)) : 1.0f) * (square - averages->motion_square);
+    averages->motion_square += lesser(elapsed * (1.0f / MOTION_TIME), 1.0f) * (square - averages->motion_square);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);
     }
     if (estimator->nis_size != 0u) {
         const float ratio = (estimator->nis_size == 2u) ? (0.5f * estimator->nis) : estimator->nis;
-        const float bounded = (ratio < INNOVATION_MOST) ? ratio : INNOVATION_MOST;
+        const float bounded = lesser(ratio, INNOVATION_MOST);
         monitor_add(&estimator->learning.monitor, ratio, elapsed);
         if (estimator->trim.unsettled <= 0.0f) { /* innovations are those of the filter, not of the levels */
             averages->innovation += share * (bounded - averages->innovation);

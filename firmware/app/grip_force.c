@@ -1,5 +1,6 @@
 #include "app/grip_force.h"
 
+#include "math/bounds.h"
 #include "math/share.h"
 
 #include <math.h>
@@ -39,7 +40,7 @@ static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, cons
 static float noise_of(const grip_force_t *grip, const lever_settings_t *s, float period)
 {
     const float gain = s->grip_force_gain_sigma;
-    const float walk = (s->k_p_walk > WALK_LEAST) ? s->k_p_walk : WALK_LEAST;
+    const float walk = greater(s->k_p_walk, WALK_LEAST);
     const float relative = (gain * gain) / walk; /* root of the density */
     return sqrtf((s->grip_force_noise * s->grip_force_noise) + (grip->square * ((relative * relative) / period)));
 }
@@ -56,10 +57,10 @@ static void look(const grip_force_t *grip, const setup_t *setup, const model_ste
     seen->torque = torque;
     seen->own[0] = torque * constants->stiffness;
     seen->own[1] = torque * constants->damping;
+    seen->error[CDKF_STEP] = 0.0f; /* of the hand's torque, which moves the lever through the force */
     for (uint32_t c = 0u; c < (uint32_t)CDKF_CALIBRATION; c++) {
         seen->error[c] = (torque * ((c <= (uint32_t)CDKF_BASE_DELAY) ? base : 1.0f)) * error[c];
     }
-    seen->error[CDKF_STEP] = 0.0f; /* of the hand's torque, which moves the lever through the force */
 }
 
 bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
@@ -73,7 +74,7 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
         trim_inputs(trim, &now, TRIM_GRIP_FORCE, 1u, period);
         grip->impulse += (period * setup->constants.length) * now;
         grip->square += share_of(period, MEMORY) * ((now * now) - grip->square);
-        grip->settling -= (grip->settling > 0.0f) ? period : 0.0f;
+        grip->settling -= period;
         if (known) {
             look(grip, setup, step, now, alone, error, seen);
         }

@@ -1,4 +1,5 @@
 #include "app/learning.h"
+#include "math/bounds.h"
 #include "math/share.h"
 
 #define REPORTED 3.0f         /* time for which a change is reported [s] */
@@ -82,8 +83,7 @@ static bool is_known(const learning_t *learning)
 /* How much torque the lever is moved by that nobody knows, 0 to 1: as far as innovations are larger than expected. */
 static float unknown_part(const learning_t *learning)
 {
-    const float part = (learning->monitor.surprise - UNSURPRISED) / (SURPRISED - UNSURPRISED);
-    return (part < 1.0f) ? part : 1.0f;
+    return lesser((learning->monitor.surprise - UNSURPRISED) / (SURPRISED - UNSURPRISED), 1.0f);
 }
 
 /* The pilot grips anew. */

@@ -1,6 +1,7 @@
 /* The façade: an instance in memory of the caller, and how its parts work together. */
 #include "app/instance.h"
 #include "bounce/alarm.h"
+#include "math/bounds.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -26,7 +27,7 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
         /* cppcheck-suppress misra-c2012-11.5 ; D4 */
         lever = (lever_t *)(void *)memory; /* storage of the caller, as large and aligned as an instance */
         const lever_settings_t *s = &config->settings;
-        const float rms_most = (s->torque_rms < s->torque_limit) ? s->torque_rms : s->torque_limit;
+        const float rms_most = lesser(s->torque_rms, s->torque_limit);
         (void)memset(lever, 0, sizeof *lever);
         estimator_init(&lever->estimator, config);
         choose_mitigation(&lever->bounce, config->mitigation);
@@ -63,7 +64,7 @@ void instance_watch(lever_t *lever)
     bounce_t *bounce = &lever->bounce;
     const uint32_t time_us = lever->estimator.time_us;
     const uint32_t publish_us = lever->link.publish_us;
-    if ((time_us - bounce->time_us) >= ((publish_us > MARGIN_US) ? publish_us : MARGIN_US)) {
+    if ((time_us - bounce->time_us) >= greater_count(publish_us, MARGIN_US)) {
         bounce->time_us = time_us;
         bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
         bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever));
@@ -112,7 +113,7 @@ void instance_mitigate(lever_t *lever)
     mitigation_t *mitigation = &lever->bounce.mitigation;
     mitigation_sample_t sample = {.constants = &setup->constants,
         .elapsed_us = to_gate->advances ? to_gate->elapsed_us : period_us,
-        .silence_us = (late_us > SILENCE_US) ? late_us : SILENCE_US,
+        .silence_us = greater_count(late_us, SILENCE_US),
         .theta = estimator_state(estimator, 0u),
         .theta_dot = estimator_state(estimator, 1u),
         .drive = lever->gate.gain,
@@ -300,6 +301,11 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform)
 enum lever_frame_result lever_on_frame(lever_t *lever, const lever_frame_t *frame)
 {
     return link_on_frame(lever, frame);
+}
+
+void lever_refuse(lever_t *lever, const lever_frame_t *command, uint8_t result)
+{
+    link_refuse(lever, command, result);
 }
 
 enum lever_mode lever_step(lever_t *lever)

@@ -1,7 +1,9 @@
 #include "app/link.h"
 
 #include "app/instance.h"
+#include "math/elapsed.h"
 
+#include <math.h>
 #include <stddef.h>
 
 #define BIT(output) ((uint32_t)1u << (uint32_t)(output))
@@ -44,10 +46,8 @@ static void start_session(link_t *link)
 
 void link_init(link_t *link, const lever_settings_t *settings)
 {
-    const float period_us = (settings->sample_period * 1.0e6f) + 0.5f;
-    const float publish_us = (settings->publish_period * 1.0e6f) + 0.5f;
-    link->period_us = (uint32_t)period_us;
-    link->publish_us = (uint32_t)publish_us;
+    link->period_us = microseconds_of(settings->sample_period);
+    link->publish_us = microseconds_of(settings->publish_period);
     link->identity_us = LONG_AGO_US;
     link->frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;
     link->settings_crc = lever_settings_crc(settings);
@@ -86,6 +86,12 @@ static enum lever_frame_result on_grip_sample(link_t *link, const lever_frame_t 
     return LEVER_FRAME_TAKEN;
 }
 
+/* At an end of its range a sender has saturated: what it measures is beyond. */
+static bool is_measured(bool valid, float value, float most)
+{
+    return valid && (fabsf(value) < most);
+}
+
 /* Completes the sample with the LEVER_SAMPLE and GRIP_SAMPLE of the same counter, as far as they have come. */
 static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
 {
@@ -97,13 +103,13 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     lever_sample_t *sample = &link->sample;
     sample->time_us = base.time_us;
     sample->z_ddot = base.z_ddot;
-    sample->z_ddot_valid = base.z_ddot_valid;
+    sample->z_ddot_valid = is_measured(base.z_ddot_valid, base.z_ddot, MESSAGE_Z_DDOT_MOST);
     sample->theta = lever->theta;
     sample->theta_dot = lever->theta_dot;
     sample->tau_m = lever->tau_m;
-    sample->theta_valid = paired && lever->theta_valid;
-    sample->theta_dot_valid = paired && lever->theta_dot_valid;
-    sample->tau_m_valid = paired && lever->tau_m_valid;
+    sample->theta_valid = paired && is_measured(lever->theta_valid, lever->theta, MESSAGE_THETA_MOST);
+    sample->theta_dot_valid = paired && is_measured(lever->theta_dot_valid, lever->theta_dot, MESSAGE_THETA_DOT_MOST);
+    sample->tau_m_valid = paired && is_measured(lever->tau_m_valid, lever->tau_m, MESSAGE_TAU_M_MOST);
     sample->grip_force = link->grip_sample.grip_force;
     sample->grip_force_valid = gripped && link->grip_sample.grip_force_valid;
     estimator->lost += paired ? 0u : 1u;
@@ -113,11 +119,12 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     return LEVER_FRAME_SAMPLE;
 }
 
-/* The sequence of commands: a second after the last accepted one it may start anywhere. A refused one leaves it. */
+/* The sequence of commands: a second after the last accepted one it may start anywhere, but not with the same counter,
+ * which is that of a sender that hangs. A refused one leaves the sequence. */
 static bool is_in_sequence(lever_t *lever, const lever_frame_t *frame)
 {
     e2e_receiver_t *receiver = &lever->link.command_receiver;
-    if (torque_gate_is_abandoned(&lever->gate)) {
+    if (torque_gate_is_abandoned(&lever->gate) && (e2e_counter(frame) != receiver->last_counter)) {
         e2e_receiver_init(receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, command_tolerance);
     }
     const e2e_receiver_t before = *receiver;
@@ -157,15 +164,28 @@ static bool is_intact(const lever_frame_t *frame, enum message_data_id data_id)
     return e2e_check(&receiver, frame) == E2E_INITIAL;
 }
 
+static void answer(link_t *link, const lever_frame_t *command, uint8_t result)
+{
+    link->command_counter = e2e_counter(command);
+    link->command_result = result;
+    link->due |= (uint16_t)BIT(OUTPUT_COMMAND_ACK);
+}
+
+void link_refuse(lever_t *lever, const lever_frame_t *command, uint8_t result)
+{
+    if (is_intact(command, MESSAGE_COMMAND_DATA_ID)) {
+        answer(&lever->link, command, result);
+    }
+    lever->estimator.corrupt++;
+    lever->estimator.communication_fault = true;
+}
+
 static enum lever_frame_result on_command(lever_t *lever, const lever_frame_t *frame)
 {
-    link_t *link = &lever->link;
     enum lever_frame_result outcome = LEVER_FRAME_REFUSED;
     if (is_intact(frame, MESSAGE_COMMAND_DATA_ID)) {
         const enum message_result result = obey(lever, frame);
-        link->command_counter = e2e_counter(frame);
-        link->command_result = (uint8_t)result;
-        link->due |= (uint16_t)BIT(OUTPUT_COMMAND_ACK);
+        answer(&lever->link, frame, (uint8_t)result);
         outcome = (result == MESSAGE_RESULT_ACCEPTED) ? LEVER_FRAME_TAKEN : LEVER_FRAME_REFUSED;
     } else {
         lever->estimator.corrupt++;
@@ -245,7 +265,7 @@ static void pass_time(link_t *link, uint32_t time_us)
     link->time_us = time_us;
     link->set_us += elapsed_us;
     link->identity_us += elapsed_us;
-    link->duplicate_us -= (elapsed_us < link->duplicate_us) ? elapsed_us : link->duplicate_us;
+    link->duplicate_us = time_left(link->duplicate_us, elapsed_us);
     if (link->identity_us >= IDENTITY_US) {
         link->identity_us = 0u;
         link->pages = (uint8_t)EVERY_PAGE;
@@ -283,7 +303,7 @@ enum lever_mode link_step(lever_t *lever)
 void link_idle(lever_t *lever, uint32_t elapsed_us)
 {
     link_t *link = &lever->link;
-    link->duplicate_us -= (elapsed_us < link->duplicate_us) ? elapsed_us : link->duplicate_us;
+    link->duplicate_us = time_left(link->duplicate_us, elapsed_us);
     if (instance_is_driving(lever)) {
         link->due |= (uint16_t)BIT(OUTPUT_MOTOR_COMMAND);
     }

@@ -1,4 +1,5 @@
 #include "app/monitor.h"
+#include "math/bounds.h"
 #include "math/share.h"
 
 #include <math.h>
@@ -71,8 +72,8 @@ bool monitor_is_spike(monitor_t *monitor, const cdkf_t *cdkf, uint32_t i, float 
 
 void monitor_add(monitor_t *monitor, float ratio, float elapsed)
 {
-    const float share = (elapsed < SURPRISE_TIME) ? (elapsed * (1.0f / SURPRISE_TIME)) : 1.0f;
-    monitor->surprise += share * (((ratio < SURPRISE_MOST) ? ratio : SURPRISE_MOST) - monitor->surprise);
+    const float share = lesser(elapsed * (1.0f / SURPRISE_TIME), 1.0f);
+    monitor->surprise += share * (lesser(ratio, SURPRISE_MOST) - monitor->surprise);
 }
 
 bool monitor_has_just_stuck(monitor_t *monitor)
@@ -113,7 +114,7 @@ bool monitor_judge_torque(monitor_t *monitor, float period, float sample_period)
     if ((torque->asked * sample_period) > (TORQUE_LEAST * (TORQUE_MEMORY / (float)MONITOR_TORQUE_EVERY))) {
         const float gain = torque->product / torque->asked;
         const float other = (torque->measured / torque->asked) - (gain * gain); /* torque of other origin, in squares */
-        const float sure = TORQUE_SURE * sqrtf((other > 0.0f) ? other : 0.0f);
+        const float sure = TORQUE_SURE * sqrtf(greater(other, 0.0f));
         monitor->torque_wrong = (fabsf(gain - 1.0f) > ((before ? TORQUE_AGAIN : TORQUE_OFF) + sure));
     }
     const float keep = 1.0f - share_of(period, TORQUE_MEMORY);

@@ -1,5 +1,7 @@
 #include "app/prediction.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <stddef.h>
 
@@ -66,9 +68,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
         cdkf->disturbance = (learning->monitor.base_wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);
-    error[CDKF_STEP] = 0.0f;
+    error[CDKF_STEP] = input[3]; /* not read without a step */
     if (steps) {
-        error[CDKF_STEP] = input[3];
         cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
     }
     const bool gripped =
@@ -119,7 +120,7 @@ static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elaps
 {
     const float average = estimator->averages.innovation;
     const float least = (estimator->trim.unsettled > 0.0f) ? UNSETTLED : 1.0f;
-    const float level = (average > least) ? average : least;
+    const float level = greater(average, least);
     monitor_t *monitor = &estimator->learning.monitor;
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
         const float y = sample->y[i] - (estimator->trim.origin[i] + estimator->trim.ahead[i]);
@@ -137,7 +138,7 @@ void prediction_advance(
 {
     float period = elapsed;
     if (periods > 1u) {
-        const uint32_t substeps = (periods < SUBSTEPS_MOST) ? periods : SUBSTEPS_MOST;
+        const uint32_t substeps = lesser_count(periods, SUBSTEPS_MOST);
         period = elapsed / (float)substeps;
         cross_gap(estimator, sample, last, period, substeps);
     }

@@ -2,6 +2,7 @@
 #include "app/instance.h"
 #include "can/e2e.h"
 #include "can/messages.h"
+#include "math/bounds.h"
 #include "math/crc32.h"
 
 #include <string.h>
@@ -15,7 +16,7 @@
 void lever_recorder_init(lever_recorder_t *recorder, uint32_t period_us)
 {
     (void)memset(recorder, 0, sizeof *recorder);
-    recorder->period_us = (period_us > PERIOD_LEAST_US) ? period_us : PERIOD_LEAST_US;
+    recorder->period_us = greater_count(period_us, PERIOD_LEAST_US);
     recorder->elapsed_us = recorder->period_us;
     recorder->sent = (uint16_t)FRAMES;
     recorder->layout = lever_state_layout();

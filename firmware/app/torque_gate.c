@@ -1,6 +1,7 @@
 #include "app/torque_gate.h"
 
 #include "math/bounds.h"
+#include "math/elapsed.h"
 
 #include <math.h>
 #include <string.h>
@@ -10,9 +11,8 @@
 #define SILENCE_PERIODS 3u
 #define IDLE_US 5000u         /* longest time from a sample to torque_gate_idle(), or the next sample */
 #define CLOSING_US 40000.0f   /* so that a step of the port's clock is left of 50 ms */
-#define MEMORY 0.25f          /* of the mean square [s] */
+#define MEMORY 0.25f          /* of the mean square [s], or in windows of torque_rms, of 1 s */
 #define MEMORY_PER_US 4.0e-6f /* 1 / that, in us */
-#define WINDOW 1.0f           /* of torque_rms [s] */
 #define ROOM 0.2f             /* part of square_most in which the amplitude falls, at least */
 
 /* Room of the mean square below square_most in which the amplitude allowed falls from the limit to what may stay for
@@ -24,23 +24,19 @@ static float room_of(const torque_gate_t *gate, float slew)
     const float share = (float)gate->silence_us * MEMORY_PER_US;
     const float by_slew = (beyond * gate->limit * gate->limit) / (MEMORY * slew);
     const float by_step = (beyond * (gate->limit + gate->sustained) * share) / (1.0f - share);
-    const float least = ROOM * gate->square_most;
-    const float room = (by_slew > by_step) ? by_slew : by_step;
-    return (room > least) ? room : least;
+    return greater(greater(by_slew, by_step), ROOM * gate->square_most);
 }
 
 void torque_gate_init(torque_gate_t *gate, const lever_settings_t *settings)
 {
     (void)memset(gate, 0, sizeof *gate);
-    const float period_us = (settings->sample_period * 1.0e6f) + 0.5f;
     const float fade_steps = settings->dither_fade / settings->sample_period;
-    gate->period_us = (uint32_t)period_us;
-    gate->silence_us = SILENCE_PERIODS * gate->period_us;
-    gate->silence_us = (gate->silence_us > SILENCE_US) ? gate->silence_us : SILENCE_US;
+    gate->period_us = microseconds_of(settings->sample_period);
+    gate->silence_us = greater_count(SILENCE_PERIODS * gate->period_us, SILENCE_US);
     gate->limit = settings->torque_limit;
     gate->slew = settings->torque_slew * 1.0e-6f;
-    gate->open_step = (fade_steps > 1.0f) ? (1.0f / fade_steps) : 1.0f;
-    gate->square_most = (settings->torque_rms * settings->torque_rms) / (1.0f + (MEMORY / WINDOW));
+    gate->open_step = 1.0f / greater(fade_steps, 1.0f);
+    gate->square_most = (settings->torque_rms * settings->torque_rms) / (1.0f + MEMORY);
     gate->sustained = sqrtf(gate->square_most);
     if (gate->limit > gate->sustained) {
         gate->amplitude_slope = (gate->limit - gate->sustained) / room_of(gate, settings->torque_slew);
@@ -48,12 +44,6 @@ void torque_gate_init(torque_gate_t *gate, const lever_settings_t *settings)
 }
 
 /* --- open or closed ----------------------------------------------------------------------------------------------- */
-
-/* What is left of a time after some of it. */
-static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)
-{
-    return (elapsed_us < time_us) ? (time_us - elapsed_us) : 0u;
-}
 
 static bool is_fresh(const torque_gate_t *gate)
 {
@@ -72,24 +62,23 @@ void torque_gate_close(torque_gate_t *gate)
 /* Amplitude that keeps the mean square below square_most; 0 when a long time at one torque has it above. */
 static float amplitude(const torque_gate_t *gate)
 {
-    const float allowed = gate->sustained + (gate->amplitude_slope * (gate->square_most - gate->mean_square));
-    return (allowed > 0.0f) ? allowed : 0.0f;
+    return greater(gate->sustained + (gate->amplitude_slope * (gate->square_most - gate->mean_square)), 0.0f);
 }
 
 /* The torque of a closed gate after so much time more. */
 static void fade(torque_gate_t *gate, uint32_t elapsed_us)
 {
     const float left = fabsf(gate->torque) - (gate->closing * (float)elapsed_us);
-    gate->torque = (left > 0.0f) ? clamped(gate->torque, (left < amplitude(gate)) ? left : amplitude(gate)) : 0.0f;
+    gate->torque = (left > 0.0f) ? clamped(gate->torque, lesser(left, amplitude(gate))) : 0.0f;
 }
 
 /* Time has passed with the torque as it was; what is too old by now closes the gate, and it has been fading since. */
 static void age(torque_gate_t *gate, uint32_t elapsed_us)
 {
     const float share = (float)elapsed_us * MEMORY_PER_US;
-    gate->mean_square += ((share < 1.0f) ? share : 1.0f) * ((gate->torque * gate->torque) - gate->mean_square);
-    gate->output_left = left_of(gate->output_left, elapsed_us);
-    gate->command_left = left_of(gate->command_left, elapsed_us);
+    gate->mean_square += lesser(share, 1.0f) * ((gate->torque * gate->torque) - gate->mean_square);
+    gate->output_left = time_left(gate->output_left, elapsed_us);
+    gate->command_left = time_left(gate->command_left, elapsed_us);
     if (!is_fresh(gate)) {
         torque_gate_close(gate);
     }
@@ -102,21 +91,19 @@ static void age(torque_gate_t *gate, uint32_t elapsed_us)
 
 static void drive(torque_gate_t *gate, float asked, uint32_t elapsed_us)
 {
-    const uint32_t step_us = (elapsed_us < gate->period_us) ? elapsed_us : gate->period_us;
+    const uint32_t step_us = lesser_count(elapsed_us, gate->period_us);
     const float slew = gate->slew * (float)step_us;
-    const float gain = gate->gain + gate->open_step;
-    gate->gain = (gain < 1.0f) ? gain : 1.0f;
+    gate->gain = lesser(gate->gain + gate->open_step, 1.0f);
     const float wanted = is_finite(asked) ? clamped(gate->gain * asked, gate->limit) : 0.0f;
     const float highest = gate->torque + slew;
     const float lowest = gate->torque - slew;
-    const float below = (wanted < highest) ? wanted : highest;
-    gate->torque = clamped((below > lowest) ? below : lowest, amplitude(gate));
+    gate->torque = clamped(greater(lesser(wanted, highest), lowest), amplitude(gate));
 }
 
 void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *sample)
 {
-    const uint32_t unknown_us = (gate->period_us > IDLE_US) ? gate->period_us : IDLE_US;
-    const uint32_t elapsed_us = left_of(sample->advances ? sample->elapsed_us : unknown_us, gate->counted);
+    const uint32_t unknown_us = greater_count(gate->period_us, IDLE_US);
+    const uint32_t elapsed_us = time_left(sample->advances ? sample->elapsed_us : unknown_us, gate->counted);
     age(gate, elapsed_us);
     gate->counted = 0u;
     if (sample->advances && sample->measured) {
@@ -137,7 +124,7 @@ void torque_gate_idle(torque_gate_t *gate, uint32_t elapsed_us)
 {
     age(gate, elapsed_us);
     gate->torque = clamped(gate->torque, amplitude(gate));
-    gate->counted += (elapsed_us < (UINT32_MAX - gate->counted)) ? elapsed_us : 0u;
+    gate->counted = time_sum(gate->counted, elapsed_us);
 }
 
 void torque_gate_keep_alive(torque_gate_t *gate)

@@ -1,11 +1,13 @@
 #include "bounce/involuntary.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <string.h>
 
 #define STIFFNESS_LEAST 10.0f /* natural frequency of 0.5 Hz [1/s^2] */
 #define PERIOD_MOST 0.02f     /* of a step of integration [s] */
-#define STEPS_MOST 5u         /* in a call */
+#define STEPS_MOST 5.0f       /* in a call */
 
 void involuntary_start(involuntary_t *involuntary, float z_ddot)
 {
@@ -44,7 +46,7 @@ bool involuntary_step(involuntary_t *involuntary, const model_dynamics_t *dynami
     uint32_t steps = 1u;
     if (step->period > PERIOD_MOST) {
         const float whole = (step->period / PERIOD_MOST) + 0.999f;
-        steps = (whole < (float)STEPS_MOST) ? (uint32_t)whole : STEPS_MOST;
+        steps = (uint32_t)lesser(whole, STEPS_MOST);
         part.period = step->period / (float)steps;
     }
     const bool stable = (dynamics->stiffness > STIFFNESS_LEAST) && (dynamics->damping > 0.0f);

@@ -61,9 +61,8 @@ static float between(float first, float second, float part)
 static uint32_t interval_at(const lever_aircraft_t *aircraft, float place)
 {
     const uint32_t last = (uint32_t)aircraft->count - 2u;
-    uint32_t i = (place > 0.0f) ? (uint32_t)place : 0u;
-    i = (i < last) ? i : last;
-    return (i < LAST_INTERVAL) ? i : LAST_INTERVAL; /* whatever has become of the caller's table */
+    const uint32_t i = (uint32_t)greater(place, 0.0f);
+    return lesser_count(lesser_count(i, last), LAST_INTERVAL); /* whatever has become of the caller's table */
 }
 
 static float frequency_at(const lever_aircraft_t *aircraft, float place)
@@ -115,8 +114,7 @@ static float step_of(const loop_t *loop, const places_t *places, float place, de
     const bool steep = (fabsf(places->slope.imaginary) > LEAST_SLOPE);
     const float to = steep ? (place - (value.imaginary / places->slope.imaginary)) : place;
     const float last = (float)loop->aircraft->count - 1.0f;
-    const float above = (to > 0.0f) ? to : 0.0f;
-    return ((above < last) ? above : last) - place;
+    return lesser(greater(to, 0.0f), last) - place;
 }
 
 /* The points of the table between which L crosses the real axis highest, and about which it is nearest. */
@@ -173,7 +171,7 @@ static void follow_crossing(const loop_t *loop, const places_t *places, limits_t
         const derived_complex_t value = loop_at(loop, limits->crossing);
         const float step = step_of(loop, places, limits->crossing, value);
         const float height = value.real + (step * places->slope.real);
-        limits->height = (height > LEAST_HEIGHT) ? height : LEAST_HEIGHT;
+        limits->height = greater(height, LEAST_HEIGHT);
         limits->crossing += step;
     }
 }
@@ -187,11 +185,9 @@ static void find_nearest(const loop_t *loop, float place, float reach, limits_t 
     }
     const float slope = 0.5f * (d[2] - d[0]);
     const float bend = (d[2] - d[1]) - (d[1] - d[0]);
-    float step = (bend > 0.0f) ? -(slope / bend) : 0.0f;
-    step = (step > 1.0f) ? 1.0f : step;
-    step = (step < -1.0f) ? -1.0f : step;
+    const float step = (bend > 0.0f) ? clamped(-(slope / bend), 1.0f) : 0.0f;
     const float square = d[1] + (step * (slope + (0.5f * step * bend)));
-    const float modulus = sqrtf((square > 0.0f) ? square : 0.0f);
+    const float modulus = sqrtf(greater(square, 0.0f));
     limits->modulus = (limits->height > 1.0f) ? -modulus : modulus;
     limits->nearest = place + (reach * step);
 }

@@ -1,6 +1,7 @@
 #include "bounce/mitigation.h"
 
 #include "math/bounds.h"
+#include "math/elapsed.h"
 #include "math/share.h"
 
 #include <math.h>
@@ -36,19 +37,13 @@ static bool has_correction(uint8_t mitigation)
 static void fade(float *weight, bool on, float elapsed_us)
 {
     const float next = *weight + (on ? (elapsed_us / OPENING_US) : -(elapsed_us / CLOSING_US));
-    const float above = (next > 0.0f) ? next : 0.0f;
-    *weight = (above < 1.0f) ? above : 1.0f;
-}
-
-static uint32_t left_of(uint32_t time_us, uint32_t elapsed_us)
-{
-    return (elapsed_us < time_us) ? (time_us - elapsed_us) : 0u;
+    *weight = lesser(greater(next, 0.0f), 1.0f);
 }
 
 /* Time has passed with all as it was; when the sensors have been away for too long by now, it has been fading since. */
 static void age(mitigation_t *mitigation, uint32_t elapsed_us)
 {
-    mitigation->sensed_left = left_of(mitigation->sensed_left, elapsed_us);
+    mitigation->sensed_left = time_left(mitigation->sensed_left, elapsed_us);
     mitigation->open = mitigation->open && (mitigation->sensed_left != 0u);
     if (!mitigation->open) {
         fade(&mitigation->weight, false, (float)elapsed_us);
@@ -62,8 +57,7 @@ static bool is_stuck(mitigation_reading_t *reading, bool same, uint32_t elapsed_
 {
     const uint32_t most = SAME_LEAST + (SAME_USUAL * reading->longest);
     if (!same) {
-        const uint32_t learnt = (reading->same < most) ? reading->same : most;
-        reading->longest = (learnt > reading->longest) ? (uint8_t)learnt : reading->longest;
+        reading->longest = (uint8_t)greater_count(lesser_count(reading->same, most), reading->longest);
         reading->same = 0u;
     } else if (reading->same < UINT8_MAX) {
         reading->same++;
@@ -79,7 +73,7 @@ static bool is_stuck(mitigation_reading_t *reading, bool same, uint32_t elapsed_
 static void pass_gate(mitigation_t *mitigation, const mitigation_sample_t *sample)
 {
     const bool sensed = sample->sensed && (sample->rated || !mitigation->rated);
-    age(mitigation, left_of(sample->elapsed_us, mitigation->counted));
+    age(mitigation, time_left(sample->elapsed_us, mitigation->counted));
     mitigation->counted = 0u;
     mitigation->rated = mitigation->rated || sample->rated;
     if (sample->advances && sensed) {
@@ -92,7 +86,7 @@ static void pass_gate(mitigation_t *mitigation, const mitigation_sample_t *sampl
     }
     mitigation->open = sample->advances && sample->permitted && (mitigation->sensed_left != 0u);
     if (mitigation->open) {
-        const uint32_t period_us = (sample->elapsed_us < sample->silence_us) ? sample->elapsed_us : sample->silence_us;
+        const uint32_t period_us = lesser_count(sample->elapsed_us, sample->silence_us);
         const bool as_chosen =
             has_correction(sample->mitigation) && (mitigation->notches == has_notch(sample->mitigation));
         fade(&mitigation->weight, mitigation->explained && as_chosen, (float)period_us);
@@ -103,7 +97,7 @@ static void pass_gate(mitigation_t *mitigation, const mitigation_sample_t *sampl
 void mitigation_idle(mitigation_t *mitigation, uint32_t elapsed_us)
 {
     age(mitigation, elapsed_us);
-    mitigation->counted += (elapsed_us < (UINT32_MAX - mitigation->counted)) ? elapsed_us : 0u;
+    mitigation->counted = time_sum(mitigation->counted, elapsed_us);
 }
 
 lever_correction_t mitigation_correction(const mitigation_t *mitigation)
@@ -118,8 +112,7 @@ lever_correction_t mitigation_correction(const mitigation_t *mitigation)
  * signal, so that torque against it takes energy from the lever. */
 static float pass_band(mitigation_band_t *band, float value, float period)
 {
-    const float share = (HIGH_PASS_TURN * BAND_HIGH) * period;
-    band->low_pass += ((share < 1.0f) ? share : 1.0f) * (value - band->low_pass);
+    band->low_pass += ((HIGH_PASS_TURN * BAND_HIGH) * period) * (value - band->low_pass); /* about once at most */
     band->level += ((HIGH_PASS_TURN * BAND_LOW) * period) * (band->low_pass - band->level);
     return band->low_pass - band->level;
 }
@@ -127,7 +120,7 @@ static float pass_band(mitigation_band_t *band, float value, float period)
 /* What a notch takes away, with gain 1 at its frequency; `turn`: that in radians a step. */
 static float pass_notch(mitigation_notch_t *notch, float value, float turn, float damping)
 {
-    const float bounded = (turn < NOTCH_TURN_MOST) ? turn : NOTCH_TURN_MOST;
+    const float bounded = lesser(turn, NOTCH_TURN_MOST);
     notch->band_pass += bounded * ((value - notch->low_pass) - (damping * notch->band_pass));
     notch->low_pass += bounded * notch->band_pass;
     return damping * notch->band_pass;
@@ -151,7 +144,7 @@ static void compare(mitigation_t *mitigation, float moved, float expected, float
 /* Begins with the base as it is now, and nothing known of how the lever moves. */
 static void start(mitigation_t *mitigation, float z_ddot)
 {
-    const mitigation_t none = {.rated = mitigation->rated, .sensed_left = mitigation->sensed_left, .started = true};
+    const mitigation_t none = {.rated = mitigation->rated, .sensed_left = mitigation->sensed_left};
     *mitigation = none;
     involuntary_start(&mitigation->involuntary, z_ddot);
 }
@@ -184,7 +177,7 @@ static void choose(mitigation_t *mitigation, const mitigation_sample_t *sample)
  * against the involuntary rate: so it is damped as the lever is, and the lever's own motion stays out of it. */
 static void advance(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample)
 {
-    const float period = (sample->step.period < PERIOD_MOST) ? sample->step.period : PERIOD_MOST;
+    const float period = lesser(sample->step.period, PERIOD_MOST);
     model_step_t step = sample->step;
     step.tau_m += sample->drive * (mitigation->expected_damping - mitigation->damping);
     const bool stable = involuntary_step(

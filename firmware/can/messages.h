@@ -75,6 +75,12 @@ enum message_data_id {
 
 /* --- to the estimator ------------------------------------------------------------------------------------------ */
 
+/* The greatest values that a sample can carry, and the least with a minus. */
+#define MESSAGE_THETA_MOST 3.2767f      /* [rad] */
+#define MESSAGE_THETA_DOT_MOST 16.3835f /* [rad/s] */
+#define MESSAGE_TAU_M_MOST 32.767f      /* [N m] */
+#define MESSAGE_Z_DDOT_MOST 32.767f     /* [m/s^2] */
+
 typedef struct message_lever_sample {
     float theta;     /* [rad] */
     float theta_dot; /* [rad/s] */
@@ -286,6 +292,10 @@ enum message_result {
     MESSAGE_RESULT_UNKNOWN_VALUE = 1,
     MESSAGE_RESULT_SEQUENCE = 2,   /* repeated, or too old */
     MESSAGE_RESULT_FAULT_MODE = 3, /* in LEVER_MODE_FAULT only a reset is accepted */
+    MESSAGE_RESULT_DISABLED = 4,   /* by command_guard.h, as the rest: the build takes no changes */
+    MESSAGE_RESULT_ACTING = 5,     /* torque or a correction acts on the lever */
+    MESSAGE_RESULT_NOT_SAFE = 6,   /* so says the machine */
+    MESSAGE_RESULT_NOT_AUTHENTIC = 7,
     MESSAGE_RESULT_COUNT
 };
 

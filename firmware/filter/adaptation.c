@@ -1,6 +1,7 @@
 #include "filter/adaptation.h"
 
 #include "lever_cdkf.h"
+#include "math/bounds.h"
 #include "math/share.h"
 
 void adaptation_start(const adaptation_t *adaptation, cdkf_t *cdkf)
@@ -32,8 +33,7 @@ void adaptation_step(
         } else {
             /* the floor */
         }
-        next = (next > floor) ? next : floor;
-        cdkf->walk[i] = (next < ceiling) ? next : ceiling;
+        cdkf->walk[i] = lesser(greater(next, floor), ceiling);
     }
     cdkf->growth = forgets ? (1.0f / adaptation->forgetting_time) : 0.0f;
 }

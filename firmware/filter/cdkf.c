@@ -68,7 +68,7 @@ static void predict_state_columns(cdkf_t *cdkf, const model_response_t *response
     const float minors = (own * own) + (rate * ((first * first) + (second * second))) +
                          (noise.angle * ((theta_dot[0] * theta_dot[0]) + (theta_dot[1] * theta_dot[1]) + rate));
     const float norm = sqrtf(square);
-    const float inverse = (norm > 0.0f) ? (1.0f / norm) : 0.0f;
+    const float inverse = 1.0f / norm;
     s[0] = norm;
     s[2] = product * inverse;
     s[3] = sqrtf(minors) * inverse;

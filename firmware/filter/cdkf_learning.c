@@ -1,6 +1,7 @@
 /* Learning of the parameters, once a block: see cdkf.h. */
 #include "filter/cdkf.h"
 #include "filter/considered.h"
+#include "math/bounds.h"
 #include "math/factor.h"
 #include "math/share.h"
 
@@ -46,8 +47,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
     float *u = cdkf->pending.matrix;
     float *step = cdkf->pending.vector; /* of w in coordinates of the columns of S_ww */
     if (u[0] > 0.0f) {                  /* there is information */
-        const float trust = cdkf->trust + share_of(period, caution);
-        cdkf->trust = (trust < 1.0f) ? trust : 1.0f;
+        cdkf->trust = lesser(cdkf->trust + share_of(period, caution), 1.0f);
     }
     for (uint32_t i = 0u; i < L; i++) {
         for (uint32_t j = i; j < L; j++) {
@@ -61,7 +61,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
     factor_reverse_solve(u, L, step, L);
     for (uint32_t r = 0u; r < ROWS; r++) { /* S (I + information)^-1/2; rows of S_ww end at their diagonal */
         float *row = &cdkf->s[r * L];
-        factor_reverse_solve(u, L, row, (r < L) ? (r + 1u) : L);
+        factor_reverse_solve(u, L, row, lesser_count(r + 1u, L));
         float *mean = (r < L) ? &cdkf->w[r] : &cdkf->x[r - L];
         *mean += factor_dot_three(row, step);
     }

@@ -1,4 +1,5 @@
 #include "filter/change_detection.h"
+#include "math/bounds.h"
 #include "math/share.h"
 
 #include <string.h>
@@ -19,7 +20,7 @@ bool change_detection_step(
     const float keep = 1.0f - share;
     float statistic = 0.0f;
     for (uint32_t i = 0u; i < L; i++) {
-        const float variance = (correction->variance[i] > 0.0f) ? correction->variance[i] : 0.0f;
+        const float variance = greater(correction->variance[i], 0.0f);
         change->sum[i] = (keep * change->sum[i]) + correction->w[i];
         change->variance[i] = (keep * keep * change->variance[i]) + variance;
         if (change->variance[i] > 0.0f) {
@@ -27,7 +28,7 @@ bool change_detection_step(
         }
     }
     change->average += (share / LONG) * ((statistic / (float)L) - change->average);
-    const float level = (change->average > 1.0f) ? change->average : 1.0f;
+    const float level = greater(change->average, 1.0f);
     const bool changed = (threshold > 0.0f) && (statistic > (threshold * level));
     if (changed) {
         (void)memset(change->sum, 0, sizeof change->sum);

@@ -1,5 +1,7 @@
 #include "filter/noise_estimation.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -36,19 +38,13 @@ void noise_estimation_add(
     }
 }
 
-static float clamped(float value, float least, float greatest)
-{
-    const float above = (value > least) ? value : least;
-    return (above < greatest) ? above : greatest;
-}
-
 /* A standard deviation times `factor`, within `range` of what is set. */
 static float scaled(float now, float factor, float set, float range)
 {
-    const float bounded = clamped(factor, STEP_LEAST, STEP_MOST);
+    const float bounded = lesser(greater(factor, STEP_LEAST), STEP_MOST);
     const bool far = (bounded > FAR) || (bounded < FAR_BELOW);
     const float step = far ? bounded : (1.0f + (SHARE * (bounded - 1.0f)));
-    return clamped(now * step, set / range, set * range);
+    return lesser(greater(now * step, set / range), set * range);
 }
 
 /* Sets the noise of output i. With too little gain innovations are large although R is right: then it stays, and what
@@ -86,8 +82,7 @@ bool noise_estimation_step(noise_estimation_t *noise, cdkf_t *cdkf, const noise_
                 far_too_small = far_too_small || (factor > FAR);
             }
         }
-        const float asked = starved ? (gain * gain) : (level * gain);
-        const float factor = (asked > Q_LEAST) ? asked : Q_LEAST;
+        const float factor = greater(starved ? (gain * gain) : (level * gain), Q_LEAST);
         const float before = cdkf->process_noise[1];
         cdkf->process_noise[1] = scaled(before, factor, setting->process_noise, setting->range);
         far_too_small = far_too_small || (cdkf->process_noise[1] > (FAR * before));

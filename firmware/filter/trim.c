@@ -1,5 +1,7 @@
 #include "filter/trim.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -96,8 +98,8 @@ bool trim_is_waiting(const trim_t *trim, uint32_t i)
 static float pass_line(trim_t *trim, uint32_t i, float value, float period)
 {
     const float elapsed = trim->missing[i] + period;
-    const float whole = (elapsed < (STEPS_MOST * period)) ? ((elapsed / period) + 0.5f) : STEPS_MOST;
-    const uint32_t steps = (uint32_t)whole;
+    const float whole = (elapsed / period) + 0.5f;
+    const uint32_t steps = (uint32_t)lesser(whole, STEPS_MOST);
     const float part = 1.0f / (float)steps;
     const float turn = trim->corner * (part * elapsed);
     float deviation = 0.0f;

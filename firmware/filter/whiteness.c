@@ -1,5 +1,7 @@
 #include "filter/whiteness.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -17,11 +19,10 @@ void whiteness_start(whiteness_t *whiteness)
 
 float whiteness_correlation(const whiteness_t *whiteness)
 {
-    float largest = 0.0f;
-    if ((whiteness->time >= LEAST) && (whiteness->variance > 0.0f)) {
+    float largest = 0.0f; /* also where nothing moves: 0 / 0 is not larger */
+    if (whiteness->time >= LEAST) {
         for (uint32_t k = 0u; k < LAGS; k++) {
-            const float correlation = fabsf(whiteness->product[k]) / whiteness->variance;
-            largest = (correlation > largest) ? correlation : largest;
+            largest = greater(fabsf(whiteness->product[k]) / whiteness->variance, largest);
         }
     }
     return largest;
@@ -32,7 +33,7 @@ void whiteness_step(whiteness_t *whiteness, float period, bool counts)
     const float sum = whiteness->sum;
     whiteness->sum = 0.0f;
     if (counts) {
-        whiteness->time = ((whiteness->time + period) < MEMORY) ? (whiteness->time + period) : MEMORY;
+        whiteness->time = lesser(whiteness->time + period, MEMORY);
         const float share = period / whiteness->time;
         whiteness->variance += share * ((sum * sum) - whiteness->variance);
         for (uint32_t k = 0u; k < LAGS; k++) {

@@ -8,6 +8,7 @@
 #ifndef MATH_EXPONENTIAL_H
 #define MATH_EXPONENTIAL_H
 
+#include "math/bounds.h"
 #include "math/rounding.h"
 
 #include <stdint.h>
@@ -15,8 +16,7 @@
 
 static inline float exponential(float x)
 {
-    float inside = (x <= 80.0f) ? x : 80.0f;
-    inside = (inside >= -80.0f) ? inside : -80.0f;
+    const float inside = greater(lesser(x, 80.0f), -80.0f);
     const float multiple = nearest_integer(inside * 1.44269504f);
     const int32_t n = (int32_t)multiple;
     const float r = (inside - (multiple * 0.693359375f)) + (multiple * 2.12194440e-4f); /* ln 2 in two parts */

@@ -8,6 +8,8 @@
 #ifndef MATH_FACTOR_H
 #define MATH_FACTOR_H
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -87,12 +89,12 @@ static inline void factor_reverse(float *information, uint32_t n)
     for (uint32_t left = n; left > 0u; left--) {
         const uint32_t j = left - 1u;
         const float rounding = FACTOR_ROUNDING * u[(j * n) + j];
-        const float least = (rounding > 1.0f) ? rounding : 1.0f;
+        const float least = greater(rounding, 1.0f);
         float pivot = 1.0f + u[(j * n) + j];
         for (uint32_t k = left; k < n; k++) {
             pivot -= u[(j * n) + k] * u[(j * n) + k];
         }
-        const float inverse = 1.0f / sqrtf((pivot < least) ? least : pivot);
+        const float inverse = 1.0f / sqrtf(greater(least, pivot));
         u[(j * n) + j] = inverse;
         for (uint32_t i = 0u; i < j; i++) {
             float sum = u[(i * n) + j];

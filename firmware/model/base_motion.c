@@ -1,11 +1,13 @@
 #include "model/base_motion.h"
 
+#include "math/bounds.h"
+
 #define KEPT 0.99998f     /* of s_dot in a step: what rounding adds is forgotten */
 #define COSINE_LEAST 0.2f /* a trim beyond 78 degrees is taken for that */
 
 float base_motion_angle(const model_constants_t *constants, const model_step_t *step)
 {
-    return 1.0f / (constants->length * ((step->trim_cosine > COSINE_LEAST) ? step->trim_cosine : COSINE_LEAST));
+    return 1.0f / (constants->length * greater(step->trim_cosine, COSINE_LEAST));
 }
 
 /* By the linearly implicit midpoint rule, as in linear.h. */

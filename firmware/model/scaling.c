@@ -1,5 +1,6 @@
 #include "model/scaling.h"
 
+#include "math/bounds.h"
 #include "math/exponential.h"
 
 #define L ((uint32_t)MODEL_PARAMETERS)
@@ -17,8 +18,8 @@ void scaling_init(scaling_t *scaling, const model_t *model, const prior_t *prior
     for (uint32_t i = 0u; i < L; i++) {
         const float least = scaled(scaling, i, model->parameter[i].least);
         const float greatest = scaled(scaling, i, model->parameter[i].greatest);
-        scaling->least[i] = (least < 0.0f) ? least : 0.0f;
-        scaling->greatest[i] = (greatest > 0.0f) ? greatest : 0.0f;
+        scaling->least[i] = lesser(least, 0.0f);
+        scaling->greatest[i] = greater(greatest, 0.0f);
     }
 }
 
@@ -60,8 +61,7 @@ bool scaling_bound(const scaling_t *scaling, float w[MODEL_PARAMETERS])
 {
     bool bounded = false;
     for (uint32_t i = 0u; i < L; i++) {
-        const float most = (w[i] > scaling->greatest[i]) ? scaling->greatest[i] : w[i];
-        const float kept = (most < scaling->least[i]) ? scaling->least[i] : most;
+        const float kept = greater(scaling->least[i], lesser(scaling->greatest[i], w[i]));
         bounded = bounded || (kept != w[i]);
         w[i] = kept;
     }

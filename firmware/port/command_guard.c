@@ -53,18 +53,39 @@ static bool is_authentic(command_guard_t *guard, const lever_frame_t *frame)
     return authentic;
 }
 
+/* Whether a COMMAND may change something now. */
+static enum message_result judge_change(const command_guard_t *guard)
+{
+    enum message_result result = MESSAGE_RESULT_ACCEPTED;
+
+    if (!guard->takes_commands) {
+        result = MESSAGE_RESULT_DISABLED;
+    } else if (lever_is_acting(guard->lever)) {
+        result = MESSAGE_RESULT_ACTING;
+    } else if ((guard->is_safe != NULL) && !guard->is_safe(guard->self)) {
+        result = MESSAGE_RESULT_NOT_SAFE;
+    } else {
+        /* it may */
+    }
+    return result;
+}
+
 static bool may_pass(command_guard_t *guard, const lever_frame_t *frame)
 {
     lever_command_t command;
-    bool passes = (guard->authentication == NULL) || is_authentic(guard, frame);
+    enum message_result result = MESSAGE_RESULT_ACCEPTED;
 
-    if (passes && message_command_decode(&command, frame) &&
-        !is_harmless(&command)) { /* else the estimator refuses it */
-        passes = guard->takes_commands && !lever_is_acting(guard->lever) &&
-                 ((guard->is_safe == NULL) || guard->is_safe(guard->self));
+    if ((guard->authentication != NULL) && !is_authentic(guard, frame)) {
+        result = MESSAGE_RESULT_NOT_AUTHENTIC;
+    } else if (message_command_decode(&command, frame) && !is_harmless(&command)) {
+        result = judge_change(guard);
+    } else {
+        /* what is no COMMAND is refused by the estimator */
     }
-    guard->refused += passes ? 0u : 1u;
-    return passes;
+    if (result != MESSAGE_RESULT_ACCEPTED) {
+        lever_refuse(guard->lever, frame, (uint8_t)result);
+    }
+    return result == MESSAGE_RESULT_ACCEPTED;
 }
 
 static bool is_authenticator(command_guard_t *guard, const lever_frame_t *frame)

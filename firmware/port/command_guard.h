@@ -6,7 +6,7 @@
  *   - any other passes when the build takes commands, while nothing acts on the lever (lever_is_acting()) and, where
  *     there is such a callback, the machine says that it is safe, e.g. on the ground;
  *   - with an authentication none passes that is not authentic and new, whatever it says.
- * What is refused is counted and gets no COMMAND_ACK. Other frames pass.
+ * What is refused is counted in LINK_HEALTH, and COMMAND_ACK says why. Other frames pass.
  *
  * Authentication is that of AUTOSAR SecOC with the authenticator in a frame of its own: COMMAND has no room for it. A
  * frame with the identifier `id`, which the integrator chooses, precedes its COMMAND: 8 bytes, the low 24 bits of the
@@ -44,13 +44,12 @@ typedef struct command_authentication {
 typedef struct command_guard {
     enum port_result (*receive)(void *self, lever_frame_t *frame); /* of the port */
     void *self;
-    const lever_t *lever;
+    lever_t *lever;
     bool (*is_safe)(void *self);                    /* NULL: the state of the lever decides alone */
     const command_authentication_t *authentication; /* NULL: none */
     bool takes_commands;                            /* that change something: by the build */
     bool has_authenticator;                         /* for the next COMMAND */
     uint8_t authenticator[8];
-    uint32_t refused; /* COMMANDs */
 } command_guard_t;
 
 /* receive of port.h, with a command_guard_t as `self`. A frame that is refused is received, but not handed on: the next

@@ -22,10 +22,16 @@ KEEP_ALIVE = 0.25
 """[s] after which to repeat a COMMAND, so that torque goes on: the estimator waits for a second."""
 
 ACCEPTED, SEQUENCE = "accepted", "sequence"
+UNANSWERED = "no COMMAND_ACK: is an estimator, of this version, on the bus?"
+"""Why a COMMAND has done nothing."""
 _REFUSALS = {
     "unknown_value": "it does not know a value in it",
     SEQUENCE: "its counter is out of sequence: is there another sender of COMMAND?",
     "fault_mode": "it is in mode fault, which only a reset leaves",
+    "disabled": "its image was built without -D LEVER_COMMANDS=ON, so no COMMAND may change anything",
+    "acting": "while torque or a correction acts on the lever, all that a COMMAND may change is to end the dither",
+    "not_safe": "its machine says that it is not safe now",
+    "not_authentic": "no authentication came with it, or not a new one of its sender",
 }
 
 

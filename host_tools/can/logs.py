@@ -53,6 +53,9 @@ class Recording:
         """Why a log breaks off, with its name."""
         self._done: dict[str, int] = {}
         names = [os.fspath(path) for path in paths]
+        files = [os.path.realpath(name) for name in names]
+        if twice := next((name for i, name in enumerate(names) if files[i] in files[:i]), None):
+            raise LogError(f"{twice}: given twice; several logs are pieces of one recording, one after another")
         self.size = sum(map(_size, names))
         """Bytes of all files, as far as they have a size."""
         opened = [self._open(path) for path in names]

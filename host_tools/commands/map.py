@@ -41,7 +41,7 @@ _SPARK = 40
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
-        "map", help="which signals of a foreign log are the inputs", description=_DESCRIPTION, epilog=_EPILOG
+        "map", help="propose which signals of any log are the inputs", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("log", metavar="LOG", help="a recorded log, or a file of columns")
     parser.add_argument("--dbc", metavar="FILE", help="database of the messages (DBC, ARXML, KCD, SYM)")

@@ -110,8 +110,9 @@ def _mapped(log: Path, reading: Reading | None) -> Tables:
         print(f"lever: record: warning: {error}", file=sys.stderr)
         return {}
     summary = samples.summary()
-    messages = [{"message": name, **counts} for name, counts in summary["messages"].items()]
-    return {"signals": [{"input": key, **row} for key, row in summary["inputs"].items()], "mapped messages": messages}
+    messages: list[Row] = [{"message": name, **vars(counts)} for name, counts in summary.messages.items()]
+    signals: list[Row] = [{"input": key, **vars(each)} for key, each in summary.inputs.items()]
+    return {"signals": signals, "mapped messages": messages}
 
 
 def _seconds(text: str) -> float:

@@ -18,12 +18,13 @@ if TYPE_CHECKING:
 
     from ..firmware.settings_file import Assignments
     from ..replay.engine import Options
+    from ..results.summary import ReplaySummary
 
 _DESCRIPTION = f"""\
 Feeds recorded CAN logs to the firmware in this process, in recorded order, and prints its estimates; with --out also
 writes into DIR
 
-  bus.log        what the estimator got and what it answered, in the format of candump, on recorded time
+  bus.log        frames to and from the estimator, in the format of candump, in recorded time
   trace.csv      measured, estimated, standard deviations and health, a row for each sample
   signals.mf4    the same signals with units and comments, for asammdf, PlotJuggler and the like
   signals.mcap   with --format mcap: the same as messages, for Foxglove
@@ -33,13 +34,13 @@ writes into DIR
 
 LOG is a log of candump -L (.log, or - for standard input), or .blf, .asc, .mf4, .trc, .csv or .db, compressed (.gz) or
 not, or a file of columns (see below). Several logs are taken one after another in the order of their first frames, or
-with --each as recordings of their own. Whatever else is in a log, other messages, other buses, damaged lines, is
-counted and left out. If it holds estimates too, of the firmware that ran when it was recorded, and of this version of
-lever.dbc (IDENTITY says so), they are compared with the new ones, signal by signal.
+with --each as separate recordings. Other messages, other buses and damaged lines are counted and left out. If the log
+also holds estimates, of the firmware that ran when it was recorded and by this version of lever.dbc (IDENTITY says so),
+they are compared with the new ones, signal by signal.
 
 {MAP_HELP}
-The settings are the firmware's defaults but for --settings and --set; COMMAND frames in the log are obeyed, but for a
-choice (model, preload, estimator, adaptation, mitigation) that is made here. sample_period is that of mapped signals.
+The settings are the firmware's defaults, changed by --settings and --set. COMMAND frames in the log are obeyed, except
+for a choice (model, preload, estimator, adaptation, mitigation) that is made here. Mapped signals set sample_period.
 """
 _EPILOG = """\
 examples:
@@ -59,11 +60,11 @@ standard error.
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
-        "replay", help="estimate again from recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
+        "replay", help="run the firmware on recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log; several are one recording in pieces")
     parser.add_argument(
-        "--each", action="store_true", help="every LOG is a recording of its own: one table, one page, a row for each"
+        "--each", action="store_true", help="every LOG is a separate recording: one table, one page, a row for each"
     )
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
     parser.add_argument(
@@ -104,12 +105,12 @@ def run(args: argparse.Namespace) -> int:
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
     print_tables(_tables(summary), args.json, inputs=[*args.logs, *input_files(args)])
-    say(summary["verdict"])
+    say(summary.verdict)
     if args.out is not None:
         say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
-    if not summary["passed"]:
+    if not summary.passed:
         print(f"lever: replay: {failure(summary)}", file=sys.stderr)
-    return 0 if summary["passed"] else 1
+    return 0 if summary.passed else 1
 
 
 def _run_each(args: argparse.Namespace) -> int:
@@ -164,57 +165,60 @@ def _assignments(args: argparse.Namespace) -> Assignments:
     return assignments
 
 
-def _tables(summary: dict[str, Any]) -> Tables:
+def _tables(summary: ReplaySummary) -> Tables:
     estimates: list[Row] = [
         {
             "quantity": name,
-            "unit": entry["unit"],
-            "at end": entry["last"],
-            "sigma": entry["last_sigma"],
-            "least": entry["least"],
-            "greatest": entry["greatest"],
+            "unit": entry.unit,
+            "at end": entry.last,
+            "sigma": entry.last_sigma,
+            "least": entry.least,
+            "greatest": entry.greatest,
         }
-        for name, entry in summary["estimates"].items()
+        for name, entry in summary.estimates.items()
     ]
     tables: dict[str, list[Row]] = {"estimates": estimates}
-    if summary["comparison"] is not None:
+    if summary.comparison is not None:
         tables["replayed minus recorded estimates"] = [
             {
                 "signal": name,
-                "unit": entry["unit"],
-                "samples": entry["samples"],
-                "identical": entry["identical_samples"],
-                "mean difference": entry["bias"],
-                "rms difference": entry["rms"],
-                "largest difference": entry["largest"],
-                "at [s]": entry["largest_at_s"],
-                "rms in sigma [1]": entry["rms_in_sigma"],
+                "unit": entry.unit,
+                "samples": entry.samples,
+                "identical": entry.identical_samples,
+                "mean difference": entry.bias,
+                "rms difference": entry.rms,
+                "largest difference": entry.largest,
+                "at [s]": entry.largest_at_s,
+                "rms in sigma [1]": entry.rms_in_sigma,
             }
-            for name, entry in summary["comparison"]["signals"].items()
+            for name, entry in summary.comparison.signals.items()
         ]
-    if mapping := summary["recording"]["mapping"]:
-        tables["signals"] = [{"input": key, **row} for key, row in mapping["inputs"].items()]
-    shares = {**summary["fault_shares"], "any that warns": summary["flagged_share"]}
+    if mapping := summary.recording.mapping:
+        tables["signals"] = [{"input": key, **vars(each)} for key, each in mapping.inputs.items()]
+    shares = {**summary.fault_shares, "any that warns": summary.flagged_share}
     tables["share of the judged time with each fault"] = [
         {"fault": name, "share [%]": None if share is None else 100.0 * share} for name, share in shares.items()
     ]
     return tables | {"recording": [_recording_row(summary)]}
 
 
-def _recording_row(summary: dict[str, Any]) -> Row:
-    recording = summary["recording"]
-    left_out = ", ".join(f"{count} {kind}" for kind, count in recording["frames_left_out"].items())
+def _recording_row(summary: ReplaySummary) -> Row:
+    recording = summary.recording
+    left_out = ", ".join(f"{count} {kind}" for kind, count in recording.frames_left_out.items())
     return {
-        "bus": recording["channel"],
-        "duration [s]": recording["duration_s"],
-        "frames": recording["frames"],
+        "bus": recording.channel,
+        "duration [s]": recording.duration_s,
+        "frames": recording.frames,
         "frames left out": left_out or "none",
-        "refused": recording["refused"],
-        "samples": summary["samples"],
-        **{count: summary[count] for count in ("lost", "corrupt", "late", "restarts")},
-        "repeated frames": recording["repeated"],
-        "damaged lines": recording["damaged_lines"],
-        "gaps": recording["gaps"],
-        "longest gap [s]": recording["longest_gap_s"],
-        "mean NIS [1]": summary["nis"]["mean"],
+        "refused": recording.refused,
+        "samples": summary.samples,
+        "lost": summary.lost,
+        "corrupt": summary.corrupt,
+        "late": summary.late,
+        "restarts": summary.restarts,
+        "repeated frames": recording.repeated,
+        "damaged lines": recording.damaged_lines,
+        "gaps": recording.gaps,
+        "longest gap [s]": recording.longest_gap_s,
+        "mean NIS [1]": summary.nis.mean,
     }

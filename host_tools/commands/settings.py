@@ -11,10 +11,10 @@ from ..tables import Row, add_json_option
 
 _DESCRIPTION = """\
 Without --set and --settings: prints every setting of the estimator with unit, default, range and meaning, after the
-four choices that are made by name.
-With them: prints a settings file with all values, for `lever_can --settings FILE` and can.Bus(interface="lever",
-settings="FILE"). A number is in the unit of the table, or in the unit that follows it, here and wherever settings are
-given: in files, with --set of `lever sim`, `lever replay` and `lever tune`, and with lever_can --set.
+choices that are made by name. With them: prints a settings file with all values, for `lever_can --settings FILE` and
+can.Bus(interface="lever", settings="FILE"). A number is in the unit of the table, or in the unit that follows it, here
+and wherever settings are given: in files, with --set of `lever sim`, `lever replay` and `lever tune`, and with
+lever_can --set.
 """
 _EPILOG = """\
 examples:

@@ -48,7 +48,7 @@ _EPILOG = """\
 examples:
   lever sim steady --out out/steady                        a log, out/steady/bus.log
   lever tune out/steady/bus.log -o my.settings
-  lever sim sudden_grip --settings my.settings             the same file is for `lever replay`, for lever_can, and as
+  lever sim steady --settings my.settings                  the same file is for `lever replay`, for lever_can, and as
                                                            -D LEVER_SETTINGS_FILE=my.settings for building firmware
   lever tune flight.log --settings old.settings --start 60 --length 120 --page tune.html
   lever tune flight.log --set model=linear_physical --keep theta_noise

@@ -80,8 +80,8 @@ def words(column: str, number: int) -> str:
 def as_words(column: str, values: FloatArray) -> list[str | None]:
     """words() of each value; None for NaN."""
     different, place = np.unique(np.nan_to_num(values, nan=-1.0), return_inverse=True)
-    told = [None if value < 0.0 else words(column, int(value)) for value in different.tolist()]
-    return [told[index] for index in place.tolist()]
+    texts = [None if value < 0.0 else words(column, int(value)) for value in different.tolist()]
+    return [texts[index] for index in place.tolist()]
 
 
 def together(described: Iterable[Column], key: Callable[[Column], str]) -> dict[str, list[Column]]:

@@ -86,9 +86,9 @@ def _objects(trace: Trace, rows: NDArray[np.intp], described: list[Column]) -> I
                 [None if word is None else f"{key}:{json.dumps(word)}" for word in as_words(column.source, values)]
             )
         else:
-            known = np.isfinite(values).tolist()
+            finite = np.isfinite(values).tolist()
             fields.append(
-                [f"{key}:{value:.{_DIGITS}g}" if there else None for value, there in zip(values, known, strict=True)]
+                [f"{key}:{value:.{_DIGITS}g}" if there else None for value, there in zip(values, finite, strict=True)]
             )
     for row in zip(*fields, strict=True):
         text = ",".join(field for field in row if field is not None)

@@ -94,11 +94,11 @@ def _metadata(kind: str, title: str, provenance: Provenance | None, more: Mappin
     creator, date, text = "Creator", {"svg": "Date", "pdf": "CreationDate"}.get(kind), {"pdf": "Subject"}.get(kind)
     if kind == "png":
         creator = "Software"
-    told: dict[str, Any] = {"Title": title, creator: None} | ({date: None} if date else {})
+    metadata: dict[str, Any] = {"Title": title, creator: None} | ({date: None} if date else {})
     if provenance is not None:
         properties = provenance.properties(**more)
-        told[creator] = f"{properties['software']} {properties['version']}"
-        told[text or "Description"] = json.dumps(properties, ensure_ascii=False)
+        metadata[creator] = f"{properties['software']} {properties['version']}"
+        metadata[text or "Description"] = json.dumps(properties, ensure_ascii=False)
         if date:
-            told[date] = provenance.moment()
-    return told
+            metadata[date] = provenance.moment()
+    return metadata

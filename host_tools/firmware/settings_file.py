@@ -1,7 +1,7 @@
 """Settings files, which `lever settings` prints and `lever_can --settings` reads: a configuration as text.
 
 One `name = value` a line, `#` starts a comment, the last of two equal names counts; firmware/port/linux/settings.h has
-the grammar, to the byte. Names are those of settings_table(), in its units unless another follows, and four choices:
+the grammar, to the byte. Names are those of settings_table(), in its units unless another follows, and the choices:
 
     preload = trim           # one of fixed, trim
     theta_noise = 2 mrad     # 0.002: [rad] standard deviation of a theta sample

@@ -72,8 +72,8 @@ class Columns:
 
 def _without(faults: FloatArray, bits: int) -> FloatArray:
     """Masks without some bits; NaN stays."""
-    known = np.isfinite(faults)
-    return np.where(known, (np.where(known, faults, 0.0).astype(np.int64) & ~bits).astype(np.float64), np.nan)
+    finite = np.isfinite(faults)
+    return np.where(finite, (np.where(finite, faults, 0.0).astype(np.int64) & ~bits).astype(np.float64), np.nan)
 
 
 class _Decoded:

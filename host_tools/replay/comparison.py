@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..firmware.quantities import DYNAMICS, quantities, recorded_name
+from ..results import summary
 from ..results.summary import Difference
 from ..results.trace import ESTIMATED, Trace
 
@@ -83,18 +83,14 @@ class Comparison:
         for each in self._sums:
             each.add(trace)
 
-    def summary(self) -> dict[str, Any] | None:
-        """For summary.json; None where the recording holds no estimates."""
+    def summary(self) -> summary.Comparison | None:
+        """None where the recording holds no estimates."""
         differences = {each.signal.name: each.finished() for each in self._sums}
         compared = [each for each in differences.values() if each.samples]
         if not compared:
             return None
         identical = all(each.identical_samples == each.samples for each in compared)
-        return {
-            "identical": identical,
-            "signals": {name: asdict(each) for name, each in differences.items()},
-            "in_words": self._in_words(differences, identical),
-        }
+        return summary.Comparison(identical, differences, self._in_words(differences, identical))
 
     def _in_words(self, differences: dict[str, Difference], identical: bool) -> str:
         if identical:

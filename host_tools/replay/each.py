@@ -20,6 +20,7 @@ from ..report.figure import SERIES, Figure, axis, line, time_axis
 from ..report.page import Page
 from ..report.series import spread_indices
 from ..report.summary_html import number, table
+from ..results.summary import ReplaySummary
 from ..tables import Row
 from .engine import Options, Progress, replay
 from .summary import failure
@@ -35,7 +36,7 @@ class Replayed:
     """One of the logs."""
 
     log: str
-    summary: dict[str, Any] | None = None
+    summary: ReplaySummary | None = None
     """None where it could not be replayed."""
     problem: str = ""
     """Why not, or why it is not to be believed."""
@@ -52,13 +53,13 @@ class Replayed:
             return {"log": Path(self.log).name, "problem": self.problem}
         row: dict[str, Any] = {
             "log": Path(self.log).name,
-            "duration [s]": self.summary["recording"]["duration_s"],
-            "samples": self.summary["samples"],
+            "duration [s]": self.summary.recording.duration_s,
+            "samples": self.summary.samples,
         }
-        for name, estimate in self.summary["estimates"].items():
-            unit = "" if estimate["unit"] == "1" else f" [{estimate['unit']}]"
-            row[f"{name}{unit}"], row[f"{name} sigma{unit}"] = estimate["last"], estimate["last_sigma"]
-        return row | {"mean NIS [1]": self.summary["nis"]["mean"], "problem": self.problem}
+        for name, estimate in self.summary.estimates.items():
+            unit = "" if estimate.unit == "1" else f" [{estimate.unit}]"
+            row[f"{name}{unit}"], row[f"{name} sigma{unit}"] = estimate.last, estimate.last_sigma
+        return row | {"mean NIS [1]": self.summary.nis.mean, "problem": self.problem}
 
 
 def replay_each(
@@ -155,10 +156,11 @@ def _cells(row: Row) -> dict[str, str]:
 
 def _figure(replays: Sequence[Replayed]) -> Figure | None:
     """A row a quantity, a curve a log."""
-    shown = [each for each in replays if each.summary is not None and len(each.rows.get("time_s", ()))]
-    if not shown:
+    shown = [each for each in replays if len(each.rows.get("time_s", ()))]
+    models = [each.summary.estimator.model for each in shown if each.summary is not None]
+    if not models:
         return None
-    wanted: list[Quantity] = list(quantities(shown[0].summary["estimator"]["model"]))  # type: ignore[index]
+    wanted: list[Quantity] = list(quantities(models[0]))
     wanted = [each for each in wanted if any(each.column("estimate") in log.rows for log in shown)]
     wanted.sort(key=lambda each: each.key not in ("natural_frequency", "damping_ratio"))
     rows = [axis(f"{each.symbol} [{each.shown_unit}]") for each in wanted]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -18,14 +18,15 @@ from ..can.logs import Recording
 from ..can.traffic import Traffic
 from ..exports.signal_files import calendar
 from ..extras import missing
-from ..files import Outputs, json_text, write_text
+from ..files import Outputs, write_text
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
 from ..provenance import printable, provenance
 from ..report import write_page
+from ..results import summary as summaries
 from ..results.faults import OPTIONAL
-from ..results.summary import SCHEMA, ReplaySummary, of
+from ..results.summary import RecordingSummary, ReplaySummary
 from ..results.trace import Trace
 from ..signals.reading import Reading
 from ..signals.traffic import MappedTraffic
@@ -77,7 +78,7 @@ def replay(
     out_dir: Path | None = None,
     progress: Progress | None = None,
     keep: Callable[[Mapping[str, FloatArray]], None] | None = None,
-) -> dict[str, Any]:
+) -> ReplaySummary:
     """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
     the signals, report.html (with the extra `report`) and summary.json there, all or none, and hands the trace,
     reduced, to `keep`. Raises LeverError, also rather than write over a log."""
@@ -185,7 +186,7 @@ class _Replay:
             published = (rows["fresh"] >> SLOTS["PILOT_PARAMETERS"]) & 1 != 0
             recorded = (rows["fresh"] >> RECORDED["PILOT_PARAMETERS"]) & 1 != 0
             if not self._folder.signals.started:
-                self._folder.signals.start(trace, int(rows["time_us"][0]), self._estimator())
+                self._folder.signals.start(trace, int(rows["time_us"][0]), asdict(self._estimator()))
             self._folder.signals.add(trace, published, recorded)
 
     def _start(self, rows: Rows) -> Columns:
@@ -214,76 +215,76 @@ class _Replay:
 
     # --- what comes of it ---------------------------------------------------------------------------------------------
 
-    def summary(self) -> dict[str, Any]:
-        """The content of summary.json."""
-        compared = None if self._comparison is None else self._comparison.summary()
-        summary: dict[str, Any] = {
-            "schema": SCHEMA,
-            "recording": self._recording(),
-            "estimator": self._estimator(),
-            "samples": self._timeline.clocks.samples,
-            **self.figures.summary(self._feeder.estimator.health()),
-            "stability": self._stability(),
-            "comparison": compared,
-            "snapshots": self._proof.summary(),
-        }
-        summary["passed"] = not failure(summary)
-        summary["verdict"] = verdict(summary)
-        return summary
+    def summary(self) -> ReplaySummary:
+        """The content of summary.json, but for the provenance of files."""
+        figures, health, aircraft = self.figures, self._feeder.estimator.health(), self._options.aircraft
+        summary = ReplaySummary(
+            estimator=self._estimator(),
+            samples=self._timeline.clocks.samples,
+            lost=health.lost,
+            corrupt=health.corrupt,
+            late=health.late,
+            restarts=health.recoveries,
+            nis=figures.nis(),
+            whiteness=figures.whiteness(),
+            stability=None if aircraft is None else figures.bounce.summary(aircraft),
+            modes_s=figures.modes_s(),
+            passed=False,
+            verdict="",
+            recording=self._recording(),
+            fault_shares=figures.faults.shares,
+            flagged_share=figures.faults.warned_share,
+            estimates=figures.estimates(),
+            comparison=None if self._comparison is None else self._comparison.summary(),
+            snapshots=self._proof.summary(),
+        )
+        return replace(summary, passed=not failure(summary), verdict=verdict(summary))
 
-    def _estimator(self) -> dict[str, Any]:
+    def _estimator(self) -> summaries.Estimator:
         choices = self._commands.choices
         if self._proof.counts.begun_at_s is not None:
             choices |= self._recorded.choices  # COMMANDs before the log
         choices |= {"model": self.model}
-        return {**choices, "settings": self._options.config.settings}
+        return summaries.Estimator(**choices, settings=dict(self._options.config.settings))
 
-    def _stability(self) -> dict[str, Any] | None:
-        """None without an aircraft."""
-        aircraft = self._options.aircraft
-        if aircraft is None:
-            return None
-        return asdict(self.figures.bounce.summary(aircraft))
-
-    def _recording(self) -> dict[str, Any]:
+    def _recording(self) -> RecordingSummary:
         traffic, clocks = self._traffic, self._timeline.clocks
         recording = traffic.recording
         first, last = traffic.first_us, traffic.last_us
-        return {
-            "logs": [printable(Path(path).name) for path in recording.paths],
-            "channel": traffic.channel,
-            "start": _calendar(first),
-            "duration_s": (last - first) * 1e-6,
-            "frames": traffic.frames,
-            "frames_left_out": {kind: count for kind, count in traffic.others.items() if count},
-            "corrupt_recorded_answers": traffic.corrupt_answers,
-            "answers_of_other_contract": self._other_contract,
-            "misplaced_answers": 0 if self._columns is None else self._columns.misplaced,
-            "damaged_lines": recording.damaged,
-            "ends_early": [_without_folder(reason) for reason in recording.ends_early],
-            "refused": self._feeder.refused,
-            "repeated": self._repeats.count,
-            "commands": self._commands.count,
-            "commands_changed": self._commands.changed,
-            "model_changes": self._model_changes,
-            "other_buses_with_samples": sorted(traffic.other_samples),
-            "typical_step_s": self._timeline.typical_step_us * 1e-6,
-            "gaps": clocks.gaps,
-            "longest_gap_s": clocks.longest_gap_s,
-            "late_samples": clocks.late,
-            "clock_wraps": clocks.wraps,
-            "clock_restarts": clocks.restarts,
-            "recorder_clock_jumps": clocks.recorder_jumps,
-            "mapping": traffic.loaded.summary() if isinstance(traffic, MappedTraffic) else None,
-        }
+        return RecordingSummary(
+            logs=[printable(Path(path).name) for path in recording.paths],
+            channel=traffic.channel,
+            start=_calendar(first),
+            duration_s=(last - first) * 1e-6,
+            frames=traffic.frames,
+            frames_left_out={kind: count for kind, count in traffic.others.items() if count},
+            corrupt_recorded_answers=traffic.corrupt_answers,
+            answers_of_other_contract=self._other_contract,
+            misplaced_answers=0 if self._columns is None else self._columns.misplaced,
+            damaged_lines=recording.damaged,
+            ends_early=[_without_folder(reason) for reason in recording.ends_early],
+            refused=self._feeder.refused,
+            repeated=self._repeats.count,
+            commands=self._commands.count,
+            commands_changed=self._commands.changed,
+            model_changes=self._model_changes,
+            other_buses_with_samples=sorted(traffic.other_samples),
+            typical_step_s=self._timeline.typical_step_us * 1e-6,
+            gaps=clocks.gaps,
+            longest_gap_s=clocks.longest_gap_s,
+            late_samples=clocks.late,
+            clock_wraps=clocks.wraps,
+            clock_restarts=clocks.restarts,
+            recorder_clock_jumps=clocks.recorder_jumps,
+            mapping=traffic.loaded.summary() if isinstance(traffic, MappedTraffic) else None,
+        )
 
-    def finish(self, folder: Folder, summary: dict[str, Any]) -> dict[str, Any]:
+    def finish(self, folder: Folder, summary: ReplaySummary) -> ReplaySummary:
         """Completes the files and puts them into place; returns the summary with their provenance."""
-        summary = summary | {"provenance": asdict(folder.complete())}
+        summary = replace(summary, provenance=folder.complete())
         if not missing("report"):
-            run = RecordedRun(self.kept, of(ReplaySummary, summary))
-            write_page(run, folder.outputs.path("report.html"))
-        write_text(folder.outputs.path(SUMMARY), json_text(summary))
+            write_page(RecordedRun(self.kept, summary), folder.outputs.path("report.html"))
+        write_text(folder.outputs.path(SUMMARY), summaries.text(summary))
         folder.outputs.finish()
         return summary
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +18,7 @@ from ..can.snapshots import Snapshot
 from ..firmware.config import CHOICES
 from ..firmware.estimator import Estimator, state_layout
 from ..firmware.library import enum_names, lib
+from ..results.summary import Snapshots
 
 _LONGEST_US = 20_000_000
 """Two periods of the longest between snapshots: after that a snapshot that has begun does not end any more."""
@@ -32,31 +31,12 @@ _SAMPLES_LATE = 8
 OTHER_CHOICES = "other choices were made for the replay"
 
 
-@dataclass
-class Counts:
-    """What came of the snapshots in a log."""
-
-    found: int = 0
-    equal: int = 0
-    different: int = 0
-    broken: int = 0
-    """Without their end, or without their sample in the log."""
-    begun_at_s: float | None = None
-    """Recorded time, since the first frame, of the snapshot that the replay began with; None: with the log."""
-    left_out: int = 0
-    """Frames before that."""
-    first_different_s: float | None = None
-    last_equal_s: float | None = None
-    not_compared: str | None = None
-    """Why they could not be."""
-
-
 class Proof:
     """Sits between the frames of a log and an estimator that has taken none yet."""
 
     def __init__(self, estimator: Estimator, another: Callable[[], Estimator], chosen: Mapping[str, str]) -> None:
         """`another` makes an estimator of the same configuration and aircraft; `chosen` are choices that stay."""
-        self.counts = Counts()
+        self.counts = Snapshots()
         self._estimator, self._another, self._chosen = estimator, another, chosen
         self._held: Frames | None = None
         self._started = self._known = False
@@ -99,9 +79,9 @@ class Proof:
         if snapshot.state is not None:
             self._estimator.restore(snapshot.state)
 
-    def summary(self) -> dict[str, Any] | None:
-        """The part of summary.json; None without a snapshot."""
-        return asdict(self.counts) if self.counts.found else None
+    def summary(self) -> Snapshots | None:
+        """None without a snapshot."""
+        return self.counts if self.counts.found else None
 
     # --- where to cut -------------------------------------------------------------------------------------------------
 
@@ -188,11 +168,10 @@ def choices_of(estimator: Estimator) -> dict[str, str]:
     return {what: enum_names(f"lever_{what}")[int(fields[what])] for what in CHOICES}
 
 
-def in_words(summary: dict[str, Any] | None) -> str:
+def in_words(counts: Snapshots | None) -> str:
     """A sentence or two for the verdict."""
-    if summary is None:
+    if counts is None:
         return ""
-    counts = Counts(**summary)
     if counts.not_compared is not None:
         return f"Its {counts.found} snapshots of the state are not compared: {counts.not_compared}."
     sentences = []

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
-
 import numpy as np
 
 from ..can.traffic import why_refused
-from ..firmware.native import Config, Health, enum_names
+from ..firmware.native import Config, enum_names
 from ..firmware.quantities import quantities
 from ..results import bounce, nis, whiteness
 from ..results.bounce import Bounce
 from ..results.faults import LITTLE, OPTIONAL, WARNINGS, FaultCounts
-from ..results.nis import Innovations, freedom
-from ..results.summary import Stability
+from ..results.nis import Innovations, Nis, freedom
+from ..results.summary import Estimate, Mapped, RecordingSummary, ReplaySummary
 from ..results.trace import CONVERGED_AFTER, MEASURED, Trace
+from ..results.whiteness import Whiteness
 from . import proof
 from .reduction import Groups
 
@@ -32,7 +30,7 @@ class Figures:
         self._average_s = size * self._period
         self._modes: dict[int, int] = {}
         self.bounce = Bounce(self._period)
-        self._faults = FaultCounts()
+        self.faults = FaultCounts()
         self._measured: set[str] = set()
         self._last: dict[str, float] = {}
         self._extremes: dict[str, tuple[float, float]] = {}
@@ -51,7 +49,7 @@ class Figures:
             self._modes[int(mode)] = self._modes.get(int(mode), 0) + count
         columns = {key: column for column, _, key in MEASURED}
         self._measured |= {fault for fault, key in OPTIONAL.items() if np.isfinite(trace[columns[key]]).any()}
-        self._faults.add(trace["faults"][judged], tuple(OPTIONAL.keys() - self._measured))
+        self.faults.add(trace["faults"][judged], tuple(OPTIONAL.keys() - self._measured))
         for name in (each.column(kind) for each in self._quantities for kind in ("estimate", "sigma")):
             finite = trace[name][np.isfinite(trace[name])]
             if len(finite):
@@ -59,136 +57,127 @@ class Figures:
                 least, greatest = self._extremes.get(name, (np.inf, -np.inf))
                 self._extremes[name] = min(least, float(finite.min())), max(greatest, float(finite.max()))
 
-    def estimates(self) -> dict[str, dict[str, Any]]:
+    def estimates(self) -> dict[str, Estimate]:
         """The last estimate of each quantity with its standard deviation, and between what it was."""
         by_key = {}
         for each in self._quantities:
             least, greatest = self._extremes.get(each.column("estimate"), (None, None))
-            by_key[each.key] = {
-                "unit": each.unit,
-                "last": self._last.get(each.column("estimate")),
-                "last_sigma": self._last.get(each.column("sigma")),
-                "least": least,
-                "greatest": greatest,
-            }
+            by_key[each.key] = Estimate(
+                unit=each.unit,
+                last=self._last.get(each.column("estimate")),
+                last_sigma=self._last.get(each.column("sigma")),
+                least=least,
+                greatest=greatest,
+            )
         return by_key
 
-    def summary(self, health: Health) -> dict[str, Any]:
-        """The part of summary.json that is about all samples; `health` is the estimator's at the end."""
-        residuals = self._residuals.all()
-        measured = None if residuals is None else whiteness.of_averages(residuals[0], self._average_s)
+    def modes_s(self) -> dict[str, float]:
+        """Seconds in each mode."""
         names = enum_names("lever_mode")
-        return {
-            "estimates": self.estimates(),
-            "nis": asdict(self._innovations.figures()),
-            "whiteness": None if measured is None else asdict(measured),
-            "lost": health.lost,
-            "corrupt": health.corrupt,
-            "late": health.late,
-            "restarts": health.recoveries,
-            "fault_shares": self._faults.shares,
-            "flagged_share": self._faults.warned_share,
-            "modes_s": {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())},
-        }
+        return {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())}
+
+    def whiteness(self) -> Whiteness | None:
+        """Of the residuals; None where there are too few."""
+        residuals = self._residuals.all()
+        return None if residuals is None else whiteness.of_averages(residuals[0], self._average_s)
+
+    def nis(self) -> Nis:
+        """Of the judged samples."""
+        return self._innovations.figures()
 
 
-def failure(summary: dict[str, Any]) -> str:
+def failure(summary: ReplaySummary) -> str:
     """Why a replay did not pass, in a line; empty when it did."""
     reasons = []
-    if "fault" in summary["modes_s"]:
-        reasons.append(f"the estimator was in fault for {summary['modes_s']['fault']:g} s")
-    if all(estimate["last"] is None for estimate in summary["estimates"].values()):
-        accepted, refused = summary["samples"], summary["recording"]["refused"]
+    if "fault" in summary.modes_s:
+        reasons.append(f"the estimator was in fault for {summary.modes_s['fault']:g} s")
+    if all(estimate.last is None for estimate in summary.estimates.values()):
+        accepted, refused = summary.samples, summary.recording.refused
         reasons.append(f"no estimate was published: samples accepted: {accepted:,}, frames refused: {refused:,}")
     return " and ".join(reasons)
 
 
-def verdict(summary: dict[str, Any]) -> str:
+def verdict(summary: ReplaySummary) -> str:
     """The replay in a few sentences."""
-    measured, stability = summary["whiteness"], summary["stability"]
     sentences = [
         *_troubles(summary),
-        proof.in_words(summary["snapshots"]),
+        proof.in_words(summary.snapshots),
         *_flags(summary),
-        bounce.verdict(stability and Stability(**stability)),
-        _comparison(summary["comparison"]),
-        nis.verdict(nis.Nis(**summary["nis"])),
-        whiteness.verdict(whiteness.Whiteness(**measured) if measured else None),
+        bounce.verdict(summary.stability),
+        summary.comparison.in_words if summary.comparison else "",
+        nis.verdict(summary.nis),
+        whiteness.verdict(summary.whiteness),
     ]
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _flags(summary: dict[str, Any]) -> list[str]:
+def _flags(summary: ReplaySummary) -> list[str]:
     """What the estimator itself says against its estimates."""
     sentences = []
-    modes = summary["modes_s"]
+    modes = summary.modes_s
     total, estimating = sum(modes.values()), modes.get("run", 0.0) + modes.get("frozen", 0.0)
     if total and estimating < 0.5 * total:
         sentences.append(
             f"It could estimate for {100.0 * estimating / total:.0f} % of the time only; else, what is shown is "
             "the first guess, or what was known last."
         )
-    shares = {name: share for name, share in summary["fault_shares"].items() if name in WARNINGS and share > LITTLE}
+    shares = {name: share for name, share in summary.fault_shares.items() if name in WARNINGS and share > LITTLE}
     if shares:
         listed = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares.items())
         sentences.append(f"Do not trust the estimates while the estimator warns: {listed} of the time.")
     return sentences
 
 
-def _comparison(comparison: dict[str, Any] | None) -> str:
-    return "" if comparison is None else str(comparison["in_words"])
-
-
-def _troubles(summary: dict[str, Any]) -> list[str]:
+def _troubles(summary: ReplaySummary) -> list[str]:
     """What the reader has to know before believing the rest."""
-    troubles, recording = [], summary["recording"]
+    troubles, recording = [], summary.recording
     if failure(summary):
         troubles.append(f"Trouble: {failure(summary)}.")
-    if mapping := recording.get("mapping"):
-        troubles += [f"{note}." for note in mapping["notes"]]
+    if mapping := recording.mapping:
+        troubles += [f"{note}." for note in mapping.notes]
         troubles += _protection(mapping)
-    if recording["refused"]:
-        why = why_refused(summary["corrupt"], summary["late"])
-        troubles.append(f"{recording['refused']:,} frames were refused{f': {why}' if why else ''}.")
-    if recording["ends_early"]:
-        troubles.append(f"The log is incomplete: {'; '.join(recording['ends_early'])}.")
-    if recording["damaged_lines"]:
-        troubles.append(f"{recording['damaged_lines']} of its lines are not frames.")
-    if recording["gaps"]:
-        gaps, longest = recording["gaps"], recording["longest_gap_s"]
+    if recording.refused:
+        why = why_refused(summary.corrupt, summary.late)
+        troubles.append(f"{recording.refused:,} frames were refused{f': {why}' if why else ''}.")
+    if recording.ends_early:
+        troubles.append(f"The log is incomplete: {'; '.join(recording.ends_early)}.")
+    if recording.damaged_lines:
+        troubles.append(f"{recording.damaged_lines} of its lines are not frames.")
+    if recording.gaps:
+        gaps, longest = recording.gaps, recording.longest_gap_s
         troubles.append(f"Samples are missing in {gaps} places, the longest gap {longest:.3g} s.")
-    if recording["clock_restarts"]:
-        troubles.append(f"The sender's clock started over {recording['clock_restarts']} times.")
-    if recording["model_changes"]:
+    if recording.clock_restarts:
+        troubles.append(f"The sender's clock started over {recording.clock_restarts} times.")
+    if recording.model_changes:
         troubles.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
-    step, period = recording["typical_step_s"], summary["estimator"]["settings"]["sample_period"]
+    step, period = recording.typical_step_s, summary.estimator.settings["sample_period"]
     if step and not 0.7 < step / period < 1.4:
         troubles.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
     return troubles + _recorded_estimates(recording)
 
 
-def _protection(mapping: dict[str, Any]) -> list[str]:
+def _protection(mapping: Mapped) -> list[str]:
     """What E2E protection has found, or that there was none."""
     sentences = []
-    for name, counts in mapping["messages"].items():
-        wrong = [f"{counts[what]:,} {what}" for what in ("corrupt", "lost", "repeated", "undecoded") if counts[what]]
+    for name, counts in mapping.messages.items():
+        wrong = [f"{count:,} {what}" for what, count in vars(counts).items() if count and what != "frames"]
         if wrong:
-            sentences.append(f"Of {counts['frames']:,} frames of {name}: {', '.join(wrong)}.")
-    if mapping["unprotected_frames"]:
+            sentences.append(f"Of {counts.frames:,} frames of {name}: {', '.join(wrong)}.")
+    if mapping.unprotected_frames:
         sentences.append(
-            f"{mapping['unprotected_frames']:,} frames are unprotected: the mapping names no E2E profile for them."
+            f"{mapping.unprotected_frames:,} frames are unprotected: the mapping names no E2E profile for them."
         )
     return sentences
 
 
-def _recorded_estimates(recording: dict[str, Any]) -> list[str]:
+def _recorded_estimates(recording: RecordingSummary) -> list[str]:
     """Why estimates in the log are not compared with the new ones."""
     troubles = []
-    if recording["answers_of_other_contract"]:
+    if recording.answers_of_other_contract:
         troubles.append(
             "The estimates in the log are of another version of lever.dbc, or of an unknown one (IDENTITY): they are "
             "not compared."
         )
-    if recording["misplaced_answers"]:
-        troubles.append(f"{recording['misplaced_answers']} recorded estimates do not belong to the sample before them.")
+    if recording.misplaced_answers:
+        troubles.append(f"{recording.misplaced_answers} recorded estimates do not belong to the sample before them.")
     return troubles

@@ -62,10 +62,8 @@ class Story(NamedTuple):
 def build(run: Run, story: Story | None = None) -> str:
     """The whole page."""
     scenario = run.simulated.scenario if run.simulated else None
-    title = (
-        (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.get("logs", ())) or "recorded run"
-    )
-    page = Page(title, _subtitle(run), "lever sim" if run.simulated else "lever replay")
+    title = (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.logs if run.recording else ())
+    page = Page(title or "recorded run", _subtitle(run), "lever sim" if run.simulated else "lever replay")
     if story is not None:
         page.section("story", "Bounce", story.title, page.figure("figure-story", story.figure, story.caption))
     _estimates(page, run)

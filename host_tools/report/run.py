@@ -15,7 +15,7 @@ from ..models.transfer import Transfer
 from ..results import whiteness
 from ..results.coherence import Coherence
 from ..results.feedthrough import Feedthrough
-from ..results.summary import ReplaySummary, SimulationSummary, Summary
+from ..results.summary import RecordingSummary, ReplaySummary, SimulationSummary, Summary
 from ..results.whiteness import Whiteness
 from .bode import slow_trim
 from .series import jumps, welch
@@ -76,9 +76,9 @@ class Run:
         return self.summary.estimator.model if self.summary else next(seen, native.Config().choices["model"])
 
     @property
-    def recording(self) -> Mapping[str, Any]:
-        """What the summary tells of the log that was replayed; empty for a simulation."""
-        return self.replayed.recording if self.replayed else {}
+    def recording(self) -> RecordingSummary | None:
+        """What was in the log that was replayed; None for a simulation."""
+        return self.replayed.recording if self.replayed else None
 
     @property
     def parameters(self) -> tuple[Quantity, ...]:

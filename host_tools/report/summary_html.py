@@ -183,10 +183,10 @@ def comparison_table(run: Run) -> str:
 def recorded(run: Run) -> str:
     """Where the samples come from, in a sentence; empty for a simulation."""
     recording = run.recording
-    if not recording:
+    if recording is None:
         return ""
-    start = f" from {recording['start']} on" if recording["start"] else ""
-    return f"A log, replayed: bus {recording['channel']}{start}."
+    start = f" from {recording.start} on" if recording.start else ""
+    return f"A log, replayed: bus {recording.channel}{start}."
 
 
 _RECORDING_FIGURES = (
@@ -209,12 +209,12 @@ _RECORDING_FIGURES = (
 def recording_table(run: Run) -> str:
     """What was in the log."""
     recording = run.recording
-    if not recording:
+    if recording is None:
         return ""
-    rows = [(label, number(recording[key]), unit) for key, label, unit in _RECORDING_FIGURES]
+    rows = [(label, number(getattr(recording, key)), unit) for key, label, unit in _RECORDING_FIGURES]
     rows += [
         (f"left out: {kind.replace('_', ' ')}", number(count), "frames")
-        for kind, count in recording["frames_left_out"].items()
+        for kind, count in recording.frames_left_out.items()
     ]
     return table(("the log", "value", "unit"), rows)
 

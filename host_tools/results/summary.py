@@ -212,20 +212,122 @@ class Comparison:
     in_words: str
 
 
+@dataclass
+class MessageCounts:
+    """What was found in the frames of one mapped message."""
+
+    frames: int = 0
+    corrupt: int = 0
+    """By their CRC; left out."""
+    lost: int = 0
+    """By their counter."""
+    repeated: int = 0
+    """By their counter; left out."""
+    undecoded: int = 0
+    """That do not fit the database; left out."""
+
+
+@dataclass(frozen=True)
+class MappedSignal:
+    """What one input of the estimator was made of."""
+
+    signal: str
+    unit: str
+    factor: float | None
+    offset: float
+    sign: int | None
+    gravity: str
+    channel: str | None
+    delay_s: float
+    rate_hz: float
+    sampled: str
+    missing: int
+    """Samples without a value."""
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """How samples were made of a log that does not speak lever.dbc."""
+
+    inputs: dict[str, MappedSignal]
+    clock: str
+    sample_period_s: float
+    disordered_values: int
+    messages: dict[str, MessageCounts]
+    unprotected_frames: int
+    """Of mapped messages without E2E protection in the mapping."""
+    notes: list[str]
+    """What was guessed or is odd, a sentence each."""
+
+
+@dataclass(frozen=True)
+class RecordingSummary:
+    """What was in the log."""
+
+    logs: list[str]
+    channel: str | None
+    start: str | None
+    """Date and time of the first frame; None where the log does not say."""
+    duration_s: float
+    frames: int
+    frames_left_out: dict[str, int]
+    corrupt_recorded_answers: int
+    answers_of_other_contract: bool
+    """The log holds estimates, of another version of lever.dbc or of an unknown one."""
+    misplaced_answers: int
+    """Recorded estimates that do not belong to the sample before them."""
+    damaged_lines: int
+    ends_early: list[str]
+    """Why, for each of the logs that does."""
+    refused: int
+    """Frames, by the firmware."""
+    repeated: int
+    commands: int
+    commands_changed: int
+    model_changes: int
+    other_buses_with_samples: list[str]
+    typical_step_s: float
+    gaps: int
+    longest_gap_s: float
+    late_samples: int
+    clock_wraps: int
+    clock_restarts: int
+    recorder_clock_jumps: int
+    mapping: Mapped | None
+
+
+@dataclass
+class Snapshots:
+    """What came of the snapshots of the estimator's state in the log."""
+
+    found: int = 0
+    equal: int = 0
+    different: int = 0
+    broken: int = 0
+    """Without their end, or without their sample in the log."""
+    begun_at_s: float | None = None
+    """Recorded time, since the first frame, of the snapshot that the replay began with; None: with the log."""
+    left_out: int = 0
+    """Frames before that."""
+    first_different_s: float | None = None
+    last_equal_s: float | None = None
+    not_compared: str | None = None
+    """Why they could not be."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReplaySummary(Summary):
     """Of `lever replay`."""
 
-    recording: dict[str, Any]
-    """What was in the log."""
+    recording: RecordingSummary
     fault_shares: dict[str, float]
     """Shares (0 to 1) of the judged time with each fault that there was; without those of inputs that the log lacks."""
     flagged_share: float | None
     """Of the judged time with any of faults.WARNINGS of those; None where nothing is judged."""
     estimates: dict[str, Estimate]
     comparison: Comparison | None
-    snapshots: dict[str, Any] | None = None
-    """Of the estimator's state in the log: replay.proof.Counts."""
+    snapshots: Snapshots | None = None
+    """None where there are none."""
 
 
 # --- to and from JSON ------------------------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from ..can.bulk import ERROR, EXTENDED, FD, REMOTE, Frames
 from ..can.logs import LogError, Recording
 from ..errors import LeverError
 from ..near_names import near_names
+from ..results.summary import MessageCounts
 from .mapping import Protection
 from .recorded import Signal
 
@@ -86,21 +87,6 @@ def _near(name: str, names: Iterable[str]) -> str:
 
 
 @dataclass
-class Counts:
-    """What was found in the frames of one message."""
-
-    frames: int = 0
-    corrupt: int = 0
-    """By their CRC; left out."""
-    lost: int = 0
-    """By their counter."""
-    repeated: int = 0
-    """By their counter; left out."""
-    undecoded: int = 0
-    """That do not fit the database; left out."""
-
-
-@dataclass
 class Received:
     """Frames of one message on one bus."""
 
@@ -123,7 +109,7 @@ class BusSignals:
         self, database: Database, wanted: Iterable[tuple[Message, Field]], protected: dict[str, Protection]
     ) -> None:
         """Raises LeverError for a protection that does not fit the database."""
-        self.counts: dict[str, Counts] = {}
+        self.counts: dict[str, MessageCounts] = {}
         """By message."""
         self.fd: set[str] = set()
         """Messages that came as CAN FD, whose data bulk.FRAME does not hold: add_fd() takes them."""
@@ -202,7 +188,7 @@ class BusSignals:
 
     def _decode(self, message: Message, received: Received) -> dict[str, Decoded]:
         """The signals of each frame that is right; a multiplexed one is not in all of them."""
-        counts = self.counts.setdefault(message.name, Counts())
+        counts = self.counts.setdefault(message.name, MessageCounts())
         counts.frames += len(received.data)
         protection = self._protected.get(message.name)
         decoded = {name: Decoded() for name in self._fields[message.name]}
@@ -234,7 +220,7 @@ def _is_right(protection: Protection | None, data: bytes) -> bool:
 class _Counter:
     """Follows the counter of a message, where the mapping names one."""
 
-    def __init__(self, message: Message, protection: Protection | None, counts: Counts) -> None:
+    def __init__(self, message: Message, protection: Protection | None, counts: MessageCounts) -> None:
         self._name = None if protection is None else protection.counter
         self._counts = counts
         self._last: int | None = None

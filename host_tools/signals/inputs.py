@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..errors import LeverError
+from ..results.summary import MappedSignal
 from ..slope import slope_ratio
 from ..units import GRAVITY
 from .mapping import Source
@@ -31,22 +31,21 @@ class Input:
     notes: tuple[str, ...]
     """What was guessed, for the user to see."""
 
-    def row(self, samples: Samples, key: str) -> dict[str, Any]:
+    def summary(self, samples: Samples, key: str) -> MappedSignal:
         """What summary.json says of it."""
-        values = samples.columns[key]
-        return {
-            "signal": self.signal.name,
-            "unit": self.source.unit,
-            "factor": self.source.factor,
-            "offset": self.source.offset,
-            "sign": self.source.sign,
-            "gravity": self.source.gravity,
-            "channel": self.source.channel,
-            "delay_s": self.source.delay,
-            "rate_hz": float(f"{1.0 / self.signal.period:.4g}"),
-            "sampled": samples.how[key],
-            "missing": int(np.isnan(values).sum()),
-        }
+        return MappedSignal(
+            signal=self.signal.name,
+            unit=self.source.unit,
+            factor=self.source.factor,
+            offset=self.source.offset,
+            sign=self.source.sign,
+            gravity=self.source.gravity,
+            channel=self.source.channel,
+            delay_s=self.source.delay,
+            rate_hz=float(f"{1.0 / self.signal.period:.4g}"),
+            sampled=samples.how[key],
+            missing=int(np.isnan(samples.columns[key]).sum()),
+        )
 
 
 def understood(key: str, source: Source, signal: Signal) -> Input:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from ..can.logs import Recording
 from ..can.traffic import LATE
 from ..errors import LeverError
 from ..near_names import near_names
-from .bus_signals import BusSignals, Counts, find, load_database
+from ..results.summary import Mapped, MessageCounts
+from .bus_signals import BusSignals, find, load_database
 from .inputs import Input, recorded_samples, understood
-from .mapping import Mapping, Source
+from .mapping import Mapping
 from .own import own_mapping
 from .recorded import Signal
 from .resample import Samples
@@ -53,24 +53,24 @@ class Loaded:
     """Of the part of the log, or rows of that of the file."""
     used: int
     """Frames of mapped messages."""
-    counts: dict[str, Counts] = field(default_factory=dict)
+    counts: dict[str, MessageCounts] = field(default_factory=dict)
     """By mapped message."""
     unprotected: int = 0
     """Frames of mapped messages without E2E protection in the mapping."""
     damaged: int = 0
     ends_early: list[str] = field(default_factory=list)
 
-    def summary(self) -> dict[str, Any]:
-        """For summary.json."""
-        return {
-            "inputs": {key: each.row(self.samples, key) for key, each in self.inputs.items()},
-            "clock": self.samples.clock,
-            "sample_period_s": self.samples.period,
-            "disordered_values": self.samples.disordered,
-            "messages": {name: asdict(counts) for name, counts in self.counts.items()},
-            "unprotected_frames": self.unprotected,
-            "notes": self.notes,
-        }
+    def summary(self) -> Mapped:
+        """What summary.json says of it."""
+        return Mapped(
+            inputs={key: each.summary(self.samples, key) for key, each in self.inputs.items()},
+            clock=self.samples.clock,
+            sample_period_s=self.samples.period,
+            disordered_values=self.samples.disordered,
+            messages=self.counts,
+            unprotected_frames=self.unprotected,
+            notes=self.notes,
+        )
 
 
 def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> Loaded:
@@ -103,7 +103,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
         channel = source.channel or reading.channel
         decoded, bus = reader.signal(message, signal.name, channel, ", ".join(paths))
         buses.add(bus)
-        named = Source(**{**asdict(source), "signal": f"{message.name}.{signal.name}", "channel": bus})
+        named = replace(source, signal=f"{message.name}.{signal.name}", channel=bus)
         inputs[key] = understood(key, named, decoded)
     samples, notes = recorded_samples(inputs, reading.clock)
     unprotected = sum(counts.frames for name, counts in reader.counts.items() if name not in mapping.protected)

@@ -193,7 +193,7 @@ def messages(picture: Picture) -> Table:
     table.add_column(no_wrap=True)
     for _ in range(4):
         table.add_column(justify="right", no_wrap=True)
-    table.add_row(*(Text(title, style="dim") for title in ("message", "[1/s]", "lost", "corrupt", "again")))
+    table.add_row(*(Text(title, style="dim") for title in ("message", "[1/s]", "lost", "corrupt", "repeated")))
     for entry in picture.traffic.values():
         there = entry.heard is not None or entry.corrupt > 0
         if not (there or entry.name in _EXPECTED):

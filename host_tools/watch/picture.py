@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..can import codec, fields
-from ..can.commander import ACCEPTED, refusal, result_of
 from ..can.identity import Identity
 from ..can.message_counts import Traffic
 from ..firmware.config import model_parameters
@@ -89,8 +88,8 @@ class Picture:
         self._windows = {name: _Window() for name in ("nis", "theta", "dither")}
         self.identity = Identity()
         """What the estimator says of itself."""
-        self.refusals: deque[str] = deque(maxlen=16)
-        """Why COMMANDs were refused; to be taken from here."""
+        self.acknowledgements: deque[dict[str, float]] = deque(maxlen=16)
+        """Fields of each COMMAND_ACK; to be taken from here."""
         self._first_estimate: float | None = None
         self._feedthrough: dict[int, tuple[float, Feedthrough]] = {}  # by frequency: when heard, and what
         self._paired = Paired()
@@ -248,8 +247,8 @@ class Picture:
             frequency, response = int(values["frequency"]), complex(values["real"], values["imaginary"])
             sigmas = values["gain_sigma"], values["phase_sigma"]
             self._feedthrough[frequency] = self.now, Feedthrough(frequency, response, *sigmas)
-        elif (result := result_of(values)) != ACCEPTED:
-            self.refusals.append(refusal(result))
+        else:
+            self.acknowledgements.append(values)
 
     def _follow_model(self, number: int) -> None:
         model = enum_names("lever_model").get(number)

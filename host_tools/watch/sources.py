@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ..can import codec
 from ..can.buses import open_bus
-from ..can.commander import KEEP_ALIVE, Commander
+from ..can.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, UNANSWERED, Commander, refusal, result_of
 from ..errors import LeverError
 from .picture import ERROR, FOREIGN, STEP, Frame, Picture
 
@@ -36,6 +36,7 @@ LONGEST_PAUSE = 5.0
 """[s] A longer gap of a log is not waited for."""
 _RECEIVE_BUFFER = 1 << 22  # [bytes]
 _SWITCH_INTERVAL = 5e-4  # [s] after which drawing gives way to receiving; Python's own is ten times that
+_TRIES = 5  # of a COMMAND, KEEP_ALIVE apart: longer than a sequence lasts that another sender has left
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
 
 
@@ -68,7 +69,13 @@ class Source(ABC):
         self._thread = threading.Thread(target=self._run, name="lever frames", daemon=True)
         self._commander = Commander()
         self._commanded = 0.0
+        self._counter = 0  # of the last COMMAND of this source
+        self._pending: Mapping[str, codec.Value] | None = None  # of command(), not yet acknowledged,
+        self._tries = 0  # sent so often
+        self._why_not = ""
         self._dithers = False  # by command() of this source
+        self.refusals: deque[str] = deque(maxlen=16)
+        """Why COMMANDs were refused; to be taken from here."""
 
     @abstractmethod
     def run(self) -> None:
@@ -102,16 +109,39 @@ class Source(ABC):
         """Sends a COMMAND: the fields of the message; those not given change nothing. Raises LeverError."""
         if not self.takes_commands:
             raise LeverError(f"{self.title} takes no commands")
-        self._commander.send(values, self._transmit)
-        self._commanded = time.monotonic()
+        self._pending, self._tries, self._why_not = values, 1, UNANSWERED
+        self._send(values)
         if isinstance(rms := values.get("dither_rms"), int | float):
             self._dithers = rms > 0.0
 
+    def acknowledged(self, ack: Mapping[str, float]) -> None:
+        """Takes the fields of a COMMAND_ACK. What is out of sequence is not refused for good: the last sender may have
+        stopped at this counter, or a moment ago."""
+        result = result_of(ack)
+        own = self._pending is not None and ack["command_counter"] == self._counter
+        if own and result == SEQUENCE:
+            self._why_not = refusal(result)
+            return
+        if own:
+            self._pending = None
+        if result != ACCEPTED:
+            self.refusals.append(refusal(result))
+
     def keep_alive(self) -> None:
-        """Repeats a COMMAND when it is time, so that dither asked for here goes on: to be called several times a second
-        as long as somebody watches it."""
-        if self._dithers and time.monotonic() - self._commanded >= KEEP_ALIVE:
-            self.command({})
+        """Repeats a COMMAND when it is time: one that is not acknowledged, or any, so that dither asked for here goes
+        on. To be called several times a second as long as somebody watches it."""
+        if time.monotonic() - self._commanded < KEEP_ALIVE:
+            return
+        pending = self._pending
+        if pending is None:
+            if self._dithers:
+                self._send({})
+        elif self._tries < _TRIES:
+            self._tries += 1
+            self._send(pending)
+        else:
+            self._pending = None
+            self.refusals.append(self._why_not)
 
     def end_dither(self) -> None:
         """Ends the dither asked for here, if there is any."""
@@ -122,6 +152,10 @@ class Source(ABC):
         """What is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at
         the frequencies [Hz]. None where that is not known."""
         return None
+
+    def _send(self, values: Mapping[str, codec.Value]) -> None:
+        self._counter = self._commander.send(values, self._transmit)
+        self._commanded = time.monotonic()
 
     def _transmit(self, identifier: int, data: bytes) -> None:
         """Sends a frame, where commands are taken. Raises LeverError."""

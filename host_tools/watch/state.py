@@ -51,6 +51,8 @@ class State:
         """Takes what has come; the messages to send: an update, and before it the start, if the model has changed."""
         picture, source = self.picture, self._source
         picture.take(source.drain(), source.now)
+        while picture.acknowledgements:
+            source.acknowledged(picture.acknowledgements.popleft())
         messages = []
         if picture.model != self._model:
             self._model = picture.model
@@ -68,7 +70,7 @@ class State:
         if not self._map or picture.now - self._map[-1][0] >= 0.99 * MAP_STEP:
             self._map.append((picture.now, np.zeros(0) if response is None else response.magnitude[::2]))
             update["map"] = self._map[-1]
-        messages += [_json({"refused": picture.refusals.popleft()}) for _ in range(len(picture.refusals))]
+        messages += [_json({"refused": source.refusals.popleft()}) for _ in range(len(source.refusals))]
         return [*messages, _json({"update": update})]
 
     def start(self) -> str:

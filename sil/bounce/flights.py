@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..aircraft import aircraft
 from ..aircraft.aircraft import Coupled
-from ..aircraft.known import UNSURE, known
+from ..aircraft.response_table import UNSURE, response_table
 from ..aircraft.stability import critical_gearing
 from ..envelope.motions import stream
 from ..fast.closed_loop import Loop
@@ -145,7 +145,7 @@ def fly(plan: Plan) -> Flown:
     assert scenario.aircraft is not None
     loop = Loop(scenario, inputs, by_frames=False, every=STRIDE)
     loop.gear(plan.gearings(inputs.time))
-    stability = loop.watch(told(scenario.aircraft, plan.seed))
+    stability = loop.watch(uncertain_response(scenario.aircraft, plan.seed))
     if plan.clock_stops is not None:
         time = np.minimum(inputs.time, plan.clock_stops)
         loop.give_time(np.round(1e6 * time).astype(np.uint32))
@@ -165,11 +165,11 @@ def fly(plan: Plan) -> Flown:
     )
 
 
-def told(coupled: Coupled, seed: int) -> AircraftResponse:
+def uncertain_response(coupled: Coupled, seed: int) -> AircraftResponse:
     """What the firmware is given of an aircraft: its response, off by what is stated."""
     gain, phase = UNSURE * stream(f"known {coupled.aircraft.title}", seed).standard_normal(2)
     off = (1.0 + gain) * np.exp(1j * phase)
-    return known(lambda s: coupled.response(s) * off)
+    return response_table(lambda s: coupled.response(s) * off)
 
 
 def _low_passed(angle: FloatArray, plan: Plan) -> FloatArray:

@@ -73,8 +73,8 @@ def coverage(runs: Runs) -> float:
 
 def nees(runs: Runs) -> float:
     """Mean over runs."""
-    known = runs.nees[np.isfinite(runs.nees)]
-    return float(np.mean(known)) if len(known) else math.nan
+    finite = runs.nees[np.isfinite(runs.nees)]
+    return float(np.mean(finite)) if len(finite) else math.nan
 
 
 def settled(runs: Runs) -> float:
@@ -84,8 +84,8 @@ def settled(runs: Runs) -> float:
 
 def flagged(runs: Runs) -> float:
     """Mean over runs; NaN for an estimator that flags nothing."""
-    known = runs.flagged[np.isfinite(runs.flagged)]
-    return float(np.mean(known)) if len(known) else math.nan
+    finite = runs.flagged[np.isfinite(runs.flagged)]
+    return float(np.mean(finite)) if len(finite) else math.nan
 
 
 _ONE = Scale("", ("",))

@@ -137,7 +137,7 @@ def make(plan: Plan, chunk: Chunk, folder: Path) -> int:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    made = [{"error": None, **row} for row in rows(plan.spec, range(chunk.first, chunk.end))]
+    chunk_rows = [{"error": None, **row} for row in rows(plan.spec, range(chunk.first, chunk.end))]
     with whole(folder / chunk.name(plan.fingerprint)) as target:
-        pq.write_table(pa.Table.from_pylist(made, schema(plan)), target, compression="zstd")
-    return len(made)
+        pq.write_table(pa.Table.from_pylist(chunk_rows, schema(plan)), target, compression="zstd")
+    return len(chunk_rows)

@@ -49,12 +49,12 @@ def of_run(flight: Flight, track: Track, run: int) -> Figures:
         covered = np.abs(values - truth) <= 2.0 * sigma
     figures: Figures = {}
     for index, name in enumerate(each.key for each in quantities(flight.scenario.config.choices["model"])):
-        known = counted & np.isfinite(truth[:, index])
-        error, is_known = relative[known, index], bool(known.any())
+        finite = counted & np.isfinite(truth[:, index])
+        error, is_known = relative[finite, index], bool(finite.any())
         figures[f"rms_{name}"] = float(np.sqrt(np.mean(np.square(error)))) if is_known else None
         figures[f"bias_{name}"] = float(np.mean(error)) if is_known else None
         is_stated = is_known and np.isfinite(sigma[:, index]).all()
-        figures[f"coverage_{name}"] = float(np.mean(covered[known, index])) if is_stated else None
+        figures[f"coverage_{name}"] = float(np.mean(covered[finite, index])) if is_stated else None
     figures["nees"] = _nees(flight, track, run)
     figures["nis"] = None if track.nis is None else _mean_known(track.nis[run][counted])
     times = times_to(relative[:, FREQUENCY], flight.time, flight.scenario.changes(), WITHIN)
@@ -79,8 +79,8 @@ def _nees(flight: Flight, track: Track, run: int) -> float | None:
 
 
 def _mean_known(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.mean(known)) if len(known) else None
+    finite = values[np.isfinite(values)]
+    return float(np.mean(finite)) if len(finite) else None
 
 
 def _finite(value: float | np.floating) -> float | None:

@@ -60,18 +60,18 @@ def figures(cells: Map, borders: Sequence[Border]) -> list[MapFigure]:
     """The error, and each other quantity that any estimator has."""
     panels = range(len(cells.panels.values))
     lines = {(name, panel): _line(cells, borders, name, panel) for name in cells.runs for panel in panels}
-    made: list[MapFigure] = []
+    maps: list[MapFigure] = []
     for each in _QUANTITIES:
         charts = tuple(
             tuple(Chart(_values(cells, each, name, panel), lines[name, panel]) for panel in panels)
             for name in cells.runs
         )
-        if not made or any(np.isfinite(chart.values).any() for row in charts for chart in row):
+        if not maps or any(np.isfinite(chart.values).any() for row in charts for chart in row):
             caption = f"{each.caption} {_LINE}"
             figure = MapFigure(f"map_{each.key}", each.title, caption, each.label, each.limits, each.more_is_better,
                                tuple(cells.runs), cells.panels, cells.x, cells.y, charts)  # fmt: skip
-            made.append(figure)
-    return made
+            maps.append(figure)
+    return maps
 
 
 def _values(cells: Map, quantity: _Quantity, name: str, panel: int) -> Array:

@@ -40,7 +40,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("aircraft", nargs="?", metavar="AIRCRAFT", help="a name, or a .toml or .csv file")
-    parser.add_argument("changes", nargs="*", metavar="KEY=VALUE", help="what is other than there")
+    parser.add_argument("changes", nargs="*", metavar="KEY=VALUE", help="values to change")
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write it into FILE")
 
 
@@ -68,7 +68,7 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
     from lever_cdkf.host_tools.firmware.native import Config, Estimator
 
     from ..aircraft.aircraft import read_aircraft
-    from ..aircraft.known import BAND, known
+    from ..aircraft.response_table import BAND, response_table
     from ..aircraft.tabulated import Tabulated
     from ..toml_tables import Place, value_of
 
@@ -86,11 +86,11 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
         coupled = read_aircraft({"model": name, **values, "gearing": f"{gearing!r} 1"}, Place("aircraft"))
         of, band, whole = coupled.response, BAND, coupled.name
     try:
-        made = known(of, band, name=whole, **said)
-        Estimator(Config()).watch(made)  # which refuses what it cannot use
+        table = response_table(of, band, name=whole, **said)
+        Estimator(Config()).watch(table)  # which refuses what it cannot use
     except LeverError as error:
         raise LeverError(f"{whole}: {error}") from None
-    return made
+    return table
 
 
 def _assignments(changes: list[str]) -> dict[str, str]:

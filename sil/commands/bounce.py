@@ -18,9 +18,9 @@ lever and rotor, with the firmware in the loop: does its alarm come in time, is 
 mitigation move the limit, what does it do to the pilot's own flying, and does it do harm where the estimated arm is
 wrong or a sensor fails?
 
-The firmware knows the aircraft by a table of its response, which is off by 5 % and 0.05 rad (standard deviations, as it
-is told). "all runs" pools the flights (sum, mean, rms or worst, as `--list` and the page say); a limit applies to that
-unless it says median or worst. The page that is written has a chart and all figures of each condition.
+The firmware knows the aircraft by a table of its response, which is off by 5 % and 0.05 rad (standard deviations, which
+it is given). "all runs" pools the flights (sum, mean, rms or worst, as `--list` and the page say); a limit applies to
+that unless it says median or worst. The page that is written has a chart and all figures of each condition.
 
 Exit status: 0 when all conditions hold, 1 when one misses, 2 when the command line is wrong.
 """
@@ -35,7 +35,7 @@ examples:
 
 class _Bounce(JudgedCommand["Condition"]):
     name = "bounce"
-    about = "hold alarm and mitigation of collective bounce against flights"
+    about = "test alarm and mitigation of collective bounce in flights"
     description, epilog = _DESCRIPTION, _EPILOG
     each = "pilots an aircraft"
 

@@ -19,7 +19,8 @@ from .names import check_names
 _DESCRIPTION = """\
 Runs the firmware's estimators and published ones on the same data and ranks them in each case: errors, errors against
 those of a Kalman filter linearised at the truth and against the posterior Cramér-Rao bound, consistency of the stated
-uncertainty (NEES, NIS), time to follow a step, time a step takes. Cases are matched random walks, sudden changes of the
+uncertainty (normalised estimation error squared, NEES; normalised innovation squared, NIS), time to follow a step of
+the pilot, processor time per sample (step). Cases are matched random walks, sudden changes of the
 pilot's grip, wrong settings of the noise, and the scenarios of `lever sim`. A difference is called significant by
 paired bootstrap over runs, at 5 % for all comparisons together (Holm); below 8 runs there is no verdict. With --out
 also writes into DIR
@@ -30,7 +31,7 @@ also writes into DIR
   provenance.json  version, revision, date and command that made them
 
 With --envelope instead: the firmware beside joint EKF and UKF in the conditions of `lever envelope` (8 pilots each),
-these told the true process noise and the trim, with and without the firmware's fourth-order high-pass (_hp) in front.
+these given the true process noise and the trim, with and without a fourth-order high-pass (_hp) in front.
 Prints rms error of the natural frequency and how often the truth is within the stated ±2σ, median and worst pilot;
 --json writes them as numbers.
 """
@@ -40,11 +41,11 @@ examples:
   lever compare --quick --out out/quick
   lever compare --scenarios step_up step_down --seeds 20
   lever compare --models lever --estimators dual joint joint_ekf --seeds 20 --out out/lever
-  lever compare --out out/compare                the whole campaign, half an hour on two cores
+  lever compare --out out/compare                the whole campaign, some ten minutes of processor time
   lever compare --envelope --quick               some conditions of `lever envelope`, a minute on two cores
   lever compare --envelope --scenarios steady retrim --estimators firmware joint_ekf_hp
 
-Times of steps are processor times, batched over runs for the baselines: compare them as ratios, and with care.
+Times per sample are processor times, batched over runs for the baselines: compare them as ratios, and with care.
 """
 _QUICK_CASES = ("lever_fixed_dither_rough", "linear_black_box_trim_base_rough", "step_up", "steady")
 _QUICK_SEEDS, _QUICK_DURATION, _SEEDS = 8, 12.0, 40

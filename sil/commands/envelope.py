@@ -30,13 +30,13 @@ examples:
   lever envelope --list
   lever envelope --quick                          some conditions, three pilots each: ten seconds
   lever envelope --only retrim base_stuck --seeds 50
-  lever envelope --json envelope.json             all conditions, 20 pilots each: three minutes
+  lever envelope --json envelope.json             all conditions, 20 pilots each: a minute on two cores
 """
 
 
 class _Envelope(JudgedCommand["Condition"]):
     name = "envelope"
-    about = "hold the firmware against what a real collective meets"
+    about = "test the firmware in the conditions of a real collective"
     description, epilog = _DESCRIPTION, _EPILOG
     each = "pilots"
 

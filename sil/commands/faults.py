@@ -47,7 +47,7 @@ _SEEDS, _QUICK_SEEDS = 3, 1
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
         "faults",
-        help="hold the firmware against faults of bus, senders and sensors",
+        help="test the firmware with faults of bus, senders and sensors",
         description=_DESCRIPTION,
         epilog=_EPILOG,
     )

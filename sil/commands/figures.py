@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..study.figures.maps import MapFigure
 
 _DESCRIPTION = """\
-Computes the paper's figures for this system from simulated runs of the firmware, and writes into DIR
+Computes figures for print from simulated runs of the firmware, and writes into DIR
 
   NAME.pdf .svg .png  each figure for print; text is text, with its font embedded; a PNG has 300 dots per inch
   NAME.csv            what it shows, as numbers
@@ -39,7 +39,7 @@ examples:
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
-        "figures", help="make the paper's figures for this system", description=_DESCRIPTION, epilog=_EPILOG
+        "figures", help="draw the figures for print, from simulated runs", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument(
         "-o",
@@ -133,8 +133,9 @@ def _make(names: Sequence[str], maps: Mapping[str, MapFigure], args: argparse.Na
             progress.show(done, len(names))
             figure = maps[name] if name in maps else FIGURES[name](args.seed, Extent())
             figures.append(figure)
+            sheet = printed.sheet(figure, args.width)
             for kind in pictures.KINDS:
-                keep(f"{name}.{kind}", printed.render(figure, kind, args.width, origin))
+                keep(f"{name}.{kind}", pictures.render(sheet, kind, figure.title, origin))
             keep(f"{name}.csv", data.table(figure).encode())
         keep(_PAGE, with_provenance(figures_page.build(figures), origin).encode())
         keep(_CAPTIONS, _captions(figures).encode())

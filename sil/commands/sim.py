@@ -42,19 +42,17 @@ cores, and prints median and worst over the runs: a single run is one draw of no
 that of --json. The columns are, for each quantity,
 
   rms         error relative to the truth from converged_after on, of a run: its median and worst over the runs
-  coverage    share of that time for which +-2 sigma holds the truth: of all runs together, of the median and worst run
+  coverage    share of that time in which ±2σ covers the truth: of all runs together, of the median and worst run
   to 5 %      time from the start and from each jump of the truth until the error stays within 5 %
   never       share of the starts and jumps after which it does not
 
-and of faults the share of that time with each. Those that warn say that the estimates are not to be trusted: a sensor
+and for each fault the share of that time with it. These faults say that the estimates are not to be trusted: a sensor
 (theta, theta_dot, torque, base), innovation, bound, mismatch, calibration, hands_off.
 
-
-With --interface lever (the default) the firmware runs inside this process. With any other (socketcan, whose --channel
-is vcan0 unless given, slcan, …) it has to be running at the other end, with the settings that --settings alone prints,
-the aircraft of a scenario that has one (`lever aircraft`, lever_can --aircraft), and lever_can with --lock-step;
-trace.csv is the same to the byte, and bus.log but for the channel's name; against a lever_can that goes on from
-another run, bus.log has other counters and CRCs.
+With --interface lever (the default) the firmware runs inside this process. With any other (slcan, socketcan on vcan0 or
+--channel, …) it has to be running at the other end: lever_can with --lock-step, with the settings that --settings alone
+prints, and with the aircraft of a scenario that has one (`lever aircraft`, lever_can --aircraft). Then trace.csv is the
+same to the byte. So is bus.log but for the channel's name, and, if lever_can has run before, counters and CRCs.
 """
 _EPILOG = """\
 examples:
@@ -104,7 +102,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "--snapshots",
         metavar="SECONDS",
         type=float,
-        help="the firmware also sends its whole state so often (0.1 to 10), so that bus.log may be cut anywhere",
+        help="the firmware also sends its whole state at this period (0.1 to 10), so that bus.log may be cut anywhere",
     )
     sim.add_argument("--realtime", action="store_true", help="pace the samples by the clock")
     sim.add_argument(
@@ -119,7 +117,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     sim.set_defaults(run=run, interface="lever")
     demo = subparsers.add_parser(
         "demo",
-        help="simulate a tiring, then startled pilot and write a report",
+        help="simulate a pilot who tires and is startled; write a report",
         description=f"The same as `lever sim {_DEMO} --out DIR`: a minute of a pilot who tires and is startled. In "
         "front of its report are two flights of one who relaxes, with mitigation of collective bounce and without.",
     )

@@ -40,7 +40,7 @@ examples:
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
-        "soak", help="fly the firmware for a day without a reset", description=_DESCRIPTION, epilog=_EPILOG
+        "soak", help="simulate a day of flights without a reset", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("--hours", type=float, default=24.0, metavar="H", help="simulated (default: 24)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default: 1)")

@@ -267,8 +267,8 @@ def _field(message: str, name: str) -> dict[str, float]:
 
 def _command_structs(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
     """Of type lever_command_t[]."""
-    made: list[Any] = [make_command(**values) for values in commands]  # type: ignore[arg-type]
-    return ffi.new("lever_command_t[]", [each[0] for each in made])
+    structs: list[Any] = [make_command(**values) for values in commands]  # type: ignore[arg-type]
+    return ffi.new("lever_command_t[]", [each[0] for each in structs])
 
 
 def _command_frames(commands: Sequence[Mapping[str, codec.Value]]) -> Any:

@@ -197,8 +197,18 @@ def commands(data: Callable[[int], bytes], every: int = KEEP_ALIVE, usual: bool 
         if not usual:
             bus.lose(bus.sent("COMMAND", time))
         samples = bus.samples(time)[::every]
-        made = {i & 15: data(i & 15) for i in range(min(16, len(samples)))}
-        bus.add_other("COMMAND", [made[i & 15] for i in range(len(samples))], samples + 0.06)
+        payloads = {i & 15: data(i & 15) for i in range(min(16, len(samples)))}
+        bus.add_other("COMMAND", [payloads[i & 15] for i in range(len(samples))], samples + 0.06)
+
+    return spoil
+
+
+def hanging_command() -> Fault:
+    """The last COMMAND before is sent again and again, as by a mailbox that nobody writes to any more."""
+
+    def spoil(bus: Bus, time: Interval) -> None:
+        later = bus.sent("COMMAND", time)
+        bus.frames["change"][later] = bus.frames["change"][bus.sent("COMMAND", (0.0, time[0]))[-1]]
 
     return spoil
 
@@ -211,13 +221,13 @@ def flood(values: Sequence[Mapping[str, codec.Value]], last: Mapping[str, codec.
         samples = np.repeat(bus.samples(time), each)
         usual = bus.sent("COMMAND", (0.0, time[0]))
         first = len(usual)  # their counter goes on
-        made: dict[tuple[int, int], bytes] = {}
+        payloads: dict[tuple[int, int], bytes] = {}
         data = []
         for i in range(len(samples)):
             key = (first + i) & 15, i % len(values)
-            if key not in made:
-                made[key] = command(key[0], **values[key[1]])
-            data.append(made[key])
+            if key not in payloads:
+                payloads[key] = command(key[0], **values[key[1]])
+            data.append(payloads[key])
         bus.add_other("COMMAND", data, samples + 0.06 + 0.001 * (np.arange(len(samples)) % each))
         later = bus.sent("COMMAND", (time[1], np.inf))
         counter = first + len(samples)

@@ -8,7 +8,7 @@ leave no files.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -51,19 +51,11 @@ def in_processes(
 ) -> list[_Done]:
     """function(task) of all tasks, in their order, from `jobs` processes. Interrupted, it leaves no process behind."""
     results = []
-    for done, (task, result) in enumerate(zip(tasks, _results(function, tasks, jobs), strict=True), 1):
+    for done, (task, result) in enumerate(zip(tasks, interrupts.in_processes(function, tasks, jobs), strict=True), 1):
         results.append(result)
         if progress is not None:
             progress(done, len(tasks), str(task))
     return results
-
-
-def _results(function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
-    if jobs == 1 or len(tasks) == 1:
-        yield from map(function, tasks)
-        return
-    with interrupts.worker_pool(min(jobs, len(tasks))) as pool:
-        yield from pool.imap(function, tasks)
 
 
 def simulate(task: Task) -> SimulationSummary:

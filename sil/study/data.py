@@ -118,7 +118,7 @@ class Batch:
     """B runs of K samples.
 
     With preload trim, `y` and `u` are deviations from the slow part of each signal and `trim` is that of theta, as
-    firmware/filter/detrend.h makes them; with preload fixed they are as measured, and `trim` is 0.
+    firmware/filter/trim.h makes them; with preload fixed they are as measured, and `trim` is 0.
     """
 
     model: Model

@@ -35,15 +35,15 @@ def main() -> int:
     args = parser.parse_args()
     for place in (*(table.place for table in tables.TABLES), tuning.PLACE, tuning.CALIBRATION_PLACE):
         tables.written(_text(place), place)  # before runs that could then not be compared
-    made = _made()
+    texts = _texts()
     if args.accept:
-        for place, table in made.items():
+        for place, table in texts.items():
             write_text(ROOT / place.file, tables.replaced(_text(place), place, table))
             print(f"Written to {place}:\n{table}")
         return 0
     wrong = [
         f"{place}: {difference}"
-        for place, table in made.items()
+        for place, table in texts.items()
         for difference in tables.differences(tables.written(_text(place), place), table)
     ]
     for line in wrong:
@@ -59,7 +59,7 @@ def _text(place: Place) -> str:
     return (ROOT / place.file).read_text(encoding="utf-8")
 
 
-def _made() -> dict[Place, str]:
+def _texts() -> dict[Place, str]:
     """The tables as they have to be."""
     jobs = os.cpu_count() or 1
     names = list(dict.fromkeys(name for table in tables.TABLES for name in table.scenarios))
@@ -72,10 +72,10 @@ def _made() -> dict[Place, str]:
         logs = tuning.calibration_tasks(tables.SEEDS)
         calibrated = seeds.in_processes(tuning.calibrated, logs, jobs, progress.show)
     summaries = {name: done[at * tables.SEEDS : (at + 1) * tables.SEEDS] for at, name in enumerate(names)}
-    made = {table.place: table.text(summaries) for table in tables.TABLES}
-    made[tuning.PLACE] = tuning.text(found)
-    made[tuning.CALIBRATION_PLACE] = tuning.calibration_text(logs, calibrated)
-    return made
+    texts = {table.place: table.text(summaries) for table in tables.TABLES}
+    texts[tuning.PLACE] = tuning.text(found)
+    texts[tuning.CALIBRATION_PLACE] = tuning.calibration_text(logs, calibrated)
+    return texts
 
 
 if __name__ == "__main__":

@@ -167,10 +167,10 @@ def rows(table: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
 
 
-def differences(table: str, made: str) -> list[str]:
+def differences(table: str, measured: str) -> list[str]:
     """Where the table of a README is not the one made now, in words. Numbers may differ by one in the last digit: a
     processor's own sine, or another NumPy, may change the last bit of a sample."""
-    old, new = rows(table), rows(made)
+    old, new = rows(table), rows(measured)
     if [len(row) for row in old] != [len(row) for row in new]:
         return ["rows or columns differ"]
     return [

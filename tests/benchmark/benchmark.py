@@ -63,10 +63,10 @@ def _arguments(recording: Recording, model: str, estimator: str) -> list[str]:
 
 
 def _instructions(text: str) -> int:
-    found = _TOTAL.search(text)
-    if found is None or int(found[1]) == 0:
+    match = _TOTAL.search(text)
+    if match is None or int(match[1]) == 0:
         raise LeverError("callgrind has counted nothing: was lever_update() inlined?")
-    return int(found[1])
+    return int(match[1])
 
 
 def _run(command: list[str]) -> str:

@@ -70,6 +70,6 @@ def of_c(build: Path) -> ByTest:
         if not program.exists():
             raise EvidenceError(f"{program} is not built")
         for line in tools.run([program]).stdout.splitlines():
-            if found := re.match(r".*?:\d+:(\w+)(?: \[\d+\])?:(PASS|FAIL)", line):
-                said.setdefault((path, found[1]), Said()).add("passed" if found[2] == "PASS" else "failed")
+            if match := re.match(r".*?:\d+:(\w+)(?: \[\d+\])?:(PASS|FAIL)", line):
+                said.setdefault((path, match[1]), Said()).add("passed" if match[2] == "PASS" else "failed")
     return said

@@ -48,7 +48,7 @@ FAULTS = {
         "app", "firmware/app/torque_gate.c", "clamped(gate->gain * asked, gate->limit)", "(gate->gain * asked)"
     ),
     "torque that stays in silence": Fault(
-        "app", "firmware/app/torque_gate.c", "gate->output_left = left_of(gate->output_left, elapsed_us);", ""
+        "app", "firmware/app/torque_gate.c", "gate->output_left = time_left(gate->output_left, elapsed_us);", ""
     ),
     "a counter that stands": Fault(
         "app", "firmware/app/link.c", "(uint8_t)((link->counter[output] + 1u) & 15u)", "link->counter[output]"
@@ -110,4 +110,4 @@ def test_a_seeded_fault_is_found(name: str, folder: Path, tmp_path: Path) -> Non
     mutant = tmp_path / "mutant.c"
     mutant.write_text(source.replace(fault.right, fault.wrong), encoding="utf-8")
     program = build(fault.target, folder, (fault.path, mutant))
-    assert libfuzzer.run(program, tmp_path / "corpus", [SEED, f"-runs={RUNS[fault.target]}"]).found
+    assert libfuzzer.run(program, tmp_path / "corpus", [SEED, f"-runs={8 * RUNS[fault.target]}"]).found

@@ -17,6 +17,7 @@ CHECKS: dict[str, Callable[..., str]] = {
         checks.tidy_cross,
         checks.misra,
         checks.misra_image,
+        checks.misra_posix,
         checks.analyzer,
         checks.python,
         checks.types,

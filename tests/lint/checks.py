@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -15,7 +16,17 @@ FIRMWARE = ROOT / "firmware"
 PYTHON_FOLDERS = ("api", "firmware", "host_tools", "sil", "tests")
 
 MISRA = (FIRMWARE / "MISRA.md").read_text(encoding="utf-8")
-NOT_APPLIED = {f"misra-c2012-{rule}" for rule in re.findall(r"^\| (\d+\.\d+) \|", MISRA, re.MULTILINE)}
+_EVERYWHERE, _POSIX = MISRA.split("## On a POSIX host")
+
+
+def _rules(text: str) -> set[str]:
+    """Those in the first column of tables."""
+    lists = re.findall(r"^\| (\d+\.\d+(?:, \d+\.\d+)*) \|", text, re.MULTILINE)
+    return {f"misra-c2012-{rule}" for each in lists for rule in each.split(", ")}
+
+
+NOT_APPLIED, NOT_ON_POSIX = _rules(_EVERYWHERE), _rules(_POSIX) | {"misra-config"}
+"""cppcheck reads no headers of a system, and says by misra-config which of their names it does not know."""
 DEVIATIONS: dict[str, str] = dict(re.findall(r"^\| (D\d+) \| (\d+\.\d+) \|", MISRA, re.MULTILINE))
 """Number and rule of each."""
 CPPCHECK_FINDING = re.compile(
@@ -56,7 +67,7 @@ def tidy_cross(database: str | Path, file: str | Path) -> str:
     return tidy(database, file, *(f"--extra-arg={option}" for option in options))
 
 
-def misra(*files: str | Path) -> str:
+def misra(*files: str | Path, without: AbstractSet[str] = frozenset()) -> str:
     """C files keep to MISRA C:2012, by cppcheck's add-on, but for what firmware/MISRA.md names; nor has cppcheck itself
     anything to warn of.
 
@@ -68,13 +79,18 @@ def misra(*files: str | Path) -> str:
     template = "--template={file}:{line}: {severity} {id}"
     with tempfile.TemporaryDirectory() as scratch:  # otherwise its dumps are written beside the sources
         _, output = _run("cppcheck", *options, f"--cppcheck-build-dir={scratch}", template, "-I", FIRMWARE, *files)
-    found = [match[0] for match in CPPCHECK_FINDING.finditer(output) if match["rule"] not in NOT_APPLIED]
+    found = [match[0] for match in CPPCHECK_FINDING.finditer(output) if match["rule"] not in NOT_APPLIED | without]
     return "\n".join(["fix, or suppress as firmware/MISRA.md says:", *found, ""]) if found else ""
 
 
 def misra_image(build_headers: str, *files: str | Path) -> str:
     """The same of all the files of an image for the microcontroller beside the core, as they are compiled for it."""
     return misra("-D__arm__", f"-I{build_headers}", *files)
+
+
+def misra_posix(*files: str | Path) -> str:
+    """The same of the port to POSIX, but for what the page names for it."""
+    return misra("--library=posix", *files, without=NOT_ON_POSIX)
 
 
 def analyzer(build_headers: str, *files: str | Path) -> str:

@@ -53,6 +53,15 @@ def test_seeded_violations_in_an_interrupt_are_found(tmp_path: Path) -> None:
     assert "can.c:" not in checks.misra_image(str(tmp_path), checks.FIRMWARE / "port/stm32f4/can.c")
 
 
+def test_seeded_violations_in_the_port_to_posix_are_found(tmp_path: Path) -> None:
+    text = (checks.FIRMWARE / "port/linux/clock.c").read_text(encoding="utf-8")
+    seeded = tmp_path / "clock.c"
+    wrong = "\nint seeded(int x)\n{\n    if (x)\n        x = 010;\n    return x;\n}\n"
+    seeded.write_text(text.replace('"port/', f'"{checks.FIRMWARE}/port/') + wrong)
+    findings = checks.misra_posix(seeded)
+    assert all(f"misra-c2012-{rule}\n" in findings for rule in ("7.1", "14.4", "15.6"))
+
+
 def test_seeded_errors_are_found_by_cppcheck_and_by_the_analyzer(tmp_path: Path) -> None:
     seeded = tmp_path / "seeded.c"
     seeded.write_text(

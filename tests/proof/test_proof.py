@@ -16,7 +16,7 @@ SEEDED = {
     "settings_text": ("port/linux/settings.c", "(sizeof line->text - 1u)", "(sizeof line->text + 8u)"),
     "settings_value": ("port/linux/settings.c", "const char *fraction = end + 1;", "const char *fraction = end + 2;"),
     "slcan": ("port/slcan/slcan.c", "((uint32_t)SLCAN_LINE_BYTES - 1u)", "((uint32_t)SLCAN_LINE_BYTES + 8u)"),
-    "torque_gate": ("app/torque_gate.c", "(share < 1.0f) ? share : 1.0f", "(float)(int32_t)(share * 1.0e9f)"),
+    "torque_gate": ("app/torque_gate.c", "lesser(share, 1.0f)", "(float)(int32_t)(share * 1.0e9f)"),
 }
 """An overflow in a file of each harness: what is replaced by what."""
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import can
 import pytest
@@ -22,6 +22,9 @@ from lever_cdkf.host_tools.firmware.native import Config
 from lever_cdkf.sil.run.runner import Result, simulate
 from lever_cdkf.sil.scenarios import scenario
 from lever_cdkf.sil.scenarios.scenario import Scenario
+
+if TYPE_CHECKING:
+    from python.watch.browser import Browser
 
 
 class PuppetBus(can.BusABC):
@@ -176,14 +179,14 @@ def samples() -> Samples:
 @pytest.fixture
 def make_bus() -> Iterator[Callable[..., LeverBus]]:
     """LeverBus, shut down after the test."""
-    made: list[LeverBus] = []
+    buses: list[LeverBus] = []
 
     def make(*args: object, **kwargs: object) -> LeverBus:
-        made.append(LeverBus(*args, **kwargs))  # type: ignore[arg-type]
-        return made[-1]
+        buses.append(LeverBus(*args, **kwargs))  # type: ignore[arg-type]
+        return buses[-1]
 
     yield make
-    for bus in made:
+    for bus in buses:
         bus.shutdown()
 
 
@@ -218,6 +221,15 @@ def installed() -> str:
         pytest.skip("the package is not installed: pip install .")
 
 
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Of all tests, each of which begins anew."""
+    from python.watch.browser import Browser
+
+    with Browser() as started:
+        yield started
+
+
 SHORT = ["duration=6 s", "converged_after=2 s", "limits={}"]
 
 
@@ -241,8 +253,8 @@ class Session:
 
 def simulated(name: str, folder: Path, *overrides: str) -> Session:
     """A short run of a scenario."""
-    made = scenario.load(name, [*SHORT, *overrides])
-    return Session(simulate(made, out_dir=folder), folder, made.config)
+    short = scenario.load(name, [*SHORT, *overrides])
+    return Session(simulate(short, out_dir=folder), folder, short.config)
 
 
 @pytest.fixture(scope="session")

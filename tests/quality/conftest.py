@@ -12,7 +12,8 @@ import can
 import cantools
 import numpy as np
 import pytest
-from lever_cdkf.sil.run.runner import simulate
+from lever_cdkf.sil.run import buslog
+from lever_cdkf.sil.run.runner import Result, simulate
 from lever_cdkf.sil.scenarios import scenario
 from quality import tools
 
@@ -72,7 +73,9 @@ def quick_campaign() -> str:
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A few seconds of a simulation, estimates included, as candump would have recorded them."""
-    return simulated(tmp_path_factory.mktemp("recording"), 4) / "bus.log"
+    folder = tmp_path_factory.mktemp("recording")
+    simulated(folder, 4)
+    return folder / "bus.log"
 
 
 @pytest.fixture(scope="session")
@@ -80,10 +83,11 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same lever as an aircraft records it that knows nothing of lever.dbc: a database, and logs."""
     folder = tmp_path_factory.mktemp("aircraft")
     (folder / "aircraft.dbc").write_text(AIRCRAFT, encoding="ascii")
-    flight = simulated(tmp_path_factory.mktemp("flight"), 25)
-    shutil.copy(flight / "bus.log", folder / "flight.log")
-    trace = np.genfromtxt(flight / "trace.csv", delimiter=",", names=True)
-    rows = np.column_stack((trace["time_s"], trace["theta_measured_rad"], trace["z_ddot_measured_m_s2"] / 9.80665 + 1))
+    trace = simulated(folder, 21).trace
+    (folder / "bus.log").rename(folder / "flight.log")
+    names = ("time_s", "theta_measured_rad", "z_ddot_measured_m_s2", "tau_m_measured_N_m")
+    time, theta, z_ddot, tau_m = (trace[name][::2] for name in names)
+    rows = np.column_stack((time, theta, z_ddot / 9.80665 + 1))
     np.savetxt(folder / "flight.csv", rows, "%.6f", ",", header="time,angle [rad],acc", comments="")
     (folder / "aircraft.toml").write_text(
         '[theta]\nsignal = "LEVER.Angle"\n[z_ddot]\nsignal = "IMU.AccZ"\n', encoding="utf-8"
@@ -92,29 +96,30 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert isinstance(database, cantools.database.Database)
     (folder / "monday").mkdir()
     logs = [can.Logger(folder / name) for name in ("flight.blf", "monday/1.blf", "monday/2.blf")]
-    for k, row in enumerate(trace):
+    for k, at in enumerate(time):
         signals = {
-            "LEVER": {"Angle": np.degrees(row["theta_measured_rad"]), "LeverCounter": k % 256},
-            "IMU": {"AccZ": row["z_ddot_measured_m_s2"] + 9.80665, "AccX": 0.1},
-            "MOTOR": {"Torque": row["tau_m_measured_N_m"]},
+            "LEVER": {"Angle": np.degrees(theta[k]), "LeverCounter": k % 256},
+            "IMU": {"AccZ": z_ddot[k] + 9.80665, "AccX": 0.1},
+            "MOTOR": {"Torque": tau_m[k]},
         }
         for name, values in signals.items():
             kind = database.get_message_by_name(name)
             message = can.Message(
-                timestamp=1e9 + row["time_s"],
+                timestamp=1e9 + at,
                 arbitration_id=kind.frame_id,
                 is_extended_id=False,
                 data=kind.encode(values),
             )
-            for log in logs if k < 4000 else logs[:1]:
+            for log in logs if k < 2000 else logs[:1]:
                 log.on_message_received(message)
     for log in logs:
         log.stop()
     return folder
 
 
-def simulated(folder: Path, seconds: float) -> Path:
-    """A folder with the files of a run."""
+def simulated(folder: Path, seconds: float) -> Result:
+    """A run, which leaves its log in a folder."""
     steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=2 s", "limits={}"])
-    simulate(steady, out_dir=folder, channel="vcan0")
-    return folder
+    result = simulate(steady, channel="vcan0")
+    (folder / "bus.log").write_bytes(b"".join(buslog.lines(result.frames, "vcan0")))
+    return result

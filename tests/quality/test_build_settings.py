@@ -75,7 +75,7 @@ def test_a_build_starts_with_the_values_of_the_file(tmp_path: Path, build_dir: P
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "error"),
     [
         ("theta_noise = 9", "my.settings:2: theta_noise = 9 is out of range: from 1.0e-7 to 0.2 rad"),
         ("theta_noise = 1e-8", "theta_noise = 1e-8 is out of range"),
@@ -94,10 +94,10 @@ def test_a_build_starts_with_the_values_of_the_file(tmp_path: Path, build_dir: P
         ("\0", "my.settings: is not text"),
     ],
 )
-def test_what_is_wrong_ends_the_configuration_with_its_place(line: str, told: str, tmp_path: Path) -> None:
+def test_what_is_wrong_ends_the_configuration_with_its_place(line: str, error: str, tmp_path: Path) -> None:
     done = configure(f'# [; "\n{line}\n', tmp_path)
     assert done.returncode != 0
-    assert told in " ".join(done.stderr.split())
+    assert error in " ".join(done.stderr.split())
     assert not (tmp_path / "lever_build.h").exists()
 
 

@@ -19,15 +19,17 @@ NOT_RUN = {
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
     r"lever (compare --(out|quick|envelope)|(envelope|bounce|faults) --json|figures --(out|campaign))": "takes minutes",
     r"lever soak --json": "takes minutes",
+    r"lever (bounce|envelope|faults) --quick": "is what tests/python/{bounce,envelope,faults} do",
+    r"lever (bounce|envelope|figures) --only|lever soak --hours": "README.md has the same",
+    r"lever compare --scenarios|lever sim steady --seed": "sil/README.md has the same",
+    r"lever replay (session.log($| -o)|monday/|flight.blf)": "host_tools/replay/README.md has the same",
+    r"lever (tune|map) flight.blf --dbc a": "host_tools/replay/README.md has the same",
 }
 SHORTER = {
     r"--seeds \d+": "--seeds 1",
-    r"--only (bode|alarm) \w+": r"--only \1",
-    r"(lever compare --(scenarios|models))": r"lever compare --duration 2 --scenarios step_up --\2",
-    r"(lever (envelope|bounce) --quick)": r"\1 --seeds 1",
-    r"--start 60 --length 120": "--length 22",
-    r"lever tune flight\.\w+": r"\g<0> --keep m_p_walk --keep c_p_walk --keep k_p_walk",
-    r"(lever sim sudden_grip|lever sim steady --seed 7) (--set)": r'\1 --set "limits={}" \2',
+    r"lever compare --models": "lever compare --duration 2 --scenarios step_up --models",
+    r"--start 60 --length 120": "--length 20.5",
+    **readmes.SHORTER,
 }
 """The same command, with less to calculate."""
 USERS_FILES = """

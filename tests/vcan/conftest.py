@@ -18,10 +18,16 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from vcan import place, rig, uml
+from lever_cdkf.host_tools.extras import hide_mf4
+from vcan import place, uml
+
+INSIDE = os.environ.get(place.INSIDE) == "1"
+if INSIDE:
+    hide_mf4(())  # which would take seconds there
+
+from vcan import rig  # noqa: E402
 
 FOLDER = Path(__file__).parent
-INSIDE = os.environ.get(place.INSIDE) == "1"
 TIME_LIMIT_S = 3000.0
 """For what hangs; nothing is expected to be fast."""
 REPORTS = "LEVER_VCAN_REPORTS"
@@ -88,7 +94,8 @@ def _run_inside(session: pytest.Session) -> Reports:
     config = session.config
     items = [item for item in session.items if _belongs_inside(item)]
     tests = [str(config.rootpath / item.nodeid) for item in items]
-    pytest_here = [sys.executable, "-m", "pytest", "--quiet", "-p", "no:cacheprovider", f"--rootdir={config.rootpath}"]
+    options = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest", f"--rootdir={config.rootpath}")
+    pytest_here = [sys.executable, "-m", "pytest", "--quiet", *options]
     found: Reports = defaultdict(list)
     with tempfile.TemporaryDirectory(prefix="lever-vcan-") as folder, open(f"{folder}/output", "w+b") as output:
         reports = Path(folder, "reports")

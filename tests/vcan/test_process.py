@@ -265,8 +265,8 @@ def test_two_on_one_bus_both_answer_and_both_say_so(
     estimates = [frame for frame in answers if frame[0] == rig.STATE_ESTIMATE]
     alone = [frame for frame in rig.in_process(SAMPLES) if frame[0] == rig.STATE_ESTIMATE]
     assert sorted(estimates) == sorted(2 * alone)
-    told = [codec.decode(*frame)[1]["fault_duplicate"] for frame in answers if frame[0] == HEALTH]
-    assert sum(told) >= 2
+    flags = [codec.decode(*frame)[1]["fault_duplicate"] for frame in answers if frame[0] == HEALTH]
+    assert sum(flags) >= 2
 
 
 def test_a_change_of_the_bus_condition_is_told_once(start: rig.Starter, interface: str) -> None:
@@ -283,9 +283,9 @@ def test_a_change_of_the_bus_condition_is_told_once(start: rig.Starter, interfac
         ]:
             injector.send(struct.pack("=IB3x8s", err_flag | identifier, 8, data))
     process.wait_for("bus-off", times=2)
-    told = [line.split(": ", 2)[2] for line in process.stderr.splitlines()]
+    messages = [line.split(": ", 2)[2] for line in process.stderr.splitlines()]
     words = ["error-passive", "bus-off", "the controller has restarted", "bus-off"]
-    assert [line.split(":")[0] for line in told] == words
+    assert [line.split(":")[0] for line in messages] == words
     host = rig.Host.on(interface)
     assert host.run(20) == rig.in_process(20)
     process.stop()

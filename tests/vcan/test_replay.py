@@ -11,7 +11,7 @@ import pytest
 from processes import LEVER, lever
 from vcan import rig
 
-SCENARIO = ("steady", "--set=duration=2 s", "--set=converged_after=1 s", "--set=limits={}")
+SCENARIO = ("steady", "--set=duration=1.2 s", "--set=converged_after=0.6 s", "--set=limits={}")
 INPUTS = ("110", "111", "120")
 """Identifiers of what the estimator takes."""
 
@@ -31,12 +31,12 @@ class Log:
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Log:
     folder = tmp_path_factory.mktemp("log")
-    made = Log(folder / "inputs.log", folder / "settings")
-    made.settings.write_text(lever("sim", *SCENARIO, "--settings"))
+    recording = Log(folder / "inputs.log", folder / "settings")
+    recording.settings.write_text(lever("sim", *SCENARIO, "--settings"))
     lever("sim", *SCENARIO, "--out", folder / "sim")
     lines = (folder / "sim/bus.log").read_text().splitlines(keepends=True)
-    made.path.write_text("".join(line for line in lines if line.split()[2][:3] in INPUTS))
-    return made
+    recording.path.write_text("".join(line for line in lines if line.split()[2][:3] in INPUTS))
+    return recording
 
 
 def play(log: Log, interface: str) -> None:
@@ -60,13 +60,14 @@ def test_the_process_answers_a_played_log_as_the_replay_does(
     assert not [name for name in ("overflowed", "unsent", "outages", "corrupt") if totals[name]]
     assert [frame for frame in rig.frames(recorded) if frame[:3] in INPUTS] == rig.frames(log.path)
 
-    lever("replay", log.path, "--settings", log.settings, "-o", tmp_path / "replay")
+    replay = ("--settings", log.settings, "--format", "csv", "-o")
+    lever("replay", log.path, *replay, tmp_path / "replay")
     assert answers(tmp_path / "replay/bus.log") == answers(recorded)
 
-    told = lever("replay", recorded, "--settings", log.settings, "-o", tmp_path / "again")
+    output = lever("replay", recorded, *replay, tmp_path / "again")
     assert answers(tmp_path / "again/bus.log") == answers(recorded)
-    assert "PILOT" not in told
-    assert "others" not in told
+    assert "PILOT" not in output
+    assert "others" not in output
 
 
 @pytest.mark.requires("canplayer", "cansend")
@@ -89,5 +90,5 @@ def test_record_has_every_frame_of_a_real_bus(log: Log, start: rig.Starter, inte
     assert ", 0 lost, 0 corrupt, 1 error frames, " in said
     assert "1 overflows of the controller" in said
     assert [frame for frame in rig.frames(path) if frame[:3] in INPUTS] == rig.frames(log.path)
-    lever("replay", path, "--settings", log.settings, "-o", tmp_path / "replay")
+    lever("replay", path, "--settings", log.settings, "--format", "csv", "-o", tmp_path / "replay")
     assert answers(tmp_path / "replay/bus.log") == answers(path)

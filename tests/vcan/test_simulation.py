@@ -13,10 +13,10 @@ from processes import lever
 from vcan import rig
 
 SHORTENED = {
-    "steady": {"duration": "3 s"},
+    "steady": {"duration": "2 s"},
     "fixed_preload": {"duration": "0.5 s"},
     "sensor_dropout": {
-        "duration": "2 s",
+        "duration": "1.7 s",
         "sensors.dropout.2.start": "0.5 s",  # theta
         "sensors.dropout.2.end": "0.8 s",
         "sensors.dropout.3.start": "1 s",  # theta_dot

@@ -55,9 +55,9 @@ def test_slcanpty_as_its_adapter(build_dir: Path, tmp_path: Path, interface: str
     with running("stdbuf", "-o0", "slcanpty", "/dev/ptmx", interface) as adapter:
         assert adapter.stdout is not None
         said = adapter.stdout.readline()
-        found = re.search(r"/dev/pts/\d+", said)
-        assert found is not None, said
-        with rig.LeverCan(build_dir / "lever_can", found[0], [], tmp_path, "slcan") as process:
+        match = re.search(r"/dev/pts/\d+", said)
+        assert match is not None, said
+        with rig.LeverCan(build_dir / "lever_can", match[0], [], tmp_path, "slcan") as process:
             host = rig.Host.on(interface)
             first = host.reach()
             before = host.samples_sent - first

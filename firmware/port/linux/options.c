@@ -143,7 +143,8 @@ static bool read_snapshots(options_t *options, const char *argument, settings_er
     if ((end == argument) || (*end != '\0') || !((seconds >= SNAPSHOTS_LEAST) && (seconds <= SNAPSHOTS_MOST))) {
         return refuse(error, "--snapshots takes seconds, from 0.1 to 10: ", argument);
     }
-    options->snapshot_us = (uint32_t)((1.0e6 * seconds) + 0.5);
+    const double rounded = (1.0e6 * seconds) + 0.5;
+    options->snapshot_us = (uint32_t)rounded;
     return true;
 }
 
@@ -220,17 +221,18 @@ bool options_read(options_t *options, int argc, char *argv[], settings_error_t *
     lever_build_config(&options->config);
     opterr = 0;
     optind = 0; /* from the start, also when called again */
-    for (int option = 0; option != -1;) {
-        option = getopt_long(argc, argv, ":", known, &which);
+    int option = getopt_long(argc, argv, ":", known, &which);
+    while (option != -1) {
         if (option == ':') {
             return refuse(error, "a value is missing after ", argv[optind - 1]);
         }
         if (option == '?') {
             return refuse(error, "unknown option (see --help): ", argv[optind - 1]);
         }
-        if ((option != -1) && !read_option(options, option, known[which].name, optarg, error)) {
+        if (!read_option(options, option, known[which].name, optarg, error)) {
             return false;
         }
+        option = getopt_long(argc, argv, ":", known, &which);
     }
     return check(options, optind, argv, error);
 }

@@ -60,14 +60,15 @@ static const choice_t choices[] = {
             [LEVER_MITIGATION_NOTCH_AND_DAMPING] = "notch_and_damping"},
         offsetof(lever_config_t, mitigation)},
 };
-enum { CHOICES = sizeof choices / sizeof choices[0] };
+enum { CHOICES = (sizeof choices) / (sizeof choices[0]) };
 
 static const unit_t units[] = {
+/* cppcheck-suppress misra-c2012-20.7 ; D1 */
 #define LEVER_UNIT(of, spelling, factor) {of, spelling, factor},
 #include "lever_units.def"
 #undef LEVER_UNIT
 };
-enum { UNITS = sizeof units / sizeof units[0] };
+enum { UNITS = (sizeof units) / (sizeof units[0]) };
 
 static bool refuse(settings_error_t *error, const char *format, ...)
 {
@@ -184,6 +185,7 @@ static bool set_number(lever_config_t *config, uint32_t index, const char *value
         return refuse(error, "%s: %g is out of range, which is %g to %g %s", setting->name, number,
             (double)setting->least, (double)setting->greatest, setting->unit);
     }
+    /* cppcheck-suppress misra-c2012-21.15 ; D2 */
     (void)memcpy((uint8_t *)&config->settings + (index * sizeof rounded), &rounded, sizeof rounded);
     return true;
 }
@@ -335,6 +337,7 @@ void settings_write(const lever_config_t *config, FILE *file)
     for (uint32_t i = 0u; i < lever_setting_count(); i++) {
         const lever_setting_t *setting = lever_setting(i);
         float value = 0.0f;
+        /* cppcheck-suppress misra-c2012-21.15 ; D2 */
         (void)memcpy(&value, (const uint8_t *)&config->settings + (i * sizeof value), sizeof value);
         (void)fprintf(file, "%s = ", setting->name);
         write_number(value, file);

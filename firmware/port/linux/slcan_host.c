@@ -13,13 +13,13 @@ static const char closing[] = "C\r";
 bool slcan_host_open(slcan_host_t *host, const char *device, int stop)
 {
     (void)memset(host, 0, sizeof *host);
-    return tty_open_device(&host->tty, device, stop) && tty_put(&host->tty, opening, sizeof opening - 1u);
+    return tty_open_device(&host->tty, device, stop) && tty_put(&host->tty, opening, (sizeof opening) - 1u);
 }
 
 void slcan_host_close(slcan_host_t *host)
 {
     if (host->tty.file >= 0) {
-        (void)tty_put(&host->tty, closing, sizeof closing - 1u);
+        (void)tty_put(&host->tty, closing, (sizeof closing) - 1u);
         (void)tty_flush(&host->tty);
     }
     tty_close(&host->tty);
@@ -54,9 +54,9 @@ static enum port_result send_frame(void *self, const lever_frame_t *frame)
     slcan_host_t *host = self;
     const slcan_frame_t sent = {.frame = *frame};
     char text[SLCAN_LINE_BYTES];
+    const uint32_t length = slcan_write_frame(&sent, SLCAN_NO_TIME, text);
 
-    if ((PORT_GOES_STALE(frame->id) && tty_is_slow(&host->tty)) ||
-        !tty_put(&host->tty, text, slcan_write_frame(&sent, SLCAN_NO_TIME, text))) {
+    if ((PORT_GOES_STALE(frame->id) && tty_is_slow(&host->tty)) || !tty_put(&host->tty, text, length)) {
         return PORT_NOTHING;
     }
     host->has_sent = true;
@@ -77,7 +77,7 @@ static enum port_result restore_link(void *self)
 
     if (result == PORT_DONE) {
         (void)memset(&host->line, 0, sizeof host->line);
-        (void)tty_put(&host->tty, opening, sizeof opening - 1u);
+        (void)tty_put(&host->tty, opening, (sizeof opening) - 1u);
     }
     return result;
 }

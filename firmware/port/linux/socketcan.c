@@ -87,12 +87,12 @@ static enum port_result find_interface(socketcan_t *socketcan, int *index)
 static bool set_options(const socketcan_t *socketcan)
 {
     static const uint32_t inputs[] = PORT_INPUTS;
-    struct can_filter filter[sizeof inputs / sizeof inputs[0]];
+    struct can_filter filter[(sizeof inputs) / (sizeof inputs[0])];
     const can_err_mask_t errors = CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED;
     const int count_overflow = 1;
     const int receive_buffer = RECEIVE_BUFFER_BYTES;
 
-    for (size_t i = 0u; i < (sizeof inputs / sizeof inputs[0]); i++) {
+    for (size_t i = 0u; i < ((sizeof inputs) / (sizeof inputs[0])); i++) {
         filter[i].can_id = inputs[i];
         filter[i].can_mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
     }
@@ -268,8 +268,8 @@ static enum port_result send_frame(void *self, const lever_frame_t *frame)
     if (send(socketcan->socket, &sent, sizeof sent, 0) == (ssize_t)sizeof sent) {
         return PORT_DONE;
     }
-    const bool full = (errno == ENOBUFS) || (errno == EAGAIN) || (errno == EINTR) || (errno == ENOMEM);
-    return full ? PORT_NOTHING : failure(socketcan);
+    const bool is_full = (errno == ENOBUFS) || (errno == EAGAIN) || (errno == EINTR) || (errno == ENOMEM);
+    return is_full ? PORT_NOTHING : failure(socketcan);
 }
 
 /* A socket outlives its interface going down and up, but is unbound for good when the interface is deleted. */

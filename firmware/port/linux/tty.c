@@ -28,7 +28,7 @@ static const named_speed_t speeds[] = {{9600u, B9600}, {19200u, B19200}, {38400u
 
 static const named_speed_t *find_speed(uint32_t baud)
 {
-    for (size_t i = 0u; i < (sizeof speeds / sizeof speeds[0]); i++) {
+    for (size_t i = 0u; i < ((sizeof speeds) / (sizeof speeds[0])); i++) {
         if (speeds[i].baud == baud) {
             return &speeds[i];
         }

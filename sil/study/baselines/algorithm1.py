@@ -1,4 +1,4 @@
-"""The sigma-point parameter filter of the paper behind this project ("Algorithm 1"): no state filter, full covariance.
+"""A sigma-point filter for the parameters alone ("Algorithm 1"): no state filter, full covariance.
 
 Source: R. van der Merwe, "Sigma-point Kalman filters for probabilistic inference in dynamic state-space models", PhD
 thesis, OGI (2004), ch. 3.5: the central difference Kalman filter for parameters, with P = P - K P_yy Kᵀ; E. A. Wan,

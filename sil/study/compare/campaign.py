@@ -7,7 +7,7 @@ the batch of a case once and keeps it until the next.
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -87,7 +87,7 @@ def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> lis
 def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Results:
     """Does all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
     results = Results(todo[0].plan, {}, {})
-    for done, (task, result) in enumerate(_results(todo, jobs), 1):
+    for done, (task, result) in enumerate(interrupts.in_processes(do, todo, jobs), 1):
         if isinstance(result, Outcome):
             results.outcomes[task.case, task.entrant or ""] = result
         elif result is not None:
@@ -95,14 +95,6 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Result
         if progress is not None:
             progress(done, len(todo), str(task))
     return results
-
-
-def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, Outcome | References | None]]:
-    if jobs == 1 or len(todo) == 1:
-        yield from map(do, todo)
-        return
-    with interrupts.worker_pool(min(jobs, len(todo))) as pool:
-        yield from pool.imap_unordered(do, todo)
 
 
 def do(task: Task) -> tuple[Task, Outcome | References | None]:

@@ -1,4 +1,4 @@
-"""Who is compared: the firmware's estimators as they can be set up, and the baselines.
+"""Which estimators are compared: the firmware's as they can be set up, and those of ../baselines, where a new one goes.
 
 The firmware's are `ours`. Names: dual and joint are told the true noise and adapt nothing; *_shipped have every default
 but what is known beforehand (the first guess, the lever); *_no_change are the same without change detection; *_r…_q…

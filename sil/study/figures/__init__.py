@@ -1,4 +1,4 @@
-"""The paper's figures for this system, from one command: `lever figures`.
+"""Figures for print and for a browser, from one command: `lever figures`.
 
 Each figure is computed from runs of the firmware and described once (`description`), its caption included; `printed`
 and `figures_page` draw what is described, for print and for a browser, `data` writes it as a table. `catalogue` lists

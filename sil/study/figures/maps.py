@@ -159,6 +159,7 @@ def sheet(figure: MapFigure, width: str = "single") -> Sheet:
         drawn.supylabel(figure.y.label, fontsize=7.5)
         drawn.colorbar(colours, ax=places, label=figure.label, aspect=30)
         drawn.draw_without_rendering()
+        drawn.set_layout_engine("none")  # see printed.sheet()
     return drawn
 
 

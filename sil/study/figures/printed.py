@@ -46,6 +46,7 @@ def sheet(figure: Figure | MapFigure, width: str = "single") -> Sheet:
         else:
             _draw_rows(drawn, figure)
         drawn.draw_without_rendering()
+        drawn.set_layout_engine("none")  # each file would be laid out anew, and a little differently
     return drawn
 
 

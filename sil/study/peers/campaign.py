@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,21 +59,13 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> list[R
     """Does all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
     total, done = sum(len(task.conditions) for task in todo), 0
     collected: list[Result] = []
-    for task, results in _results(todo, jobs):
+    for task, results in interrupts.in_processes(do, todo, jobs):
         collected += results
         done += len(task.conditions)
         if progress is not None:
             progress(done, total, task.conditions[-1])
     order = list(conditions.CONDITIONS)
     return sorted(collected, key=lambda result: (order.index(result.condition), ESTIMATORS.index(result.estimator)))
-
-
-def _results(todo: list[Task], jobs: int) -> Iterator[tuple[Task, list[Result]]]:
-    if jobs == 1 or len(todo) == 1:
-        yield from map(do, todo)
-        return
-    with interrupts.worker_pool(min(jobs, len(todo))) as pool:
-        yield from pool.imap_unordered(do, todo)
 
 
 def do(task: Task) -> tuple[Task, list[Result]]:

@@ -7,15 +7,20 @@ REACHED and REACHED_UNDER: a folder for the notes, and the folders whose functio
 
 from __future__ import annotations
 
-import atexit
 import os
 import sys
 import threading
+from functools import cache
 from importlib.machinery import SourceFileLoader
+from inspect import CO_OPTIMIZED
 from types import CodeType, FrameType
 from typing import Any
 
 _get_code = SourceFileLoader.get_code
+_noted: dict[int, CodeType] = {}
+_folder = os.environ.get("REACHED", "")
+_under = tuple(os.environ.get("REACHED_UNDER", "").split(os.pathsep))
+_open, _real_path = open, cache(os.path.realpath)
 
 
 def _code_with_mutant(loader: SourceFileLoader, name: str) -> CodeType | None:
@@ -26,25 +31,32 @@ def _code_with_mutant(loader: SourceFileLoader, name: str) -> CodeType | None:
         return compile(file.read(), path, "exec", dont_inherit=True)
 
 
-def _note_functions() -> None:
-    reached: set[CodeType] = set()
-    folders = tuple(os.environ["REACHED_UNDER"].split(os.pathsep))
+def _called(frame: FrameType, event: str, argument: Any) -> None:
+    code = frame.f_code
+    if id(code) in _noted:
+        return
+    path = _real_path(code.co_filename)
+    if path.startswith(_under) and (code.co_flags & CO_OPTIMIZED or code.co_name == "<module>"):  # no body of a class
+        try:
+            with _open(f"{_folder}/{os.getpid()}", "a", encoding="utf-8") as file:
+                file.write(f"{path}:{code.co_name}()\n")
+        except OSError:  # a test lets no file grow
+            return
+    _noted[id(code)] = code
 
-    def called(frame: FrameType, event: str, argument: Any) -> None:
-        reached.add(frame.f_code)
 
-    def write() -> None:
-        sys.settrace(None)
-        places = {(os.path.realpath(code.co_filename), code.co_firstlineno) for code in list(reached)}
-        with open(os.path.join(os.environ["REACHED"], str(os.getpid())), "a", encoding="utf-8") as file:
-            file.writelines(f"{path}:{line}\n" for path, line in places if path.startswith(folders))
-
-    atexit.register(write)
-    threading.settrace(called)
-    sys.settrace(called)
+def note_in(folder: str) -> str:
+    """What runs from now on, here and in processes started here, is noted in this folder; returns that of before."""
+    global _folder
+    before = _folder
+    os.makedirs(folder, exist_ok=True)
+    os.environ["REACHED"] = _folder = folder
+    _noted.clear()
+    return before
 
 
 if "MUTANT_OF" in os.environ:
     SourceFileLoader.get_code = _code_with_mutant  # type: ignore[method-assign,assignment]
 if "REACHED" in os.environ:
-    _note_functions()
+    threading.settrace(_called)
+    sys.settrace(_called)

@@ -193,48 +193,50 @@ class Copy:
 
 @pytest.fixture(scope="module")
 def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Copy:
-    made = Copy(root, tmp_path_factory.mktemp("additions"))
-    made.file("sil/scenarios/seesaw.toml", SCENARIO)
-    made.file("sil/plants/seesaw_plant.py", PLANT)
+    project = Copy(root, tmp_path_factory.mktemp("additions"))
+    project.file("sil/scenarios/seesaw.toml", SCENARIO)
+    project.file("sil/plants/seesaw_plant.py", PLANT)
     pilots = "sil/plants/pilots.py"
-    made.change(pilots, "mayo_plant, reflex_plant,", "mayo_plant, seesaw_plant, reflex_plant,")
-    made.change(pilots, "\n_ALL = (", PILOT)
-    made.change("sil/plants/trajectories.py", "\nKINDS: Mapping[str, type[Trajectory]] = {", TRAJECTORY)
-    made.change("sil/plants/excitation.py", "\nKINDS: dict[str, type[Excitation]] = {", EXCITATION)
-    made.change("sil/plants/sensors.py", "\nFAULTS: dict[str, type[Fault]] = {", FAULT)
-    made.change("host_tools/results/trace.py", "\nHEALTH = (\n", '\nHEALTH = (\n    ("gap", "HEALTH", "fault_gap"),\n')
-    made.file("sil/study/baselines/guess.py", BASELINE)
+    project.change(pilots, "mayo_plant, reflex_plant,", "mayo_plant, seesaw_plant, reflex_plant,")
+    project.change(pilots, "\n_ALL = (", PILOT)
+    project.change("sil/plants/trajectories.py", "\nKINDS: Mapping[str, type[Trajectory]] = {", TRAJECTORY)
+    project.change("sil/plants/excitation.py", "\nKINDS: dict[str, type[Excitation]] = {", EXCITATION)
+    project.change("sil/plants/sensors.py", "\nFAULTS: dict[str, type[Fault]] = {", FAULT)
+    project.change(
+        "host_tools/results/trace.py", "\nHEALTH = (\n", '\nHEALTH = (\n    ("gap", "HEALTH", "fault_gap"),\n'
+    )
+    project.file("sil/study/baselines/guess.py", BASELINE)
     baselines = "sil/study/baselines/__init__.py"
-    made.change(baselines, "from .joint_ekf", "from .guess import guess\nfrom .joint_ekf")
-    made.change(
+    project.change(baselines, "from .joint_ekf", "from .guess import guess\nfrom .joint_ekf")
+    project.change(
         baselines, "    for baseline in (\n", '    for baseline in (\n        Baseline("guess", "it", "none", guess),\n'
     )
-    made.change(
+    project.change(
         "sil/envelope/conditions.py", "\n_STEADY = (", '\n_STEADY = (\n    Condition("calm", "no motion", Motion()),'
     )
-    made.change(
+    project.change(
         "sil/study/compare/cases.py",
         "def _wrong_noise() -> Iterator[Case]:\n",
         'def _wrong_noise() -> Iterator[Case]:\n    yield WrongNoise(name="wronger", title="wronger")\n',
     )
     clock = "    clock = readings.clock\n"
-    made.change("sil/faults/rows.py", clock, f'    yield Row("sulk", "it sulks")\n{clock}')
-    made.change(
+    project.change("sil/faults/rows.py", clock, f'    yield Row("sulk", "it sulks")\n{clock}')
+    project.change(
         "sil/bounce/conditions.py", "\n_ALARMS = (", '\n_ALARMS = (\n    Condition("mild", "mild", measure.relaxing),'
     )
-    shutil.copy(root / "sil/campaign/specs/quick.toml", made.folder / "lever_cdkf/sil/campaign/specs/slow.toml")
-    made.file("host_tools/report/charts/speed.py", CHART)
+    shutil.copy(root / "sil/campaign/specs/quick.toml", project.folder / "lever_cdkf/sil/campaign/specs/slow.toml")
+    project.file("host_tools/report/charts/speed.py", CHART)
     page = "host_tools/report/page.py"
-    made.change(page, "import comparison, health,", "import comparison, health, speed,")
+    project.change(page, "import comparison, health,", "import comparison, health, speed,")
     section = 'page.section("speed", "Speed", "Speed", page.figure("figure-speed", speed.rate(run), "It."))'
-    made.change(page, "    _health(page, run)\n", f"    {section}\n    _health(page, run)\n")
-    made.change("host_tools/can/logs.py", '_CANDUMP = (".log",', '_CANDUMP = (".dump", ".log",')
-    made.file("sil/commands/hello.py", COMMAND)
-    entries = made.folder / "hello-1.dist-info"
+    project.change(page, "    _health(page, run)\n", f"    {section}\n    _health(page, run)\n")
+    project.change("host_tools/can/logs.py", '_CANDUMP = (".log",', '_CANDUMP = (".dump", ".log",')
+    project.file("sil/commands/hello.py", COMMAND)
+    entries = project.folder / "hello-1.dist-info"
     entries.mkdir()
     (entries / "METADATA").write_text("Metadata-Version: 2.1\nName: hello\nVersion: 1\n")
     (entries / "entry_points.txt").write_text("[lever_cdkf.commands]\nhello = lever_cdkf.sil.commands.hello\n")
-    return made
+    return project
 
 
 def test_a_scenario_with_a_new_plant_trajectory_excitation_fault_and_column_runs(copy: Copy) -> None:

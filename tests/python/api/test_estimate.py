@@ -144,17 +144,17 @@ def test_what_is_refused(samples: Any, options: Any, said: str) -> None:
 def test_other_names_and_settings(columns: Columns) -> None:
     renamed = {"Zeit": columns["time"], "winkel": columns["theta"], "nz": columns["z_ddot"]}
     names = {"theta": "winkel", "z_ddot": "nz"}
-    made = estimate(renamed, Config(model="linear_physical"), names=names)
-    assert list(made)[:3] == ["m", "c", "k"]
+    estimated = estimate(renamed, Config(model="linear_physical"), names=names)
+    assert list(estimated)[:3] == ["m", "c", "k"]
 
 
 def test_missing_values_are_missing(columns: Columns) -> None:
     holes = {**columns, "tau_m": np.full(len(columns["time"]), math.nan), "theta": columns["theta"].copy()}
     holes["theta"][::7] = math.nan
-    made = estimate(holes)
-    assert "theta" in made.flags[7]
-    assert "tau" not in " ".join(made.notes)
-    assert made["natural_frequency"].last == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+    estimated = estimate(holes)
+    assert "theta" in estimated.flags[7]
+    assert "tau" not in " ".join(estimated.notes)
+    assert estimated["natural_frequency"].last == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
 
 
 def test_everything_has_its_name(result: Result, tmp_path: Path) -> None:

@@ -139,11 +139,11 @@ def test_without_an_image_it_says_how_to_build_one(
     ],
 )
 def test_openocd_is_told(options: list[str], arguments: list[str], image: Path, stand_in: Path) -> None:
-    told = install(stand_in, "openocd", "** Verified OK **", 0)
+    called = install(stand_in, "openocd", "** Verified OK **", 0)
     install(stand_in, "pyocd", "not this one", 1)
     assert cli.main(["flash", str(image), *options]) == 0
     program = f"program {{{image}}} verify reset exit 0x08000000"
-    assert told.read_text().split("\n") == [*arguments, "-f", "target/stm32f4x.cfg", "-c", program]
+    assert called.read_text().split("\n") == [*arguments, "-f", "target/stm32f4x.cfg", "-c", program]
 
 
 @pytest.mark.parametrize(
@@ -155,17 +155,17 @@ def test_openocd_is_told(options: list[str], arguments: list[str], image: Path, 
     ],
 )
 def test_pyocd_is_told(options: list[str], arguments: list[str], image: Path, stand_in: Path) -> None:
-    told = install(stand_in, "pyocd", "", 0)
+    called = install(stand_in, "pyocd", "", 0)
     assert cli.main(["flash", str(image), *options]) == 0
     expected = ["load", "--no-wait", "--target", "stm32f405rgtx", *arguments, str(image)]
-    assert told.read_text().split("\n") == expected
+    assert called.read_text().split("\n") == expected
 
 
 def test_dry_run_runs_nothing(image: Path, stand_in: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    told = install(stand_in, "openocd", "", 0)
+    called = install(stand_in, "openocd", "", 0)
     assert cli.main(["flash", str(image), "--dry-run"]) == 0
     assert "interface/stlink.cfg" in capsys.readouterr().out
-    assert not told.exists()
+    assert not called.exists()
 
 
 @pytest.mark.parametrize("probe", ["usb", "stlink:a b", "stlink:x;shutdown"])

@@ -49,8 +49,8 @@ def undisturbed(small: Plan, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 
 @pytest.fixture
-def made(tmp_path: Path) -> Callable[[str], Spec]:
-    """made(text): the spec of a TOML text."""
+def spec_of(tmp_path: Path) -> Callable[[str], Spec]:
+    """spec_of(text): the spec of a TOML text."""
 
     def from_text(text: str) -> Spec:
         file = tmp_path / "made.toml"

@@ -155,15 +155,15 @@ def test_figures_of_a_campaign_are_made_from_its_folder_alone(
     written = {file.name for file in tmp_path.iterdir()}
     assert written >= {f"{name}.{kind}" for name in names for kind in ("pdf", "svg", "png", "csv")}
     assert 'id="map_error"' in (tmp_path / "figures.html").read_text()
-    told = list(csv.DictReader((tmp_path / "map_error.csv").read_text().splitlines()))
+    table = list(csv.DictReader((tmp_path / "map_error.csv").read_text().splitlines()))
     rows = polars.read_parquet(place / "*.parquet")
     for row in rows.iter_rows(named=True):
         where = {"chart": row["estimator"], "series": "", "estimator.adaptation": row["estimator.adaptation"]}
         where["pilot.process_noise [rad/s/sqrt(s)]"] = f"{row['pilot.process_noise']}"
-        (cell,) = [each for each in told if where.items() <= each.items()]
+        (cell,) = [each for each in table if where.items() <= each.items()]
         worst = max(row["rms_m_p"], row["rms_c_p"], row["rms_k_p"])
         assert float(cell["value"]) == pytest.approx(100.0 * worst)
-    lines = [[row["value"], row["low"], row["high"]] for row in told if row["series"] == "border"]
+    lines = [[row["value"], row["low"], row["high"]] for row in table if row["series"] == "border"]
     borders = csv.DictReader((place / "border.csv").read_text().splitlines())
     at = "pilot.process_noise [rad/s/sqrt(s)]"
     assert lines == [[row[at], row["low"], row["high"]] for row in borders]

@@ -19,13 +19,13 @@ from lever_cdkf.sil.campaign.spec import Spec
 from lever_cdkf.sil.run import runner
 from lever_cdkf.sil.scenarios import scenario
 
-Made = Callable[[str], Spec]
+SpecOf = Callable[[str], Spec]
 
 ONE = 'title = "one"\nscenario = "steady"\nevery = "0.02 s"\nset = { duration = "20 s", converged_after = "8 s" }\n'
 
 
-def test_a_run_is_that_of_lever_sim(made: Made) -> None:
-    (row,) = runs.rows(made("seed = 5\n" + ONE), range(1))
+def test_a_run_is_that_of_lever_sim(spec_of: SpecOf) -> None:
+    (row,) = runs.rows(spec_of("seed = 5\n" + ONE), range(1))
     summary = runner.simulate(scenario.load("steady", ["duration=20 s", "converged_after=8 s", "seed=5"])).summary
     for name, quality in summary.parameters.items():
         assert 100.0 * row[f"rms_{name}"] == pytest.approx(quality.rms_percent, rel=0.02)  # frames round
@@ -53,9 +53,9 @@ def test_what_was_measured_makes_the_firmware_say_the_same_to_the_bit(changes: l
         np.testing.assert_array_equal(replayed[name], flight.firmware[name], err_msg=name)
 
 
-def test_figures_of_errors_that_are_known(made: Made) -> None:
+def test_figures_of_errors_that_are_known(spec_of: SpecOf) -> None:
     """Parameters 1, 2 and 3 standard deviations off, each relative to a truth of its own, NEES by hand."""
-    flight = simulate(made(ONE).first, 1.0, measured=False)
+    flight = simulate(spec_of(ONE).first, 1.0, measured=False)
     times = len(flight.at)
     sigma = np.array([0.05, 0.05, 0.05, 0.01, 0.02])
     off = np.array([1.0, 2.1, -3.0, 0.0, 1.0]) * sigma
@@ -78,9 +78,9 @@ def test_figures_of_errors_that_are_known(made: Made) -> None:
             figures.of_run(flight, dataclasses.replace(track, values=broken[None]), 0)
 
 
-def test_times_without_a_truth_are_not_judged(made: Made) -> None:
+def test_times_without_a_truth_are_not_judged(spec_of: SpecOf) -> None:
     """As with hands off. By `lever sim`, too, error and coverage are of the others."""
-    flight = simulate(made(ONE).first, 1.0, measured=False)
+    flight = simulate(spec_of(ONE).first, 1.0, measured=False)
     truth = flight.truth.copy()
     truth[15:, :3] = np.nan
     values = flight.truth * 1.1
@@ -94,8 +94,8 @@ def test_times_without_a_truth_are_not_judged(made: Made) -> None:
 
 
 @pytest.mark.parametrize("name", ENTRANTS)
-def test_every_estimator_follows_a_steady_pilot(name: str, made: Made) -> None:
-    (row,) = runs.rows(made(f'estimators = ["{name}"]\n' + ONE), range(1))
+def test_every_estimator_follows_a_steady_pilot(name: str, spec_of: SpecOf) -> None:
+    (row,) = runs.rows(spec_of(f'estimators = ["{name}"]\n' + ONE), range(1))
     assert "error" not in row
     assert row["rms_natural_frequency"] < 0.1
     assert (row["coverage_k_p"] is None) == (name == "lms")
@@ -109,10 +109,10 @@ def test_rows_do_not_depend_on_how_flights_are_grouped(small: Plan) -> None:
     assert [row["run"] for row in together] == list(range(6, 14))
 
 
-def test_a_run_that_cannot_be_is_a_row_with_its_error(made: Made, tmp_path: Path) -> None:
+def test_a_run_that_cannot_be_is_a_row_with_its_error(spec_of: SpecOf, tmp_path: Path) -> None:
     text = '[[vary]]\nkey = "settings.theta_noise"\nvalues = ["1 mrad", "-1 mrad", "2 mrad"]\n'
     text += '[[vary]]\nkey = "estimator.preload"\nvalues = ["trim", "fixed"]\n'
-    plan = Plan(made('estimators = ["dual", "rls"]\n' + ONE.replace("20 s", "2 s").replace("8 s", "1 s") + text))
+    plan = Plan(spec_of('estimators = ["dual", "rls"]\n' + ONE.replace("20 s", "2 s").replace("8 s", "1 s") + text))
     assert chunks.make(plan, Chunk(0, 4), tmp_path) == 8
     rows = pq.read_table(tmp_path / Chunk(0, 4).name(plan.fingerprint)).to_pylist()
     assert [row["error"] is not None for row in rows] == [False, False, False, True, True, True, True, True]

@@ -79,7 +79,7 @@ def run(
         return finished.get_nowait()
 
     monkeypatch.setattr(session, "_next", following)
-    done = session.run(plan, folder, client, lambda *told: shown.append(told))
+    done = session.run(plan, folder, client, lambda *progress: shown.append(progress))
     return done, client, shown
 
 

@@ -11,7 +11,7 @@ from lever_cdkf.sil.campaign import design, spec
 from lever_cdkf.sil.campaign.spec import Spec
 from lever_cdkf.sil.toml_tables import ScenarioError
 
-Made = Callable[[str], Spec]
+SpecOf = Callable[[str], Spec]
 
 HEAD = 'title = "made"\nscenario = "steady"\nset = { duration = "2 s", converged_after = "1 s" }\n'
 NOISE = '[[vary]]\nkey = "pilot.process_noise"\n'
@@ -20,8 +20,8 @@ PROGRESS = NOISE.replace("process", "progress") + 'values = ["1 rad", "2 rad"]\n
 THETA = '[[vary]]\nkey = "sensors.theta.noise"\nvalues = ["1 mrad", "2 mrad"]\n'
 
 
-def test_a_grid_goes_through_all_values_the_last_axis_fastest(made: Made) -> None:
-    grid = made(HEAD + THETA + LOG + "steps = 3\n")
+def test_a_grid_goes_through_all_values_the_last_axis_fastest(spec_of: SpecOf) -> None:
+    grid = spec_of(HEAD + THETA + LOG + "steps = 3\n")
     points = [design.columns(grid, design.point(grid, number)) for number in range(grid.size)]
     assert [tuple(point.values()) for point in points] == [
         (1.0, 0.01), (1.0, 0.1), (1.0, 1.0), (2.0, 0.01), (2.0, 0.1), (2.0, 1.0),
@@ -29,18 +29,18 @@ def test_a_grid_goes_through_all_values_the_last_axis_fastest(made: Made) -> Non
     assert [axis.unit for axis in grid.vary] == ["mrad", "rad/s/sqrt(s)"]
 
 
-def test_what_goes_with_an_axis_moves_in_its_own_range(made: Made) -> None:
+def test_what_goes_with_an_axis_moves_in_its_own_range(spec_of: SpecOf) -> None:
     text = 'steps = 3\nalso = { "settings.theta_dot_process_noise" = ["0.02 rad/s/sqrt(s)", "2 rad/s/sqrt(s)"] }\n'
-    flight = (grid := made(HEAD + LOG + text)).flight(design.point(grid, 1), 7)
+    flight = (grid := spec_of(HEAD + LOG + text)).flight(design.point(grid, 1), 7)
     assert flight.pilot.process_noise == pytest.approx(0.1)
     assert flight.config.settings["theta_dot_process_noise"] == pytest.approx(0.2)
     assert (flight.seed, flight.duration) == (7, 2.0)
 
 
-def test_a_latin_hypercube_has_one_point_in_each_part_of_each_axis(made: Made) -> None:
+def test_a_latin_hypercube_has_one_point_in_each_part_of_each_axis(spec_of: SpecOf) -> None:
     text = HEAD + 'design = "latin_hypercube"\npoints = 50\n' + LOG
     text += '[[vary]]\nkey = "sensors.theta.noise"\nrange = ["1 mrad", "3 mrad"]\n'
-    hypercube = made(text)
+    hypercube = spec_of(text)
     points = [design.columns(hypercube, design.point(hypercube, number)) for number in range(50)]
     noise = np.log10([float(point["pilot.process_noise"]) for point in points]) / 2.0 + 1.0
     theta = (np.array([float(point["sensors.theta.noise"]) for point in points]) - 1.0) / 2.0
@@ -49,24 +49,24 @@ def test_a_latin_hypercube_has_one_point_in_each_part_of_each_axis(made: Made) -
     assert abs(np.corrcoef(noise, theta)[0, 1]) < 0.5  # each in an order of its own
 
 
-def test_random_points_are_the_same_every_time_and_each_its_own(made: Made) -> None:
-    random = made(HEAD + 'design = "random"\npoints = 1000000000\n' + LOG + THETA)
+def test_random_points_are_the_same_every_time_and_each_its_own(spec_of: SpecOf) -> None:
+    random = spec_of(HEAD + 'design = "random"\npoints = 1000000000\n' + LOG + THETA)
     numbers = (0, 1, 999_999_999)
     points = [design.point(random, number) for number in numbers]
     assert points == [design.point(random, number) for number in numbers]
     assert len({str(point) for point in points}) == 3
 
 
-def test_a_table_can_be_set(made: Made) -> None:
+def test_a_table_can_be_set(spec_of: SpecOf) -> None:
     text = HEAD.replace("set = { ", 'set = { "pilot.k_p" = { kind = "ramp", first = "1500 N/m", last = "1800 N/m", '
                         'start = "1 s", duration = "1 s" }, ')  # fmt: skip
-    truth = (flight := made(text).first).truth(flight.time())
+    truth = (flight := spec_of(text).first).truth(flight.time())
     assert truth.parameters["k_p"][[0, -1]] == pytest.approx([1500.0, 1800.0], abs=1.0)
 
 
-def test_the_hash_is_of_what_makes_rows(made: Made, tmp_path: Path) -> None:
-    first = made(HEAD + LOG + "steps = 3\n")
-    same = made('description = "in other words"\nchunk = 3\n' + HEAD.replace("made", "called") + LOG + "steps = 3\n")
+def test_the_hash_is_of_what_makes_rows(spec_of: SpecOf, tmp_path: Path) -> None:
+    first = spec_of(HEAD + LOG + "steps = 3\n")
+    same = spec_of('description = "in other words"\nchunk = 3\n' + HEAD.replace("made", "called") + LOG + "steps = 3\n")
     assert same.hashed == first.hashed
     (tmp_path / "own.toml").write_bytes(first.content + b"\n")
     others = (
@@ -75,7 +75,7 @@ def test_the_hash_is_of_what_makes_rows(made: Made, tmp_path: Path) -> None:
         HEAD.replace("2 s", "3 s") + LOG + "steps = 3\n",
         HEAD.replace("steady", "own.toml") + LOG + "steps = 3\n",
     )
-    assert len({first.hashed, *(made(text).hashed for text in others)}) == 5
+    assert len({first.hashed, *(spec_of(text).hashed for text in others)}) == 5
 
 
 @pytest.mark.parametrize(
@@ -121,24 +121,24 @@ def test_the_hash_is_of_what_makes_rows(made: Made, tmp_path: Path) -> None:
         (HEAD.replace("steady", "fixed_preload") + 'estimators = ["joint_ekf"]\n', "joint_ekf needs preload trim"),
     ],
 )
-def test_what_is_refused(text: str, says: str, made: Made, tmp_path: Path) -> None:
+def test_what_is_refused(text: str, says: str, spec_of: SpecOf, tmp_path: Path) -> None:
     with pytest.raises(ScenarioError) as refused:
-        made(text)
+        spec_of(text)
     assert says in str(refused.value)
     assert str(refused.value).startswith(f"{tmp_path}/made.toml: ")
 
 
-def test_what_cannot_be_at_one_end_of_an_axis_is_said_and_left_to_its_runs(made: Made) -> None:
+def test_what_cannot_be_at_one_end_of_an_axis_is_said_and_left_to_its_runs(spec_of: SpecOf) -> None:
     """Even at the first point, of which all else is taken."""
     values = 'values = ["-1 mrad", "1 mrad"]\n'
-    refused = made(HEAD + THETA.replace('values = ["1 mrad", "2 mrad"]\n', values) + LOG + "steps = 2\n")
+    refused = spec_of(HEAD + THETA.replace('values = ["1 mrad", "2 mrad"]\n', values) + LOG + "steps = 2\n")
     (doubt,) = refused.doubts
     assert "made.toml: vary[0]: sensors.theta.noise: '-1 mrad' is out of range" in doubt
     assert refused.first.sensors.theta.noise == pytest.approx(1e-3)
     preload = '[[vary]]\nkey = "estimator.preload"\nvalues = ["trim", "fixed"]\n'
-    (doubt,) = made('estimators = ["dual", "rls"]\n' + HEAD + preload).doubts
+    (doubt,) = spec_of('estimators = ["dual", "rls"]\n' + HEAD + preload).doubts
     assert "estimators: rls needs preload trim" in doubt
-    assert made(HEAD + THETA).doubts == ()
+    assert spec_of(HEAD + THETA).doubts == ()
 
 
 @pytest.mark.parametrize("name", spec.names())

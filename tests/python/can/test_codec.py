@@ -138,8 +138,8 @@ def test_not_a_number(message: Message, signal: Signal, value: float | None) -> 
             codec.encode(message.name, 0, values)
         return
     frame = codec.encode(message.name, 0, values)
-    told = {signal.name: 0.0, flag: 0} if flag in values else {signal.name: absent}
-    assert frame[1:] == by_cantools(message, contents(message, signal) | told, 0)
+    changed = {signal.name: 0.0, flag: 0} if flag in values else {signal.name: absent}
+    assert frame[1:] == by_cantools(message, contents(message, signal) | changed, 0)
 
 
 def test_counts_and_time_wrap_but_codes_do_not() -> None:

@@ -22,16 +22,16 @@ def test_columns_are_the_frames_one_by_one(name: str, fields: tuple[str, ...]) -
     random = np.random.default_rng(3)
     rows = np.concatenate([np.array([ODD] * len(fields)).T, random.normal(0.0, 5.0, (200, len(fields)))])
     counters = np.arange(len(rows))
-    made = codec.encode_columns(name, counters, dict(zip(fields, rows.T, strict=True)))
+    encoded = codec.encode_columns(name, counters, dict(zip(fields, rows.T, strict=True)))
     one_by_one = codec.encoder(name)
     expected = [one_by_one(k, *row) for k, row in enumerate(rows.tolist())]
-    assert [bytes(row) for row in made] == expected
+    assert [bytes(row) for row in encoded] == expected
 
 
 def test_time_wraps_as_in_one_frame() -> None:
     time_us = np.array([0, 1, (1 << 32) - 1, 1 << 32, 1_700_000_000_123_456])
     z_ddot = np.array([0.0, -9.81, math.nan, 32.7, 33.0])
-    made = codec.encode_columns("BASE_SAMPLE", np.arange(5), {"z_ddot": z_ddot, "time_us": time_us})
+    encoded = codec.encode_columns("BASE_SAMPLE", np.arange(5), {"z_ddot": z_ddot, "time_us": time_us})
     one_by_one = codec.encoder("BASE_SAMPLE")
     expected = [one_by_one(k, z_ddot[k], int(time_us[k])) for k in range(5)]
-    assert [bytes(row) for row in made] == expected
+    assert [bytes(row) for row in encoded] == expected

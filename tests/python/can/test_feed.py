@@ -21,7 +21,7 @@ INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")
 def spoilt(lines: list[str]) -> list[str]:
     """Frames lost, doubled, swapped, corrupt and cut; other messages and other buses between them."""
     random = np.random.default_rng(4)
-    made = []
+    damaged = []
     for line in lines:
         kind = random.integers(0, 60)
         if kind == 0:
@@ -31,18 +31,18 @@ def spoilt(lines: list[str]) -> list[str]:
             line = f"{time} {bus} {frame[:-1]}{'0' if frame[-1] != '0' else '1'} T"
         if kind == 2:
             line = f"{time} {bus} {frame[:-4]} T"
-        made.append(line)
+        damaged.append(line)
         if kind == 3:
-            made.append(line)
+            damaged.append(line)
         if kind == 4:
-            made.append(f"{time} other {frame}")
+            damaged.append(f"{time} other {frame}")
         if kind == 5:
-            made.append(f"{time} {bus} 7A0#0011")
+            damaged.append(f"{time} {bus} 7A0#0011")
         if kind == 6:
-            made.append(f"{time} {bus} 00000{frame}")
-        if kind == 7 and len(made) > 1:
-            made[-2:] = made[:-3:-1]
-    return made
+            damaged.append(f"{time} {bus} 00000{frame}")
+        if kind == 7 and len(damaged) > 1:
+            damaged[-2:] = damaged[:-3:-1]
+    return damaged
 
 
 @pytest.fixture(scope="module")

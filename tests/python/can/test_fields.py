@@ -44,8 +44,8 @@ def test_flags_of_health_are_the_bits_of_the_facade() -> None:
 
 
 def test_frames_belong_to_the_sample_whose_low_bits_they_carry() -> None:
-    told = {"time_low": np.array([0.0, 5.0, 65535.0, 1.0])}
-    assert fields.belongs(told, np.array([1 << 16, 5, (1 << 32) - 1, 2])).tolist() == [True, True, True, False]
+    fields_sent = {"time_low": np.array([0.0, 5.0, 65535.0, 1.0])}
+    assert fields.belongs(fields_sent, np.array([1 << 16, 5, (1 << 32) - 1, 2])).tolist() == [True, True, True, False]
 
 
 def answers(estimator: Estimator, name: str) -> list[dict[str, float]]:

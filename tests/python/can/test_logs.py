@@ -179,9 +179,10 @@ def test_other_failures_are_one_line_each(tmp_path: Path, refused: Refused) -> N
     assert ".xyz is not a known format" in refused("replay", tmp_path / "a.xyz")
     foreign = tmp_path / "foreign.log"
     foreign.write_text("(1.0) can0 123#00\n(1.1) can1 124#00\n")
-    told = refused("replay", foreign)
-    assert "no sample" in told
-    assert "can0, can1" in told
+    error = refused("replay", foreign)
+    assert "no sample" in error
+    assert "can0, can1" in error
+    assert f"{foreign}: given twice" in refused("replay", foreign, tmp_path / "." / "foreign.log")
 
 
 @pytest.mark.requires("setpriv")

@@ -63,8 +63,8 @@ def test_wireshark_reads_every_signal(log: Path, wireshark: dict[str, str]) -> N
         signal = codec.message(name).get_signal_by_name(field)
         if signal.is_signed and signal.length not in (8, 16, 32, 64):  # no number of Wireshark's: its name says so
             expected = np.where(expected < 0.0, expected + float(signal.scale) * (1 << signal.length), expected)
-        known = np.isfinite(expected) | (codec.not_available(signal) is None)
-        np.testing.assert_allclose(read[known], expected[known], rtol=1e-9, atol=1e-12, err_msg=f"{name}.{field}")
+        finite = np.isfinite(expected) | (codec.not_available(signal) is None)
+        np.testing.assert_allclose(read[finite], expected[finite], rtol=1e-9, atol=1e-12, err_msg=f"{name}.{field}")
 
 
 @pytest.mark.requires("tshark")

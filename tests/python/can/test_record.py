@@ -78,9 +78,9 @@ def test_the_log_has_every_frame_and_can_be_replayed(
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     assert record(log, sent) == 0
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
-    told = capsys.readouterr().out
-    assert "3000 frames, 0 lost, 0 corrupt, 0 error frames" in told
-    assert "LEVER_SAMPLE" in told
+    printed = capsys.readouterr().out
+    assert "3000 frames, 0 lost, 0 corrupt, 0 error frames" in printed
+    assert "LEVER_SAMPLE" in printed
     with can.CanutilsLogReader(log) as reader:
         read = [(frame.arbitration_id, bytes(frame.data)) for frame in reader]
     assert read == [(frame.arbitration_id, bytes(frame.data)) for frame in sent]
@@ -100,9 +100,9 @@ def test_losses_and_damage_are_counted(session: Session, tmp_path: Path, capsys:
     other = can.Message(arbitration_id=0x700, is_extended_id=False, data=b"\1")
     sent = [*(frame for index, frame in enumerate(frames) if index not in gone), error, other]
     assert record(tmp_path / "a.log", sent) == 0
-    told = capsys.readouterr().out
-    assert "1999 frames, 3 lost, 1 corrupt, 1 error frames" in told
-    row = next(line.split() for line in told.splitlines() if "LEVER_SAMPLE" in line)
+    printed = capsys.readouterr().out
+    assert "1999 frames, 3 lost, 1 corrupt, 1 error frames" in printed
+    row = next(line.split() for line in printed.splitlines() if "LEVER_SAMPLE" in line)
     assert [row[index] for index in (4, 5, 6)] == ["3", "0", "1"]
 
 

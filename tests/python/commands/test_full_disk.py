@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from lever_cdkf.sil.study.figures import runs
 from processes import full_disk
 from python.conftest import Run
+from python.study.shown import SHORT
 
 COMPARE = ["compare", "--scenarios", "step_up", "--estimators", "joint_ekf", "--seeds", "1", "--duration", "2"]
 
@@ -21,8 +23,11 @@ COMPARE = ["compare", "--scenarios", "step_up", "--estimators", "joint_ekf", "--
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
-def test_all_files_or_none(command: list[str], size: int, fits: str, tmp_path: Path, lever: Run) -> None:
+def test_all_files_or_none(
+    command: list[str], size: int, fits: str, tmp_path: Path, lever: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """`fits` would go in."""
+    monkeypatch.setattr(runs, "Extent", lambda: SHORT)
     (tmp_path / fits).write_text("of an earlier run")
     with full_disk(size):
         status, _, error = lever(*command, tmp_path)

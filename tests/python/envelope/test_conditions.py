@@ -137,8 +137,10 @@ def test_a_condition_is_as_required(name: str) -> None:
     assert limits + (f"; or {unless}" if unless else "") == must
     assert set(condition.figures) <= set(FIGURES)
     assert condition.against is None or CONDITIONS[condition.against].motion == condition.motion
-    told = {key: value for key, value in condition.settings.items() if not key.endswith(("_sigma", "grip_force_noise"))}
-    assert told == TOLD.get(name, {})
+    stated = {
+        key: value for key, value in condition.settings.items() if not key.endswith(("_sigma", "grip_force_noise"))
+    }
+    assert stated == TOLD.get(name, {})
     for key, value in different(condition.sensors, Sensors()).items():
         if key.endswith("_sigma"):
             assert condition.settings[key.replace("grip_gain", "grip_force_gain")] == value

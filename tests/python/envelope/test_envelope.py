@@ -292,13 +292,13 @@ def test_lag_of_a_ramp() -> None:
 
 
 def test_against_a_reference() -> None:
-    told, not_told = outcome({"zeta": np.full_like(TIME, 0.02)}), outcome({"zeta": np.full_like(TIME, 0.05)})
-    for case in (told, not_told):
+    stated, unstated = outcome({"zeta": np.full_like(TIME, 0.02)}), outcome({"zeta": np.full_like(TIME, 0.05)})
+    for case in (stated, unstated):
         case.track.value["zeta"][:, 1] += 0.01
-    not_told = replace(not_told, reference=told)
-    np.testing.assert_allclose(FIGURES["zeta ratio"].compute(not_told), (2.5, 1.0))
-    not_told.track.sigma["m_p"][:, 0] = 0.3
-    np.testing.assert_allclose(FIGURES["σ ratio"].compute(not_told), (3.0, 1.0))
+    unstated = replace(unstated, reference=stated)
+    np.testing.assert_allclose(FIGURES["zeta ratio"].compute(unstated), (2.5, 1.0))
+    unstated.track.sigma["m_p"][:, 0] = 0.3
+    np.testing.assert_allclose(FIGURES["σ ratio"].compute(unstated), (3.0, 1.0))
 
 
 def test_feedthrough() -> None:

@@ -8,12 +8,14 @@ import re
 import shutil
 import subprocess
 import sys
+from argparse import Namespace
 from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools import provenance as origin
+from lever_cdkf.host_tools.commands.signal_options import input_files
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import native_file, shared_library
 from lever_cdkf.host_tools.provenance import provenance, with_provenance
@@ -34,22 +36,31 @@ def test_the_date_is_now_or_that_of_the_environment(monkeypatch: pytest.MonkeyPa
 
 def test_inputs_are_told_by_the_hash_of_their_bytes(tmp_path: Path) -> None:
     (tmp_path / "Größe θ.log").write_bytes(b"abc")
-    told = provenance([tmp_path / "Größe θ.log", "-", tmp_path])
-    assert told.inputs == {
+    provided = provenance([tmp_path / "Größe θ.log", "-", tmp_path])
+    assert provided.inputs == {
         f"{tmp_path}/Größe θ.log": f"sha256:{hashlib.sha256(b'abc').hexdigest()}",
         "-": None,
         str(tmp_path): None,
     }
     library = native_file(shared_library("lever_cdkf"))
-    assert told.library == f"sha256:{hashlib.sha256(library.read_bytes()).hexdigest()}"
+    assert provided.library == f"sha256:{hashlib.sha256(library.read_bytes()).hexdigest()}"
+
+
+def test_inputs_are_all_files_that_options_name(tmp_path: Path) -> None:
+    aircraft = tmp_path / "own.toml"
+    aircraft.touch()
+    options = Namespace(
+        settings="my.settings", dbc="my.dbc", map=["theta=A.B", "my.TOML"], aircraft=f"{aircraft},gearing=2"
+    )
+    assert input_files(options) == ["my.settings", "my.dbc", str(aircraft), "my.TOML"]
 
 
 def test_every_format_can_hold_the_names(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["/bin/lever", "replay", "a b\x07\udcff.log"])
-    told = provenance(["a\x00\udcff"])
-    assert told.command == r"lever replay 'a b\x07\udcff.log'"
-    assert list(told.inputs) == [r"a\x00\udcff"]
-    assert json.loads(told.text())["command"] == told.command
+    provided = provenance(["a\x00\udcff"])
+    assert provided.command == r"lever replay 'a b\x07\udcff.log'"
+    assert list(provided.inputs) == [r"a\x00\udcff"]
+    assert json.loads(provided.text())["command"] == provided.command
 
 
 @pytest.mark.requires("git")
@@ -83,19 +94,19 @@ def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
 
 def test_rows_in_json_have_it(session: Session, tmp_path: Path) -> None:
     assert cli.main(["replay", str(session.log), "--json", str(tmp_path / "rows.json")]) == 0
-    told = json.loads((tmp_path / "rows.json").read_text())["provenance"]
-    assert told["version"] == origin.version()
-    assert told["inputs"] == {str(session.log): origin.sha256(session.log)}
+    provided = json.loads((tmp_path / "rows.json").read_text())["provenance"]
+    assert provided["version"] == origin.version()
+    assert provided["inputs"] == {str(session.log): origin.sha256(session.log)}
 
 
 def test_a_page_says_it_at_its_end() -> None:
-    told = provenance(["</script><b>"])
-    page = with_provenance("<html><body><p>x</p></body></html>", told)
+    provided = provenance(["</script><b>"])
+    page = with_provenance("<html><body><p>x</p></body></html>", provided)
     assert page.startswith("<html><body><p>x</p><footer>")
     assert page.endswith("</body></html>")
     kept = '<script type="application/json" id="provenance">(.*?)</script>'
     (content,) = re.findall(kept, page)
-    assert json.loads(content) == told.properties()
+    assert json.loads(content) == provided.properties()
     assert "<b>" not in re.sub(kept, "", page)
     assert with_provenance("<html></html>", None) == "<html></html>"
-    assert with_provenance("<html></html>", told).endswith("</html>")
+    assert with_provenance("<html></html>", provided).endswith("</html>")

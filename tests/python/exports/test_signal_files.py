@@ -128,6 +128,16 @@ def test_mode_and_faults_are_words_in_mf4(replayed: Replayed) -> None:
     assert b"settling" in set(faults.samples)
 
 
+def test_a_mode_that_is_not_known_yet_is_said_so_in_mf4(session: Session, tmp_path: Path) -> None:
+    health = [line for line in session.lines if " 214#" in line]
+    late = tmp_path / "late.log"
+    late.write_text("\n".join(line for line in session.lines if line not in health[: len(health) // 2]) + "\n")
+    assert cli.main(["replay", str(late), "-o", str(tmp_path / "out"), "--format", "mf4"]) == 0
+    with MDF(tmp_path / "out/signals.mf4") as file:
+        modes = file.get("mode_recorded").samples
+    assert (modes[0], modes[-1]) == (b"not known", b"run")
+
+
 def test_mf4_of_a_simulation_has_the_truth_and_no_date(simulation: Path) -> None:
     table = pd.read_csv(simulation / "trace.csv")
     with MDF(simulation / "signals.mf4") as file:
@@ -160,12 +170,12 @@ def test_mcap_holds_the_frames_of_the_log_at_their_time(replayed: Replayed) -> N
         expected = replayed.frames(name)
         found = content[f"/lever/{name}"]
         assert len(found) == len(expected) == 6000
-        for (at, told), (time, signals) in zip(found[::97], expected[::97], strict=True):
+        for (at, message), (time, signals) in zip(found[::97], expected[::97], strict=True):
             assert abs(at - 1000 * time) <= 1000
-            assert told == pytest.approx({field: signals[field] for field in fields}, abs=1e-9)
-    state = [(at, told) for at, told in replayed.frames("STATE_ESTIMATE") if told["valid"]]
-    assert [told["theta"] for _, told in content["/lever/STATE_ESTIMATE"]] == pytest.approx(
-        [told["theta"] for _, told in state], abs=1e-9
+            assert message == pytest.approx({field: signals[field] for field in fields}, abs=1e-9)
+    state = [(at, message) for at, message in replayed.frames("STATE_ESTIMATE") if message["valid"]]
+    assert [message["theta"] for _, message in content["/lever/STATE_ESTIMATE"]] == pytest.approx(
+        [message["theta"] for _, message in state], abs=1e-9
     )
     assert content["/lever/recorded/STATE_ESTIMATE"] == content["/lever/STATE_ESTIMATE"]
 
@@ -176,9 +186,9 @@ def test_every_message_in_mcap_is_what_its_schema_says(replayed: Replayed, simul
         content, schemas = messages(path / "signals.mcap")
         for topic, schema in schemas.items():
             assert schema["type"] == "object"
-            for _, told in content[topic]:
-                assert told
-                for field, value in told.items():
+            for _, message in content[topic]:
+                assert message
+                for field, value in message.items():
                     assert isinstance(value, kinds[schema["properties"][field]["type"]]), (topic, field)
     assert schemas["/lever/PILOT_PARAMETERS"]["properties"]["k_p"]["description"].endswith("[N/m]")
     assert content["/lever/truth"][-1][1]["m_p"] == pytest.approx(3.2)
@@ -188,9 +198,9 @@ def test_mcap_is_in_order_of_time_with_words_for_mode_and_faults(replayed: Repla
     with (replayed.folder / "signals.mcap").open("rb") as file:
         times = [message.log_time for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
     assert times == sorted(times)
-    health = [told for _, told in messages(replayed.folder / "signals.mcap")[0]["/lever/HEALTH"]]
-    assert {"align", "run"} <= {told["mode"] for told in health}
-    assert "settling" in {told["faults"] for told in health}
+    health = [contents for _, contents in messages(replayed.folder / "signals.mcap")[0]["/lever/HEALTH"]]
+    assert {"align", "run"} <= {contents["mode"] for contents in health}
+    assert "settling" in {contents["faults"] for contents in health}
 
 
 # --- Parquet ----------------------------------------------------------------------------------------------------------
@@ -223,10 +233,10 @@ def test_parquet_says_the_unit_of_each_column(replayed: Replayed) -> None:
 def test_every_file_says_where_it_is_from(replayed: Replayed) -> None:
     folder = replayed.folder
     summary = json.loads((folder / "summary.json").read_text())
-    told = summary["provenance"]
-    assert told["inputs"] == {str(replayed.log): digest(replayed.log)}
-    assert told["outputs"] == {name: digest(folder / name) for name in ("bus.log", "trace.csv")}
-    assert told["created"] == "2023-11-14T22:13:20Z"
+    origin = summary["provenance"]
+    assert origin["inputs"] == {str(replayed.log): digest(replayed.log)}
+    assert origin["outputs"] == {name: digest(folder / name) for name in ("bus.log", "trace.csv")}
+    assert origin["created"] == "2023-11-14T22:13:20Z"
     with MDF(folder / "signals.mf4") as file:
         mf4 = {e.attrib["name"]: e.text or "" for e in ElementTree.fromstring(file.header.comment).iter("e")}
         assert file.file_history[0].time_stamp == datetime.fromtimestamp(1_700_000_000, tz=timezone.utc)
@@ -239,9 +249,9 @@ def test_every_file_says_where_it_is_from(replayed: Replayed) -> None:
     assert record.name == "provenance"
     assert mf4 == record.metadata == columns
     assert json.loads(mf4["estimator"]) == summary["estimator"]
-    assert json.loads(mf4["inputs"]) == told["inputs"]
+    assert json.loads(mf4["inputs"]) == origin["inputs"]
     for name in ("version", "library", "created", "command"):
-        assert mf4[name] == told[name] != ""
+        assert mf4[name] == origin[name] != ""
 
 
 def digest(path: Path) -> str:

@@ -81,8 +81,8 @@ def test_every_member_is_saved_or_follows_from_the_configuration(build_dir: Path
     flags = ["-std=c99", "-g", "-O0", f"-I{FIRMWARE}", f"-I{build_dir}/firmware/build_headers"]
     sources = [tmp_path / "rows.c", FIRMWARE / "app/state.c", build_dir / "firmware/liblever_cdkf.a"]
     subprocess.run([*shlex.split(os.environ.get("CC", "cc")), *flags, *sources, "-o", program, "-lm"], check=True)
-    told = subprocess.run([program], check=True, capture_output=True, text=True).stdout
-    rows = [tuple(map(int, line.split())) for line in told.splitlines()]
+    output = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    rows = [tuple(map(int, line.split())) for line in output.splitlines()]
     saved = [byte for offset, length in rows for byte in range(offset, offset + length)]
     assert len(set(saved)) == len(saved)  # nothing twice
     with program.open("rb") as file:

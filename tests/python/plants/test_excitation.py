@@ -23,7 +23,7 @@ NORMALISED: list[dict[str, Any]] = [
 ]
 
 
-def made(table: dict[str, Any], seed: int = 0, unit: str = "m/s^2") -> FloatArray:
+def sampled(table: dict[str, Any], seed: int = 0, unit: str = "m/s^2") -> FloatArray:
     read = excitation.read_excitation(table, Place("x.toml", "base[0]", unit))
     samples: FloatArray = read.samples(TIME, np.random.default_rng(seed))
     return samples
@@ -41,7 +41,7 @@ def share_of_power(values: FloatArray, low: float, high: float) -> float:
 @pytest.mark.parametrize("table", NORMALISED, ids=lambda table: table["kind"])
 @pytest.mark.parametrize("window", [{}, {"start": "3.2105 s", "end": "20 s"}], ids=["whole", "window"])
 def test_rms_is_exact_inside_the_window_and_zero_outside(table: dict[str, Any], window: dict[str, str]) -> None:
-    values = made(table | window)
+    values = sampled(table | window)
     inside = (TIME >= 3.2105) & (TIME < 20.0) if window else np.ones(len(TIME), dtype=bool)
     assert rms(values[inside]) == pytest.approx(0.980665, rel=1e-12)
     assert not values[~inside].any()
@@ -50,11 +50,11 @@ def test_rms_is_exact_inside_the_window_and_zero_outside(table: dict[str, Any], 
 @pytest.mark.parametrize("kind", ["multisine", "chirp", "noise"])
 def test_power_lies_in_the_band(kind: str) -> None:
     table = next(table for table in NORMALISED if table["kind"] == kind)
-    assert share_of_power(made(table), 0.85, 10.2) > 0.995
+    assert share_of_power(sampled(table), 0.85, 10.2) > 0.995
 
 
 def test_noise_is_flat_in_its_band_gaussian_and_nothing_outside() -> None:
-    values = made({"kind": "noise", **BAND})
+    values = sampled({"kind": "noise", **BAND})
     frequency, power = signal.welch(values, 1 / PERIOD, nperseg=8192)
     density = 0.980665**2 / 9.0  # one-sided, over the 9 Hz of the band
     for low, high in ((1.5, 4.0), (4.0, 7.0), (7.0, 9.5)):
@@ -77,7 +77,7 @@ def test_gauss_markov_noise_has_its_variance_and_its_correlation() -> None:
 
 
 def test_chirp_sweeps_its_band_evenly_in_the_logarithm() -> None:
-    values = made({"kind": "chirp", "rms": "1 m/s^2", "low": "1 Hz", "high": "16 Hz", "sweep": "30 s"})
+    values = sampled({"kind": "chirp", "rms": "1 m/s^2", "low": "1 Hz", "high": "16 Hz", "sweep": "30 s"})
     crossings = TIME[1:][np.diff(np.signbit(values).astype(int)) == -1]  # upwards: one a cycle
     middles, frequency = 0.5 * (crossings[1:] + crossings[:-1]), 1.0 / np.diff(crossings)
     expected = 16.0 ** (1.0 - np.abs(1.0 - middles / 30.0))
@@ -85,7 +85,7 @@ def test_chirp_sweeps_its_band_evenly_in_the_logarithm() -> None:
 
 
 def test_rotor_vibration_is_lines_of_equal_strength_at_the_harmonics() -> None:
-    values = made({"kind": "rotor", "rms": "1 m/s^2", "rotor_frequency": "6.5 Hz", "harmonics": [1, 4]})
+    values = sampled({"kind": "rotor", "rms": "1 m/s^2", "rotor_frequency": "6.5 Hz", "harmonics": [1, 4]})
     amplitude = 2.0 * np.abs(np.fft.rfft(values)) / len(values)
     strongest = np.sort(np.fft.rfftfreq(len(values), PERIOD)[np.argsort(amplitude)[-2:]])
     assert strongest == pytest.approx([6.5, 26.0])
@@ -93,7 +93,7 @@ def test_rotor_vibration_is_lines_of_equal_strength_at_the_harmonics() -> None:
 
 
 def test_pulses_have_their_amplitude_width_and_period_and_alternate() -> None:
-    values = made({"kind": "pulses", "amplitude": "2 m/s^2", "width": "50 ms", "period": "1 s", "start": "10 s"})
+    values = sampled({"kind": "pulses", "amplitude": "2 m/s^2", "width": "50 ms", "period": "1 s", "start": "10 s"})
     assert set(np.unique(values)) == {-2.0, 0.0, 2.0}
     starts = TIME[1:][(values[1:] != 0.0) & (values[:-1] == 0.0)]
     assert starts == pytest.approx(np.arange(10.0, 60.0, 1.0))
@@ -127,4 +127,4 @@ def test_pulses_have_their_amplitude_width_and_period_and_alternate() -> None:
 )
 def test_nonsense_is_refused_with_place_and_remedy(table: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        made(table)
+        sampled(table)

@@ -12,25 +12,25 @@ from lever_cdkf.sil.toml_tables import Place, ScenarioError
 TIME = np.arange(40_000, dtype=np.float64) * 1e-3
 
 
-def made(value: Any, unit: str = "N/m") -> trajectories.Trajectory:
+def trajectory(value: Any, unit: str = "N/m") -> trajectories.Trajectory:
     read: trajectories.Trajectory = trajectories.read_trajectory()(value, Place("x.toml", "pilot.k_p", unit))
     return read
 
 
 def values(value: Any, seed: int = 0) -> FloatArray:
-    return made(value).values(TIME, np.random.default_rng(seed))
+    return trajectory(value).values(TIME, np.random.default_rng(seed))
 
 
 def test_a_bare_quantity_is_constant() -> None:
     assert np.all(values("2.1 N/mm") == 2100.0)
-    assert made("2.1 N/mm").changes() == ()
+    assert trajectory("2.1 N/mm").changes() == ()
 
 
 def test_steps_hold_their_values_from_their_times_on() -> None:
     steps = {"kind": "steps", "first": "1000 N/m", "at": ["10 s", "20 s"], "to": ["3000 N/m", "2000 N/m"]}
     at = values(steps)[[0, 9_999, 10_000, 19_999, 20_000, 39_999]]
     assert at.tolist() == [1000.0, 1000.0, 3000.0, 3000.0, 2000.0, 2000.0]
-    assert made(steps).changes() == (10.0, 20.0)
+    assert trajectory(steps).changes() == (10.0, 20.0)
 
 
 def test_ramp_is_straight_between_its_ends() -> None:
@@ -59,7 +59,7 @@ def test_noise_has_its_mean_and_exactly_its_rms_in_its_band_and_its_window() -> 
     frequency, power = np.fft.rfftfreq(len(moving), 1e-3), np.abs(np.fft.rfft(moving)) ** 2
     assert power[(frequency < 0.049) | (frequency > 0.501)].sum() < 1e-20 * power.sum()
     assert not np.allclose(path, values(noise, seed=1))
-    assert made(noise).changes() == ()
+    assert trajectory(noise).changes() == ()
 
 
 def test_random_walk_has_its_rate_and_stays_between_its_limits() -> None:
@@ -86,7 +86,7 @@ def test_sequence_takes_one_part_after_the_other_and_knows_its_jumps() -> None:
     sequence = {"kind": "sequence", "at": ["10 s"], "parts": [falling, stepping]}
     at = values(sequence)[[0, 5_000, 9_999, 10_000, 29_999, 30_000]]
     assert at == pytest.approx([2.0, 1.5, 1.0001, 6.0, 6.0, 7.0])
-    assert made(sequence).changes() == (10.0, 30.0)
+    assert trajectory(sequence).changes() == (10.0, 30.0)
 
 
 @pytest.mark.parametrize(
@@ -109,4 +109,4 @@ def test_sequence_takes_one_part_after_the_other_and_knows_its_jumps() -> None:
 )
 def test_nonsense_is_refused_with_place_and_remedy(value: Any, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        made(value)
+        trajectory(value)

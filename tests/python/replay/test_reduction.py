@@ -72,9 +72,9 @@ def test_groups_are_of_equal_size_wherever_the_cuts_are() -> None:
     groups = Groups(10, lambda column: (column.reshape(-1, 10).sum(axis=1),))
     for part in np.array_split(values, 7):
         groups.add(part)
-    made = groups.all()
-    assert made is not None
-    np.testing.assert_array_equal(made[0], values[:100].reshape(-1, 10).sum(axis=1))
+    gathered = groups.all()
+    assert gathered is not None
+    np.testing.assert_array_equal(gathered[0], values[:100].reshape(-1, 10).sum(axis=1))
     assert Groups(10, lambda column: (column,)).all() is None
 
 

@@ -20,6 +20,7 @@ from lever_cdkf.host_tools.formats import FORMATS
 from lever_cdkf.host_tools.replay import engine, reduction
 from lever_cdkf.host_tools.replay.outputs import FILES
 from lever_cdkf.host_tools.replay.summary import verdict
+from lever_cdkf.host_tools.results.summary import ReplaySummary, of
 from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
 
@@ -75,7 +76,7 @@ def test_the_log_of_a_simulation_is_reproduced_to_the_byte(name: str, tmp_path: 
     summary = replayed(tmp_path / "out", session.log, "--settings", settings_of(session, tmp_path))
     assert (tmp_path / "out/bus.log").read_bytes() == session.log.read_bytes()
     assert summary["comparison"]["identical"] is True
-    assert all(told["samples"] > 0 for told in summary["comparison"]["signals"].values())
+    assert all(signal["samples"] > 0 for signal in summary["comparison"]["signals"].values())
     assert "reproduced bit for bit" in summary["verdict"]
 
 
@@ -130,15 +131,18 @@ def test_other_traffic_and_doubled_frames_change_no_estimate(session: Session, t
     log = tmp_path / "messy.log"
     log.write_text("".join(f"{line}\n" for line in messy))
     summary = replayed(tmp_path / "out", log, "--channel", "lever")
-    told, count = summary["recording"], len(session.lines)
+    recording, count = summary["recording"], len(session.lines)
     left_out = {"other_buses": count, "other_identifiers": count, "extended": count, "error": -(-(count - 9) // 1000)}
-    assert told["frames_left_out"] == left_out
-    assert told["damaged_lines"] == -(-(count - 7) // 100)
-    assert told["repeated"] == len(messy) - 4 * count - told["damaged_lines"] - left_out["error"] > 50
-    assert told["other_buses_with_samples"] == ["can7"]
-    assert told["refused"] == told["repeated"]
-    assert told["refused"] == summary["late"]
-    assert f"{told['refused']} frames were refused: {summary['late']} repeated or out of sequence" in summary["verdict"]
+    assert recording["frames_left_out"] == left_out
+    assert recording["damaged_lines"] == -(-(count - 7) // 100)
+    assert recording["repeated"] == len(messy) - 4 * count - recording["damaged_lines"] - left_out["error"] > 50
+    assert recording["other_buses_with_samples"] == ["can7"]
+    assert recording["refused"] == recording["repeated"]
+    assert recording["refused"] == summary["late"]
+    assert (
+        f"{recording['refused']} frames were refused: {summary['late']} repeated or out of sequence"
+        in summary["verdict"]
+    )
     parameters = [(i, d) for i, d in estimates(tmp_path / "out/bus.log") if i in ("210", "211", "212", "213")]
     assert parameters == [(i, d) for i, d in estimates(session.log) if i in ("210", "211", "212", "213")]
 
@@ -172,8 +176,8 @@ def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
 def test_other_settings_give_other_estimates_and_are_compared(session: Session, tmp_path: Path) -> None:
     tables = tmp_path / "tables.json"
     summary = replayed(tmp_path / "out", session.log, "--set", "k_p_walk=0.2", "--json", tables)
-    told = summary["comparison"]
-    assert told["identical"] is False
+    comparison = summary["comparison"]
+    assert comparison["identical"] is False
     printed = {row["signal"]: row for row in json.loads(tables.read_text())["replayed minus recorded estimates"]}
     names = {
         "samples": "samples",
@@ -181,9 +185,9 @@ def test_other_settings_give_other_estimates_and_are_compared(session: Session, 
         "rms difference": "rms",
         "rms in sigma [1]": "rms_in_sigma",
     }
-    assert printed.keys() == told["signals"].keys()
+    assert printed.keys() == comparison["signals"].keys()
     for name, row in printed.items():
-        assert {key: row[key] for key in names} == {key: told["signals"][name][own] for key, own in names.items()}
+        assert {key: row[key] for key in names} == {key: comparison["signals"][name][own] for key, own in names.items()}
     with (tmp_path / "out/trace.csv").open() as file:
         rows = list(csv.DictReader(file))
     columns = {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
@@ -191,7 +195,7 @@ def test_other_settings_give_other_estimates_and_are_compared(session: Session, 
         difference = columns[f"{key}_estimate{unit}"] - columns[f"{key}_recorded{unit}"]
         said = ~np.isnan(difference)  # from the first message on
         difference = difference[said]
-        signal = told["signals"][key]
+        signal = comparison["signals"][key]
         assert signal["samples"] == len(difference) > len(rows) - ALIGNING - 20
         assert signal["identical_samples"] == int(np.sum(difference == 0.0)) < len(rows)
         assert signal["rms"] == pytest.approx(math.sqrt(np.mean(difference**2)), rel=1e-6)
@@ -313,24 +317,25 @@ def test_the_verdict_begins_with_what_is_wrong(
     part: str, key: str, value: object, words: str, replay: tuple[Path, Summary]
 ) -> None:
     summary = replay[1]
-    assert words not in verdict(summary)
-    assert words in verdict(summary | {part: summary[part] | {key: value}})
+    assert words not in verdict(of(ReplaySummary, summary))
+    assert words in verdict(of(ReplaySummary, summary | {part: summary[part] | {key: value}}))
     for step in (0.71e-3, 1.39e-3, 0.0):
-        assert "Samples come" not in verdict(summary | {"recording": summary["recording"] | {"typical_step_s": step}})
+        recording = summary["recording"] | {"typical_step_s": step}
+        assert "Samples come" not in verdict(of(ReplaySummary, summary | {"recording": recording}))
 
 
 # --- the files -------------------------------------------------------------------------------------------------------
 
 
 def test_the_summary_says_what_the_simulations_does(session: Session, replay: tuple[Path, Summary]) -> None:
-    told, simulation, trace = replay[1], session.result.summary, session.result.trace
-    assert told["samples"] == simulation.samples
-    assert told["modes_s"] == simulation.modes_s
-    assert told["estimator"] == asdict(simulation.estimator)
+    replayed_summary, simulation, trace = replay[1], session.result.summary, session.result.trace
+    assert replayed_summary["samples"] == simulation.samples
+    assert replayed_summary["modes_s"] == simulation.modes_s
+    assert replayed_summary["estimator"] == asdict(simulation.estimator)
     for key, column in (("k_p", "k_p_estimate_N_m"), ("damping_ratio", "damping_ratio_estimate")):
-        assert told["estimates"][key]["last"] == trace[column][-1]
-        assert told["estimates"][key]["greatest"] == np.nanmax(trace[column])
-    assert told["nis"]["mean"] is None  # shorter than what it takes to converge
+        assert replayed_summary["estimates"][key]["last"] == trace[column][-1]
+        assert replayed_summary["estimates"][key]["greatest"] == np.nanmax(trace[column])
+    assert replayed_summary["nis"]["mean"] is None  # shorter than what it takes to converge
 
 
 def test_a_long_log_is_reduced_for_the_page_and_nowhere_else(

@@ -12,12 +12,10 @@ import pytest
 from lever_cdkf.host_tools.can import codec
 from lever_cdkf.host_tools.firmware.native import Config, lib
 from lever_cdkf.host_tools.replay.engine import Options, replay
-from lever_cdkf.host_tools.replay.proof import Counts
+from lever_cdkf.host_tools.results.summary import ReplaySummary, Snapshots
 from lever_cdkf.sil.run import buslog
 from lever_cdkf.sil.run.runner import simulate
 from lever_cdkf.sil.scenarios.scenario import Scenario, load
-
-Summary = dict[str, Any]
 
 CUTS = int(os.environ.get("LEVER_CUTS", "12"))
 """Places at which the log is cut; 1,000 once: replay/README.md."""
@@ -37,11 +35,12 @@ def lines() -> list[str]:
     return flight(load("re_trim", ["duration=5.8 s", "converged_after=1 s"]))
 
 
-def counts(lines: list[str], folder: Path, **options: Any) -> tuple[Counts, Summary]:
+def counts(lines: list[str], folder: Path, **options: Any) -> tuple[Snapshots, ReplaySummary]:
     log = folder / "part.log"
     log.write_text("".join(lines))
     summary = replay([log], Options(**options))
-    return Counts(**summary["snapshots"]), summary
+    assert summary.snapshots is not None
+    return summary.snapshots, summary
 
 
 def seconds(line: str) -> float:
@@ -51,7 +50,7 @@ def seconds(line: str) -> float:
 def test_the_whole_log_is_proved_from_its_beginning(lines: list[str], tmp_path: Path) -> None:
     found, summary = counts(lines, tmp_path)
     assert (found.equal, found.different, found.broken, found.begun_at_s) == (11, 0, 0, None)
-    assert "to the bit at all of 11 snapshots" in summary["verdict"]
+    assert "to the bit at all of 11 snapshots" in summary.verdict
 
 
 @pytest.mark.requirement("R53")
@@ -67,7 +66,8 @@ def test_any_cut_replays_and_proves_itself_within_a_second(lines: list[str], tmp
         assert found.equal >= 1
         begun = found.begun_at_s or 0.0
         assert begun <= 0.501
-        assert summary["comparison"]["identical"]
+        assert summary.comparison is not None
+        assert summary.comparison.identical
         with_two = [line for line in part if seconds(line) <= first + begun + 1.0]  # its snapshot, and another's end
         assert counts(with_two, tmp_path)[0].equal >= (1 if found.begun_at_s is not None else 0)
 
@@ -94,8 +94,8 @@ def test_one_flipped_bit_is_found(lines: list[str], tmp_path: Path) -> None:
         spoilt[place] = flipped(lines[place], source)
         found, summary = counts(spoilt, tmp_path)
         was, now = (int(line.split()[2].split("#")[0], 16) for line in (lines[place], spoilt[place]))
-        left_out = summary["recording"]["frames_left_out"].get("other_identifiers", 0)
-        corrupt = summary["recording"]["corrupt_recorded_answers"]
+        left_out = summary.recording.frames_left_out.get("other_identifiers", 0)
+        corrupt = summary.recording.corrupt_recorded_answers
         if was in inputs or now in inputs:
             assert found.different or found.begun_at_s is not None, (lines[place], spoilt[place])
             assert found.different <= 1
@@ -115,7 +115,7 @@ def test_what_is_lost_of_the_snapshots_themselves(lines: list[str], tmp_path: Pa
     assert counts(without_data, tmp_path)[0].equal == 11
     found, summary = counts(without_end, tmp_path)
     assert (found.equal, found.broken) == (10, 1)
-    assert "1 snapshots are not whole" in summary["verdict"]
+    assert "1 snapshots are not whole" in summary.verdict
     doubled = [each for line in lines for each in ([line, line] if " 21D#" in line else [line])]
     assert counts(doubled, tmp_path)[0].equal == 11
 
@@ -127,18 +127,19 @@ def test_snapshots_that_come_late(lines: list[str], tmp_path: Path) -> None:
     found, summary = counts(moved, tmp_path)
     assert found.begun_at_s is not None
     assert (found.different, found.broken) == (0, 0)
-    assert summary["comparison"]["identical"]
+    assert summary.comparison is not None
+    assert summary.comparison.identical
 
 
 def test_other_settings_and_choices_are_not_compared(lines: list[str], tmp_path: Path) -> None:
     found, summary = counts(lines[4000:], tmp_path, config=Config(settings={"theta_noise": 0.01}))
     assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
-    assert "of other settings" in summary["verdict"]
+    assert "of other settings" in summary.verdict
     for part in (lines, lines[4000:]):
         other = {"config": Config(estimator="joint"), "chosen": {"estimator": "joint"}}
         found, summary = counts(part, tmp_path, **other)
         assert (found.equal, found.different, found.begun_at_s) == (0, 0, None)
-        assert "other choices were made for the replay" in summary["verdict"]
+        assert "other choices were made for the replay" in summary.verdict
     assert counts(lines[4000:], tmp_path, chosen={"estimator": "dual"})[0].equal > 0
 
 
@@ -148,13 +149,13 @@ def test_choices_before_the_log_are_told(tmp_path: Path) -> None:
     found, summary = counts(flight(scenario)[5000:], tmp_path, config=Config(settings=scenario.config.settings))
     assert found.begun_at_s is not None
     assert found.different == 0
-    assert summary["estimator"]["model"] == "linear_physical"
+    assert summary.estimator.model == "linear_physical"
 
 
 def test_a_part_by_its_time(lines: list[str], tmp_path: Path) -> None:
     """COMMANDs before it come first; they are in the state of the snapshot."""
     found, summary = counts(lines, tmp_path, start=3.3)
-    assert summary["recording"]["commands"] > 0
+    assert summary.recording.commands > 0
     assert found.begun_at_s == pytest.approx(0.2, abs=0.002)
     assert (found.equal, found.different) == (3, 0)
 
@@ -162,4 +163,4 @@ def test_a_part_by_its_time(lines: list[str], tmp_path: Path) -> None:
 def test_a_log_without_any_is_as_before(lines: list[str], tmp_path: Path) -> None:
     log = tmp_path / "without.log"
     log.write_text("".join(line for line in lines if " 21D#" not in line))
-    assert replay([log], Options())["snapshots"] is None
+    assert replay([log], Options()).snapshots is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from lever_cdkf.host_tools.report import screenshot
 from lever_cdkf.host_tools.report.figure import Figure, axis, line
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.summary_html import table
+from python.report.test_report import FIGURES
 from python.watch.browser import Browser
 
 pytestmark = pytest.mark.requires("|".join(screenshot.BROWSERS))
@@ -21,27 +21,16 @@ A4 = (210 - 2 * 12) * 96 / 25.4
 
 
 @pytest.fixture(scope="module")
-def desk(report: Path) -> Iterator[Browser]:
-    with Browser(1400, 900) as browser:
-        browser.open(report.as_uri())
-        yield browser
+def desk(browser: Browser, report: Path) -> Browser:
+    """For the tests that come before those that open other pages."""
+    browser.begin(1400, 900)
+    browser.open(report.as_uri())
+    return browser
 
 
 def test_answer_and_first_chart_are_on_the_first_screen(desk: Browser) -> None:
     for selector in (".verdict", ".answer table", "#figure-parameters .main-svg"):
         assert desk.run(BOXES % selector)[0]["bottom"] <= 900, selector
-
-
-def test_charts_are_drawn_before_the_page_counts_as_loaded(report: Path) -> None:
-    """Or who prints it by a program prints nothing."""
-    with Browser(1400, 900) as browser:
-        browser.ask("Page.enable")
-        script = (
-            "addEventListener('load', () => { window.drawn = document.querySelectorAll('.js-plotly-plot').length })"
-        )
-        browser.ask("Page.addScriptToEvaluateOnNewDocument", source=script)
-        browser.open(report.as_uri())
-        assert browser.run("drawn == document.querySelectorAll('.chart').length && drawn > 0")
 
 
 def test_the_last_column_of_every_table_is_seen(desk: Browser) -> None:
@@ -80,28 +69,47 @@ def test_the_slider_moves_through_the_run(desk: Browser) -> None:
     assert desk.run("document.querySelector('.slider output').value") != place
 
 
-def test_nothing_is_scrolled_sideways_on_a_phone(report: Path) -> None:
-    with Browser(390, 844, phone=True) as phone:
-        phone.open(report.as_uri())
-        assert phone.run("document.documentElement.scrollWidth") == 390
-        assert phone.run(BOXES % ".verdict")[0]["bottom"] <= 844
-        assert max(box["right"] for box in phone.run(BOXES % ".answer td")) <= 390
-        assert phone.complaints == []
+def test_charts_are_drawn_before_the_page_counts_as_loaded(browser: Browser, report: Path) -> None:
+    """Or who prints it by a program prints nothing."""
+    browser.begin(1400, 900)
+    browser.prepare(
+        "addEventListener('load', () => { window.drawn = document.querySelectorAll('.js-plotly-plot').length })"
+    )
+    browser.open(report.as_uri())
+    assert browser.run("drawn == document.querySelectorAll('.chart').length && drawn > 0")
 
 
-def test_on_paper_charts_are_whole_and_light(report: Path) -> None:
-    with Browser(1400, 900) as browser:
-        browser.darken()
-        browser.open(report.as_uri())
-        dark = browser.run("getComputedStyle(document.body).backgroundColor")
-        browser.run("dispatchEvent(new Event('beforeprint'))")
-        charts = browser.run(BOXES % ".chart .main-svg")
-        assert max(box["right"] - box["left"] for box in charts) <= A4
-        assert browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)" != dark
-        assert browser.run("document.querySelectorAll('details:not([open])').length") == 0
-        browser.run("dispatchEvent(new Event('afterprint'))")
-        assert browser.run("getComputedStyle(document.body).backgroundColor") == dark
-        assert max(box["right"] - box["left"] for box in browser.run(BOXES % ".chart .main-svg")) > A4
+@pytest.mark.parametrize("width", [1280, 500])
+def test_renders_without_complaint_and_without_sideways_scrolling(browser: Browser, report: Path, width: int) -> None:
+    browser.begin(width, 900)
+    browser.open(report.as_uri())
+    assert browser.run("document.querySelectorAll('.chart.js-plotly-plot').length") == len(FIGURES)
+    assert browser.run("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    assert browser.complaints == []
+
+
+def test_nothing_is_scrolled_sideways_on_a_phone(browser: Browser, report: Path) -> None:
+    browser.begin(390, 844, phone=True)
+    browser.open(report.as_uri())
+    assert browser.run("document.documentElement.scrollWidth") == 390
+    assert browser.run(BOXES % ".verdict")[0]["bottom"] <= 844
+    assert max(box["right"] for box in browser.run(BOXES % ".answer td")) <= 390
+    assert browser.complaints == []
+
+
+def test_on_paper_charts_are_whole_and_light(browser: Browser, report: Path) -> None:
+    browser.begin(1400, 900)
+    browser.darken()
+    browser.open(report.as_uri())
+    dark = browser.run("getComputedStyle(document.body).backgroundColor")
+    browser.run("dispatchEvent(new Event('beforeprint'))")
+    charts = browser.run(BOXES % ".chart .main-svg")
+    assert max(box["right"] - box["left"] for box in charts) <= A4
+    assert browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)" != dark
+    assert browser.run("document.querySelectorAll('details:not([open])').length") == 0
+    browser.run("dispatchEvent(new Event('afterprint'))")
+    assert browser.run("getComputedStyle(document.body).backgroundColor") == dark
+    assert max(box["right"] - box["left"] for box in browser.run(BOXES % ".chart .main-svg")) > A4
 
 
 @pytest.fixture
@@ -117,23 +125,23 @@ def wide(tmp_path: Path) -> Path:
     return tmp_path / "wide.html"
 
 
-def test_the_last_column_of_a_wide_table_is_on_the_paper(wide: Path) -> None:
-    with Browser(1400, 900) as browser:
-        browser.open(wide.as_uri())
-        width = browser.run(BOXES % "table")[0]["width"]
-        browser.run("dispatchEvent(new Event('beforeprint'))")
-        body = browser.run(BOXES % "body")[0]
-        assert browser.run(BOXES % "th:last-child")[0]["right"] <= body["right"] + 0.5
-        assert body["width"] <= A4 + 0.5
-        browser.run("dispatchEvent(new Event('afterprint'))")
-        assert browser.run(BOXES % "table")[0]["width"] == width
+def test_the_last_column_of_a_wide_table_is_on_the_paper(browser: Browser, wide: Path) -> None:
+    browser.begin(1400, 900)
+    browser.open(wide.as_uri())
+    width = browser.run(BOXES % "table")[0]["width"]
+    browser.run("dispatchEvent(new Event('beforeprint'))")
+    body = browser.run(BOXES % "body")[0]
+    assert browser.run(BOXES % "th:last-child")[0]["right"] <= body["right"] + 0.5
+    assert body["width"] <= A4 + 0.5
+    browser.run("dispatchEvent(new Event('afterprint'))")
+    assert browser.run(BOXES % "table")[0]["width"] == width
 
 
-def test_a_long_title_of_an_axis_is_whole_on_a_phone(wide: Path) -> None:
-    with Browser(390, 844, phone=True) as phone:
-        phone.open(wide.as_uri())
-        title = phone.run(BOXES % ".xtitle")[0]
-        chart = phone.run(BOXES % ".chart")[0]
-        assert title["left"] >= chart["left"]
-        assert title["right"] <= chart["right"]
-        assert title["bottom"] <= chart["bottom"]
+def test_a_long_title_of_an_axis_is_whole_on_a_phone(browser: Browser, wide: Path) -> None:
+    browser.begin(390, 844, phone=True)
+    browser.open(wide.as_uri())
+    title = browser.run(BOXES % ".xtitle")[0]
+    chart = browser.run(BOXES % ".chart")[0]
+    assert title["left"] >= chart["left"]
+    assert title["right"] <= chart["right"]
+    assert title["bottom"] <= chart["bottom"]

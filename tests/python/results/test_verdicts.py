@@ -25,13 +25,13 @@ def test_figures_of_innovations_are_those_of_chi_square() -> None:
     for piece in np.array_split(np.arange(4000), 3):
         innovations.add(values[piece], outputs[piece])
     used = (outputs > 0) & np.isfinite(values)
-    told, expected = innovations.figures(), outputs[used].mean()
-    assert told.mean == pytest.approx(values[used].mean())
-    assert told.expected == pytest.approx(expected)
+    nis_figures, expected = innovations.figures(), outputs[used].mean()
+    assert nis_figures.mean == pytest.approx(values[used].mean())
+    assert nis_figures.expected == pytest.approx(expected)
     half = stats.norm.ppf(0.975) * math.sqrt(2.0 * expected / used.sum())  # the variance of chi-square is 2 n
-    assert told.mean_band_95 == pytest.approx([expected - half, expected + half])
+    assert nis_figures.mean_band_95 == pytest.approx([expected - half, expected + half])
     inside = values[used] <= stats.chi2.ppf(0.95, outputs[used])
-    assert told.inside_95_percent == pytest.approx(inside.mean())
+    assert nis_figures.inside_95_percent == pytest.approx(inside.mean())
 
 
 @pytest.mark.parametrize(
@@ -47,12 +47,12 @@ def test_a_fifth_of_correlation_makes_a_long_residual_coloured(correlation: floa
     """Moving averages of first order, e_k + b e_{k-1}, have the correlation b / (1 + b²)."""
     b = (1.0 - math.sqrt(1.0 - 4.0 * correlation**2)) / (2.0 * correlation)
     noise = np.random.default_rng(2).standard_normal(400_000)
-    told = whiteness.of_averages(noise[1:] + b * noise[:-1], 0.02)
-    assert told is not None
-    assert told.autocorrelation[0] == pytest.approx(correlation, abs=0.005)
-    assert told.white is white
-    text = whiteness.verdict(told)
-    assert f"{told.largest:.2f} after 20 ms" in text
+    measured = whiteness.of_averages(noise[1:] + b * noise[:-1], 0.02)
+    assert measured is not None
+    assert measured.autocorrelation[0] == pytest.approx(correlation, abs=0.005)
+    assert measured.white is white
+    text = whiteness.verdict(measured)
+    assert f"{measured.largest:.2f} after 20 ms" in text
     assert ("slightly correlated" in text) is white
     assert "white" not in text
     assert ("are coloured" in text) is not white

@@ -18,27 +18,27 @@ def coloured(seed: int, count: int, per_sample: float) -> np.ndarray:
 
 
 def test_white_noise_is_white() -> None:
-    told = whiteness.measure(np.random.default_rng(1).standard_normal(60_000), PERIOD)
-    assert told is not None
-    assert told.white
-    assert told.average_s == pytest.approx(AVERAGE)
-    assert told.band_95 == pytest.approx(stats.norm.ppf(0.975) / np.sqrt(3000), rel=1e-3)
+    measured = whiteness.measure(np.random.default_rng(1).standard_normal(60_000), PERIOD)
+    assert measured is not None
+    assert measured.white
+    assert measured.average_s == pytest.approx(AVERAGE)
+    assert measured.band_95 == pytest.approx(stats.norm.ppf(0.975) / np.sqrt(3000), rel=1e-3)
     all_lags = stats.norm.ppf(0.5 + 0.5 * 0.95 ** (1.0 / whiteness.LAGS))
-    assert told.band_of_all == pytest.approx(all_lags / np.sqrt(3000), rel=1e-3)
-    assert np.mean(np.abs(told.autocorrelation) <= told.band_95) >= 0.8
+    assert measured.band_of_all == pytest.approx(all_lags / np.sqrt(3000), rel=1e-3)
+    assert np.mean(np.abs(measured.autocorrelation) <= measured.band_95) >= 0.8
 
 
 def test_first_order_noise_has_the_correlation_of_its_averages() -> None:
     """Cov of averages over n samples, k averages apart: sum over i, j of a^|n k + i - j| (n² times the variance)."""
     a = 0.98
-    told = whiteness.measure(coloured(2, 400_000, a), PERIOD)
-    assert told is not None
+    measured = whiteness.measure(coloured(2, 400_000, a), PERIOD)
+    assert measured is not None
     index = np.arange(SIZE)
     expected = [np.sum(a ** np.abs(SIZE * k + index[:, None] - index)) for k in range(LAGS + 1)]
-    assert told.autocorrelation == pytest.approx(np.array(expected[1:]) / expected[0], abs=0.03)
-    assert not told.white
-    assert told.largest == max(told.autocorrelation)
-    assert told.largest_after_s == pytest.approx(AVERAGE)
+    assert measured.autocorrelation == pytest.approx(np.array(expected[1:]) / expected[0], abs=0.03)
+    assert not measured.white
+    assert measured.largest == max(measured.autocorrelation)
+    assert measured.largest_after_s == pytest.approx(AVERAGE)
 
 
 def test_a_little_colour_under_much_noise_is_found_by_averaging() -> None:
@@ -46,9 +46,9 @@ def test_a_little_colour_under_much_noise_is_found_by_averaging() -> None:
     rng = np.random.default_rng(3)
     motion = coloured(4, 60_000, np.exp(-PERIOD / 0.1))
     values = rng.standard_normal(60_000) + 0.25 * motion / np.std(motion)
-    told = whiteness.measure(values, PERIOD)
-    assert told is not None
-    assert not told.white
+    measured = whiteness.measure(values, PERIOD)
+    assert measured is not None
+    assert not measured.white
     assert np.corrcoef(values[1:], values[:-1])[0, 1] < 0.1  # where a look at single samples sees next to nothing
 
 

@@ -253,10 +253,10 @@ def test_real_time_is_real_and_changes_nothing(lever_bus: MakeBus) -> None:
 
 
 def test_progress_is_told_from_start_to_end_each_half_second() -> None:
-    told: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     wanted = scenario.load("steady", ["duration=1.2 s"])
-    loop.run(wanted, PuppetBus(always), progress=lambda done, total: told.append((done, total)))
-    assert told == [(done, 1200) for done in (0, 500, 1000, 1200)]
+    loop.run(wanted, PuppetBus(always), progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(done, 1200) for done in (0, 500, 1000, 1200)]
 
 
 def test_files_are_complete_or_not_there(short: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

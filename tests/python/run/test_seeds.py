@@ -89,12 +89,15 @@ def test_troubles_name_their_seeds() -> None:
     assert seeds.troubles(runs) == ["samples without an answer with seed 4", "the estimator in fault with seed 4"]
 
 
-def test_a_run_in_a_process_is_the_single_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_in_a_process_is_the_single_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(interrupts, "START", 0.0)
     tasks = [seeds.Task("steady", seed, SHORT) for seed in (5, 6)]
-    told: list[tuple[int, int, str]] = []
-    apart = seeds.run(tasks, jobs=2, progress=lambda *progress: told.append(progress))
+    calls: list[tuple[int, int, str]] = []
+    apart = seeds.run(tasks, jobs=2, progress=lambda *progress: calls.append(progress))
     assert [each.scenario.seed for each in apart] == [5, 6]
-    assert told == [(1, 2, "steady, seed 5"), (2, 2, "steady, seed 6")]
+    assert calls == [(1, 2, "steady, seed 5"), (2, 2, "steady, seed 6")]
     assert apart[0].parameters != apart[1].parameters
     sets = (f"--set={override}" for override in (*SHORT, "limits={}"))
     assert cli.main(["sim", "steady", "--seed", "5", *sets, "--json", str(tmp_path / "single.json")]) == 0

@@ -64,30 +64,30 @@ def perfect(recording: loop.Recording) -> Trace:
 
 
 def test_a_perfect_estimate_is_perfect(recording: loop.Recording) -> None:
-    made = summary.build(recording, perfect(recording))
-    for entry in made.parameters.values():
+    summarised = summary.build(recording, perfect(recording))
+    for entry in summarised.parameters.values():
         assert (entry.rms_percent, entry.bias_percent, entry.coverage_2sigma) == (0.0, 0.0, 1.0)
         assert entry.time_to_10_percent_s == entry.time_to_5_percent_s == [0.0, 0.0]
-    assert made.passed
-    assert made.verdict.startswith("All limits kept. Rms errors after convergence: m_p 0.0 %")
-    assert "In this run ±2σ covers every truth for at least 100 % of the time." in made.verdict
-    assert made.modes_s == {"align": 0.1, "run": 9.9}
-    assert made.scenario.changes_s == [0.0, 4.0]
+    assert summarised.passed
+    assert summarised.verdict.startswith("All limits kept. Rms errors after convergence: m_p 0.0 %")
+    assert "In this run ±2σ covers every truth for at least 100 % of the time." in summarised.verdict
+    assert summarised.modes_s == {"align": 0.1, "run": 9.9}
+    assert summarised.scenario.changes_s == [0.0, 4.0]
 
 
 def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.Recording) -> None:
     trace = perfect(recording)
     judged = ((TIME >= 2) & (TIME < 4)) | (TIME >= 6)
     trace["m_p_estimate_kg"] = np.where(judged, np.where(np.arange(COUNT) % 2, 2.0 * 1.07, 2.0 * 0.97), 7.0)
-    made = summary.build(recording, trace)
-    entry = made.parameters["m_p"]
+    summarised = summary.build(recording, trace)
+    entry = summarised.parameters["m_p"]
     assert entry.rms_percent == pytest.approx(math.sqrt((49 + 9) / 2))
     assert entry.bias_percent == pytest.approx(2.0)
     assert entry.coverage_2sigma == 0.0
-    assert not made.passed
-    assert made.missed == ["rms error of m_p 5.4 % (limit 5 %)", "coverage of m_p 0 % (limit 90 %)"]
-    assert "Limits missed: rms error of m_p 5.4 % (limit 5 %)" in made.verdict
-    assert "In this run the stated σ of m_p is too small" in made.verdict
+    assert not summarised.passed
+    assert summarised.missed == ["rms error of m_p 5.4 % (limit 5 %)", "coverage of m_p 0 % (limit 90 %)"]
+    assert "Limits missed: rms error of m_p 5.4 % (limit 5 %)" in summarised.verdict
+    assert "In this run the stated σ of m_p is too small" in summarised.verdict
 
 
 @pytest.mark.parametrize(
@@ -160,18 +160,18 @@ def test_nis_expects_as_many_degrees_of_freedom_as_outputs(recording: loop.Recor
 def test_faults_and_missing_answers_fail_a_run(recording: loop.Recording) -> None:
     trace = perfect(recording)
     recording.unanswered = 3
-    made = summary.build(recording, trace)
-    assert not made.passed
-    assert made.verdict.startswith("Trouble: 3 samples got no answer.")
+    summarised = summary.build(recording, trace)
+    assert not summarised.passed
+    assert summarised.verdict.startswith("Trouble: 3 samples got no answer.")
     recording.unanswered, recording.misplaced = 0, 2
-    made = summary.build(recording, trace)
-    assert not made.passed
-    assert made.verdict.startswith("Trouble: 2 estimates belong to other samples.")
+    summarised = summary.build(recording, trace)
+    assert not summarised.passed
+    assert summarised.verdict.startswith("Trouble: 2 estimates belong to other samples.")
     recording.misplaced = 0
     trace["mode"][5000:5100] = 5.0
-    made = summary.build(recording, trace)
-    assert not made.passed
-    assert "the estimator was in fault for 0.1 s" in made.verdict
+    summarised = summary.build(recording, trace)
+    assert not summarised.passed
+    assert "the estimator was in fault for 0.1 s" in summarised.verdict
 
 
 def test_faults_are_shares_of_the_judged_time(recording: loop.Recording) -> None:
@@ -182,25 +182,25 @@ def test_faults_are_shares_of_the_judged_time(recording: loop.Recording) -> None
     trace["faults"][7000:8000] = bits["bound"]
     trace["faults"][8000:8500] = bits["excitation"]
     trace["faults"][9400:] = np.nan  # HEALTH has not told
-    made = summary.build(recording, trace)
+    summarised = summary.build(recording, trace)
     expected = {"bound": 1.0, "change": 0.5, "mismatch": 0.5, "excitation": 0.5}
-    assert made.fault_shares == pytest.approx({name: seconds / 5.4 for name, seconds in expected.items()})
-    assert made.flagged_share == pytest.approx(1.5 / 5.4)
+    assert summarised.fault_shares == pytest.approx({name: seconds / 5.4 for name, seconds in expected.items()})
+    assert summarised.flagged_share == pytest.approx(1.5 / 5.4)
     trace["faults"][:] = np.nan
-    made = summary.build(recording, trace)
-    assert (made.fault_shares, made.flagged_share) == ({}, None)
+    summarised = summary.build(recording, trace)
+    assert (summarised.fault_shares, summarised.flagged_share) == ({}, None)
 
 
 def test_whether_the_estimator_has_the_settings_of_the_scenario_is_told(recording: loop.Recording) -> None:
     unknown = "The estimator has not sent its settings (IDENTITY): those of the scenario are assumed."
-    made = summary.build(recording, perfect(recording))
-    assert made.firmware == Firmware(None, None, None)
-    assert made.verdict.endswith(unknown)
+    summarised = summary.build(recording, perfect(recording))
+    assert summarised.firmware == Firmware(None, None, None)
+    assert summarised.verdict.endswith(unknown)
     pages = {"firmware_major": 0.0, "firmware_minor": 2.0, "firmware_patch": 0.0, "contract": 2.0}
     recording.identity.take(pages | {"settings_crc": float(recording.scenario.config.settings_crc)})
-    made = summary.build(recording, perfect(recording))
-    assert made.firmware == Firmware("0.2.0", 2, True)
-    assert unknown not in made.verdict
+    summarised = summary.build(recording, perfect(recording))
+    assert summarised.firmware == Firmware("0.2.0", 2, True)
+    assert unknown not in summarised.verdict
 
 
 def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., Scenario]) -> None:
@@ -208,10 +208,10 @@ def test_a_run_too_short_to_judge_says_so_and_is_valid_json(load: Callable[..., 
     recording = loop.Recording(scenario, inputs.prepare(scenario))
     trace = perfect(recording)
     trace["m_p_estimate_kg"][:] = math.nan
-    made = summary.build(recording, trace)
-    assert made.passed
-    assert made.verdict.startswith("Too short to judge")
-    content = json.loads(text(made.timed(0.5)))
+    summarised = summary.build(recording, trace)
+    assert summarised.passed
+    assert summarised.verdict.startswith("Too short to judge")
+    content = json.loads(text(summarised.timed(0.5)))
     assert content["parameters"]["m_p"]["rms_percent"] is None
     assert content["parameters"]["m_p"]["time_to_10_percent_s"] == [None, None]
     assert content["wall_time_per_simulated_time"] == pytest.approx(0.05)
@@ -223,23 +223,23 @@ def test_of_a_pilot_of_another_model_only_the_dynamics_are_judged(load: Callable
     trace = perfect(recording)
     trace["damping_ratio_sigma"][:] = 0.0
     trace["damping_ratio_estimate"] *= 1.01
-    made = summary.build(recording, trace)
-    assert list(made.parameters) == ["natural_frequency", "damping_ratio"]
-    assert made.missed == ["coverage of damping_ratio 0 % (limit 90 %)"]
-    assert "m_p" not in made.verdict
+    summarised = summary.build(recording, trace)
+    assert list(summarised.parameters) == ["natural_frequency", "damping_ratio"]
+    assert summarised.missed == ["coverage of damping_ratio 0 % (limit 90 %)"]
+    assert "m_p" not in summarised.verdict
 
 
 def test_the_transfer_function_of_another_models_truth_is_told_where_it_changes(load: Callable[..., Scenario]) -> None:
     """The pilot tightens his c_p at 4 s; against M, D, K and the forcing of firmware/THEORY.md worked out here."""
     scenario = load(TEXT, "estimator.model=linear_physical", "limits={}")
     recording = loop.Recording(scenario, inputs.prepare(scenario))
-    told = summary.build(recording, perfect(recording)).truth
-    assert told.model == "lever"
-    assert told.transfer is not None
-    assert told.transfer.time_s == [0.0, pytest.approx(4.0, abs=10.0 / summary.MOST_TRANSFERS)]
+    transfers = summary.build(recording, perfect(recording)).truth
+    assert transfers.model == "lever"
+    assert transfers.transfer is not None
+    assert transfers.transfer.time_s == [0.0, pytest.approx(4.0, abs=10.0 / summary.MOST_TRANSFERS)]
     cosine, arm = math.cos(math.radians(20.0)), 0.45**2
     for c_p, numerator, denominator in zip(
-        (50.0, 40.0), told.transfer.numerator, told.transfer.denominator, strict=True
+        (50.0, 40.0), transfers.transfer.numerator, transfers.transfer.denominator, strict=True
     ):
         assert numerator == pytest.approx([-0.45 * (0.6 + 2.0) * cosine])
         expected = [arm * (0.3 + 2.0) + 0.02, arm * c_p * cosine**2 + 0.5, arm * 2000.0 * cosine**2 + 5.0]
@@ -270,9 +270,9 @@ def test_what_is_no_summary_is_refused_in_a_line(wrong: str, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("name", ["two_dof", "steady"])
 def test_that_of_any_run_is_read_back(name: str) -> None:
-    made = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
-    content = json.loads(text(made))
-    assert of(SimulationSummary, content) == made
+    built = simulate(load_scenario(name, ["duration=3 s", "converged_after=1 s", "limits={}"])).summary
+    content = json.loads(text(built))
+    assert of(SimulationSummary, content) == built
     wrongs: tuple[dict[str, Any], ...] = (
         {"samples": "x"},
         {"passed": 1},

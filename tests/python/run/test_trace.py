@@ -48,7 +48,7 @@ def answers(sample: int) -> list[tuple[str, dict[str, Any]]]:
     return [*frames, estimate(theta=sample * 1e-3, innovation=1.5 if sample != 111 else None, valid=valid)]
 
 
-def made(*overrides: str) -> tuple[loop.Recording, trace.Trace]:
+def traced(*overrides: str) -> tuple[loop.Recording, trace.Trace]:
     wanted = scenario.load("sensor_dropout", ["duration=0.5 s", *overrides])
     recording = loop.run(wanted, PuppetBus(answers))
     return recording, columns_of(recording, recording.frames())
@@ -79,7 +79,7 @@ def test_parameters_are_those_of_the_estimators_model(
 
 
 def test_measured_is_what_was_on_the_bus_and_nan_where_it_was_not() -> None:
-    recording, columns = made("sensors.dropout.2.start=0.1 s", "sensors.dropout.2.end=0.2 s")
+    recording, columns = traced("sensors.dropout.2.start=0.1 s", "sensors.dropout.2.end=0.2 s")
     missing = recording.inputs.missing
     no_theta = missing["theta"] | missing["lever_frame"]
     assert np.array_equal(np.isnan(columns["theta_measured_rad"]), no_theta)
@@ -106,7 +106,7 @@ def test_estimates_stand_at_their_sample_and_slower_frames_are_held() -> None:
 
 
 def test_counts_start_at_zero_and_go_on_beyond_their_bits() -> None:
-    _, columns = made("sensors.dropout=[{what='theta', share='1 %'}]")
+    _, columns = traced("sensors.dropout=[{what='theta', share='1 %'}]")
     for name in ("lost", "restarts"):
         assert columns[name][[0, 150, 250, 350, 499]].tolist() == [0, 70, 140, 210, 280]
     assert columns["late"].max() == 0
@@ -149,7 +149,7 @@ def test_whole_numbers_have_no_decimals() -> None:
 
 
 def test_csv_holds_the_trace(tmp_path: Path) -> None:
-    _, columns = made()
+    _, columns = traced()
     with (tmp_path / "trace.csv").open("wb") as file:
         trace.write_csv_header(columns, file)
         trace.write_csv_rows(columns, file)

@@ -89,13 +89,13 @@ NOT_WHITE = {"sensor_dropout", "grip_force", "bounce"}
 
 @pytest.mark.parametrize("name", sorted(set(scenario.names()) - BROKEN.keys() - NOT_WHITE))
 def test_innovations_are_white_unless_the_pilot_is_of_another_kind(name: str) -> None:
-    told = result(name).summary
-    same = told.truth.model == told.estimator.model
-    assert told.whiteness is not None
-    assert told.whiteness.white is same
-    assert (abs(told.whiteness.largest) < 0.15) is same
-    assert ("coloured" in told.verdict) is not same
-    assert ("is not of the estimator's model" not in told.verdict) is same
+    reported = result(name).summary
+    same = reported.truth.model == reported.estimator.model
+    assert reported.whiteness is not None
+    assert reported.whiteness.white is same
+    assert (abs(reported.whiteness.largest) < 0.15) is same
+    assert ("coloured" in reported.verdict) is not same
+    assert ("is not of the estimator's model" not in reported.verdict) is same
 
 
 @pytest.mark.parametrize("name", ["two_dof", "mayo_ectomorphic", "mayo_mesomorphic"])

@@ -60,7 +60,7 @@ class Flight:
         return Flight(*(values[::step] for values in (self.time, self.theta, self.theta_dot, self.z_ddot)))
 
 
-def fly(duration: float = 30.0, rate: float = 500.0, seed: int = 1) -> Flight:
+def fly(duration: float = 20.0, rate: float = 500.0, seed: int = 1) -> Flight:
     """Base noise of 1 to 10 Hz and 0.15 g, no motor torque, white sensor noise."""
     random = np.random.default_rng(seed)
     substeps = max(1, round(2000.0 / rate))

@@ -44,9 +44,9 @@ class Line(can.BusABC):
 
 
 def shown_frequency(text: str) -> float:
-    found = re.search(r"natural frequency\s+([\d.]+)", text.replace("_", " "))
-    assert found is not None, text
-    return float(found[1])
+    match = re.search(r"natural frequency\s+([\d.]+)", text.replace("_", " "))
+    assert match is not None, text
+    return float(match[1])
 
 
 def test_a_log_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -67,9 +67,9 @@ def test_a_bus_gives_what_a_replay_of_its_log_gives(folder: Path, frames: list[c
     database = str(folder / "foreign.dbc")
     online = Online(read_mapping(MAPPED), database)
     sent = [
-        (frame.timestamp, made)
+        (frame.timestamp, estimate)
         for frame in frames
-        for made in online.take(frame.arbitration_id, frame.is_extended_id, bytes(frame.data), frame.timestamp)
+        for estimate in online.take(frame.arbitration_id, frame.is_extended_id, bytes(frame.data), frame.timestamp)
     ]
     assert online.period == 2e-3
     assert any("gravity" in note for note in online.notes)

@@ -39,9 +39,9 @@ def recorded(aircraft: Aircraft, seed: int, flight: Flight, folder: Path) -> tup
 
 @pytest.fixture(scope="module")
 def short(flight: Flight) -> Flight:
-    """Twelve seconds at 100 Hz."""
+    """Seven seconds at 100 Hz."""
     slow = flight.every(5)
-    return Flight(*(values[:1200] for values in (slow.time, slow.theta, slow.theta_dot, slow.z_ddot)))
+    return Flight(*(values[:700] for values in (slow.time, slow.theta, slow.theta_dot, slow.z_ddot)))
 
 
 @pytest.mark.parametrize("fleet", [AIRCRAFT, WITH_TORQUE, WITHHELD], ids=["no torque", "torque", "withheld"])

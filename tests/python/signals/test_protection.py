@@ -23,7 +23,7 @@ BO_ 291 Protected: 8 A
 """
 
 
-def made(folder: Path, profile: int, wrong: tuple[int, ...] = (), lost: tuple[int, ...] = ()) -> Loaded:
+def protected_frames(folder: Path, profile: int, wrong: tuple[int, ...] = (), lost: tuple[int, ...] = ()) -> Loaded:
     """200 protected frames, of which some have a flipped bit and some never came."""
     lines = []
     for k in range(200):
@@ -51,9 +51,9 @@ def made(folder: Path, profile: int, wrong: tuple[int, ...] = (), lost: tuple[in
 
 @pytest.mark.parametrize("profile", [1, 5])
 def test_profiles_of_foreign_messages(profile: int, tmp_path: Path) -> None:
-    right = made(tmp_path, profile)
+    right = protected_frames(tmp_path, profile)
     assert (right.counts["Protected"].corrupt, right.counts["Protected"].lost, right.unprotected) == (0, 0, 0)
-    wrong = made(tmp_path, profile, wrong=(17, 100, 101), lost=(60, 61))
+    wrong = protected_frames(tmp_path, profile, wrong=(17, 100, 101), lost=(60, 61))
     counts = wrong.counts["Protected"]
     assert (counts.frames, counts.corrupt, counts.repeated) == (198, 3, 0)
     assert counts.lost == 5  # a corrupt frame leaves a gap in the counter, too

@@ -26,11 +26,11 @@ def clock(rate: float, offset: float = 0.0, seconds: float = 4.0) -> FloatArray:
 
 
 def test_a_slow_one_is_missing_in_between_and_nowhere_else() -> None:
-    made = sample({"theta": signal(clock(100.0)), "z_ddot": signal(clock(500.0))})
-    assert (made.clock, made.how["theta"], made.period) == ("z_ddot", "slower", 2e-3)
-    there = np.isfinite(made.columns["theta"])
+    sampled = sample({"theta": signal(clock(100.0)), "z_ddot": signal(clock(500.0))})
+    assert (sampled.clock, sampled.how["theta"], sampled.period) == ("z_ddot", "slower", 2e-3)
+    there = np.isfinite(sampled.columns["theta"])
     np.testing.assert_array_equal(np.flatnonzero(there), np.arange(0, 2000, 5))
-    np.testing.assert_array_equal(made.columns["theta"][there], wave(clock(100.0)))
+    np.testing.assert_array_equal(sampled.columns["theta"][there], wave(clock(100.0)))
 
 
 def test_what_the_model_is_driven_by_makes_the_samples() -> None:
@@ -47,26 +47,26 @@ def test_one_burst_is_one_sample() -> None:
     """Frames that follow each other at once hold values of one moment, whatever their stamps."""
     time = clock(500.0)
     jitter = np.random.default_rng(1).normal(0.0, 2e-5, len(time))
-    made = sample({"theta": signal(time), "z_ddot": Signal("z", time + 3e-4 + jitter, wave(time))})
-    assert made.how["z_ddot"] == "paired"
-    np.testing.assert_array_equal(made.columns["z_ddot"], wave(time))
+    sampled = sample({"theta": signal(time), "z_ddot": Signal("z", time + 3e-4 + jitter, wave(time))})
+    assert sampled.how["z_ddot"] == "paired"
+    np.testing.assert_array_equal(sampled.columns["z_ddot"], wave(time))
 
 
 @pytest.mark.parametrize("drift", [0.0, 1e-3, -2e-3])
 def test_another_clock_is_interpolated(drift: float) -> None:
-    made = sample({"theta": signal(clock(500.0)), "z_ddot": signal(clock(500.0 * (1.0 + drift), 0.0009))})
-    assert made.how["z_ddot"] == "interpolated"
-    there = np.isfinite(made.columns["z_ddot"])
+    sampled = sample({"theta": signal(clock(500.0)), "z_ddot": signal(clock(500.0 * (1.0 + drift), 0.0009))})
+    assert sampled.how["z_ddot"] == "interpolated"
+    there = np.isfinite(sampled.columns["z_ddot"])
     assert there.mean() > 0.99
-    np.testing.assert_allclose(made.columns["z_ddot"][there], wave(clock(500.0))[there], atol=2e-4)
+    np.testing.assert_allclose(sampled.columns["z_ddot"][there], wave(clock(500.0))[there], atol=2e-4)
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.0009])
 def test_nothing_is_invented_in_a_gap(offset: float) -> None:
     time = clock(500.0, offset)
     gap = (time > 1.0) & (time < 1.2)
-    made = sample({"theta": signal(clock(500.0)), "z_ddot": signal(time[~gap])})
-    missing = clock(500.0)[np.isnan(made.columns["z_ddot"])]
+    sampled = sample({"theta": signal(clock(500.0)), "z_ddot": signal(time[~gap])})
+    missing = clock(500.0)[np.isnan(sampled.columns["z_ddot"])]
     assert 1.0 <= missing[missing > 0.1].min() <= 1.003
     assert 1.197 <= missing.max() <= 1.2
     assert len(missing[missing > 0.1]) == pytest.approx(100, abs=1)
@@ -75,19 +75,19 @@ def test_nothing_is_invented_in_a_gap(offset: float) -> None:
 def test_a_lost_frame_is_a_missing_value_and_a_gap_of_the_clock_one_of_time() -> None:
     time = clock(500.0)
     lost = np.delete(time, [700, 701, 900])
-    made = sample({"theta": signal(time), "z_ddot": signal(lost)})
-    np.testing.assert_array_equal(np.flatnonzero(np.isnan(made.columns["z_ddot"])), [700, 701, 900])
-    made = sample({"theta": signal(lost), "z_ddot": signal(time)}, "theta")
-    assert np.diff(made.time_us).max() == 6000
-    assert np.isfinite(made.columns["z_ddot"]).all()
+    sampled = sample({"theta": signal(time), "z_ddot": signal(lost)})
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(sampled.columns["z_ddot"])), [700, 701, 900])
+    sampled = sample({"theta": signal(lost), "z_ddot": signal(time)}, "theta")
+    assert np.diff(sampled.time_us).max() == 6000
+    assert np.isfinite(sampled.columns["z_ddot"]).all()
 
 
 def test_what_goes_back_in_time_is_left_out() -> None:
     time = clock(500.0)
     odd = np.concatenate((time[:1000], time[990:1000], time[1000:]))
-    made = sample({"theta": signal(odd), "z_ddot": signal(time)})
-    assert (len(made.time_us), made.disordered) == (2000, 10)
-    assert (np.diff(made.time_us) == 2000).all()
+    sampled = sample({"theta": signal(odd), "z_ddot": signal(time)})
+    assert (len(sampled.time_us), sampled.disordered) == (2000, 10)
+    assert (np.diff(sampled.time_us) == 2000).all()
 
 
 @pytest.mark.parametrize(("rate", "said"), [(20.0, "every 50 ms"), (20000.0, "every 0.05 ms")])

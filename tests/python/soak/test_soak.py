@@ -18,7 +18,7 @@ Content = dict[str, Any]
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> Content:
+def summary(tmp_path_factory: pytest.TempPathFactory) -> Content:
     folder = tmp_path_factory.mktemp("soak")
     page, path = folder / "soak.html", folder / "soak.json"
     assert cli.main(["soak", "--hours", "0.1667", "--json", str(path), "-o", str(page)]) == 0
@@ -28,11 +28,11 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Content:
 
 
 @pytest.mark.requirement("R54")
-def test_ten_minutes(told: Content) -> None:
-    total = told["total"]
+def test_ten_minutes(summary: Content) -> None:
+    total = summary["total"]
     assert total["flights"] == 2
-    assert sum(told["faults"].values()) == 6
-    assert told["troubles"] == []
+    assert sum(summary["faults"].values()) == 6
+    assert summary["troubles"] == []
     assert 0.2 < total["NEES [1]"] < 3.0
     assert total["NIS [1]"] == pytest.approx(1.0, abs=0.05)
     assert total["natural_frequency within 2 sigma [%]"] > 80.0

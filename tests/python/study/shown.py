@@ -13,5 +13,5 @@ ONCE = {name: functools.cache(make) for name, make in catalogue.FIGURES.items()}
 """catalogue.FIGURES, which compute nothing twice."""
 
 
-def made(name: str) -> Figure:
+def figure_of(name: str) -> Figure:
     return ONCE[name](SEED, SHORT)

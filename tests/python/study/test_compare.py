@@ -96,15 +96,15 @@ def test_a_scenario_is_judged_as_it_judges_itself() -> None:
 
 
 def test_told_the_wrong_noise_in_all_combinations() -> None:
-    made = entrants(cases()["wrong_noise_fixed"])
+    by_name = entrants(cases()["wrong_noise_fixed"])
     combinations = {(r, q) for r in ("0.1", "1", "10") for q in ("0.1", "1", "10")}
     default = {row.name: row.default for row in settings_table()}
     for name in ("dual", "joint"):
-        assert {f"{name}_r{r}_q{q}" for r, q in combinations} <= made.keys()
-        assert made[f"{name}_r10_q0.1"].reference == name
-        told: Any = made[f"{name}_r10_q0.1"].make(cases()["wrong_noise_fixed"])
+        assert {f"{name}_r{r}_q{q}" for r, q in combinations} <= by_name.keys()
+        assert by_name[f"{name}_r10_q0.1"].reference == name
+        misinformed: Any = by_name[f"{name}_r10_q0.1"].make(cases()["wrong_noise_fixed"])
         for setting, factor in (("theta_noise", 10.0), ("theta_dot_noise", 10.0), ("theta_dot_process_noise", 0.1)):
-            assert told.settings[setting] == factor * default[setting]
+            assert misinformed.settings[setting] == factor * default[setting]
 
 
 @pytest.mark.parametrize("name", ["lever_fixed_dither_quiet", "lever_trim_base_rough", "wrong_noise_trim", "step_up"])

@@ -19,7 +19,7 @@ from lever_cdkf.sil.study.figures.description import LOOKS, Band, Curve, Points,
 from lever_cdkf.sil.study.firmware import EXACT
 from lever_cdkf.sil.study.matched import Condition, matched
 from numpy.typing import NDArray
-from python.study.shown import SEED, SHORT, made
+from python.study.shown import SEED, SHORT, figure_of
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.stats import chi2
@@ -34,7 +34,7 @@ every = pytest.mark.parametrize("name", catalogue.FIGURES)
 
 
 def rows(name: str, column: int = 0) -> dict[str, Row]:
-    content = made(name).columns[column].content
+    content = figure_of(name).columns[column].content
     assert not isinstance(content, Surface)
     return {row.label: row for row in content}
 
@@ -66,7 +66,7 @@ def by_sample(config: Config, batch: Batch, run: int = 0) -> list[Any]:
 
 @every
 def test_every_axis_has_a_unit_and_every_series_is_drawn_within_its_time(name: str) -> None:
-    figure = made(name)
+    figure = figure_of(name)
     for column in figure.columns:
         if isinstance(column.content, Surface):
             assert column.content.label.endswith("[deg per m/s²]")
@@ -86,7 +86,7 @@ def test_every_axis_has_a_unit_and_every_series_is_drawn_within_its_time(name: s
 
 @every
 def test_charts_hold_all_that_is_drawn_once_the_start_is_over(name: str) -> None:
-    figure = made(name)
+    figure = figure_of(name)
     for column in figure.columns:
         if isinstance(column.content, Surface):
             continue
@@ -98,7 +98,7 @@ def test_charts_hold_all_that_is_drawn_once_the_start_is_over(name: str) -> None
 
 def test_series_that_share_a_chart_do_not_rely_on_hue() -> None:
     for name in catalogue.FIGURES:
-        for column in made(name).columns:
+        for column in figure_of(name).columns:
             if isinstance(column.content, Surface):
                 continue
             for row in column.content:
@@ -150,7 +150,7 @@ def test_the_surfaces_are_the_answer_of_the_linearised_lever() -> None:
     walks = {"m_p_walk": 0.01, "c_p_walk": 0.06, "k_p_walk": 0.06}
     batch = matched(Condition("lever", "fixed", settings={**PRIOR, **walks}), 1, 3.0 * SHORT.duration, SEED)
     found = by_sample(Config("lever", "fixed", "dual", "fixed", settings={**PRIOR, **walks, **MATCHED}), batch)
-    truth, estimate = (column.content for column in made("bode").columns)
+    truth, estimate = (column.content for column in figure_of("bode").columns)
     assert isinstance(truth, Surface)
     assert isinstance(estimate, Surface)
     assert truth.magnitude.shape == estimate.magnitude.shape == (len(truth.frequency), len(truth.time))
@@ -170,8 +170,8 @@ def test_the_surfaces_are_the_answer_of_the_linearised_lever() -> None:
             assert surface.ridge[index] == pytest.approx(natural, rel=1e-5 if surface is truth else 3e-3)
         assert estimate.ridge[index] == found[k].natural_frequency
     peaks = [max(at_once) for at_once in truth.magnitude.T]
-    told = f"the peak is between {number(min(peaks))} and {number(max(peaks))} deg per m/s²"
-    assert told in made("bode").caption
+    sentence = f"the peak is between {number(min(peaks))} and {number(max(peaks))} deg per m/s²"
+    assert sentence in figure_of("bode").caption
 
 
 # --- linear models ---------------------------------------------------------------------------------------------------
@@ -207,14 +207,14 @@ def test_excitation_and_response_are_those_of_the_run() -> None:
         assert isinstance(measured, Points)
         np.testing.assert_allclose(measured.y, 1e3 * batch.raw_y[0, window, state])
     x, noise = batch.truth.x[0, :, 0], (batch.raw_y - batch.truth.x)[0, :, 0]
-    caption = made("excitation").caption
+    caption = figure_of("excitation").caption
     assert f"moves by {two(1e3 * np.sqrt(np.mean(x**2)))} mm rms" in caption
     assert f"off by {two(1e3 * np.sqrt(np.mean(noise**2)))} mm rms" in caption
     assert "last 2 s" in caption
 
 
 def test_states_are_those_of_the_firmware_and_the_caption_tells_their_errors() -> None:
-    batch, chart, caption = matched(NOISY, 1, SHORT.duration, SEED), rows("states"), made("states").caption
+    batch, chart, caption = matched(NOISY, 1, SHORT.duration, SEED), rows("states"), figure_of("states").caption
     config = Config("linear_physical", "fixed", "dual", "fixed", settings={**NOISY.settings, **MATCHED})
     found = by_sample(config, batch)
     half, window = slice(batch.samples // 2, None), slice(batch.samples - 2000, None)
@@ -242,7 +242,7 @@ def test_linear_parameters_are_those_of_the_firmware(
 ) -> None:
     batch = matched(Condition(model, "fixed", dither_rms=force, settings=settings), 1, SHORT.duration, SEED)
     found = by_sample(Config(model, "fixed", "dual", "fixed", settings={**settings, **MATCHED}), batch)
-    chart, caption = rows("parameters"), made("parameters").caption
+    chart, caption = rows("parameters"), figure_of("parameters").caption
     assert batch.truth.p is not None
     for index, (symbol, unit) in enumerate(labels.items()):
         row = chart[f"{symbol} [{unit}]"]
@@ -254,8 +254,8 @@ def test_linear_parameters_are_those_of_the_firmware(
         late = estimate.x >= estimate.x[-1] / 2.0
         off = float(np.sqrt(np.mean((estimate.y - truth.y)[late] ** 2)))
         share = 100.0 * float(np.mean((band.low <= truth.y) & (truth.y <= band.high)))
-        told = two(off) if unit == "1" else f"{two(off)} {unit}"
-        assert f"{symbol} {told} ({two(share, 3)} %)" in caption
+        printed_error = two(off) if unit == "1" else f"{two(off)} {unit}"
+        assert f"{symbol} {printed_error} ({two(share, 3)} %)" in caption
 
 
 # --- identification --------------------------------------------------------------------------------------------------
@@ -347,10 +347,10 @@ def test_the_grip_caption_tells_how_fast_the_runs_followed(column: int, title: s
     ends = (float(np.median(settled)), max(settled))
     seconds = [f"{two(time)} s" if math.isfinite(time) else "never" for time in ends]
     words = f"{title}, stiffness is within 10 % for good after {seconds[0]} (median; worst: {seconds[1]})"
-    assert words in made("grip").caption
+    assert words in figure_of("grip").caption
     assert (
         f"the first 2 s the band holds it in {two(100.0 * float(np.mean(inside)))} % of the time"
-        in made("grip").caption
+        in figure_of("grip").caption
     )
     many = rows("grip", column)["k_p error [%]"]
     np.testing.assert_allclose(trace(many, "median of the runs").y, np.median(errors, axis=0), rtol=1e-6)
@@ -382,6 +382,6 @@ def test_nees_is_that_of_the_firmwares_own_covariance(case: str, dither: float) 
     np.testing.assert_allclose(band.low, low, rtol=1e-9)
     np.testing.assert_allclose(band.high, high, rtol=1e-9)
     inside = 100.0 * np.mean((mean.y >= low) & (mean.y <= high))
-    found = re.search(rf"{case}, dual: ([\d.]+) \(.*?\), ([\d.]+) %", made("consistency").caption)
-    assert found is not None
-    assert found.groups() == (two(squares.mean(), 3), two(inside))
+    match = re.search(rf"{case}, dual: ([\d.]+) \(.*?\), ([\d.]+) %", figure_of("consistency").caption)
+    assert match is not None
+    assert match.groups() == (two(squares.mean(), 3), two(inside))

@@ -31,7 +31,7 @@ from lever_cdkf.sil.study.figures.typesetting import colours, css, in_html, in_m
 from PIL import Image
 from PIL.PngImagePlugin import PngImageFile
 from python.report.reading import figures, read, unpack
-from python.study.shown import ONCE, SEED, SHORT, made
+from python.study.shown import ONCE, SEED, SHORT, figure_of
 from quality.tools import ROOT
 
 if sys.version_info >= (3, 11):
@@ -48,7 +48,7 @@ every = pytest.mark.parametrize("name", NAMES)
 @functools.cache
 def sheet(name: str, width: str = "single") -> Any:
     """A figure in print, with a time axis as long as that of the real one."""
-    figure = made(name)
+    figure = figure_of(name)
     if figure.x_range[0] == 0.0:
         figure = dataclasses.replace(figure, x_range=(0.0, figure.x_range[1] * LONG.duration / SHORT.duration))
     return printed.sheet(figure, width)
@@ -173,7 +173,7 @@ def test_a_double_width_is_two_columns_wide(lever: Run, tmp_path: Path) -> None:
 def test_the_table_holds_what_is_drawn(folder: Path) -> None:
     for name in NAMES:
         table = pd.read_csv(folder / f"{name}.csv", keep_default_na=False, na_values={"value": "", "low": ""})
-        for column in made(name).columns:
+        for column in figure_of(name).columns:
             rows = table[table["column"] == column.title]
             if isinstance(column.content, Surface):
                 surface = rows[rows["series"] == ""].astype({"frequency_Hz": float, "time_s": float})
@@ -189,11 +189,11 @@ def test_the_table_holds_what_is_drawn(folder: Path) -> None:
 
 
 def test_every_picture_says_where_it_is_from(folder: Path) -> None:
-    told = json.loads((folder / "provenance.json").read_text())
-    assert told["created"] == "2023-11-14T22:13:20Z"
-    for name, digest in told["outputs"].items():
+    origin = json.loads((folder / "provenance.json").read_text())
+    assert origin["created"] == "2023-11-14T22:13:20Z"
+    for name, digest in origin["outputs"].items():
         assert digest == f"sha256:{hashlib.sha256((folder / name).read_bytes()).hexdigest()}"
-    assert set(told["outputs"]) | {"provenance.json"} == {path.name for path in folder.iterdir()}
+    assert set(origin["outputs"]) | {"provenance.json"} == {path.name for path in folder.iterdir()}
     with Image.open(folder / "grip.png") as image:
         assert isinstance(image, PngImageFile)
         in_png = json.loads(image.text["Description"])
@@ -203,7 +203,7 @@ def test_every_picture_says_where_it_is_from(folder: Path) -> None:
     in_page = json.loads(re.findall('<script type="application/json" id="provenance">(.*?)</script>', page)[0])
     for properties in (in_png, in_svg, in_page):
         assert {key: properties[key] for key in ("version", "library", "created", "command")} == {
-            key: told[key] for key in ("version", "library", "created", "command")
+            key: origin[key] for key in ("version", "library", "created", "command")
         }
     assert b"D:20231114221320Z" in (folder / "grip.pdf").read_bytes()
 
@@ -211,9 +211,9 @@ def test_every_picture_says_where_it_is_from(folder: Path) -> None:
 def test_a_picture_does_not_depend_on_how_matplotlib_is_configured() -> None:
     import matplotlib as mpl
 
-    plain = printed.render(made("excitation"))
+    plain = printed.render(figure_of("excitation"))
     with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "black", "savefig.bbox": "tight"}):
-        assert printed.render(made("excitation")) == plain
+        assert printed.render(figure_of("excitation")) == plain
 
 
 def test_what_is_drawn_is_where_it_belongs() -> None:
@@ -242,9 +242,9 @@ def test_what_is_drawn_is_where_it_belongs() -> None:
 
 def test_the_page_holds_what_is_described(folder: Path) -> None:
     specs = figures(read(folder / "figures.html"))
-    assert list(specs) == [f"{name}-{index}" for name in NAMES for index in range(len(made(name).columns))]
+    assert list(specs) == [f"{name}-{index}" for name in NAMES for index in range(len(figure_of(name).columns))]
     for name in NAMES:
-        for index, column in enumerate(made(name).columns):
+        for index, column in enumerate(figure_of(name).columns):
             spec = specs[f"{name}-{index}"]
             if isinstance(column.content, Surface):
                 surface, ridge = spec["data"]
@@ -255,7 +255,7 @@ def test_the_page_holds_what_is_described(folder: Path) -> None:
                 key = f"y{row_index + 1}" if row_index else "y"
                 axis = spec["layout"][key.replace("y", "yaxis")]
                 assert axis["title"]["text"] == in_html(row.label)
-                assert axis["range"] == pytest.approx(made(name).limits()[row_index])
+                assert axis["range"] == pytest.approx(figure_of(name).limits()[row_index])
                 drawn = [trace for trace in spec["data"] if trace["yaxis"] == key]
                 edges = [(e.low, e.high) if isinstance(e, Band) else (e.y,) for e in row.traces]
                 series = [np.sort(values) for edge in edges for values in edge]
@@ -289,7 +289,7 @@ def test_the_page_needs_nothing_else(folder: Path) -> None:
 def test_captions_are_the_same_on_the_page_and_beside_the_pictures(folder: Path) -> None:
     text, captions = "".join(read(folder / "figures.html").text), (folder / "captions.md").read_text(encoding="utf-8")
     for name in NAMES:
-        figure = made(name)
+        figure = figure_of(name)
         assert f"## {figure.title} ({name}.png)\n\n{figure.caption}\n" in captions
         assert re.sub(r"\b(\w)_(\w+)", r"\1\2", figure.caption) in text
         assert "nan" not in figure.caption
@@ -306,14 +306,14 @@ def test_every_colour_of_the_page_exists_in_both_themes(folder: Path) -> None:
 def test_text_is_set_in_type() -> None:
     assert in_html("m_p < 2 & a_21") == "m<sub>p</sub> &lt; 2 &amp; a<sub>21</sub>"
     assert in_mathtext("|θ/z̈| ẋ [N s/m], k_p") == r"|θ/$\ddot{z}$| $\dot{x}$ [N s/m], $k_{p}$"
-    assert "<sub>" not in figures_page.build([made("states")]).split("<body>")[0]
+    assert "<sub>" not in figures_page.build([figure_of("states")]).split("<body>")[0]
 
 
 @pytest.mark.requires("|".join(screenshot.BROWSERS))
 def test_the_page_is_drawn_without_complaint_or_sideways_scrolling(tmp_path: Path) -> None:
     probe = "<script>window.addEventListener('load', () => setTimeout(() => { document.title = 'width ' + "
     probe += "document.documentElement.scrollWidth + ' of ' + document.documentElement.clientWidth; }, 3000));</script>"
-    shown = [made(name) for name in NAMES]
+    shown = [figure_of(name) for name in NAMES]
     copy = tmp_path / "probed.html"
     copy.write_text(figures_page.build(shown).replace("</body>", f"{probe}</body>"), encoding="utf-8")
     options = ("--dump-dom", "--enable-logging=stderr", "--enable-unsafe-swiftshader", "--window-size=500,900")
@@ -348,7 +348,7 @@ def test_only_makes_what_is_asked_for(lever: Run, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert out == f"Written to {tmp_path}: {', '.join(names)}\n"
     assert read(tmp_path / "figures.html").ids("section") == ["excitation", "states"]
-    assert made("states").caption in (tmp_path / "captions.md").read_text(encoding="utf-8")
+    assert figure_of("states").caption in (tmp_path / "captions.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

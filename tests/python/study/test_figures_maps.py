@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -23,7 +24,7 @@ VALUES = np.array(((10.0, 20.0, 30.0), (40.0, 50.0, np.nan)))
 BORDER = Line((0, 1), np.array((-np.inf, 0.3)), np.array((-np.inf, 0.2)), np.array((0.05, np.inf)))
 
 
-def made() -> MapFigure:
+def map_figure() -> MapFigure:
     """Two estimators at four rates; the charts of each rate are brighter by one."""
     rows = tuple(tuple(Chart(VALUES + column, BORDER) for column in range(4)) for _ in range(2))
     return MapFigure(
@@ -33,7 +34,7 @@ def made() -> MapFigure:
 
 @pytest.mark.parametrize("width", ["single", "double"])
 def test_no_label_lies_on_another(width: str) -> None:
-    sheet = printed.sheet(made(), width)
+    sheet = printed.sheet(map_figure(), width)
     texts = list(sheet.texts)
     for axes in sheet.axes:
         texts += [axes.title, axes.xaxis.label, axes.yaxis.label]
@@ -47,8 +48,16 @@ def test_no_label_lies_on_another(width: str) -> None:
     assert upper.get_xlim() == lower.get_xlim()
 
 
+def test_of_many_values_four_are_written_with_both_ends() -> None:
+    steps = Scale("noise [mrad]", tuple(float(value) for value in range(1, 11)))
+    chart = Chart(np.ones((10, 3)), None)
+    one = replace(map_figure(), columns=NAMED, rows=("dual",), y=steps, charts=((chart, chart),))
+    (axes, *_) = printed.sheet(one, "double").axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["1", "4", "7", "10"]
+
+
 def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -> None:
-    figure = made()
+    figure = map_figure()
     pixels = np.asarray(Image.open(io.BytesIO(printed.render(figure, "png", "double"))).convert("RGB")).astype(int)
     first = printed.sheet(figure, "double").axes[0]
 
@@ -65,7 +74,7 @@ def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -
 
 
 def test_the_page_has_every_value_and_the_line_inside_the_map(tmp_path: Path) -> None:
-    spec = maps.spec(made())
+    spec = maps.spec(map_figure())
     heats = [trace for trace in spec["data"] if trace["type"] == "heatmap"]
     assert len(heats) == 8
     assert heats[2]["z"] == [[12.0, 22.0, 32.0], [42.0, 52.0, None]]
@@ -74,12 +83,12 @@ def test_the_page_has_every_value_and_the_line_inside_the_map(tmp_path: Path) ->
     assert lines[1]["x"] == pytest.approx([0.01, 0.3])
     assert lines[0]["x"] == pytest.approx([0.01, 0.2, 1.0, 0.05])
     assert lines[0]["y"] == [0.0, 1.0, 1.0, 0.0]
-    (tmp_path / "page.html").write_text(figures_page.build([made()]), encoding="utf-8")
+    (tmp_path / "page.html").write_text(figures_page.build([map_figure()]), encoding="utf-8")
     assert list(figures(read(tmp_path / "page.html"))) == ["map-0"]
 
 
 def test_the_table_has_cells_and_border() -> None:
-    rows = list(csv.DictReader(data.table(made()).splitlines()))
+    rows = list(csv.DictReader(data.table(map_figure()).splitlines()))
     assert len(rows) == 8 * (6 + 2)
     cells = [row for row in rows if row["chart"] == "joint" and row[RATES.label] == "3.0" and row["series"] == ""]
     assert [row["value"] for row in cells] == ["11", "21", "31", "41", "51", ""]

@@ -64,22 +64,22 @@ def test_the_filter_that_is_watched_is_the_firmware() -> None:
     samples = textbook.simulate(GUESS * 1.1, 3000, seed=3)
     samples["theta_valid"][1000:1010] = False
     samples["theta_dot_valid"][1005:1020] = False
-    told = innovations(config(sigma=0.3), samples)
+    seen = innovations(config(sigma=0.3), samples)
     columns = {name: samples[name] for name in samples.dtype.names or ()}
     columns["time_us"] = columns["time_us"].astype(np.int64)
     said = run_samples(config(sigma=0.3), columns)
-    used = told["size"] > 0
+    used = seen["size"] > 0
     assert used.sum() >= 2990
-    assert (told["size"][used] == said["nis_size"][used]).all()
-    np.testing.assert_allclose(told["nis"][used], said["nis"][used], rtol=2e-3, atol=1e-4)
+    assert (seen["size"][used] == said["nis_size"][used]).all()
+    np.testing.assert_allclose(seen["nis"][used], said["nis"][used], rtol=2e-3, atol=1e-4)
 
 
 def test_an_output_that_is_missing_says_nothing() -> None:
     """Without the rate, an innovation's density is that of the angle alone."""
     samples = textbook.simulate(GUESS, 2000, seed=4)
     samples["theta_dot_valid"][1000] = False
-    told = innovations(config(sigma=1e-3), samples)[1000]
-    sigma, value = float(told["sigma"][0]), float(told["value"][0])
-    assert (told["value"][1], told["sigma"][1], told["size"]) == (0.0, 0.0, 1)
+    seen = innovations(config(sigma=1e-3), samples)[1000]
+    sigma, value = float(seen["sigma"][0]), float(seen["value"][0])
+    assert (seen["value"][1], seen["sigma"][1], seen["size"]) == (0.0, 0.0, 1)
     density = -0.5 * (value / sigma) ** 2 - np.log(sigma * np.sqrt(2.0 * np.pi))
-    assert told["log_likelihood"] == pytest.approx(density, abs=0.01)
+    assert seen["log_likelihood"] == pytest.approx(density, abs=0.01)

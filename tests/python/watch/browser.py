@@ -22,9 +22,9 @@ _OPTIONS = [option for option in screenshot.OFFLINE if "virtual-time" not in opt
 class Browser:
     """One page. A context manager; what the page complains of is in `complaints`."""
 
-    def __init__(self, width: int = 1280, height: int = 900, *, phone: bool = False) -> None:
+    def __init__(self) -> None:
         self.complaints: list[str] = []
-        self._size = {"width": width, "height": height, "deviceScaleFactor": 2 if phone else 1, "mobile": phone}
+        self._scripts: list[str] = []
         self._numbers = itertools.count(1)
         self._loop = asyncio.new_event_loop()
         self._socket: WebSocketClientConnection | None = None
@@ -69,7 +69,23 @@ class Browser:
         self._session = self.ask("Target.attachToTarget", targetId=page["targetId"], flatten=True)["sessionId"]
         self.ask("Runtime.enable")
         self.ask("Log.enable")
-        self.ask("Emulation.setDeviceMetricsOverride", **self._size)
+        self.ask("Page.enable")
+
+    def begin(self, width: int = 1280, height: int = 900, *, phone: bool = False) -> None:
+        """For another user: on a screen of this size, with light colours and without what others have left."""
+        self.ask("Page.navigate", url="about:blank")
+        scale = 2 if phone else 1
+        self.ask(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=phone
+        )
+        self.ask("Emulation.setEmulatedMedia", features=[])
+        while self._scripts:
+            self.ask("Page.removeScriptToEvaluateOnNewDocument", identifier=self._scripts.pop())
+        self.complaints.clear()
+
+    def prepare(self, script: str) -> None:
+        """Runs a script in each page that is opened, before its own."""
+        self._scripts.append(self.ask("Page.addScriptToEvaluateOnNewDocument", source=script)["identifier"])
 
     def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
         """A command of the protocol; returns its result."""
@@ -91,11 +107,11 @@ class Browser:
                 return result
 
     def _note(self, message: dict[str, Any]) -> None:
-        told = message.get("params", {})
+        params = message.get("params", {})
         if message.get("method") == "Runtime.exceptionThrown":
-            self.complaints.append(told["exceptionDetails"]["exception"].get("description", "exception"))
-        elif message.get("method") == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
-            self.complaints.append(told["entry"]["text"])
+            self.complaints.append(params["exceptionDetails"]["exception"].get("description", "exception"))
+        elif message.get("method") == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
+            self.complaints.append(params["entry"]["text"])
 
     def open(self, url: str) -> None:
         """Opens a page and waits until it is there with all that belongs to it."""

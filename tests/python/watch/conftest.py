@@ -50,14 +50,14 @@ class Flight:
 @pytest.fixture
 def make_flight() -> Iterator[Callable[..., Flight]]:
     """Flight, whose bus is shut down after the test."""
-    made: list[Flight] = []
+    flights: list[Flight] = []
 
     def make(config: Config | None = None) -> Flight:
-        made.append(Flight(config))
-        return made[-1]
+        flights.append(Flight(config))
+        return flights[-1]
 
     yield make
-    for flight in made:
+    for flight in flights:
         flight.bus.shutdown()
 
 

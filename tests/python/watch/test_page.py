@@ -7,7 +7,7 @@ import json
 import re
 import signal
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -28,9 +28,9 @@ def address(process: subprocess.Popen[str]) -> str:
     """Of the page, which the command prints first."""
     assert process.stdout is not None
     line = process.stdout.readline()
-    found = re.search(r"http://\S+/", line)
-    assert found, line
-    return found[0]
+    match = re.search(r"http://\S+/", line)
+    assert match, line
+    return match[0]
 
 
 def end(process: subprocess.Popen[str]) -> None:
@@ -61,10 +61,10 @@ def choose(browser: Browser, selector: str, value: str) -> None:
     browser.run(script % (json.dumps(selector), json.dumps(value)))
 
 
-@pytest.fixture(scope="module")
-def desktop() -> Iterator[Browser]:
-    with Browser() as browser:
-        yield browser
+@pytest.fixture
+def desktop(browser: Browser) -> Browser:
+    browser.begin()
+    return browser
 
 
 def test_a_session(desktop: Browser, start_lever: Start) -> None:
@@ -130,22 +130,21 @@ LABELS = """
 
 @pytest.mark.parametrize("width", [390, 1280])
 def test_a_scenario_that_starts_over_is_told_and_no_label_lies_on_another(
-    width: int, start_lever: Start, tmp_path: Path
+    width: int, browser: Browser, start_lever: Start, tmp_path: Path
 ) -> None:
     steady = (resources.files("lever_cdkf.sil.scenarios") / "steady.toml").read_text()
-    (tmp_path / "brief.toml").write_text(re.sub("(?m)^duration = .*$", 'duration = "4 s"', steady))
+    (tmp_path / "brief.toml").write_text(re.sub("(?m)^duration = .*$", 'duration = "2 s"', steady))
     process = start_lever("live", "--scenario", str(tmp_path / "brief.toml"), "--port", "0")
-    with Browser(width, 844) as browser:
-        browser.ask("Page.enable")
-        browser.ask("Page.addScriptToEvaluateOnNewDocument", source=LABELS)
-        browser.open(address(process))
-        browser.wait("document.getElementById('notice').textContent.startsWith('The scenario has started over')")
-        assert "simulation of brief, run " in browser.run("document.getElementById('title').textContent")
-        for labels in browser.run("Array.from(document.querySelectorAll('canvas'), e => e.labels)"):
-            assert len(labels) > 4
-            for first, second in itertools.combinations(labels, 2):
-                apart = first[3] <= second[1] or second[3] <= first[1] or first[4] <= second[2] or second[4] <= first[2]
-                assert apart, (first, second)
+    browser.begin(width, 844)
+    browser.prepare(LABELS)
+    browser.open(address(process))
+    browser.wait("document.getElementById('notice').textContent.startsWith('The scenario has started over')")
+    assert "simulation of brief, run " in browser.run("document.getElementById('title').textContent")
+    for labels in browser.run("Array.from(document.querySelectorAll('canvas'), e => e.labels)"):
+        assert len(labels) > 4
+        for first, second in itertools.combinations(labels, 2):
+            apart = first[3] <= second[1] or second[3] <= first[1] or first[4] <= second[2] or second[4] <= first[2]
+            assert apart, (first, second)
     end(process)
 
 
@@ -186,7 +185,6 @@ def test_before_the_first_frame_and_read_only(desktop: Browser, start_lever: Sta
     log.write_text("(100.000000) can0 123#00 R\n" + "".join(late))
     process = start_lever("live", str(log), "--port", "0")
     desktop.open(address(process))
-    desktop.complaints.clear()  # those of the last page
     desktop.wait(f"{CONDITION} == 'frames pass, but neither samples nor estimates'")
     assert all(cells[0] == "–" for cells in estimates(desktop).values())
     assert desktop.run("document.getElementById('controls').hidden")
@@ -198,22 +196,22 @@ def test_before_the_first_frame_and_read_only(desktop: Browser, start_lever: Sta
     end(process)
 
 
-def test_on_a_phone(start_lever: Start) -> None:
+def test_on_a_phone(browser: Browser, start_lever: Start) -> None:
     process = start_lever("live", "--scenario", "steady", "--port", "0")
     background = "getComputedStyle(document.body).backgroundColor"
-    with Browser(390, 844, phone=True) as phone:
-        phone.open(address(process))
-        phone.wait(f"{CONDITION}.startsWith('run')")
-        sizes = phone.run("(({scrollWidth, clientWidth}) => [scrollWidth, clientWidth])(document.documentElement)")
-        assert sizes == [390, 390]  # nothing to be scrolled sideways
-        targets: list[dict[str, Any]] = phone.run(
-            "Array.from(document.querySelectorAll('button, select'), e => e.getBoundingClientRect().toJSON())"
-        )
-        assert all(each["height"] >= 40 and each["right"] <= 390 for each in targets)
-        assert phone.run(background) == "rgb(255, 255, 255)"
-        phone.darken()
-        phone.wait(f"{background} != 'rgb(255, 255, 255)'")
-        phone.click("[data-request=freeze]")
-        phone.wait(f"{CONDITION}.startsWith('frozen: ')")
-        assert phone.complaints == []
+    browser.begin(390, 844, phone=True)
+    browser.open(address(process))
+    browser.wait(f"{CONDITION}.startsWith('run')")
+    sizes = browser.run("(({scrollWidth, clientWidth}) => [scrollWidth, clientWidth])(document.documentElement)")
+    assert sizes == [390, 390]  # nothing to be scrolled sideways
+    targets: list[dict[str, Any]] = browser.run(
+        "Array.from(document.querySelectorAll('button, select'), e => e.getBoundingClientRect().toJSON())"
+    )
+    assert all(each["height"] >= 40 and each["right"] <= 390 for each in targets)
+    assert browser.run(background) == "rgb(255, 255, 255)"
+    browser.darken()
+    browser.wait(f"{background} != 'rgb(255, 255, 255)'")
+    browser.click("[data-request=freeze]")
+    browser.wait(f"{CONDITION}.startsWith('frozen: ')")
+    assert browser.complaints == []
     end(process)

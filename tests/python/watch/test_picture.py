@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.commander import KEEP
+from lever_cdkf.host_tools.can.commander import KEEP, result_of
 from lever_cdkf.host_tools.firmware.config import Config, model_parameters
 from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
 from lever_cdkf.host_tools.watch import status
@@ -264,9 +264,9 @@ def test_an_estimator_that_does_not_tell_its_contract_is_told(flight: Flight) ->
     picture = Picture()
     for _ in range(40):
         picture.take([frame for frame in flight.frames(100) if frame[0] != 0x217], flight.sample * 1e-3)
-        told = status.condition(picture)
-        assert (told[0] == "bad") is (picture.now > 3.1 + 1e-9)
-    assert told[1].startswith("the estimator does not send its version (IDENTITY): ")
+        shown = status.condition(picture)
+        assert (shown[0] == "bad") is (picture.now > 3.1 + 1e-9)
+    assert shown[1].startswith("the estimator does not send its version (IDENTITY): ")
 
 
 def test_a_second_estimator_on_the_bus_is_told(make_flight: Callable[..., Flight]) -> None:
@@ -280,15 +280,15 @@ def test_a_second_estimator_on_the_bus_is_told(make_flight: Callable[..., Flight
     assert "a second estimator is on this bus" in status.condition(picture)[1]
 
 
-def test_refused_commands_are_told(flight: Flight) -> None:
+def test_each_acknowledgement_is_taken(flight: Flight) -> None:
     picture = Picture()
     watch(picture, flight, 0.1)
     command = codec.encode("COMMAND", 0, {"request": "none", **KEEP})
     for _ in range(2):
         flight.send(0x120, command)
     watch(picture, flight, 0.1)
-    (why,) = picture.refusals
-    assert why.startswith("the estimator refuses COMMAND: its counter is out of sequence")
+    acknowledged = [(ack["command_counter"], result_of(ack)) for ack in picture.acknowledgements]
+    assert acknowledged == [(0, "accepted"), (0, "sequence")]
 
 
 def test_other_traffic_is_counted_and_harmless(flight: Flight) -> None:

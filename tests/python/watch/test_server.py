@@ -18,6 +18,7 @@ import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
 from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.commander import KEEP
 from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.firmware.library import enum_names
 from lever_cdkf.host_tools.watch.server import Server
@@ -52,9 +53,9 @@ class FlightSource(Source):
     def now(self) -> float:
         return self.flight.sample * 1e-3
 
-    def command(self, values: Any) -> None:
+    def _send(self, values: Any) -> None:
         self.commanded.append(dict(values))
-        super().command(values)
+        super()._send(values)
 
     def _transmit(self, identifier: int, data: bytes) -> None:
         self.flight.send(identifier, data)
@@ -433,11 +434,14 @@ def test_a_page_that_connects_anew_cannot_fill_the_bus_either(
 
 
 def test_a_command_that_the_estimator_refuses_is_told(on_server: Callable[..., FlightSource], flight: Flight) -> None:
+    """Here another sender's: its counter is there twice."""
+    refused = codec.encode("COMMAND", 0, {"request": "none", **KEEP})
+
     async def story(server: Server) -> None:
         async with Visitor(server) as visitor:
             await visitor.hear("update")
-            flight.command({})
-            await visitor.ask('{"request": "freeze"}')  # with a counter that was there before
+            for _ in range(2):
+                flight.send(0x120, refused)
             assert (await visitor.hear("refused")).startswith("the estimator refuses COMMAND: its counter is out of")
 
     on_server(story)

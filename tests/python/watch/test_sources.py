@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import can
 import pytest
@@ -118,6 +119,82 @@ def test_a_command_goes_out_protected_and_is_shown(other_end: can.BusABC, on_bus
     assert [values["dither_rms"] for values in decoded] == [65.535, pytest.approx(0.3)]  # the first keeps it
     assert all(values[what] == 15 for values in decoded for what in CHOICES)
     assert [identifier for identifier, _ in on_bus.drain()] == [0x120, 0x120]
+
+
+class Commanding(Source):
+    """Notes the counter and request of what it sends."""
+
+    title = "a bus"
+    takes_commands = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sent: list[tuple[float, float]] = []
+
+    def run(self) -> None:
+        raise NotImplementedError
+
+    def _transmit(self, identifier: int, data: bytes) -> None:
+        values = codec.decode(identifier, data)[1]
+        self.sent.append((values["counter"], values["request"]))
+
+
+@pytest.fixture
+def pass_time(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Lets time pass for sources [s]."""
+    now = [1000.0]
+    monkeypatch.setattr(sources, "time", SimpleNamespace(monotonic=lambda: now[0]))
+
+    def pass_by(seconds: float) -> None:
+        now[0] += seconds
+
+    return pass_by
+
+
+FREEZE = 2
+
+
+def test_a_command_is_repeated_until_it_is_acknowledged_in_sequence(pass_time: Callable[[float], None]) -> None:
+    source = Commanding()
+    source.command({"request": "freeze"})
+    accepted, sequence = 0, 2
+    for counter, result, sent in ((7, accepted, 2), (1, sequence, 3), (2, accepted, 3)):
+        source.acknowledged({"command_counter": counter, "result": result})
+        pass_time(0.1)
+        source.keep_alive()
+        pass_time(0.2)
+        source.keep_alive()
+        assert source.sent == [(k, FREEZE) for k in range(sent)]
+    assert not source.refusals
+
+
+@pytest.mark.parametrize(("result", "why"), [(None, "no COMMAND_ACK"), (2, "is there another sender of COMMAND?")])
+def test_a_command_that_nobody_obeys_is_told_after_a_second(
+    result: int | None, why: str, pass_time: Callable[[float], None]
+) -> None:
+    source = Commanding()
+    source.command({"request": "freeze"})
+    for _ in range(20):
+        if result is not None:
+            source.acknowledged({"command_counter": source.sent[-1][0], "result": result})
+        pass_time(0.3)
+        source.keep_alive()
+    assert source.sent == [(counter, FREEZE) for counter in range(5)]
+    assert why in source.refusals[0]
+
+
+@pytest.mark.parametrize(("result", "why"), [(4, "LEVER_COMMANDS=ON"), (5, "acts on the lever"), (6, "not safe now")])
+def test_a_command_that_is_refused_for_good_is_told_and_not_repeated(
+    result: int, why: str, pass_time: Callable[[float], None]
+) -> None:
+    source = Commanding()
+    source.command({"request": "freeze"})
+    source.acknowledged({"command_counter": 0, "result": result})
+    pass_time(1.0)
+    source.keep_alive()
+    assert len(source.sent) == 1
+    (told,) = source.refusals
+    assert why in told
 
 
 # --- a log -----------------------------------------------------------------------------------------------------------

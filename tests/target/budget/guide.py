@@ -34,9 +34,9 @@ def update(sections: dict[str, str]) -> None:
 
 
 def _find(text: str, name: str) -> re.Match[str]:
-    found = re.search(_SECTION.format(name=name), text, re.DOTALL)
-    assert found is not None, f"{GUIDE}: no section {name}"
-    return found
+    match = re.search(_SECTION.format(name=name), text, re.DOTALL)
+    assert match is not None, f"{GUIDE}: no section {name}"
+    return match
 
 
 def instructions(values: Values) -> str:

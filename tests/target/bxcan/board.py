@@ -19,12 +19,15 @@ START_LIMIT = 500 * MS
 class Board:
     """`peer` is the node that speaks with the image. Times in ns."""
 
-    def __init__(self, elf: Path, **chip_options: Any) -> None:
+    def __init__(self, elf: Path, *, takes_commands: bool = False, **chip_options: Any) -> None:
+        """`takes_commands`: as if the image had been built with -D LEVER_COMMANDS=ON."""
         self.schedule = Schedule()
         self.bus = Bus(self.schedule)
         self.chip = Chip(self.bus, **chip_options)
         self.can = self.chip.can
         self.machine = Machine(elf, self.chip)
+        if takes_commands:
+            self.machine.answer("transport_takes_commands", 1)
         self.peer = Peer(self.bus)
 
     def start(self) -> None:

@@ -56,9 +56,9 @@ def latency(talk: Talk, board: Board) -> Latency:
 
 
 def said(pattern: str) -> tuple[int, ...]:
-    found = re.search(pattern, GUIDE.read_text(encoding="utf-8"))
-    assert found is not None, pattern
-    return tuple(int(number.replace(",", "")) for number in found.groups())
+    match = re.search(pattern, GUIDE.read_text(encoding="utf-8"))
+    assert match is not None, pattern
+    return tuple(int(number.replace(",", "")) for number in match.groups())
 
 
 def test_worst_latency_is_that_of_the_guide(latency: Latency) -> None:
@@ -67,16 +67,16 @@ def test_worst_latency_is_that_of_the_guide(latency: Latency) -> None:
     others = [cycles for name, cycles in latency.interrupts.items() if name != "can_receive_interrupt"]
     worst = off + sum(others) + EXCEPTION_CYCLES * (1 + len(others))
     pattern = r"at most ([\d,]+) cycles \((\d+) µs\) late.*?([\d,]+) cycles with\s+interrupts off"
-    told, told_us, told_off = said(f"(?s){pattern}")
+    stated, stated_us, stated_off = said(f"(?s){pattern}")
     assert set(latency.interrupts) == HANDLERS
     assert set(latency.off) == {"can_poll", "can_send", "wait_frame", "test_unless_in_use"}
-    assert worst <= told <= 1.1 * worst
-    assert off <= told_off <= 1.1 * off
-    assert told_us == -(-told // CORE_MHZ)
+    assert worst <= stated <= 1.1 * worst
+    assert off <= stated_off <= 1.1 * off
+    assert stated_us == -(-stated // CORE_MHZ)
 
 
 def test_fifo_has_room_for_what_comes_meanwhile() -> None:
     """Three frames, of which the shortest have no data."""
     shortest = min(len(Frame(identifier, b"").wire) for identifier in range(0x100, 0x220))
-    (_, told_us) = said(r"at most ([\d,]+) cycles \((\d+) µs\) late")
-    assert told_us * 1000 < DEPTH * shortest * 1000
+    (_, stated_us) = said(r"at most ([\d,]+) cycles \((\d+) µs\) late")
+    assert stated_us * 1000 < DEPTH * shortest * 1000

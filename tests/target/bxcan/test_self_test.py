@@ -132,8 +132,8 @@ def test_stack_that_has_reached_its_end_is_found_and_told_each_second(talk: Talk
     assert (first["failed"], second["failed"]) == (0, STACK_FAILED)
     assert (first["counter"], second["counter"]) == (0, 1)
     identifier = codec.message("PLATFORM_RESET").frame_id
-    told = [frame for frame in board.peer.frames() if frame.identifier == identifier]
-    assert [codec.check(identifier, frame.data) for frame in told] == [True, True]
+    reports = [frame for frame in board.peer.frames() if frame.identifier == identifier]
+    assert [codec.check(identifier, frame.data) for frame in reports] == [True, True]
 
 
 # --- watchdog ------------------------------------------------------------------------------------------------------

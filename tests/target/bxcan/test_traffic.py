@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import can
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.can import codec
+from lever_cdkf.host_tools.can.commander import result_of
 from lever_cdkf.host_tools.firmware.config import CHOICES
 from lever_cdkf.host_tools.firmware.native import lib
 from lever_cdkf.sil.run import loop
@@ -15,6 +19,7 @@ from target.bxcan.bus import Peer
 from target.bxcan.frame import Frame
 from target.bxcan.talk import COMMAND, OF_MACHINE, STATE_ESTIMATE, Talk, answers, is_estimate
 
+ACK, MOTOR_COMMAND = (codec.message(name).frame_id for name in ("COMMAND_ACK", "MOTOR_COMMAND"))
 URGENT = Frame(0x010, b"\x55" * 8)
 """Of another node, more important than anything of ours."""
 
@@ -22,10 +27,10 @@ URGENT = Frame(0x010, b"\x55" * 8)
 @pytest.mark.parametrize(
     ("name", "changes"),
     [
-        ("steady", ["duration=3 s"]),
-        ("steady", ["duration=1 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
-        ("linear_black_box", ["duration=1 s", "estimator.estimator=joint"]),
-        ("linear_physical", ["duration=1 s", "settings={}"]),  # the image has its own
+        ("steady", ["duration=1.5 s"]),
+        ("steady", ["duration=0.6 s", "estimator.estimator=joint", "estimator.adaptation=forgetting"]),
+        ("linear_black_box", ["duration=0.6 s", "estimator.estimator=joint"]),
+        ("linear_physical", ["duration=0.6 s", "settings={}"]),  # the image has its own
     ],
 )
 def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
@@ -45,10 +50,41 @@ def test_a_scenario_gives_the_frames_of_the_firmware_in_this_process(
     assert board.machine.resets == []
 
 
+def command(counter: int, **values: codec.Value) -> Frame:
+    keep: dict[str, codec.Value] = {"request": "none", "dither_rms": math.inf, **dict.fromkeys(CHOICES, "keep")}
+    return Frame(COMMAND, codec.encode("COMMAND", counter, keep | values))
+
+
 def dither(talk: Talk) -> None:
     """From now on a motor command goes out with every estimate."""
-    keep = dict.fromkeys(CHOICES, "keep")
-    talk.tell(Frame(COMMAND, codec.encode("COMMAND", 0, {"request": "none", "dither_rms": 0.3, **keep})))
+    talk.tell(command(0, dither_rms=0.3))
+
+
+@pytest.mark.requirement("S1", "R24")
+def test_the_image_as_it_is_shipped_changes_nothing_by_command(make_board: Callable[..., Board]) -> None:
+    """It says so in each COMMAND_ACK; what changes nothing is accepted. `dither` above is obeyed by the same image as
+    it is built with -D LEVER_COMMANDS=ON."""
+    board = make_board()
+    board.start()
+    asked = [command(0, dither_rms=0.3), command(1, request="freeze"), command(2, model="hand"), command(3)]
+    with Talk(board) as talk:
+        for _ in range(350):
+            talk.ask()
+        for frame in asked:
+            board.peer.send(frame)
+            board.run(MS)
+            talk.ask()
+        for _ in range(50):
+            talk.ask()
+        assert talk.report("HEALTH")["mode"] == lib.LEVER_MODE_RUN
+    heard = board.peer.frames()
+    acks = [codec.decode(ACK, frame.data)[1] for frame in heard if frame.identifier == ACK]
+    assert [(ack["command_counter"], result_of(ack)) for ack in acks] == [
+        (0, "disabled"), (1, "disabled"), (2, "disabled"), (3, "accepted")
+    ]  # fmt: skip
+    assert {ack["dither_rms"] for ack in acks} == {0.0}
+    assert not [frame for frame in heard if frame.identifier == MOTOR_COMMAND]
+    assert board.machine.resets == []
 
 
 def test_keeps_up_with_samples_each_millisecond(talk: Talk, board: Board) -> None:

@@ -50,30 +50,30 @@ def filters(**registers: int) -> Filters:
     def refuse(what: str) -> None:
         raise AssertionError(what)
 
-    made = Filters(refuse)
+    accepting = Filters(refuse)
     offsets = {"FM1R": FM1R, "FS1R": FS1R, "FFA1R": FFA1R, "FA1R": FA1R}
     for name, value in registers.items():
         if name in offsets:
-            made.write(offsets[name], value)
+            accepting.write(offsets[name], value)
         else:
             bank = int(name.removeprefix("bank_"))
-            made.write(0x240 + 8 * bank, value >> 32)
-            made.write(0x244 + 8 * bank, value & 0xFFFFFFFF)
-    made.write(FMR, FMR_RESET & ~1)
-    return made
+            accepting.write(0x240 + 8 * bank, value >> 32)
+            accepting.write(0x244 + 8 * bank, value & 0xFFFFFFFF)
+    accepting.write(FMR, FMR_RESET & ~1)
+    return accepting
 
 
 def test_list_of_four_16_bit_identifiers() -> None:
     """Figure 342 of RM0090: STID[10:0] RTR IDE EXID[17:15]."""
-    made = filters(FM1R=1, FA1R=1, bank_0=(0x111 << 21 | 0x110 << 5) << 32 | (0x7FF << 21 | 0x120 << 5))
-    assert [made.match(Frame(each)) for each in (0x110, 0x111, 0x120, 0x7FF)] == [(0, k) for k in range(4)]
-    assert made.match(Frame(0x112)) is None
-    assert made.match(Frame(0x110, remote=True)) is None
-    assert made.match(Frame(0x110 << 18, extended=True)) is None
+    accepting = filters(FM1R=1, FA1R=1, bank_0=(0x111 << 21 | 0x110 << 5) << 32 | (0x7FF << 21 | 0x120 << 5))
+    assert [accepting.match(Frame(each)) for each in (0x110, 0x111, 0x120, 0x7FF)] == [(0, k) for k in range(4)]
+    assert accepting.match(Frame(0x112)) is None
+    assert accepting.match(Frame(0x110, remote=True)) is None
+    assert accepting.match(Frame(0x110 << 18, extended=True)) is None
 
 
 def test_nothing_passes_while_filters_are_initialised() -> None:
-    made = filters(FS1R=1, FA1R=1, bank_0=0)
-    assert made.match(Frame(1)) == (0, 0)
-    made.write(FMR, FMR_RESET)
-    assert made.match(Frame(1)) is None
+    accepting = filters(FS1R=1, FA1R=1, bank_0=0)
+    assert accepting.match(Frame(1)) == (0, 0)
+    accepting.write(FMR, FMR_RESET)
+    assert accepting.match(Frame(1)) is None

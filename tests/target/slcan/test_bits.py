@@ -1,6 +1,6 @@
 """`lever sim` over SLCAN against the flash image in QEMU: every estimate frame is the host's, bit for bit.
 
-Three seconds of each model with each estimator: 18,000 samples, each answered before the next is sent.
+Two seconds of each model with each estimator: 12,000 samples, each answered before the next is sent.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from lever_cdkf.sil.scenarios import scenario
 LEVER = str(Path(sys.executable).with_name("lever"))
 SCENARIOS = {"lever": "steady", "linear_physical": "linear_physical", "linear_black_box": "linear_black_box"}
 CASES = list(itertools.product(SCENARIOS, ("dual", "joint")))
-SECONDS = 3
+SECONDS = 2
 ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS")
 """The messages compared. HEALTH is not: there the board tells of itself, too."""
 TORQUE = 'torque.0={kind="noise", rms="0.3 N m", low="1 Hz", high="10 Hz"}'

@@ -17,9 +17,9 @@ def tool(name: str, *arguments: str | Path) -> str:
 
 def symbol(elf: Path, name: str) -> int:
     """The address of a symbol."""
-    found = re.search(rf"^([0-9a-f]+) \w {name}$", tool("nm", elf), re.MULTILINE)
-    assert found, f"{elf} has no {name}"
-    return int(found[1], 16)
+    match = re.search(rf"^([0-9a-f]+) \w {name}$", tool("nm", elf), re.MULTILINE)
+    assert match, f"{elf} has no {name}"
+    return int(match[1], 16)
 
 
 def flash_bytes(elf: Path) -> bytearray:

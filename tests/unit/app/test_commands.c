@@ -57,6 +57,9 @@ TEST(a_command_with_one_unknown_part_is_refused_as_a_whole)
             }
         }
     }
+    lever_command_t command = command_none();
+    command.dither_rms = 1.0e4f;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
 }
 
 /* --- reset -------------------------------------------------------------------------------------------------------- */
@@ -142,6 +145,9 @@ TEST(a_reset_leaves_nothing_of_what_was)
     TEST_ASSERT_EQUAL_MEMORY(&expected, now, sizeof expected);
     for (uint32_t i = 0u; i < (sizeof value / sizeof value[0]); i++) {
         TEST_ASSERT_EQUAL_FLOAT(0.0f, *value[i]);
+    }
+    for (uint32_t i = 0u; i < (sizeof flag / sizeof flag[0]); i++) {
+        TEST_ASSERT_FALSE(*flag[i]);
     }
     TEST_ASSERT_EQUAL_UINT32(0u, now->faults);
     TEST_ASSERT_TRUE((no_dither.low_pass == 0.0f) && (no_dither.low_pass_rate == 0.0f) && (no_dither.slope == 0.0f));

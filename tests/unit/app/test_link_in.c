@@ -82,14 +82,16 @@ TEST(a_grip_sample_serves_the_one_base_sample_with_its_counter)
     TEST_ASSERT_FALSE(sample->grip_force_valid || sample->theta_valid);
 }
 
-/* By the validity bits of each value; and a code for "not available" is no measurement, whatever its flag says. */
+/* By the validity bits of each value; and a code for "not available", or an end of the range, is no measurement,
+ * whatever its flag says. */
 /* R31 */
-TEST(values_that_are_not_valid_or_not_available_are_missing)
+TEST(values_that_are_not_valid_not_available_or_saturated_are_missing)
 {
+    const uint32_t code[3] = {0x8000u, 0x8001u, 0x7FFFu};
     const uint32_t fault[4] = {LEVER_FAULT_THETA, LEVER_FAULT_THETA_DOT, LEVER_FAULT_TORQUE, LEVER_FAULT_BASE};
     (void)deliver_many(3000u);
     TEST_ASSERT_EQUAL_UINT32(0u, health().faults);
-    for (uint32_t k = 0u; k < 8u; k++) {
+    for (uint32_t k = 0u; k < 16u; k++) {
         const uint32_t which = k % 4u;
         next_pair();
         lever_frame_t *const frame = (which < 3u) ? &lever_frame : &base_frame;
@@ -97,14 +99,34 @@ TEST(values_that_are_not_valid_or_not_available_are_missing)
         if (k < 4u) {
             frame->data[1] &= (uint8_t)(0xFFu - (0x10u << place));
         } else {
-            frame->data[2u + (2u * place)] = 0x00u;
-            frame->data[3u + (2u * place)] = 0x80u;
+            frame->data[2u + (2u * place)] = (uint8_t)code[(k / 4u) - 1u];
+            frame->data[3u + (2u * place)] = (uint8_t)(code[(k / 4u) - 1u] >> 8u);
         }
         e2e_protect(frame, (uint8_t)((which < 3u) ? 1u : 17u), e2e_counter(frame)); /* E2EDataIdBase of the DBC */
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, take_pair());
         TEST_ASSERT_EQUAL_UINT32(fault[which], health().faults);
     }
     assert_counts(0u, 0u, 0u);
+}
+
+TEST(one_step_from_the_ends_of_the_range_is_measured)
+{
+    const uint8_t code[2][2] = {{0xFEu, 0x7Fu}, {0x02u, 0x80u}};
+    for (uint32_t k = 0u; k < 2u; k++) {
+        next_pair();
+        for (uint32_t i = 0u; i < 2u; i++) {
+            base_frame.data[2u + i] = code[k][i];
+            for (uint32_t place = 2u; place < 8u; place += 2u) {
+                lever_frame.data[place + i] = code[k][i];
+            }
+        }
+        e2e_protect(&lever_frame, 1u, e2e_counter(&lever_frame));
+        e2e_protect(&base_frame, 17u, e2e_counter(&base_frame));
+        (void)lever_on_frame(lever, &lever_frame);
+        TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &base_frame));
+        const lever_sample_t *const sample = &lever->link.sample;
+        TEST_ASSERT_TRUE(sample->theta_valid && sample->theta_dot_valid && sample->tau_m_valid && sample->z_ddot_valid);
+    }
 }
 
 /* An outage may end at any counter: those that look like a repetition or a step back cost a few frames more. */
@@ -270,9 +292,11 @@ TEST(off_is_obeyed_in_any_order)
     lever_command_t off = command_none();
     const lever_frame_t on = dither_frame(0.3f);
     TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_ACCEPTED, answer_to(&on).result);
+    command_counter = (uint8_t)(command_counter + 9u); /* a sender that has started again */
+    const lever_frame_t more = dither_frame(0.5f);
+    TEST_ASSERT_EQUAL_FLOAT(0.3f, answer_to(&more).dither_rms);
     off.request = (uint8_t)LEVER_REQUEST_FREEZE;
     off.dither_rms = 0.0f;
-    command_counter = (uint8_t)(command_counter + 9u); /* a sender that has started again */
     const lever_frame_t frame = command_frame(&off);
     const message_command_ack_t ack = answer_to(&frame);
     TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_SEQUENCE, ack.result);
@@ -300,7 +324,7 @@ TEST(an_on_that_is_sent_again_after_an_off_is_refused_however_often)
     TEST_ASSERT_TRUE(health().torque == 0.0f);
 }
 
-/* Up to three may be lost; and a second after the last one, a sender may start anywhere. */
+/* Up to three may be lost; and a second after the last one, a sender may start anywhere but there. */
 TEST(a_command_is_accepted_by_its_place_in_the_sequence)
 {
     const struct {
@@ -309,13 +333,30 @@ TEST(a_command_is_accepted_by_its_place_in_the_sequence)
         enum message_result result;
     } rows[] = {{7u, 1u, MESSAGE_RESULT_ACCEPTED}, {7u, 1u, MESSAGE_RESULT_SEQUENCE}, {8u, 1u, MESSAGE_RESULT_ACCEPTED},
         {12u, 1u, MESSAGE_RESULT_ACCEPTED}, {1u, 1u, MESSAGE_RESULT_SEQUENCE}, {11u, 1u, MESSAGE_RESULT_SEQUENCE},
-        {0u, 1u, MESSAGE_RESULT_ACCEPTED}, {0u, 1000u, MESSAGE_RESULT_SEQUENCE}, {0u, 1u, MESSAGE_RESULT_ACCEPTED}};
+        {0u, 1u, MESSAGE_RESULT_ACCEPTED}, {9u, 1000u, MESSAGE_RESULT_SEQUENCE}, {9u, 1u, MESSAGE_RESULT_ACCEPTED}};
     const lever_command_t nothing = command_none();
     for (uint32_t k = 0u; k < (sizeof rows / sizeof rows[0]); k++) {
         (void)deliver_many(rows[k].after_ms);
         command_counter = rows[k].counter;
         TEST_ASSERT_EQUAL(rows[k].result, send(&nothing));
     }
+}
+
+/* A sender that hangs: a mailbox is sent again and again. Its counter is right once in 16 for one that starts anew. */
+/* R39 */
+TEST(a_counter_that_stands_keeps_torque_for_a_second_and_never_starts_it_again)
+{
+    const lever_frame_t on = dither_frame(0.3f);
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, answer_to(&on).result);
+    for (uint32_t k = 0u; k < 50u; k++) {
+        (void)deliver_many(100u);
+        TEST_ASSERT_EQUAL((k < 10u) || (health().torque == 0.0f), true);
+        TEST_ASSERT_EQUAL(MESSAGE_RESULT_SEQUENCE, answer_to(&on).result);
+    }
+    const lever_frame_t anew = dither_frame(0.3f); /* with the counter after it */
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, answer_to(&anew).result);
+    (void)deliver_many(900u);
+    TEST_ASSERT_TRUE(health().torque != 0.0f);
 }
 
 /* --- another estimator -------------------------------------------------------------------------------------------- */

@@ -51,6 +51,8 @@ TEST(a_set_of_divided_messages_is_spread_over_a_publish_period)
         }
         next[count++] = 0x210u;
         assert_ids(next, count, answers());
+        TEST_ASSERT_EQUAL_UINT32(1000u * (k % 20u), lever->link.set_us);
+        TEST_ASSERT_EQUAL_UINT32(1000u * (k % 1000u), lever->link.identity_us);
     }
 }
 
@@ -100,6 +102,30 @@ TEST(frames_not_fetched_are_replaced_and_do_not_pile_up_and_a_late_sample_is_ans
     const uint32_t count = answers();
     TEST_ASSERT_EQUAL_UINT32(1u, health().late);
     TEST_ASSERT_TRUE(message_state_estimate_decode(&message, &frames[count - 1u]));
+}
+
+/* A clock that is half a turn off has not advanced. */
+TEST(a_sample_that_is_not_newer_takes_a_period)
+{
+    (void)deliver_many(10u);
+    const uint32_t before_us = lever->link.identity_us;
+    lever->link.time_us = (time_us + (uint32_t)PERIOD_US) - 0x80000000u;
+    (void)deliver();
+    TEST_ASSERT_EQUAL_UINT32(before_us + (uint32_t)PERIOD_US, lever->link.identity_us);
+}
+
+/* Also when none is due; recoveries wrap. */
+TEST(the_last_page_of_identity_and_the_lowest_byte_of_the_recoveries_are_said)
+{
+    lever_frame_t frame;
+    message_identity_t identity;
+    message_health_t message;
+    lever->link.pages = 0u;
+    TEST_ASSERT_TRUE(link_encode(lever, OUTPUT_IDENTITY, &frame) && message_identity_decode(&identity, &frame));
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_PAGE_CHOICES, identity.page);
+    lever->estimator.recoveries = 0x105u;
+    TEST_ASSERT_TRUE(link_encode(lever, OUTPUT_HEALTH, &frame) && message_health_decode(&message, &frame));
+    TEST_ASSERT_EQUAL_UINT8(5u, message.restarts);
 }
 
 /* Once there was no HEALTH at all then. */

@@ -240,6 +240,37 @@ TEST(damping_ends_with_the_commands)
     TEST_ASSERT_EQUAL_FLOAT(1.0f, correction().weight);
 }
 
+/* Long before the estimator finds it stuck. */
+TEST_EACH(2, a_sensor_that_says_the_same_closes_it)
+{
+    (void)run(3000u);
+    const lever_sample_t stuck = sample_after(0u);
+    for (uint32_t k = 1u; k <= 23u; k++) {
+        TEST_ASSERT_TRUE(lever->bounce.mitigation.open);
+        lever_sample_t sample = sample_after(1u);
+        sample.theta = (test_round == 0u) ? stuck.theta : sample.theta;
+        sample.z_ddot = (test_round == 1u) ? stuck.z_ddot : sample.z_ddot;
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_FALSE(lever->bounce.mitigation.open);
+}
+
+/* To the microsecond, or 1.25 sample periods. */
+TEST(a_sample_serves_for_20_ms_or_longer_if_samples_are_slow)
+{
+    static const float period[] = {1.0e-3f, 0.016001f, 0.02f};
+    static const uint32_t silence_us[] = {20000u, 20001u, 25000u};
+    for (uint32_t i = 0u; i < 3u; i++) {
+        config.settings.sample_period = period[i];
+        start();
+        for (uint32_t k = 0u; k < 100u; k++) {
+            const lever_sample_t sample = sample_after((i == 0u) ? 4u : 16u);
+            (void)lever_update(lever, &sample);
+        }
+        TEST_ASSERT_EQUAL_UINT32(silence_us[i] + 1u, lever->bounce.mitigation.sensed_left);
+    }
+}
+
 TEST(each_fault_of_sensors_clock_or_hands_closes_it)
 {
     static const uint32_t fault[] = {LEVER_FAULT_CLOCK, LEVER_FAULT_RECOVERED, LEVER_FAULT_HANDS_OFF, 0u};

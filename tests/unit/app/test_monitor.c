@@ -68,8 +68,10 @@ TEST(a_signal_that_stands_still_against_the_innovations_is_stuck)
 /* Its sender says so itself: then it is missing, not stuck, however long, and counts anew when it is back. */
 TEST(a_signal_that_is_not_sent_or_not_valid_is_not_stuck)
 {
-    (void)block((uint32_t)MONITOR_THETA, 0.5f);
     surprise(4.0, 300u);
+    for (uint32_t k = 0u; k < 4u; k++) {
+        TEST_ASSERT_FALSE(block((uint32_t)MONITOR_THETA, 0.5f));
+    }
     for (uint32_t k = 0u; k < 50u; k++) {
         TEST_ASSERT_FALSE(monitor_has_just_stuck(&monitor));
     }
@@ -94,7 +96,7 @@ TEST(a_base_acceleration_that_always_changed_is_stuck_without_the_innovations)
             stuck = block((uint32_t)MONITOR_Z_DDOT, (float)changes) || stuck;
         }
         TEST_ASSERT_EQUAL(changes == 20u, stuck);
-        for (uint32_t k = 0u; k < 5u; k++) { /* having stood still, it is not taken for granted any more */
+        for (uint32_t k = 0u; k < 18u; k++) { /* having stood still, it is not taken for granted any more */
             (void)block((uint32_t)MONITOR_Z_DDOT, 0.5f + (float)k);
         }
         for (uint32_t k = 0u; k < 10u; k++) {
@@ -266,4 +268,55 @@ TEST(a_torque_that_follows_again_is_right_and_without_dither_nothing_is_said)
         (void)torque_wrong_after(&fresh, 0.0, 0.0, 0.2);
     }
     TEST_ASSERT_FALSE(fresh.torque_wrong);
+}
+
+/* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.35, they
+ * count: of a gain of 0 and of 1. */
+TEST(the_verdict_on_the_base_waits_until_it_is_sure)
+{
+    static const struct {
+        float information;
+        float period;
+        bool before;
+        bool is;
+        float kept;
+    } row[] = {{50.0f, 0.02f, false, false, 48.0f}, {5.0f, 0.02f, true, true, 4.5f}, {99.0f, 0.0f, false, false, 99.0f},
+        {101.0f, 0.0f, false, true, 0.0f}, {8.0f, 0.0f, true, true, 8.0f}, {8.3f, 0.0f, true, false, 0.0f}};
+    static const score_t nothing = {0.0f, 0.0f};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        setUp();
+        monitor.base_wrong = row[i].before;
+        monitor.base.information = row[i].information;
+        monitor.base.vector = row[i].before ? -row[i].information : row[i].information;
+        (void)monitor_step(&monitor, &nothing, row[i].period);
+        TEST_ASSERT_EQUAL(row[i].is, monitor.base_wrong);
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, row[i].kept, monitor.base.information);
+    }
+    monitor.base_wrong = true;
+    monitor.base.information = 1.0f;
+    monitor_trust_base(&monitor);
+    TEST_ASSERT_TRUE(!monitor.base_wrong && (monitor.base.information == 0.0f));
+}
+
+/* Sums over samples of 1 ms of which every eighth counts: from 0.025 on they say something. A quarter off is right
+ * again. */
+TEST(the_verdict_on_the_torque_waits_until_enough_is_asked)
+{
+    static const struct {
+        float asked;
+        float gain;
+        float sample_period;
+        bool before;
+        bool is;
+    } row[] = {{0.024f, -1.0f, 1.0e-3f, false, false}, {0.026f, -1.0f, 1.0e-3f, false, true},
+        {4.0e-4f, -1.0f, 0.0625f, false, false}, {0.0f, 1.0f, 1.0e-3f, true, false},
+        {1.0f, 0.75f, 1.0e-3f, true, false}, {1.0f, 0.74f, 1.0e-3f, true, true}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        const float product = row[i].gain * row[i].asked;
+        setUp();
+        monitor.torque = (agreement_t){row[i].asked, row[i].gain * product, product};
+        monitor.torque_wrong = row[i].before;
+        (void)monitor_judge_torque(&monitor, 0.02f, row[i].sample_period);
+        TEST_ASSERT_EQUAL(row[i].is, monitor.torque_wrong);
+    }
 }

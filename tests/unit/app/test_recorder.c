@@ -1,4 +1,5 @@
 /* Snapshots on the bus: whole, in time, spread evenly, and what they say of themselves. */
+#include "app/instance.h"
 #include "frames.h"
 
 enum { FRAMES = 2 + ((LEVER_STATE_BYTES + 5) / 6), PERIOD = 500000 };
@@ -15,6 +16,7 @@ void setUp(void)
 {
     lever_config_default(&config);
     start_bus();
+    (void)memset(&recorder, 0xA5, sizeof recorder);
     lever_recorder_init(&recorder, PERIOD);
     parts = 0u;
     whole = 0u;
@@ -120,6 +122,26 @@ TEST(time_is_that_of_the_samples)
     time_us -= 3000u;
     TEST_ASSERT_EQUAL_UINT32(0u, record(1000u));
     TEST_ASSERT_EQUAL_UINT32(1u, parts);
+}
+
+/* Half a turn of the clock is no time. */
+TEST(when_a_snapshot_was_late_the_next_begins_with_a_sample)
+{
+    lever_frame_t frame;
+    (void)record(1000u);
+    recorder.elapsed_us = recorder.period_us;
+    while (lever_recorder_next_frame(&recorder, &frame)) {
+    }
+    const uint16_t sent = recorder.sent;
+    lever_recorder_step(&recorder, lever);
+    TEST_ASSERT_EQUAL_UINT16(sent, recorder.sent);
+    recorder.elapsed_us = recorder.period_us - 1u;
+    lever->link.time_us += 0x80000000u;
+    lever_recorder_step(&recorder, lever);
+    TEST_ASSERT_EQUAL_UINT16(sent, recorder.sent);
+    lever->link.time_us++;
+    lever_recorder_step(&recorder, lever);
+    TEST_ASSERT_EQUAL_UINT16(0u, recorder.sent);
 }
 
 TEST(a_period_that_is_too_short_is_as_short_as_can_be)

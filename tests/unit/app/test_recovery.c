@@ -190,3 +190,20 @@ TEST(a_huge_innovation_after_an_outage_does_not_spoil_the_average)
     TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_INNOVATION));
     TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
 }
+
+/* The level of friction, which would keep what is not a number. */
+TEST(a_rate_that_is_none_has_no_friction)
+{
+    static const float rates[] = {1.0e4f, 1.2e4f, NAN};
+    level_t *level = &lever->estimator.trim.input[TRIM_FRICTION];
+    const level_t nothing = {.section = {{0.0f, 0.0f}}};
+    for (uint32_t i = 0u; i < 3u; i++) {
+        setUp();
+        *level = nothing;
+        lever->estimator.trim.origin[1] = 0.0f;
+        cdkf->x[1] = rates[i];
+        (void)run(1u);
+        TEST_ASSERT_EQUAL(i == 0u, level->section[0].level > 0.0f);
+        TEST_ASSERT_FALSE(isnan(level->section[0].level));
+    }
+}

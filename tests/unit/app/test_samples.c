@@ -1,4 +1,5 @@
 /* Single samples: what is missing, invalid, implausible, late, twice; time that wraps or starts anew. */
+#include "app/instance.h"
 #include "model/model.h"
 #include "rig.h"
 
@@ -92,9 +93,9 @@ TEST(a_value_is_plausible_up_to_its_limit)
 /* In whole periods, rounded; a clock that advances by less than a quarter of one as good as stands. */
 TEST(time_that_passes_is_counted_in_periods)
 {
-    static const uint32_t elapsed_us[] = {1400u, 1600u, 2300u, 2600u, 300u, 200u};
-    static const uint32_t lost[] = {0u, 1u, 1u, 2u, 0u, 0u};
-    for (uint32_t k = 0u; k < 6u; k++) {
+    static const uint32_t elapsed_us[] = {1400u, 1600u, 2300u, 2600u, 300u, 200u, 1500u, 250u};
+    static const uint32_t lost[] = {0u, 1u, 1u, 2u, 0u, 0u, 0u, 0u};
+    for (uint32_t k = 0u; k < 8u; k++) {
         start();
         (void)run(400u);
         lever_sample_t sample = sample_after(1u);
@@ -145,11 +146,11 @@ TEST(without_measured_torque_the_torque_asked_for_counts)
 /* R30 */
 TEST(a_sample_that_comes_twice_or_is_older_is_late_and_changes_nothing)
 {
-    const uint32_t older_us[] = {0u, 5000u, 1800000000u}; /* half a turn of the clock is 36 minutes */
-    run_both(1501u);                                      /* settled */
+    const uint32_t older_us[] = {0u, 5000u, 1800000000u, 0x80000000u}; /* half a turn of the clock is 36 minutes */
+    run_both(1501u);                                                   /* settled */
     lever_sample_t sample = sample_after(0u);
     sample.theta += 0.1f;
-    for (uint32_t k = 0u; k < 3u; k++) {
+    for (uint32_t k = 0u; k < 4u; k++) {
         sample.time_us = time_us - older_us[k];
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_update(lever, &sample));
         TEST_ASSERT_EQUAL_UINT32(k + 1u, health().late);
@@ -215,6 +216,43 @@ TEST(late_samples_that_do_not_advance_are_no_new_clock)
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run_lagging(1u, ((k % 300u) == 0u) ? 0u : lag_us));
     }
     TEST_ASSERT_EQUAL_UINT32(1005u, health().samples);
+}
+
+/* Samples so many milliseconds before the last good one; of a clock that starts anew they advance by gap_limit on end,
+ * from one to the next by no more. A good one (0) begins it again, as does one that stands. */
+TEST(a_new_clock_advances_by_gap_limit_on_end)
+{
+    static const struct {
+        uint32_t before_us[5];
+        enum lever_mode mode;
+    } row[] = {{{10000000u, 9500000u}, LEVER_MODE_ALIGN}, {{10000000u, 9500001u}, LEVER_MODE_RUN},
+        {{10000000u, 9499999u, 9000000u}, LEVER_MODE_RUN}, {{10000000u, 9600000u, 9500000u}, LEVER_MODE_ALIGN},
+        {{10000000u, 0u, 9600000u, 9450000u}, LEVER_MODE_RUN},
+        {{10000000u, 9600000u, 9600000u, 9450000u}, LEVER_MODE_RUN}};
+    (void)run(1000u);
+    const lever_memory_t before = memory;
+    const uint32_t then_us = time_us;
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        enum lever_mode mode = LEVER_MODE_RUN;
+        memory = before;
+        for (uint32_t k = 0u; (k < 5u) && ((k < 2u) || (row[i].before_us[k] != 0u)); k++) {
+            lever_sample_t sample = sample_after(0u);
+            sample.time_us = (row[i].before_us[k] == 0u) ? (then_us + 1000u) : (then_us - row[i].before_us[k]);
+            mode = lever_update(lever, &sample);
+        }
+        TEST_ASSERT_EQUAL(row[i].mode, mode);
+    }
+}
+
+/* There is nothing to extrapolate from. */
+TEST(the_first_base_acceleration_is_taken_as_it_is_whatever_the_delay)
+{
+    config.settings.z_ddot_delay = 5.0e-3f;
+    start();
+    lever_sample_t sample = sample_after(1u);
+    sample.z_ddot = 2.0f;
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_EQUAL_FLOAT(2.0f, lever->estimator.last_z_ddot);
 }
 
 /* R30 */

@@ -58,7 +58,12 @@ TEST(choices_that_are_not_known_and_settings_that_do_not_go_together_are_named)
     config.settings.trim_corner = 2.0f;
     config.settings.gap_limit = 1.01f * (1.5f / 2.0f);
     assert_refused("gap_limit");
-    config.settings.gap_limit = 0.99f * (1.5f / 2.0f);
+    config.settings.gap_limit = 0.75f;
+    TEST_ASSERT_NULL(lever_config_check(&config));
+    config.settings.sample_period = 0.01f;
+    config.settings.gap_limit = 0.0199f;
+    assert_refused("gap_limit");
+    config.settings.gap_limit = 0.02f;
     TEST_ASSERT_NULL(lever_config_check(&config));
     TEST_ASSERT_NULL(lever_init(NULL, &config));
     TEST_ASSERT_NULL(lever_init(&memory, NULL));

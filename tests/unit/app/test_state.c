@@ -2,6 +2,7 @@
 #include "app/instance.h"
 #include "app/state.h"
 #include "frames.h"
+#include "port/embedded/crc32.h"
 
 #include <stddef.h>
 
@@ -157,7 +158,7 @@ TEST(limits_are_those_of_what_they_index)
         {offsetof(struct lever, estimator.mode), 5u}, {offsetof(struct lever, estimator.nis_size), 2u},
         {offsetof(struct lever, link.due), 0x1FFFu}, /* 13 messages */
         {offsetof(struct lever, link.pages), 7u}, {offsetof(struct lever, link.counter), 15u},
-        {offsetof(struct lever, link.command_result), 3u}, {offsetof(struct lever, bounce.chosen), 5u},
+        {offsetof(struct lever, link.command_result), 7u}, {offsetof(struct lever, bounce.chosen), 5u},
         {offsetof(struct lever, bounce.state), 3u}};
     for (uint32_t i = 0u; i < (uint32_t)(sizeof limits / sizeof limits[0]); i++) {
         uint32_t row = 0u;
@@ -241,8 +242,34 @@ TEST(any_bytes_that_are_accepted_break_nothing)
     }
 }
 
+TEST(counts_of_two_bytes_are_restored_whole_and_a_sample_that_waits_is_dropped)
+{
+    const lever_platform_t platform = {.overruns = 0x1234u, .dropped = 0x5678u};
+    start_bus();
+    fly(50u);
+    lever_platform(lever, &platform);
+    lever->link.due = 0x1234u;
+    lever_state_save(lever, state);
+    lever_t *other = lever_init(&other_memory, &config);
+    other->link.has_sample = true;
+    TEST_ASSERT_TRUE(lever_state_restore(other, state));
+    TEST_ASSERT_EQUAL_HEX16(platform.overruns, other->platform.overruns);
+    TEST_ASSERT_EQUAL_HEX16(platform.dropped, other->platform.dropped);
+    TEST_ASSERT_EQUAL_HEX16(0x1234u, other->link.due);
+    TEST_ASSERT_FALSE(other->link.has_sample);
+}
+
+/* A CRC-32, by another implementation, over version, and count and greatest value of each row. */
 TEST(the_layout_is_a_number_of_its_own)
 {
-    TEST_ASSERT_EQUAL_UINT16(lever_state_layout(), lever_state_layout());
-    TEST_ASSERT_NOT_EQUAL(0u, lever_state_layout());
+    const uint8_t version[] = {LEVER_VERSION_MAJOR, LEVER_VERSION_MINOR, LEVER_VERSION_PATCH};
+    uint32_t crc = crc32_update(0u, version, (uint32_t)sizeof version);
+    for (uint32_t i = 0u; i < state_row_count(); i++) {
+        const uint32_t count = state_row(i)->count;
+        const uint32_t most = state_row(i)->most;
+        const uint8_t bytes[] = {(uint8_t)(count & 0xFFu), (uint8_t)(count >> 8u), (uint8_t)(most & 0xFFu),
+            (uint8_t)((most >> 8u) & 0xFFu), (uint8_t)((most >> 16u) & 0xFFu), (uint8_t)(most >> 24u)};
+        crc = crc32_update(crc, bytes, (uint32_t)sizeof bytes);
+    }
+    TEST_ASSERT_EQUAL_HEX16(~crc & 0xFFFFu, lever_state_layout());
 }

@@ -112,3 +112,38 @@ TEST(what_is_within_the_limits_passes_as_it_is)
         TEST_ASSERT_TRUE((k < 101u) || (gate.torque == asked));
     }
 }
+
+/* The amplitude falls with the mean square as steeply as is allowed by its slew, by the silence that is to be outlasted,
+ * or by a fifth of the mean square; figures by hand. */
+TEST(settings_become_times_and_slopes)
+{
+    static const struct {
+        float sample_period;
+        float limit;
+        float slew;
+        float rms;
+        float fade;
+        uint32_t period_us;
+        uint32_t silence_us;
+        float open_step;
+        float slope;
+    } row[] = {{1.0e-3f, 2.0f, 10.0f, 0.5f, 0.1f, 1000u, 20000u, 0.01f, 0.625f},        /* slew / (4 limit^2) */
+        {2.0e-2f, 1.0f, 1.0e5f, 0.55901699f, 0.025f, 20000u, 60000u, 0.8f, 2.1111111f}, /* .76 / (.24 (limit + .5)) */
+        {6.6670e-3f, 3.0f, 1.0e5f, 1.11803399f, 0.0f, 6667u, 20001u, 1.0f, 2.8748438f},
+        {1.00030e-3f, 9.5f, 1.0e5f, 0.55901699f, 1.0e-3f, 1000u, 20000u, 1.0f, 1.15f},
+        {1.0e-3f, 1.0f, 1.0e5f, 1.0f, 1.0f, 1000u, 20000u, 1.0e-3f, 0.6598300f},
+        {1.0e-3f, 0.0f, 200.0f, 0.0f, 1.0f, 1000u, 20000u, 1.0e-3f, 0.0f}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        torque_gate_t gate;
+        config.settings.sample_period = row[i].sample_period;
+        config.settings.torque_limit = row[i].limit;
+        config.settings.torque_slew = row[i].slew;
+        config.settings.torque_rms = row[i].rms;
+        config.settings.dither_fade = row[i].fade;
+        torque_gate_init(&gate, &config.settings);
+        TEST_ASSERT_EQUAL_UINT32(row[i].period_us, gate.period_us);
+        TEST_ASSERT_EQUAL_UINT32(row[i].silence_us, gate.silence_us);
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, row[i].open_step, gate.open_step);
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-4f * row[i].slope, row[i].slope, gate.amplitude_slope);
+    }
+}

@@ -204,3 +204,15 @@ TEST(an_arm_that_is_not_stable_is_refused)
         TEST_ASSERT_EQUAL_FLOAT(0.0f, motion.theta_dot);
     }
 }
+
+TEST(an_angle_is_plausible_up_to_its_limit)
+{
+    model_step_t step = about;
+    step.period = 0.0f;
+    motion.theta = 25.0f;
+    TEST_ASSERT_TRUE(involuntary_step(&motion, &arm, &lever, &step, (float)CORNER));
+    TEST_ASSERT_EQUAL_FLOAT(25.0f, motion.theta);
+    motion.theta = 26.0f;
+    TEST_ASSERT_FALSE(involuntary_step(&motion, &arm, &lever, &step, (float)CORNER));
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, motion.theta);
+}

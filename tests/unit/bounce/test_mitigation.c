@@ -170,6 +170,8 @@ TEST_EACH(CAUSES, whatever_closes_it_has_it_passive_within_100_ms_without_a_jump
     if (cause != SILENCE) {
         run(2u);
         TEST_ASSERT_EQUAL_FLOAT(0.0f, mitigation.damping);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, mitigation.expected_damping);
+        run(160u); /* however long it lasts */
     }
     TEST_ASSERT_TRUE((cause == CHOSEN_OFF) || !mitigation.open);
     TEST_ASSERT_TRUE((cause != CHOSEN_OFF) || !on);
@@ -235,17 +237,31 @@ TEST(a_sensor_that_was_quiet_long_ago_is_stuck_as_soon_as_any)
     TEST_ASSERT_FALSE(mitigation.open);
 }
 
-/* At 100 Hz 22 ms are two samples, which any two may be. */
-TEST(a_few_samples_that_are_the_same_are_no_fault_however_long_they_take)
+/* It is stuck after more than 22 ms, and more than eight samples or three times as many as it usually is the same for: at
+ * 100 Hz 22 ms are two samples, which any two may be. What was usual for one sample is forgotten by now. */
+TEST(a_sensor_is_stuck_after_22_ms_and_more_samples_than_is_usual)
 {
-    run(3000u);
-    sample.elapsed_us = 10000u;
-    sample.step.period = 0.01f;
-    spoil(THETA_STUCK);
-    run(8u);
-    TEST_ASSERT_TRUE(mitigation.open);
-    run(1u);
-    TEST_ASSERT_FALSE(mitigation.open);
+    static const struct {
+        uint32_t period_us;
+        uint8_t longest;
+        uint32_t samples;
+    } row[] = {{1000u, 0u, 23u}, {449u, 0u, 49u}, {10000u, 0u, 9u}, {1000u, 20u, 69u}, {10000u, 1u, 9u}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        for (uint32_t which = 0u; which < 2u; which++) {
+            setUp();
+            run(2u);
+            mitigation.samples = (uint8_t)((row[i].longest == 1u) ? 0u : 1u);
+            *((which == 0u) ? &mitigation.theta : &mitigation.z_ddot) =
+                (mitigation_reading_t){.longest = row[i].longest};
+            sample.elapsed_us = row[i].period_us;
+            sample.step.period = 1.0e-6f * (float)row[i].period_us;
+            spoil((which == 0u) ? THETA_STUCK : BASE_STUCK);
+            run(row[i].samples - 1u);
+            TEST_ASSERT_TRUE(mitigation.open);
+            run(1u);
+            TEST_ASSERT_FALSE(mitigation.open);
+        }
+    }
 }
 
 TEST(it_comes_back_within_a_second)

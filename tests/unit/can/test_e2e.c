@@ -47,7 +47,7 @@ TEST(frames_are_used_again_once_so_many_have_come_in_order)
 TEST(without_synchronisation_a_sequence_goes_on_where_it_was)
 {
     static const cycle_t cycles[] = {{1, E2E_INITIAL, 0u}, {1, E2E_OK, 0u}, {3, E2E_WRONG_SEQUENCE, 0u},
-        {14, E2E_OK, 0u}, {NONE, E2E_NO_NEW_DATA, 0u}, {1, E2E_OK, 0u}};
+        {NONE, E2E_NO_NEW_DATA, 0u}, {14, E2E_OK, 0u}, {NONE, E2E_NO_NEW_DATA, 0u}, {1, E2E_OK, 0u}};
     e2e_tolerance_t lenient = strict;
     lenient.sync_counter = 0u;
     ASSERT_CYCLES(lenient, cycles);

@@ -78,6 +78,17 @@ TEST(a_state_that_starts_anew_is_independent_of_w_and_drops_what_is_pending)
     TEST_ASSERT_TRUE((cdkf->s_xx[2] == 0.0f) && (cdkf->s[9] == 0.0f) && (cdkf->s[14] == 0.0f));
 }
 
+TEST(an_output_that_is_not_valid_has_no_innovation)
+{
+    const float y[N] = {1.0f, 1.0f};
+    const bool valid[N] = {false, false};
+    const innovation_t none = {.inverse_variance = 1.0f};
+    innovation_t innovation[N] = {{1.0f, 2.0f, 3.0f, 4.0f}, {1.0f, 2.0f, 3.0f, 4.0f}};
+    cdkf_measurement_update(cdkf, y, valid, true, innovation);
+    TEST_ASSERT_EQUAL_MEMORY(&none, &innovation[0], sizeof none);
+    TEST_ASSERT_EQUAL_MEMORY(&none, &innovation[1], sizeof none);
+}
+
 /* --- learning and walk at their limits ---------------------------------------------------------------------------- */
 
 TEST(w_is_held_at_its_bounds_and_said_to_rest_there)
@@ -94,6 +105,21 @@ TEST(w_is_held_at_its_bounds_and_said_to_rest_there)
     }
 }
 
+/* The state, too, by what it sees of the step itself; beyond the last score nothing is written. */
+TEST(a_step_that_is_learnt_leaves_w_within_its_bounds)
+{
+    const score_t score = {.vector = 1.0e6f, .information = 1.0f};
+    score_t scores[CDKF_CONSIDERED + 1] = {[CDKF_CONSIDERED] = {-1.0f, -1.0f}};
+    cdkf_begin_step(cdkf);
+    cdkf->considered[CDKF_STEP].w[0] = 1.0f;
+    cdkf_constant_scores(cdkf, scores);
+    TEST_ASSERT_EQUAL_FLOAT(0.5f, scores[CDKF_STEP].vector); /* what is pending */
+    TEST_ASSERT_EQUAL_FLOAT(3.0f, scores[CDKF_STEP].information);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0f, scores[CDKF_CONSIDERED].vector);
+    cdkf_learn_step(cdkf, &score);
+    TEST_ASSERT_TRUE(cdkf->w[0] == cdkf->scaling.greatest[0]);
+}
+
 /* --- the invariant ------------------------------------------------------------------------------------------------ */
 
 typedef struct damage {
@@ -104,10 +130,10 @@ typedef struct damage {
 
 TEST(the_invariant_refuses_every_kind_of_damage)
 {
-    const damage_t damages[] = {{&cdkf->x[0], NAN, true}, {&cdkf->x[1], INFINITY, true}, {&cdkf->x[0], 26.0f, true},
-        {&cdkf->x[1], -1.1e4f, true}, {&cdkf->s_xx[0], NAN, true}, {&cdkf->s_xx[0], 0.0f, false},
+    const damage_t damages[] = {{&cdkf->x[0], NAN, true}, {&cdkf->x[1], INFINITY, true}, {&cdkf->x[0], 25.0f, true},
+        {&cdkf->x[1], -1.0e4f, true}, {&cdkf->s_xx[0], NAN, true}, {&cdkf->s_xx[0], 0.0f, false},
         {&cdkf->s_xx[2], -INFINITY, true}, {&cdkf->s_xx[2], NAN, true}, {&cdkf->s_xx[3], 0.0f, false},
-        {&cdkf->s_xx[3], -1.0f, false}, {&cdkf->s_xx[3], 1.1e6f, true}, {&cdkf->response[0], NAN, false},
+        {&cdkf->s_xx[3], -1.0f, false}, {&cdkf->s_xx[3], 1.0e6f, true}, {&cdkf->response[0], NAN, false},
         {&cdkf->response[1], INFINITY, false}, {&cdkf->w[0], NAN, false}, {&cdkf->w[1], 1.0e6f, false},
         {&cdkf->w[2], -1.0e6f, false}, {&cdkf->walk[0], NAN, false}, {&cdkf->walk[1], -1.0e-9f, false},
         {&cdkf->walk[2], INFINITY, false}, {&cdkf->s[0], 0.0f, false}, {&cdkf->s[4], -0.1f, false},
@@ -120,7 +146,7 @@ TEST(the_invariant_refuses_every_kind_of_damage)
         TEST_ASSERT_EQUAL(!damages[k].of_state, cdkf_state_is_valid(cdkf));
     }
     for (uint32_t k = 0u; k < (uint32_t)(CDKF_ROWS * L); k++) {
-        const float bad[] = {NAN, INFINITY, -INFINITY, 1.1e17f};
+        const float bad[] = {NAN, INFINITY, -INFINITY, 1.0e17f};
         for (uint32_t b = 0u; b < 4u; b++) {
             setUp();
             cdkf->s[k] = bad[b];

@@ -26,5 +26,28 @@ TEST(a_force_is_taken_up_to_eight_standard_deviations)
         seen.innovation = sigmas[i] * sqrtf(own + 0.14f); /* and the rows */
         TEST_ASSERT_EQUAL(i < 2u, grip_predict_state_columns(&cdkf, &response, PERIOD, &seen));
         TEST_ASSERT_TRUE(cdkf_state_is_valid(&cdkf));
+        TEST_ASSERT_TRUE(cdkf.s_xx[0] < 1.1e-3f); /* theta is no less certain after a step */
+    }
+}
+
+/* An output that sees 1 of the first error and 3 of the second, in halves of its standard deviation; the third does not
+ * act. Whether the base is wrong must not depend on the force. */
+TEST(a_force_says_of_the_errors_what_it_sees_of_them)
+{
+    static const float row[MODEL_PARAMETERS] = {1.0f, 10.0f, 100.0f};
+    static const float of_seen[] = {2.0f, 6.0f, 0.0f};
+    const gain_t gain = {.k = {0.5f, 0.25f}, .inverse = 2.0f};
+    const float seen[CDKF_CONSIDERED] = {1.0f, 3.0f, 5.0f};
+    considered_t considered[CDKF_CONSIDERED] = {{.vector = 0.0f}};
+    considered_correct_by(considered, 2u, &gain, seen, row, -3.0f, true);
+    for (uint32_t c = 0u; c < 3u; c++) {
+        const bool counts = (c != (uint32_t)CDKF_BASE_GAIN);
+        TEST_ASSERT_EQUAL_FLOAT(-0.25f * of_seen[c], considered[c].x[0]);
+        TEST_ASSERT_EQUAL_FLOAT(-0.125f * of_seen[c], considered[c].x[1]);
+        TEST_ASSERT_EQUAL_FLOAT(counts ? (-3.0f * of_seen[c]) : 0.0f, considered[c].vector);
+        TEST_ASSERT_EQUAL_FLOAT(counts ? (of_seen[c] * of_seen[c]) : 0.0f, considered[c].information);
+        for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+            TEST_ASSERT_EQUAL_FLOAT(row[i] * of_seen[c], considered[c].cross[i]);
+        }
     }
 }

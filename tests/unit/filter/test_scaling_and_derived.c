@@ -72,18 +72,25 @@ TEST(w_is_kept_within_its_bounds)
 
 /* --- derived ------------------------------------------------------------------------------------------------------ */
 
-/* A falling lever has no natural frequency, but answers the base. */
-TEST(without_stiffness_there_is_no_natural_frequency)
+/* A falling lever, or one without a spring, has no natural frequency, but answers the base. */
+TEST_EACH(2, without_stiffness_there_is_no_natural_frequency)
 {
     const model_constants_t constants = {.trim = true};
     const model_step_t step = {.trim_cosine = 1.0f};
     static cdkf_t cdkf;
-    const prior_t prior = {.guess = {20.0f, -4.0f, -2.0f}, .sigma = {1.0f, 1.0f, 1.0f}};
+    const prior_t prior = {.guess = {(test_round == 0u) ? 20.0f : 0.0f, -4.0f, -2.0f}, .sigma = {1.0f, 1.0f, 1.0f}};
     cdkf_init(&cdkf, &model_linear_black_box, &constants, &prior);
     cdkf_draw(&cdkf, &model_linear_black_box, &constants);
     const derived_dynamics_t dynamics = derived_dynamics(&cdkf, &model_linear_black_box, &constants, &step);
-    const derived_feedthrough_t feedthrough =
-        derived_feedthrough(&cdkf, &model_linear_black_box, &constants, &step, 0.0f);
     TEST_ASSERT_TRUE((dynamics.natural_frequency == 0.0f) && (dynamics.damping_ratio == 0.0f));
-    TEST_ASSERT_EQUAL_FLOAT(0.1f, feedthrough.real);
+    const float frequency = (test_round == 0u) ? 0.0f : (0.5f / 3.14159265f); /* of 1 rad/s */
+    const derived_feedthrough_t feedthrough =
+        derived_feedthrough(&cdkf, &model_linear_black_box, &constants, &step, frequency);
+    TEST_ASSERT_EQUAL_FLOAT((test_round == 0u) ? 0.1f : (2.0f / 17.0f), feedthrough.real);
+    for (uint32_t k = 1u; k < (uint32_t)MODEL_POINTS; k++) {
+        cdkf.points[k] = cdkf.points[0];
+    }
+    const derived_feedthrough_t certain =
+        derived_feedthrough(&cdkf, &model_linear_black_box, &constants, &step, frequency);
+    TEST_ASSERT_TRUE((certain.gain_sigma == 0.0f) && (certain.correlation == 0.0f));
 }

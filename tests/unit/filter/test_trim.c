@@ -96,6 +96,8 @@ TEST(a_prediction_that_is_none_does_not_reach_the_level)
     for (uint32_t k = 0u; k < 4u; k++) {
         setUp();
         (void)run_without(1u, 5u, wild[k]);
-        TEST_ASSERT_TRUE(trim_angle(&trim) == 0.35f);
+        TEST_ASSERT_TRUE((trim_angle(&trim) == 0.35f) && (trim.ahead[0] == 0.0f));
     }
+    (void)run_without(1u, 1u, 25.0f); /* the greatest angle that is one */
+    TEST_ASSERT_TRUE(trim.ahead[0] > 0.0f);
 }

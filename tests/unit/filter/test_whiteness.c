@@ -62,6 +62,12 @@ TEST(blocks_that_do_not_count_and_the_first_two_seconds_say_nothing)
     (void)run(2u, 10.0, 0.99, true);
     TEST_ASSERT_TRUE(whiteness.coloured);
     setUp();
+    for (uint32_t block = 1u; block <= 4u; block++) { /* at two seconds a verdict is due */
+        whiteness_add(&whiteness, 1.0f);
+        whiteness_step(&whiteness, 0.5f, true);
+        TEST_ASSERT_EQUAL(block == 4u, whiteness_correlation(&whiteness) > 0.0f);
+    }
+    setUp();
     (void)run(500u, 0.0, 0.0, true);
     const whiteness_t before = whiteness;
     TEST_ASSERT_EQUAL_UINT32(0u, run(500u, 10.0, 0.99, false));
@@ -70,17 +76,22 @@ TEST(blocks_that_do_not_count_and_the_first_two_seconds_say_nothing)
     TEST_ASSERT_EQUAL_UINT32(10u, run(10u, 0.0, 0.0, false)); /* a verdict stays until there is another */
 }
 
-/* Between the two thresholds a verdict stays what it is. */
+/* Between the two thresholds a verdict stays what it is; they belong to white. */
 TEST(a_verdict_has_hysteresis)
 {
-    for (uint32_t was = 0u; was < 2u; was++) {
+    static const struct {
+        float correlation;
+        bool was;
+        bool is;
+    } row[] = {{-0.3f, false, false}, {-0.3f, true, true}, {0.35f, false, false}, {0.25f, true, false}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         setUp();
-        whiteness.time = 5.0f;
-        whiteness.variance = 1.0f;
-        whiteness.product[2] = -0.3f;
-        whiteness.coloured = (was == 1u);
+        whiteness = (whiteness_t){.time = 5.0f, .variance = 1.0f, .coloured = row[i].was};
+        whiteness.product[2] = row[i].correlation;
+        whiteness.before[2] = row[i].correlation;
+        whiteness_add(&whiteness, 1.0f); /* so that neither mean moves */
         whiteness_step(&whiteness, 1.0e-6f, true);
-        TEST_ASSERT_EQUAL(was == 1u, whiteness.coloured);
+        TEST_ASSERT_EQUAL(row[i].is, whiteness.coloured);
     }
 }
 

@@ -204,4 +204,7 @@ TEST(a_pivot_is_kept_above_the_rounding_of_its_information)
     TEST_ASSERT_EQUAL_FLOAT(1.0e-6f, u[8]);
     TEST_ASSERT_EQUAL_FLOAT(1.0e-3f, u[4]);
     TEST_ASSERT_EQUAL_FLOAT(0.5e-6f, u[0]);
+    float near[4] = {1199999.0f, 1.2e6f, NAN, 1.2e6f}; /* the rounding, 1.2, is more than the pivot that is left */
+    factor_reverse(near, 2u);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 0.91287f, near[0]);
 }

@@ -1,6 +1,7 @@
 /* Rounding, exponential, logarithm, sine and cosine against libm in double: the error bounds and domains that their
  * headers state. */
 #include "math/bounds.h"
+#include "math/elapsed.h"
 #include "math/exponential.h"
 #include "math/rounding.h"
 #include "math/trigonometry.h"
@@ -152,4 +153,25 @@ TEST(neither_infinity_nor_nan_is_finite_and_a_value_beyond_its_bound_is_at_it)
     TEST_ASSERT_TRUE(is_finite(-3.0e38f) && is_finite(0.0f));
     TEST_ASSERT_FALSE(is_finite(INFINITY) || is_finite(-INFINITY) || is_finite(NAN));
     TEST_ASSERT_TRUE((clamped(2.0f, 1.5f) == 1.5f) && (clamped(-2.0f, 1.5f) == -1.5f) && (clamped(1.0f, 1.5f) == 1.0f));
+}
+
+TEST(of_two_the_lesser_or_greater_and_the_second_where_one_is_not_a_number)
+{
+    TEST_ASSERT_TRUE((lesser(-1.0f, 2.0f) == -1.0f) && (lesser(2.0f, -1.0f) == -1.0f));
+    TEST_ASSERT_TRUE((greater(-1.0f, 2.0f) == 2.0f) && (greater(2.0f, -1.0f) == 2.0f));
+    TEST_ASSERT_TRUE((lesser(NAN, 2.0f) == 2.0f) && (greater(NAN, 2.0f) == 2.0f));
+    TEST_ASSERT_TRUE(isnan(lesser(2.0f, NAN)) && isnan(greater(2.0f, NAN)));
+    TEST_ASSERT_EQUAL_UINT32(1u, lesser_count(1u, 2u) * lesser_count(2u, 1u));
+    TEST_ASSERT_EQUAL_UINT32(4u, greater_count(1u, 2u) * greater_count(2u, 1u));
+}
+
+TEST(a_time_is_rounded_and_runs_out_and_a_sum_of_times_ends_at_the_longest)
+{
+    TEST_ASSERT_EQUAL_UINT32(1000u, microseconds_of(1.00030e-3f));
+    TEST_ASSERT_EQUAL_UINT32(1001u, microseconds_of(1.00060e-3f));
+    TEST_ASSERT_EQUAL_UINT32(3u, time_left(5u, 2u));
+    TEST_ASSERT_EQUAL_UINT32(0u, time_left(5u, 6u));
+    TEST_ASSERT_EQUAL_UINT32(7u, time_sum(5u, 2u));
+    TEST_ASSERT_EQUAL_UINT32(5u, time_sum(5u, 0u));
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, time_sum(5u, UINT32_MAX - 2u));
 }

@@ -94,6 +94,27 @@ void setUp(void)
     guard = (command_guard_t){.receive = receive, .self = queue, .lever = lever, .takes_commands = true};
 }
 
+/* What the last COMMAND_ACK says, if there is one. */
+static int32_t answer(void)
+{
+    lever_frame_t frame;
+    message_command_ack_t ack = {.result = UINT8_MAX};
+    while (lever_next_frame(lever, &frame)) {
+        if (frame.id == (uint32_t)MESSAGE_COMMAND_ACK_ID) {
+            TEST_ASSERT_TRUE(message_command_ack_decode(&ack, &frame));
+            TEST_ASSERT_EQUAL_UINT8(0u, ack.command_counter);
+        }
+    }
+    return (int32_t)ack.result;
+}
+
+static uint32_t refused(void)
+{
+    lever_health_t health;
+    lever_health(lever, &health);
+    return health.corrupt;
+}
+
 static lever_frame_t command(const lever_command_t *content)
 {
     lever_frame_t frame;
@@ -170,6 +191,7 @@ TEST(a_build_that_takes_no_commands_lets_through_what_changes_nothing_or_ends_to
     TEST_ASSERT_TRUE(command_passes(&other));
     other.dither_rms = 0.001f;
     TEST_ASSERT_FALSE(command_passes(&other));
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_DISABLED, answer());
     for (uint32_t i = 0u; i < 6u; i++) {
         other = nothing;
         uint8_t *const choice[] = {
@@ -177,7 +199,7 @@ TEST(a_build_that_takes_no_commands_lets_through_what_changes_nothing_or_ends_to
         *choice[i] = 1u;
         TEST_ASSERT_FALSE(command_passes(&other));
     }
-    TEST_ASSERT_EQUAL_UINT32(7u, guard.refused);
+    TEST_ASSERT_EQUAL_UINT32(7u, refused());
 }
 
 /* S2 */
@@ -188,7 +210,9 @@ TEST(nothing_is_changed_while_torque_acts)
     TEST_ASSERT_TRUE(command_passes(&reset));
     fly(0.3f);
     TEST_ASSERT_TRUE(lever_is_acting(lever));
+    (void)answer();
     TEST_ASSERT_FALSE(command_passes(&reset));
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACTING, answer());
     TEST_ASSERT_TRUE(command_passes(&nothing));
     fly(0.0f);
     TEST_ASSERT_FALSE(lever_is_acting(lever));
@@ -204,6 +228,7 @@ TEST(nothing_is_changed_where_the_machine_says_that_it_is_not_safe)
     TEST_ASSERT_TRUE(command_passes(&start));
     safe = false;
     TEST_ASSERT_FALSE(command_passes(&start));
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_NOT_SAFE, answer());
     TEST_ASSERT_TRUE(command_passes(&nothing));
 }
 
@@ -214,6 +239,7 @@ TEST(with_authentication_only_a_new_command_of_its_sender_passes)
     guard.authentication = &authentication;
     arrive(frame); /* without */
     TEST_ASSERT_FALSE(passes());
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_NOT_AUTHENTIC, answer());
     arrive(authenticator(&frame, 1001u));
     arrive(frame); /* right */
     TEST_ASSERT_TRUE(passes());
@@ -228,7 +254,7 @@ TEST(with_authentication_only_a_new_command_of_its_sender_passes)
     arrive(authenticator(&frame, 1002u));
     arrive(frame);
     TEST_ASSERT_TRUE(passes());
-    TEST_ASSERT_EQUAL_UINT32(4u, guard.refused);
+    TEST_ASSERT_EQUAL_UINT32(4u, refused());
 }
 
 /* S3 */
@@ -263,6 +289,20 @@ TEST(another_key_is_refused_and_a_refused_command_uses_no_freshness_up)
     arrive(authenticator(&frame, 1001u));
     arrive(frame);
     TEST_ASSERT_TRUE(passes());
+}
+
+/* R24 */
+TEST(a_damaged_command_that_is_refused_gets_no_answer)
+{
+    lever_command_t reset = nothing;
+    reset.request = LEVER_REQUEST_RESET;
+    lever_frame_t frame = command(&reset);
+    frame.data[0] ^= 1u;
+    guard.takes_commands = false;
+    arrive(frame);
+    TEST_ASSERT_FALSE(passes());
+    TEST_ASSERT_EQUAL(UINT8_MAX, answer());
+    TEST_ASSERT_EQUAL_UINT32(1u, refused());
 }
 
 TEST(other_frames_pass_and_what_is_no_command_is_left_to_the_estimator)

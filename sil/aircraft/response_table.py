@@ -19,7 +19,7 @@ _NEEDED = (2.0, 7.0)
 _POINTS = 24
 
 
-def known(response: Response, band: tuple[float, float] = BAND, **said: Any) -> AircraftResponse:
+def response_table(response: Response, band: tuple[float, float] = BAND, **said: Any) -> AircraftResponse:
     """The table of z_ddot / delta, which is known in `band` [Hz]; `said` are those of AircraftResponse. Raises
     LeverError."""
     low, high = max(band[0], BAND[0]), min(band[1], BAND[1])
