@@ -82,10 +82,9 @@ class Row:
 def _refused(message: str) -> Must:
     """Nothing of a message comes through, and it says so."""
     alone = _ALONE[message]
-    within = 251 if message == "COMMAND" else 2
     if message == "BASE_SAMPLE":
         return replace(alone, after=_COMMUNICATION)  # without a sample it can only say so afterwards
-    return Must(_COMMUNICATION, within, mode=alone.mode, torque_ends=alone.torque_ends)
+    return Must(_COMMUNICATION, 2, mode=alone.mode, torque_ends=alone.torque_ends)
 
 
 def _first(share: float) -> int:
@@ -96,9 +95,8 @@ def _first(share: float) -> int:
 def _damaged() -> Iterator[Row]:
     for message in MESSAGES:
         short, grip = _SHORT[message], message == "GRIP_SAMPLE"
-        within = 251 if message == "COMMAND" else 11
         for byte in range(8):
-            must = _refused(message) if message == "COMMAND" else Must(_COMMUNICATION, within)
+            must = _refused(message) if message == "COMMAND" else Must(_COMMUNICATION, 2)
             title = f"{message}: a bit of byte {byte} flipped in every {'' if message == 'COMMAND' else 'tenth '}frame"
             quick = byte == 3 and message == "BASE_SAMPLE"
             yield Row(f"{short}_flip_{byte}", title, must, bus.flipped(message, byte), grip=grip, quick=quick)
@@ -121,10 +119,9 @@ def _damaged() -> Iterator[Row]:
 def _counters() -> Iterator[Row]:
     for message in MESSAGES:
         short, grip = _SHORT[message], message == "GRIP_SAMPLE"
-        within = 251 if message == "COMMAND" else 2
         title = f"{message}: each frame twice"
         yield Row(
-            f"{short}_twice", title, Must(_COMMUNICATION, within), bus.repeated(message), grip=grip,
+            f"{short}_twice", title, Must(_COMMUNICATION, 2), bus.repeated(message), grip=grip,
             quick=message == "LEVER_SAMPLE",
         )  # fmt: skip
     for message in bus.SAMPLES:
@@ -142,7 +139,7 @@ def _counters() -> Iterator[Row]:
     yield Row("counters_by_two", "all samples: the counter skips every second number", Must(), by_two)
     back = bus.counting(bus.SAMPLES, lambda i: -i)
     yield Row("counters_backwards", "all samples: the counter runs backwards", Must(_COMMUNICATION, 20), back)
-    hangs = Must(_COMMUNICATION, 251, torque_ends=_ABANDONED_ENDS)
+    hangs = Must(_COMMUNICATION, 2, torque_ends=_ABANDONED_ENDS)
     yield Row("command_counter_frozen", "COMMAND: the last one again and again", hangs, bus.hanging_command())
     other = bus.commands(lambda _: bus.command(0))
     once = replace(hangs, torque_ends=_ABANDONED_ENDS + 1.25)  # its first one is that of a new sender
@@ -199,7 +196,8 @@ def _late() -> Iterator[Row]:
         "base_stale", "BASE_SAMPLE: old content and time, counter goes on",
         _STANDS, bus.stale("BASE_SAMPLE"), quick=True,
     )  # fmt: skip
-    yield Row("grip_stale", "GRIP_SAMPLE: old content, counter goes on", Must(), bus.stale("GRIP_SAMPLE"), grip=True)
+    still = Must(_FLAG["grip_force"], _GRIP_WRONG)
+    yield Row("grip_stale", "GRIP_SAMPLE: old content, counter goes on", still, bus.stale("GRIP_SAMPLE"), grip=True)
 
 
 def _other_senders() -> Iterator[Row]:
@@ -256,10 +254,15 @@ def _readings() -> Iterator[Row]:
         grip = signal == "grip_force"
         own = _FLAG[signal]
         gone, still = Must(own, 1), Must(own, _STUCK)
-        wrong = Must(own, _WRONG) if signal == "z_ddot" else Must()
+        sign, gain = Must((*own, "BASE", "MISMATCH"), _WRONG), Must()
+        if signal == "z_ddot":
+            sign = Must(own, _WRONG)
+        if signal == "tau_m":
+            sign = gain = Must(own, _WRONG)
         if grip:
-            gone, still, wrong = Must(), Must(own, _GRIP_WRONG), Must(own, _GRIP_WRONG)
-        # what moves the lever may be a step or a drift of an output, and a pilot's grip what a gain of it may be
+            gone, still, sign, gain = Must(), *[Must(own, _GRIP_WRONG)] * 3
+        # what moves the lever may be a step or a drift of an output, and a pilot's grip what a gain of it may be; what
+        # the motor does is known
         faults = {
             "invalid": ("marked invalid", readings.reads(signal, math.nan), gone),
             "not_available": ("NaN-coded but marked valid", readings.reads(signal, math.inf), gone),
@@ -268,9 +271,9 @@ def _readings() -> Iterator[Row]:
             "zero": ("zero", readings.reads(signal, 0.0), still),
             "step": ("off by a step", readings.step(signal), Must()),
             "drift": ("off by a ramp to the same", readings.drift(signal), Must()),
-            "sign": ("of the wrong sign", readings.scaled(signal, -1.0), wrong),
-            "gain_half": ("half as large", readings.scaled(signal, 0.5), wrong if grip else Must()),
-            "gain_double": ("twice as large", readings.scaled(signal, 2.0), wrong if grip else Must()),
+            "sign": ("of the wrong sign", readings.scaled(signal, -1.0), sign),
+            "gain_half": ("half as large", readings.scaled(signal, 0.5), gain),
+            "gain_double": ("twice as large", readings.scaled(signal, 2.0), gain),
             "gain_drift": ("gain going to 1.5", readings.gain_drift(signal, 1.5), Must()),
             "spikes": ("1 % of the values far off", readings.spikes(signal), _SPIKES.get(signal, Must())),
         }
@@ -317,18 +320,20 @@ def _table() -> Iterator[Row]:
 ROWS = {row.name: row for row in _table()}
 """All by name, in the order of the table."""
 
-_TWO_RATES = "angle and rate are not compared with each other; the arm that fits both is another one"
-_BASE = "seen by its effect on the innovations alone, which takes that long"
-_CLOCK = "time is that of the samples: the firmware has no clock to compare it with"
+_TWO_RATES = "angle and rate are not compared with each other, for which there is no room; another arm fits both"
+_OFFSET = "a step passes the high-passes; for some pilots it is taken for a change of the arm"
+_TORQUE = "takes a second: a shorter memory takes other torque of a frequency near the dither's for a wrong gain"
+_BASE = "without torque a gain of z̈ is a scale of the arm, which no innovation tells from it; dither tells in seconds"
+_CLOCK = "it is samples at another rate, which is no fault: the firmware has no clock of its own"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
     "theta_gain_drift": _TWO_RATES,
-    "theta_dot_step": "for some pilots, an offset is mistaken for a change of the arm",
+    "theta_dot_step": _OFFSET,
     "theta_dot_gain_half": _TWO_RATES,
     "theta_dot_gain_double": _TWO_RATES,
-    "tau_m_stuck": "shows by the dither that it does not follow, after a second",
-    "tau_m_zero": "as tau_m_stuck",
-    "z_ddot_step": "for some pilots, an offset is mistaken for a change of the arm",
+    "tau_m_stuck": _TORQUE,
+    "tau_m_zero": _TORQUE,
+    "z_ddot_step": _OFFSET,
     "z_ddot_gain_half": _BASE,
     "z_ddot_gain_double": _BASE,
     "z_ddot_gain_drift": _BASE,
