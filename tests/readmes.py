@@ -7,8 +7,11 @@ import shlex
 from pathlib import Path
 
 KEPT = "m_p_walk c_p_walk k_p_walk walk_ceiling robbins_monro_time theta_dot_noise theta_dot_process_noise"
-SHORTER_TUNE = {r"lever tune \S+": r"\g<0>" + "".join(f" --keep {name}" for name in KEPT.split())}
-"""Of all settings only one is looked for, which takes a third of the time."""
+SHORTER = {
+    r"lever tune \S+": r"\g<0>" + "".join(f" --keep {name}" for name in KEPT.split()),
+    r"(?m)^lever replay (?!.*(?:--format|out/replay))(.*(?:-o|--out) \S+)": r"lever replay \1 --format csv",
+}
+"""Commands with less to calculate: one setting is looked for, and no MF4 written, for which much is imported."""
 
 
 def blocks(readme: Path, language: str) -> dict[int, str]:

@@ -6,6 +6,7 @@ import csv
 import gzip
 import io
 import re
+import zlib
 from itertools import islice
 
 import numpy as np
@@ -63,7 +64,7 @@ def _start(path: str) -> list[str]:
     try:
         with _open(path) as file:
             return [line.rstrip("\r\n") for line in islice(file, _LOOKED_AT)] or [""]
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise LeverError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
 
 

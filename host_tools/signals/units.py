@@ -38,6 +38,8 @@ _FACTORS["angular rate"] |= {"rpm": 2.0 * math.pi / 60.0, "deg/min": _DEGREE / 6
 _SPELLINGS = (
     (r"[\s\[\](){}·*._]|\^|⋅|(?<=[a-z])-(?=[a-z])", ""),
     (r"²", "2"),
+    (r"s(-|⁻)(1|¹)", "/s"),
+    (r"s(-|⁻)2", "/s2"),
     (r"µ|μ|micro", "u"),
     (r"°|º|degrees?|degs|degrés?|\bgrad\b", "deg"),
     (r"radians?|rads", "rad"),
@@ -48,10 +50,9 @@ _SPELLINGS = (
     (r"met(er|re)s?", "m"),
     (r"revolutions?|turns?", "rev"),
     (r"1/min|rev/min|u/min", "rpm"),
-    (r"lbs?f?", "lb"),
+    (r"lbs?f?(?!t)", "lb"),
     (r"dps", "deg/s"),
-    (r"/s/s|s-2", "/s2"),
-    (r"s-1", "/s"),
+    (r"/s/s", "/s2"),
     (r"per", "/"),
     (r"//", "/"),
 )

@@ -30,9 +30,10 @@ EQUIVALENT = Path(__file__).with_name("python_equivalent.txt")
 """Mutants that change nothing that can be seen: the reason after #, their names below it."""
 MUTATED = ("host_tools", "sil")
 TESTS = ("tests/python", "tests/accuracy", "tests/slcan", "tests/target/slcan")
+IMPORTED = "<module>()"
 PATIENCE = 10
 """A mutant hangs when a test takes so many times as long as without."""
-GRACE = 60.0
+GRACE = 240.0
 NO_TESTS = 5
 """Exit status of pytest."""
 IMPORTING = 300.0
@@ -46,7 +47,7 @@ class Test:
     name: str
     seconds: float
     reached: frozenset[str]
-    """path:line of the functions it calls."""
+    """path:name() of the functions it calls."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,10 @@ class TestFile:
 
 
 def concerns(reached: frozenset[str], mutant: PythonMutant) -> bool:
+    """Its function is reached; of a mutant outside of functions: any of its module."""
     if mutant.function:
         return f"{mutant.path}:{mutant.function}" in reached
-    return any(place.startswith(f"{mutant.path}:") for place in reached)
+    return any(place.startswith(f"{mutant.path}:") and not place.endswith(IMPORTED) for place in reached)
 
 
 def files_under(folders: Sequence[str], name: str) -> list[Path]:
@@ -132,6 +134,8 @@ def test_file(path: str, reached: list[str], tests: list[tuple[str, float, list[
 def killer_of(mutant: PythonMutant, files: Sequence[TestFile]) -> str:
     """What the test says that fails with the mutant; nothing: it survives."""
     able = [(file, tests) for file in files if (tests := file.able(mutant))]
+    if not able:  # a module without functions
+        able = [(file, list(file.tests)) for file in files if f"{mutant.path}:{IMPORTED}" in file.reached]
     own = f"/{mutant.path.parent.name}/"
     able.sort(key=lambda pair: (own not in pair[0].path, sum(test.seconds for test in pair[1])))
     with tempfile.TemporaryDirectory() as folder:

@@ -42,8 +42,8 @@ class PythonMutant:
     number: int
     """Among all of the module, from 0."""
     line: int
-    function: int
-    """First line of the function around it, decorators included; 0: none."""
+    function: str
+    """The outermost around it, as "name()"; "": none."""
     name: str
     """Module, function and change, with (2) when it is the second of that name: stays when lines move."""
 
@@ -129,13 +129,12 @@ def _skips(node: ast.AST, parent: ast.AST) -> bool:
 
 
 Place = tuple[ast.AST, str, int | None]
-Function = tuple[int, str]
 
 
-def _places(parent: ast.AST, function: Function = (0, "")) -> Iterator[tuple[ast.AST, Place, Function]]:
-    """Each node that may change, where it hangs, and first line and name of the function around it."""
-    if isinstance(parent, (ast.FunctionDef, ast.AsyncFunctionDef)) and not function[0]:
-        function = min([parent.lineno, *(each.lineno for each in parent.decorator_list)]), f"{parent.name}()"
+def _places(parent: ast.AST, function: str = "") -> Iterator[tuple[ast.AST, Place, str]]:
+    """Each node that may change, where it hangs, and the function around it."""
+    if isinstance(parent, (ast.FunctionDef, ast.AsyncFunctionDef)) and not function:
+        function = f"{parent.name}()"
     for field, value in ast.iter_fields(parent):
         if field in UNTOUCHED:
             continue
@@ -153,7 +152,7 @@ def _put(place: Place, node: ast.AST) -> None:
         getattr(parent, field)[index] = node
 
 
-def _changes(tree: ast.Module) -> Iterator[tuple[ast.AST, ast.AST, Place, Function]]:
+def _changes(tree: ast.Module) -> Iterator[tuple[ast.AST, ast.AST, Place, str]]:
     """Of a module: node, what takes its place, where that is, and the function."""
     for node, place, function in list(_places(tree)):
         for new in replacements(node, place[1]):
@@ -168,12 +167,12 @@ def mutants_of(root: Path, path: Path) -> Iterator[PythonMutant]:
     """All mutants of a module, a path relative to the root."""
     changes = _changes(ast.parse((root / path).read_text(encoding="utf-8")))
     seen: Counter[str] = Counter()
-    for number, (node, new, _, (first, function)) in enumerate(changes):
+    for number, (node, new, _, function) in enumerate(changes):
         after = "(dropped)" if isinstance(new, ast.Pass) else ast.unparse(new)
         name = f"{path}: {function or 'module'}: {_short(ast.unparse(node))} -> {_short(after)}"
         seen[name] += 1
         which = f" ({seen[name]})" if seen[name] > 1 else ""
-        yield PythonMutant(path, number, getattr(node, "lineno", 0), first, name + which)
+        yield PythonMutant(path, number, getattr(node, "lineno", 0), function, name + which)
 
 
 def text_with(root: Path, mutant: PythonMutant) -> str:

@@ -29,7 +29,7 @@ SHORTER = {
     r"--seeds \d+": "--seeds 1",
     r"lever compare --models": "lever compare --duration 2 --scenarios step_up --models",
     r"--start 60 --length 120": "--length 20.5",
-    **readmes.SHORTER_TUNE,
+    **readmes.SHORTER,
 }
 """The same command, with less to calculate."""
 USERS_FILES = """

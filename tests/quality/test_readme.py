@@ -38,7 +38,7 @@ NEEDED = {
 }
 """By blocks with these words in them."""
 SHORTER = {
-    **readmes.SHORTER_TUNE,
+    **readmes.SHORTER,
     r"--seeds 4": "--seeds 2",
     r"lever compare --scenarios step_up": r"\g<0> --duration 3",
     r"lever campaign quick(?= -o)": "lever campaign quick.toml --workers 1",

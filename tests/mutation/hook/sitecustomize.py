@@ -12,6 +12,7 @@ import sys
 import threading
 from functools import cache
 from importlib.machinery import SourceFileLoader
+from inspect import CO_OPTIMIZED
 from types import CodeType, FrameType
 from typing import Any
 
@@ -35,10 +36,10 @@ def _called(frame: FrameType, event: str, argument: Any) -> None:
     if id(code) in _noted:
         return
     path = _real_path(code.co_filename)
-    if path.startswith(_under):
+    if path.startswith(_under) and (code.co_flags & CO_OPTIMIZED or code.co_name == "<module>"):  # no body of a class
         try:
             with _open(f"{_folder}/{os.getpid()}", "a", encoding="utf-8") as file:
-                file.write(f"{path}:{code.co_firstlineno}\n")
+                file.write(f"{path}:{code.co_name}()\n")
         except OSError:  # a test lets no file grow
             return
     _noted[id(code)] = code

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.firmware.library import lib
 from lever_cdkf.sil.aircraft import aircraft, stability
 from lever_cdkf.sil.aircraft.aircraft import Coupled
 from lever_cdkf.sil.bounce import flights, measure, pilots
 from lever_cdkf.sil.bounce.flights import AIRCRAFT, Plan
+from lever_cdkf.sil.scenarios import inputs
 from python.aircraft.loops import loop_of
 
 
@@ -54,3 +57,21 @@ def test_a_stopped_clock_is_one() -> None:
     faults: FloatArray = flown.health["faults"]
     assert not (faults[flown.notes < 2.0] & lib.LEVER_FAULT_CLOCK).any()
     assert (faults[flown.notes > 2.1] & lib.LEVER_FAULT_CLOCK).all()
+
+
+def test_a_refused_command_ends_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inputs, "commands", lambda *_: {0: {"request": "reset", "dither_rms": -1.0}})
+    with pytest.raises(LeverError, match="refuses COMMAND"):
+        flights.fly(Plan("uh60_like", 1, pilots.table(pilots.arm(1)), 0.2, duration=1.0))
+
+
+@pytest.mark.parametrize(("sigma", "covered"), [(0.6, 100.0), (0.4, 0.0)])
+def test_the_error_of_a_stated_margin_is_from_the_true_one(sigma: float, covered: float) -> None:
+    plan = measure.geared(Plan("uh60_like", 1, pilots.table(pilots.arm(1)), 1.0, duration=10.0), 0.7)
+    flown = flights.fly(plan)
+    stated = flown.stability.copy()
+    stated["state"] = lib.LEVER_BOUNCE_CLEAR
+    stated["gain_margin"] = np.repeat(flown.margins(25), 25)[: len(stated)] - 1.0
+    stated["gain_margin_sigma"] = sigma
+    figures = measure._margins(replace(flown, stability=stated))
+    assert figures == pytest.approx({"margin covered": covered, "margin rms": 1.0, "margin stated": 100.0})

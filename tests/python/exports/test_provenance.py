@@ -8,12 +8,14 @@ import re
 import shutil
 import subprocess
 import sys
+from argparse import Namespace
 from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
 from lever_cdkf.host_tools import cli
 from lever_cdkf.host_tools import provenance as origin
+from lever_cdkf.host_tools.commands.signal_options import input_files
 from lever_cdkf.host_tools.errors import LeverError
 from lever_cdkf.host_tools.files import native_file, shared_library
 from lever_cdkf.host_tools.provenance import provenance, with_provenance
@@ -42,6 +44,15 @@ def test_inputs_are_told_by_the_hash_of_their_bytes(tmp_path: Path) -> None:
     }
     library = native_file(shared_library("lever_cdkf"))
     assert provided.library == f"sha256:{hashlib.sha256(library.read_bytes()).hexdigest()}"
+
+
+def test_inputs_are_all_files_that_options_name(tmp_path: Path) -> None:
+    aircraft = tmp_path / "own.toml"
+    aircraft.touch()
+    options = Namespace(
+        settings="my.settings", dbc="my.dbc", map=["theta=A.B", "my.TOML"], aircraft=f"{aircraft},gearing=2"
+    )
+    assert input_files(options) == ["my.settings", "my.dbc", str(aircraft), "my.TOML"]
 
 
 def test_every_format_can_hold_the_names(monkeypatch: pytest.MonkeyPatch) -> None:

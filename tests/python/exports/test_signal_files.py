@@ -128,6 +128,16 @@ def test_mode_and_faults_are_words_in_mf4(replayed: Replayed) -> None:
     assert b"settling" in set(faults.samples)
 
 
+def test_a_mode_that_is_not_known_yet_is_said_so_in_mf4(session: Session, tmp_path: Path) -> None:
+    health = [line for line in session.lines if " 214#" in line]
+    late = tmp_path / "late.log"
+    late.write_text("\n".join(line for line in session.lines if line not in health[: len(health) // 2]) + "\n")
+    assert cli.main(["replay", str(late), "-o", str(tmp_path / "out"), "--format", "mf4"]) == 0
+    with MDF(tmp_path / "out/signals.mf4") as file:
+        modes = file.get("mode_recorded").samples
+    assert (modes[0], modes[-1]) == (b"not known", b"run")
+
+
 def test_mf4_of_a_simulation_has_the_truth_and_no_date(simulation: Path) -> None:
     table = pd.read_csv(simulation / "trace.csv")
     with MDF(simulation / "signals.mf4") as file:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +15,9 @@ from lever_cdkf.host_tools.firmware.config import Config
 from lever_cdkf.host_tools.firmware.library import lib
 from lever_cdkf.sil.envelope import firmware
 from lever_cdkf.sil.envelope.condition import ClosedLoop
+from lever_cdkf.sil.envelope.motions import PERIOD, STRIDE
 from lever_cdkf.sil.faults import bus, faults_page, judge, matrix, readings, table
-from lever_cdkf.sil.faults.flight import Pilot
+from lever_cdkf.sil.faults.flight import Pilot, Record
 from lever_cdkf.sil.faults.rows import KNOWN, MOTION, ROWS, TIME
 from python.conftest import Refused
 
@@ -22,6 +25,12 @@ from python.conftest import Refused
 @pytest.fixture(scope="module")
 def pilot() -> Pilot:
     return Pilot(MOTION, 0)
+
+
+@pytest.fixture(scope="module")
+def right(pilot: Pilot) -> Record:
+    """Without a fault."""
+    return pilot.fly(Config(), TIME)
 
 
 @pytest.mark.requirement("R12", "R19", "R22", "R30", "R33", "R35", "R36")
@@ -33,14 +42,13 @@ def test_a_fault_is_met_as_demanded(name: str, pilot: Pilot) -> None:
     assert not verdict.broken or name in KNOWN, (verdict.broken, verdict.measured)
 
 
-def test_without_a_fault_it_is_the_loop_by_structs(pilot: Pilot) -> None:
+def test_without_a_fault_it_is_the_loop_by_structs(right: Record) -> None:
     """The same pilot, dither and noise, but for the rounding of the frames."""
-    record = pilot.fly(Config(), TIME)
     _, track = firmware.closed_loop(Config(), MOTION, [0], ClosedLoop(lost=0.0), lambda: None)
     late = track.time >= TIME[0]
-    own = record.estimate["natural_frequency"][late]
+    own = right.estimate["natural_frequency"][late]
     np.testing.assert_allclose(own, track.value["f_n"][late, 0], rtol=2e-3)
-    assert record.results[lib.LEVER_FRAME_REFUSED] == record.unanswered == 0
+    assert right.results[lib.LEVER_FRAME_REFUSED] == right.unanswered == 0
 
 
 @pytest.mark.requirement("R18")
@@ -64,6 +72,15 @@ def test_frames_arrive_as_the_fault_says() -> None:
     assert arrive(bus.late("BASE_SAMPLE", 1.0))[5:9] == [(3, 3, 0), (3, 2, 1), (4, 4, 0), (4, 3, 1)]
     assert arrive(bus.repeated("LEVER_SAMPLE"))[4:7] == [(2, 2, 0), (2, 2, 0), (2, 2, 1)]
     assert arrive(bus.stale("BASE_SAMPLE"))[5:8] == [(2, 2, 1), (3, 3, 0), (3, 2, 1)]
+
+
+@pytest.mark.parametrize(("usual", "expected"), [(False, []), (True, [250, 500])])
+def test_other_commands_come_beside_the_usual_ones_or_instead(usual: bool, expected: list[int]) -> None:
+    sent = bus.Bus(1000, 1e-3, False, 0.3, np.random.default_rng(1))
+    bus.commands(bus.unknown_command, 100, usual)(sent, (0.2, 0.6))
+    frames = sent.delivered()
+    at = frames["at"][frames["id"] == 0x120].tolist()
+    assert at == sorted([0, 200, 300, 400, 500, 750, *expected])
 
 
 def test_readings_are_spoilt_as_the_fault_says() -> None:
@@ -103,6 +120,41 @@ def test_a_fault_that_is_not_met_is_named_and_explained(pilot: Pilot) -> None:
     assert result.broken == ["to flag"]
     assert table.unexpected([result]) == ["clock_wraps"]
     assert "<strong" in faults_page.build([result], 1)
+
+
+def spoilt(right: Record, **columns: tuple[slice, float]) -> Record:
+    """With a factor, or what is no number, on a stretch of these columns of the estimates."""
+    estimate = right.estimate.copy()
+    for name, (where, factor) in columns.items():
+        estimate[name][where] *= factor
+    return replace(right, estimate=estimate)
+
+
+FIRST, AFTER, LAST = slice(0, 1), slice(round(TIME[1] / PERIOD / STRIDE), None), slice(-5, None)
+BROKEN: dict[str, tuple[judge.Must, Callable[[Record], Record]]] = {
+    "not finite": (judge.Must(), lambda right: spoilt(right, theta=(FIRST, math.nan))),
+    "unanswered": (judge.Must(), lambda right: replace(right, unanswered=1)),
+    "torque": (
+        judge.Must(),
+        lambda right: replace(right, asked=2.001 * (right.asked == right.asked.max())),
+    ),
+    "torque rms": (judge.Must(), lambda right: replace(right, asked=np.full_like(right.asked, 1.001))),
+    "torque left": (judge.Must(torque_ends=0.06), lambda right: right),
+    "estimates changed": (judge.Must(unaffected=True), lambda right: spoilt(right, theta=(LAST, 1.001))),
+    "to flag after": (judge.Must(after=("CLOCK",)), lambda right: right),
+    "mode run": (judge.Must(mode=("init",)), lambda right: right),
+    "silent": (judge.Must(), lambda right: spoilt(right, natural_frequency=(AFTER, 1.5))),
+    "error after": (judge.Must(), lambda right: spoilt(right, natural_frequency=(LAST, 3.0))),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_demand_that_is_not_kept_is_named(what: str, right: Record, pilot: Pilot) -> None:
+    must, spoil = BROKEN[what]
+    assert judge.judge(judge.Must(unaffected=True), right, right, pilot.truth, TIME).broken == []
+    broken = judge.judge(must, spoil(right), right, pilot.truth, TIME).broken
+    assert broken[0] == what
+    assert set(broken) <= {what, "error after"}
 
 
 def test_bad_input_is_one_line(refused: Refused) -> None:

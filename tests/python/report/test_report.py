@@ -40,7 +40,11 @@ def page(report: Path) -> Reader:
 def test_sections_and_figures_are_all_there_in_order(page: Reader) -> None:
     assert page.ids("section") == SECTIONS
     assert page.ids("div") == FIGURES
-    assert list(figures(page)) == FIGURES
+    drawn = figures(page)
+    assert list(drawn) == FIGURES
+    for key, figure in drawn.items():
+        rows = sum(axis.startswith("yaxis") for axis in figure["layout"])
+        assert 140 * rows <= figure["layout"]["height"] <= 400 * rows, key
     assert [attributes["href"] for tag, attributes in page.tags if tag == "a"] == [f"#{key}" for key in SECTIONS]
     assert page.open == []
 
@@ -91,8 +95,13 @@ def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
             shown = [None if text == "never" else float(text) for text in cell.split(", ")]
             assert shown == [None if time is None else pytest.approx(time, abs=0.0051) for time in expected[times]]
     values = {row[0]: row[1] for row in run[1:]}
-    assert first_number(values["samples"]) == result.summary.samples
-    assert first_number(values["lost"]) == result.summary.lost > 0
+    summary = result.summary
+    assert {label: first_number(values[label]) for label in list(values)[4:12]} == {
+        "samples": summary.samples, "lost": summary.lost, "corrupt": summary.corrupt, "late": summary.late,
+        "restarts of the filter": summary.restarts, "samples without an answer": summary.unanswered,
+        "estimates of other samples": summary.misplaced, "simulated time": summary.simulated_time_s,
+    }  # fmt: skip
+    assert summary.lost > 0
     nis = asdict(result.summary.nis)
     assert float(values["mean normalised innovation squared"]) == pytest.approx(nis["mean"], rel=5e-3)
     assert float(values["innovations inside their 95 % bound"]) == pytest.approx(

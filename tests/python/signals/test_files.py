@@ -107,6 +107,15 @@ def test_a_packed_table_is_a_table(tmp_path: Path) -> None:
     assert angle.values.tolist() == [1.0, 2.0]
 
 
+@pytest.mark.parametrize(
+    "content", [gzip.compress(b"time,a\n")[:15], gzip.compress(b"")[:10] + b"\xff" * 20], ids=["cut", "damaged"]
+)
+def test_a_packed_table_that_is_damaged_is_one_line(content: bytes, tmp_path: Path, refused: Refused) -> None:
+    path = tmp_path / "flight.csv.gz"
+    path.write_bytes(content)
+    assert f"cannot read {path}: " in refused("map", path)
+
+
 def test_what_an_mf4_marks_invalid_is_missing(tmp_path: Path) -> None:
     invalid = np.array([False, True, False, True])
     with MDF(version="4.10") as file:

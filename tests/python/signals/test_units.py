@@ -1,11 +1,13 @@
-"""Units that nobody says: what values look like, and what no lever and no aircraft has."""
+"""Spellings of units; units that nobody says: what values look like, and what no lever and no aircraft has."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.signals.units import check_plausible, gravity_in, guess
+from lever_cdkf.host_tools.signals.units import check_plausible, factor, gravity_in, guess
 
 
 @pytest.mark.parametrize(
@@ -27,6 +29,39 @@ def test_the_unit_is_that_of_the_size(key: str, value: float, unit: str) -> None
     values = np.full(1000, value)
     values[:5], values[5:100] = 1e6, np.nan
     assert guess(key, values)[0] == unit
+
+
+DEGREE = math.pi / 180.0
+SPELLINGS: dict[str, dict[float, tuple[str, ...]]] = {
+    "theta": {
+        1.0: ("rad", "Radians", "[rad]"),
+        1e-3: ("mrad", "milliradian"),
+        DEGREE: ("deg", "°", "º", "Degrees", "degrés", "grad"),
+        2.0 * math.pi: ("rev", "revolution", "turns"),
+    },
+    "theta_dot": {
+        1.0: ("rad/s", "rad s-1", "rad·s⁻¹", "rad*s^-1", "rad/sec", "radians per second", "rads/second"),
+        DEGREE: ("deg/s", "dps", "°/s", "deg s-1", "degs_per_sec"),
+        math.pi / 30.0: ("rpm", "1/min", "U/min", "rev/min"),
+    },
+    "z_ddot": {
+        1.0: ("m/s2", "m/s^2", "[m/s²]", "m/s/s", "m/sec/sec", "m s-2", "m·s⁻²", "meters/second^2", "metre per s2"),
+        0.3048: ("ft/s²", "ft/s/s"),
+        9.80665: ("g", "G"),
+        9.80665e-6: ("ug", "µg", "micro-g"),
+    },
+    "tau_m": {
+        1.0: ("N m", "Nm", "N·m", "N.m", "N*m", "N-m", "N⋅m", "newton metres", "Newtonmeter"),
+        4.4482216152605 * 0.3048: ("lbf ft", "ft-lb", "lb.ft", "lb ft", "lbs-ft", "ft lbs"),
+    },
+    "grip_force": {1.0: ("N", "newton", "Newtons"), 4.4482216152605: ("lb", "lbs", "lbf")},
+}
+
+
+@pytest.mark.parametrize("key", SPELLINGS)
+def test_a_unit_has_many_spellings(key: str) -> None:
+    spelt = {unit: si for si, units in SPELLINGS[key].items() for unit in units}
+    assert {unit: factor(key, unit) for unit in spelt} == pytest.approx(spelt)
 
 
 @pytest.mark.parametrize("level", [0.0, 0.84, 1.16, 8.3, 11.3])

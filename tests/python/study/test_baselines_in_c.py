@@ -37,7 +37,7 @@ CASES = (
 def test_the_c_says_what_the_reference_says(name: str, baseline: str) -> None:
     case = cases.cases()[name]
     batch = case.batch(cases.Plan(seeds=2, duration=2.0))
-    at = campaign.samples(case, batch)
+    at = np.append(0, campaign.samples(case, batch))  # also before the first sample is followed
     reference, near = REFERENCES[baseline]
     quick, slow = BASELINES[baseline].run(batch, at), follow(reference(batch), at)
     assert quick.covariance is not None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -45,6 +46,14 @@ def test_no_label_lies_on_another(width: str) -> None:
     upper, lower = (sheet.axes[4 * row] for row in range(2))  # they share both scales, whose numbers stand at the foot
     assert not any(tick.label1.get_visible() for tick in upper.xaxis.get_major_ticks())
     assert upper.get_xlim() == lower.get_xlim()
+
+
+def test_of_many_values_four_are_written_with_both_ends() -> None:
+    steps = Scale("noise [mrad]", tuple(float(value) for value in range(1, 11)))
+    chart = Chart(np.ones((10, 3)), None)
+    one = replace(map_figure(), columns=NAMED, rows=("dual",), y=steps, charts=((chart, chart),))
+    (axes, *_) = printed.sheet(one, "double").axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["1", "4", "7", "10"]
 
 
 def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -> None:

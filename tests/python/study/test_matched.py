@@ -87,6 +87,7 @@ def test_parameters_are_the_random_walk_of_the_settings(name: str) -> None:
 def test_the_start_is_drawn_from_the_prior() -> None:
     sigma = {"m_p_sigma": 0.1, "c_p_sigma": 0.2, "k_p_sigma": 0.3}
     batch = matched(Condition(settings=sigma), 1000, 2e-3, 7)
+    assert batch.samples == 2
     assert batch.truth.p is not None
     w = np.log(batch.truth.p[:, 0] / [DEFAULTS[name] for name in ("m_p", "c_p", "k_p")])
     for index, value in enumerate(sigma.values()):

@@ -17,7 +17,7 @@ from lever_cdkf.sil.envelope.motions import FREQUENCIES, PERIOD, Motion
 from lever_cdkf.sil.envelope.sensors import Fault, Sensors
 from lever_cdkf.sil.study.baselines.joint_ekf import Joint
 from lever_cdkf.sil.study.data import Batch
-from lever_cdkf.sil.study.peers import filters, logs, tables
+from lever_cdkf.sil.study.peers import campaign, filters, logs, tables
 from lever_cdkf.sil.study.peers.campaign import ESTIMATORS, Result
 from numpy.typing import NDArray
 from python.conftest import Refused
@@ -127,6 +127,14 @@ class Fixed(Joint):
 
     def step(self, k: int) -> None:
         pass
+
+
+def test_progress_counts_conditions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign, "do", lambda task: (task, []))
+    shown: list[tuple[int, int, str]] = []
+    todo = [campaign.Task(("a", "b"), 1, ()), campaign.Task(("c",), 1, ())]
+    assert campaign.run(todo, 1, lambda *step: shown.append(step)) == []
+    assert shown == [(2, 3, "b"), (3, 3, "c")]
 
 
 # --- how it is said --------------------------------------------------------------------------------------------------

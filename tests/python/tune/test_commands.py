@@ -128,10 +128,8 @@ def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
     log = tmp_path / "slow.log"
     write_log(log, count=3000, period_us=10_000)
     status, out, err = lever("tune", log, *QUICK, "-o", tmp_path / "slow.settings", "--held-out", "0")
-    assert (status, err.splitlines()[0]) == (
-        0,
-        "lever: tune: the log has a sample each 10 ms: sample_period becomes that (was 1 ms)",
-    )
+    assert status == 0
+    assert "lever: tune: the log has a sample each 10 ms: sample_period becomes that (was 1 ms)" in err.splitlines()
     assert "lever_friction stay as they are: without dither they cannot be known." in out
     assert not set(calibration.NAMES) & set(read_assignments(tmp_path / "slow.settings"))
     assert read_assignments(tmp_path / "slow.settings")["sample_period"] == 0.01
