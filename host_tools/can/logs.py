@@ -11,7 +11,6 @@ are no frame are counted, as is a log that breaks off; one that has no frame at 
 
 from __future__ import annotations
 
-import gc
 import gzip
 import os
 import stat
@@ -26,6 +25,7 @@ import numpy as np
 
 from ..errors import LeverError
 from ..extras import require
+from ..unheard import unheard
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 
 BLOCK = 1 << 22
@@ -186,25 +186,14 @@ def _open_log(path: str) -> Any:
     """python-can's reader. Raises LogError, and OSError for what the system says."""
     import can
 
-    with _unheard_deletions():
+    with unheard():
         try:
             return can.LogReader(path)
         except Exception as error:  # each format has its own, from struct.error to those of asammdf
             if isinstance(error, OSError) and error.errno is not None:
                 raise
             reason = _one_line(error)
-        gc.collect()
     raise LogError(reason)
-
-
-@contextmanager
-def _unheard_deletions() -> Iterator[None]:
-    """asammdf complains on standard error when a file that it could not open is deleted."""
-    before, sys.unraisablehook = sys.unraisablehook, lambda _: None
-    try:
-        yield
-    finally:
-        sys.unraisablehook = before
 
 
 def _one_line(error: Exception) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Array, FloatArray
 from ..errors import LeverError
 from ..extras import require
+from ..unheard import unheard
 from . import text_table
 from .recorded import Signal
 from .units import factor, split_name
@@ -132,11 +133,8 @@ def _parquet(path: str, time: str | None) -> list[Signal]:
 
 
 def _mf4(path: str, time: str | None) -> list[Signal]:
-    require("mf4")
-    from asammdf import MDF
-
     signals: dict[str, Signal] = {}
-    with MDF(path) as file:
+    with _opened_mf4(path) as file:
         start = file.header.start_time.timestamp()
         for channel in file.iter_channels(skip_master=True):
             if channel.samples.ndim == 1 and channel.samples.dtype.kind in "biuf" and channel.name not in signals:
@@ -151,14 +149,20 @@ def _mf4(path: str, time: str | None) -> list[Signal]:
 
 def _has_frames(path: str) -> bool:
     """Whether an MF4 file holds CAN frames as they were on the bus."""
+    with _opened_mf4(path) as file:
+        return any("CAN_DataFrame" in name for name in file.channels_db)
+
+
+def _opened_mf4(path: str) -> Any:
     require("mf4")
     from asammdf import MDF
 
-    try:
-        with MDF(path) as file:
-            return any("CAN_DataFrame" in name for name in file.channels_db)
-    except Exception as error:
-        raise LeverError(f"{path}: it cannot be read: {type(error).__name__}: {error}") from None
+    with unheard():
+        try:
+            return MDF(path)
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
+    raise LeverError(f"{path}: it cannot be read: {reason}")
 
 
 def _npz(path: str, time: str | None) -> list[Signal]:

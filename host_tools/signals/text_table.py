@@ -105,15 +105,22 @@ def _layout(lines: list[str], path: str) -> tuple[str, bool, int]:
 def _first_row(lines: list[str], delimiter: str, comma: bool) -> tuple[int, int]:
     """How well the lines fit, 0: not at all, and which is the first of several with as many fields, mostly numbers."""
     rows = [_fields(line, delimiter) for line in lines]
-    for index, row in enumerate(rows):
-        values = [_number(each, comma) for each in row]
+    numbered = [[_number(each, comma) for each in row] for row in rows]
+    for index, (row, values) in enumerate(zip(rows, numbered, strict=True)):
         numbers = sum(each is not None and each == each for each in values)
         text = sum(each is None for each in values)
         if numbers >= 2 and numbers > 2 * text:
             after = [each for each in rows[index + 1 : index + 6] if any(each)]
             if after and all(len(each) == len(row) for each in after):
+                while index and len(rows[index - 1]) == len(row) and _says_little(numbered[index - 1]):
+                    index -= 1
                 return numbers - 2 * text, index
     return 0, 0
+
+
+def _says_little(values: list[float | None]) -> bool:
+    """A time, and nothing known at it."""
+    return None not in values and any(value == value for value in values)
 
 
 def _header(lines: list[str], delimiter: str, first: int, path: str) -> tuple[list[str], list[str]]:

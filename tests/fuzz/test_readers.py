@@ -7,8 +7,11 @@ from __future__ import annotations
 import gzip
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
+from asammdf import MDF, Signal
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from lever_cdkf.host_tools.can.logs import Recording
@@ -137,6 +140,17 @@ time [s];theta [deg];z_ddot
 0,02;1,7;-0,3
 0,03;1,8;0,1
 """
+
+
+def mf4() -> bytes:
+    """A file of two signals, as asammdf writes it."""
+    time = np.arange(20) * 1e-3
+    signals = [Signal(np.sin(time * k), time, name=f"signal {k}", unit="rad") for k in (1, 2)]
+    with TemporaryDirectory() as folder, MDF(version="4.10") as file:
+        file.append(signals, common_timebase=True)
+        return Path(file.save(Path(folder) / "a.mf4")).read_bytes()
+
+
 RESPONSE = b"gain_sigma = 0.1\nphase_sigma = 0.1 # rad\nwarning = 5\n1.5 -12.1 4.2\n2 -11 5\n3 1 1\n"
 SETTINGS = b"model = hand\nsample_period = 2 ms # each\npreload=fixed\nm_p = .5e1\ntheta_noise = 1e-3 rad\n"
 
@@ -165,6 +179,8 @@ READERS: dict[str, tuple[str, bytes, Callable[[str], object]]] = {
     "trc": ("a.trc", TRC, read_log),
     "frames as csv": ("a.csv", CAN_CSV, read_log),
     "table": ("b.csv", TABLE, tables.read_table),
+    "mf4": ("b.mf4", mf4(), tables.read_table),
+    "mf4 of whatever": ("c.mf4", mf4(), tables.is_table),
     "scenario": ("a.toml", (ROOT / "sil/scenarios/sudden_grip.toml").read_bytes(), read_scenario),
     "campaign": ("a.toml", sorted((ROOT / "sil/campaign/specs").glob("*.toml"))[0].read_bytes(), spec.load),
     "aircraft": ("a.toml", (ROOT / "sil/aircraft/uh60_like.toml").read_bytes(), aircraft.load),

@@ -80,6 +80,13 @@ static bool refuse(settings_error_t *error, const char *format, ...)
     return false;
 }
 
+/* Adds a name to a list in memory of `size` bytes, as far as it fits. */
+static void add_name(char *list, size_t size, const char *name)
+{
+    (void)strncat(list, (list[0] != '\0') ? ", " : "", size - strlen(list) - 1u);
+    (void)strncat(list, name, size - strlen(list) - 1u);
+}
+
 static const choice_t *find_choice(const char *name)
 {
     for (uint32_t i = 0u; i < (uint32_t)CHOICES; i++) {
@@ -147,12 +154,10 @@ static double unit_factor(const char *of, const char *spelling)
 /* The spellings of a unit, as "kg, g". */
 static const char *unit_names(const char *of, char *text, size_t size)
 {
-    size_t used = 0u;
-
     text[0] = '\0';
     for (uint32_t i = 0u; i < (uint32_t)UNITS; i++) {
-        if ((strcmp(units[i].of, of) == 0) && (used < size)) {
-            used += (size_t)snprintf(&text[used], size - used, "%s%s", (used > 0u) ? ", " : "", units[i].spelling);
+        if (strcmp(units[i].of, of) == 0) {
+            add_name(text, size, units[i].spelling);
         }
     }
     return text;
@@ -221,12 +226,12 @@ bool settings_assign(lever_config_t *config, const char *text, settings_error_t 
         return refuse(error, "longer than %d characters", LINE_BYTES);
     }
     (void)memcpy(name, text, strlen(text) + 1u);
-    char *value = strchr(name, '=');
-    if (value == NULL) {
+    const size_t length = strcspn(name, "=");
+    if (name[length] == '\0') {
         return refuse(error, "\"%s\" has no \"=\": write name = value", trim(name));
     }
-    *value = '\0';
-    return settings_set(config, trim(name), trim(value + 1), error);
+    name[length] = '\0';
+    return settings_set(config, trim(name), trim(&name[length + 1u]), error);
 }
 
 /* Reads a line; false at the end of the file, when the line is what was left. */
@@ -298,12 +303,11 @@ bool settings_read(lever_config_t *config, FILE *file, const char *path, setting
 bool settings_choice_names(const char *choice, char *text, size_t size)
 {
     const choice_t *found = find_choice(choice);
-    size_t used = 0u;
 
     text[0] = '\0';
     for (uint32_t i = 0u; (found != NULL) && (i < (uint32_t)CHOICE_VALUES); i++) {
-        if ((found->values[i] != NULL) && (used < size)) {
-            used += (size_t)snprintf(&text[used], size - used, "%s%s", (used > 0u) ? ", " : "", found->values[i]);
+        if (found->values[i] != NULL) {
+            add_name(text, size, found->values[i]);
         }
     }
     return found != NULL;

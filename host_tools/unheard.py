@@ -1,0 +1,22 @@
+"""Without what asammdf says on standard error of a file that it cannot open: the reason is in the exception."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Open in it, and leave the handler of the exception in it: its objects are deleted at its end."""
+    logger = logging.getLogger("asammdf")
+    before = sys.unraisablehook, logger.disabled
+    sys.unraisablehook, logger.disabled = lambda _: None, True
+    try:
+        yield
+        gc.collect()
+    finally:
+        sys.unraisablehook, logger.disabled = before
