@@ -72,6 +72,8 @@ FRAMES: dict[str, Callable[[Columns], Any]] = {
 def test_whatever_holds_the_samples(kind: str, columns: Columns, result: Result) -> None:
     other = estimate(FRAMES[kind](columns))
     assert other["natural_frequency"].last == pytest.approx(result["natural_frequency"].last, rel=1e-4)
+    assert set(other) == set(result)
+    assert len(other) == len(set(other)) == 7
     assert len(other.time) == len(columns["time"])
 
 

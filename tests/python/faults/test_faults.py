@@ -74,6 +74,13 @@ def test_frames_arrive_as_the_fault_says() -> None:
     assert arrive(bus.stale("BASE_SAMPLE"))[5:8] == [(2, 2, 1), (3, 3, 0), (3, 2, 1)]
 
 
+def test_each_message_has_frames_of_every_other_kind() -> None:
+    messages, kinds = ("lever", "grip", "base", "command"), ("extended", "remote", "error")
+    names = {f"{message}_{kind}" for message in messages for kind in kinds}
+    assert {name for name, row in ROWS.items() if name in names and row.quick} == {"lever_extended"}
+    assert names <= ROWS.keys()
+
+
 @pytest.mark.parametrize(("usual", "expected"), [(False, []), (True, [250, 500])])
 def test_other_commands_come_beside_the_usual_ones_or_instead(usual: bool, expected: list[int]) -> None:
     sent = bus.Bus(1000, 1e-3, False, 0.3, np.random.default_rng(1))
