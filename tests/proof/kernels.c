@@ -66,7 +66,9 @@ static void prove_factors(void)
 
 void main(void)
 {
-    prove_functions(any_finite());
+    prove_functions(Frama_C_float_interval(-80.0f, 80.0f)); /* in parts: Eva does not infer x from fabsf(x) */
+    prove_functions(Frama_C_float_interval(80.0f, 3.4028235e38f));
+    prove_functions(Frama_C_float_interval(-3.4028235e38f, -80.0f));
     prove_functions(INFINITY);
     prove_functions(-INFINITY);
     prove_factors();
