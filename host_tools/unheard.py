@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 import sys
 from collections.abc import Iterator
@@ -11,12 +10,11 @@ from contextlib import contextmanager
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Open in it, and leave the handler of the exception in it: its objects are deleted at its end."""
+    """Open in it, and after a failure, when its exception is gone, gc.collect() in it, which deletes its objects."""
     logger = logging.getLogger("asammdf")
     before = sys.unraisablehook, logger.disabled
     sys.unraisablehook, logger.disabled = lambda _: None, True
     try:
         yield
-        gc.collect()
     finally:
         sys.unraisablehook, logger.disabled = before

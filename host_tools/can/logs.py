@@ -11,6 +11,7 @@ are no frame are counted, as is a log that breaks off; one that has no frame at 
 
 from __future__ import annotations
 
+import gc
 import gzip
 import os
 import stat
@@ -193,6 +194,7 @@ def _open_log(path: str) -> Any:
             if isinstance(error, OSError) and error.errno is not None:
                 raise
             reason = _one_line(error)
+        gc.collect()
     raise LogError(reason)
 
 

@@ -3,6 +3,7 @@ unit where the file says one; each has a time, which is a column too."""
 
 from __future__ import annotations
 
+import gc
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -162,6 +163,7 @@ def _opened_mf4(path: str) -> Any:
             return MDF(path)
         except Exception as error:
             reason = f"{type(error).__name__}: {error}"
+        gc.collect()
     raise LeverError(f"{path}: it cannot be read: {reason}")
 
 
