@@ -274,6 +274,16 @@ TEST(an_unknown_command_is_refused_said_and_changes_nothing_and_a_damaged_one_ge
     assert_counts(0u, 2u, 0u);
 }
 
+TEST(a_command_that_the_port_refuses_is_counted_and_said)
+{
+    const lever_command_t command = command_none();
+    const lever_frame_t frame = command_frame(&command);
+    lever_refuse(lever, &frame, (uint8_t)MESSAGE_RESULT_NOT_SAFE);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_COMMUNICATION));
+    assert_counts(0u, 1u, 0u);
+}
+
 TEST(after_a_reset_a_sender_may_start_anew_with_any_counter_and_time)
 {
     lever_command_t command = command_none();
