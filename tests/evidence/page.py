@@ -4,12 +4,15 @@ hand."""
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lever_cdkf.host_tools.report.page import Page
 from lever_cdkf.host_tools.report.summary_html import table
 
+_SHOWN = 6
+"""More figures of a test are folded up."""
 _STYLE = """
 .failed { color: var(--bad); }
 #requirements :is(td, th):nth-child(n+2), #faults :is(td, th):nth-child(-n+4), #proof td:nth-child(2) {
@@ -57,16 +60,24 @@ def verdict(content: Mapping[str, Any]) -> str:
 
 def _requirements(content: Mapping[str, Any]) -> str:
     rows = (
-        [row["number"], html.escape(row["requirement"]), "".join(_test(test) for test in row["tests"])]
+        [row["number"], _with_code(row["requirement"]), "".join(_test(test) for test in row["tests"])]
         for row in content["rows"]
     )
     return table(("", "requirement", '<div class="test"><span>test</span><span>result</span></div>'), rows)
 
 
+def _with_code(text: str) -> str:
+    """What stands between backticks is code."""
+    return re.sub("`(.+?)`", r"<code>\1</code>", html.escape(text))
+
+
 def _test(test: Mapping[str, Any]) -> str:
     """Its name, result and figures."""
     said = test["verdict"] if test["cases"] < 2 else f"{test['verdict']}, {test['cases']} cases"
-    figures = "".join(f"<br>{html.escape(name)}: {html.escape(_range(of))}" for name, of in test["figures"].items())
+    lines = [f"{html.escape(name)}: {html.escape(_range(of))}" for name, of in test["figures"].items()]
+    figures = "<br>".join(["", *lines])
+    if len(lines) > _SHOWN:
+        figures = f"<details><summary>{len(lines)} figures</summary>{'<br>'.join(lines)}</details>"
     state = "" if test["verdict"] == "passed" else ' class="failed"'
     name = html.escape(test["test"]).replace("/", "/<wbr>").replace("_", "_<wbr>")
     return f'<div class="test"><span>{name}</span><span{state}>{said}{figures}</span></div>'
