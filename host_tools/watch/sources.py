@@ -44,6 +44,12 @@ SIMULATIONS = "lever_cdkf.simulations"
 """Entry point group with one function, which makes a source and its estimator's configuration of a scenario."""
 
 
+def _dithers(values: Mapping[str, codec.Value]) -> bool | None:
+    """Whether a COMMAND asks for dither; None where it says nothing of it."""
+    rms = values.get("dither_rms")
+    return rms > 0.0 if isinstance(rms, int | float) else None
+
+
 class Source(ABC):
     """Frames from a thread that run() is, between start() and stop()."""
 
@@ -69,11 +75,10 @@ class Source(ABC):
         self._thread = threading.Thread(target=self._run, name="lever frames", daemon=True)
         self._commander = Commander()
         self._commanded = 0.0
-        self._counter = 0  # of the last COMMAND of this source
-        self._pending: Mapping[str, codec.Value] | None = None  # of command(), not yet acknowledged,
-        self._tries = 0  # sent so often
+        self._pending: Mapping[str, codec.Value] = {}  # of command(), not yet acknowledged,
+        self._tries: list[int] = []  # sent with these counters
         self._why_not = ""
-        self._dithers = False  # by command() of this source
+        self._dithers = False  # by a COMMAND of this source that was accepted
         self.refusals: deque[str] = deque(maxlen=16)
         """Why COMMANDs were refused; to be taken from here."""
 
@@ -106,46 +111,46 @@ class Source(ABC):
         return [self._waiting.popleft() for _ in range(len(self._waiting))]
 
     def command(self, values: Mapping[str, codec.Value]) -> None:
-        """Sends a COMMAND: the fields of the message; those not given change nothing. Raises LeverError."""
+        """Sends a COMMAND: the fields of the message, and of the ones before as far as they are not acknowledged; those
+        not given change nothing. Raises LeverError."""
         if not self.takes_commands:
             raise LeverError(f"{self.title} takes no commands")
-        self._pending, self._tries, self._why_not = values, 1, UNANSWERED
-        self._send(values)
-        if isinstance(rms := values.get("dither_rms"), int | float):
-            self._dithers = rms > 0.0
+        self._pending, self._why_not = {**self._pending, **values}, UNANSWERED
+        self._dithers = self._dithers and _dithers(values) is not False
+        self._tries = [self._send(self._pending)]
 
     def acknowledged(self, ack: Mapping[str, float]) -> None:
         """Takes the fields of a COMMAND_ACK. What is out of sequence is not refused for good: the last sender may have
         stopped at this counter, or a moment ago."""
         result = result_of(ack)
-        own = self._pending is not None and ack["command_counter"] == self._counter
+        own = bool(self._pending) and int(ack["command_counter"]) in self._tries
         if own and result == SEQUENCE:
             self._why_not = refusal(result)
             return
-        if own:
-            self._pending = None
         if result != ACCEPTED:
             self.refusals.append(refusal(result))
+        elif own and (dithers := _dithers(self._pending)) is not None:
+            self._dithers = dithers
+        if own:
+            self._pending = {}
 
     def keep_alive(self) -> None:
         """Repeats a COMMAND when it is time: one that is not acknowledged, or any, so that dither asked for here goes
         on. To be called several times a second as long as somebody watches it."""
         if time.monotonic() - self._commanded < KEEP_ALIVE:
             return
-        pending = self._pending
-        if pending is None:
+        if not self._pending:
             if self._dithers:
                 self._send({})
-        elif self._tries < _TRIES:
-            self._tries += 1
-            self._send(pending)
+        elif len(self._tries) < _TRIES:
+            self._tries.append(self._send(self._pending))
         else:
-            self._pending = None
+            self._pending = {}
             self.refusals.append(self._why_not)
 
     def end_dither(self) -> None:
         """Ends the dither asked for here, if there is any."""
-        if self._dithers:
+        if self._dithers or _dithers(self._pending):
             self.command({"dither_rms": 0.0})
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
@@ -153,9 +158,10 @@ class Source(ABC):
         the frequencies [Hz]. None where that is not known."""
         return None
 
-    def _send(self, values: Mapping[str, codec.Value]) -> None:
-        self._counter = self._commander.send(values, self._transmit)
+    def _send(self, values: Mapping[str, codec.Value]) -> int:
+        """Returns its counter."""
         self._commanded = time.monotonic()
+        return self._commander.send(values, self._transmit)
 
     def _transmit(self, identifier: int, data: bytes) -> None:
         """Sends a frame, where commands are taken. Raises LeverError."""

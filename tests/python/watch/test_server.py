@@ -53,9 +53,9 @@ class FlightSource(Source):
     def now(self) -> float:
         return self.flight.sample * 1e-3
 
-    def _send(self, values: Any) -> None:
+    def _send(self, values: Any) -> int:
         self.commanded.append(dict(values))
-        super()._send(values)
+        return super()._send(values)
 
     def _transmit(self, identifier: int, data: bytes) -> None:
         self.flight.send(identifier, data)

@@ -115,14 +115,14 @@ def test_a_command_goes_out_protected_and_is_shown(other_end: can.BusABC, on_bus
     received = [other_end.recv(PATIENCE), other_end.recv(PATIENCE)]
     decoded = [codec.decode(message.arbitration_id, message.data)[1] for message in received if message is not None]
     assert [values["counter"] for values in decoded] == [0, 1]
-    assert [values["request"] for values in decoded] == [2, 0]
+    assert [values["request"] for values in decoded] == [2, 2]  # goes with it until it is acknowledged
     assert [values["dither_rms"] for values in decoded] == [65.535, pytest.approx(0.3)]  # the first keeps it
     assert all(values[what] == 15 for values in decoded for what in CHOICES)
     assert [identifier for identifier, _ in on_bus.drain()] == [0x120, 0x120]
 
 
 class Commanding(Source):
-    """Notes the counter and request of what it sends."""
+    """Notes the counter, request and dither of what it sends."""
 
     title = "a bus"
     takes_commands = True
@@ -130,6 +130,7 @@ class Commanding(Source):
     def __init__(self) -> None:
         super().__init__()
         self.sent: list[tuple[float, float]] = []
+        self.dithers: list[float] = []
 
     def run(self) -> None:
         raise NotImplementedError
@@ -137,6 +138,7 @@ class Commanding(Source):
     def _transmit(self, identifier: int, data: bytes) -> None:
         values = codec.decode(identifier, data)[1]
         self.sent.append((values["counter"], values["request"]))
+        self.dithers.append(values["dither_rms"])
 
 
 @pytest.fixture
@@ -166,6 +168,28 @@ def test_a_command_is_repeated_until_it_is_acknowledged_in_sequence(pass_time: C
         source.keep_alive()
         assert source.sent == [(k, FREEZE) for k in range(sent)]
     assert not source.refusals
+
+
+def test_dither_is_kept_alive_only_once_it_is_accepted(pass_time: Callable[[float], None]) -> None:
+    """An answer to any try of it will do; until there is one, what was asked before goes with it."""
+    source = Commanding()
+    accepted, acting, keep = 0, 5, 65.535
+    source.command({"request": "freeze"})
+    source.command({"dither_rms": 0.3})
+    pass_time(0.3)
+    source.keep_alive()
+    source.acknowledged({"command_counter": 1, "result": accepted})
+    pass_time(0.3)
+    source.keep_alive()
+    assert source.sent == [(0, FREEZE), (1, FREEZE), (2, FREEZE), (3, 0)]
+    assert source.dithers == [keep, 0.3, 0.3, keep]
+    source.end_dither()
+    source.acknowledged({"command_counter": 4, "result": accepted})
+    source.command({"dither_rms": 0.3})
+    source.acknowledged({"command_counter": 5, "result": acting})
+    pass_time(0.3)
+    source.keep_alive()
+    assert source.dithers[4:] == [0.0, 0.3]
 
 
 @pytest.mark.parametrize(("result", "why"), [(None, "no COMMAND_ACK"), (2, "is there another sender of COMMAND?")])
