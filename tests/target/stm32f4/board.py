@@ -137,7 +137,10 @@ class Board:
                 self._line.sendall(f"t{identifier:03X}8{data.hex()}\r".encode())
             said |= dict(codec.decode(*frame) for frame in self._answers())
             if "PLATFORM_HEALTH" in said and "PLATFORM_RESET" in said:
-                assert self.command("C") == ""
+                closed = self.command("C")
+                while closed[:1] in ("t", "z"):  # of the last sample, still
+                    closed = self._read_line()
+                assert closed == ""
                 return said["PLATFORM_HEALTH"] | said["PLATFORM_RESET"]
         raise AssertionError("no PLATFORM_HEALTH or no PLATFORM_RESET in 300 samples")
 
