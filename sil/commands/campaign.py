@@ -133,6 +133,8 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
         raise LeverError(
             "every chunk killed the workers that tried it: give the workers more memory, or go on with --resume"
         )
+    for unfinished in folder.glob(f".{plan.fingerprint}-*.tmp"):  # of workers that were killed
+        unfinished.unlink(missing_ok=True)
     origin = provenance([plan.spec.file] if args.spec == plan.spec.file else [])
     found = summary.build(plan, folder, session) | {"provenance": asdict(origin)}
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)
