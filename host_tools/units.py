@@ -45,11 +45,17 @@ def number_of(text: str) -> float:
 
 
 def parse(text: object, unit: str) -> float:
-    """Value of `text`, for example "0.1 g", in the SI `unit`, for example "m/s^2". Raises UnitError."""
+    """Return the value of `text`, for example "0.1 g", in the SI `unit`, for example "m/s^2".
+
+    A number of the unit 1 needs none: 0.5, as a number or as text. Raises UnitError.
+    """
+    if unit == "1" and isinstance(text, int | float) and not isinstance(text, bool):
+        text = f"{text!r} 1"
     quantity = split(text) if isinstance(text, str) else None
     if quantity is None:
         raise UnitError(f'{text!r} is not a quantity; write a number and a unit in quotes, like "1.5 {unit}"')
     number, spelling = quantity
+    spelling = "1" if unit == "1" and not spelling else spelling
     allowed = spellings(unit)
     if spelling not in allowed:
         said = f"unit {spelling!r}" if spelling else "no unit"

@@ -146,6 +146,7 @@ class Recording:
                     if len(messages) == _MESSAGES:
                         yield self._frames(messages)
                         messages = []
+            self.ends_early += _why_short(path, reader)
         except Exception as error:  # each format has its own, from struct.error to those of asammdf
             if isinstance(error, OSError) and error.errno is not None:
                 raise
@@ -196,6 +197,17 @@ def _open_log(path: str) -> Any:
             reason = _one_line(error)
         gc.collect()
     raise LogError(reason)
+
+
+def _why_short(path: str, reader: Any) -> list[str]:
+    """Why a BLF has less in it than was recorded, by its header; python-can reads it without a word."""
+    length = getattr(reader, "file_size", None)
+    if length is None or path.endswith(_COMPRESSED):
+        return []
+    if not length:
+        return [f"{path}: its header has no length: the recorder did not close it"]
+    size = _size(path)
+    return [f"{path}: {size:,} bytes of the {length:,} that its header says"] if size < length else []
 
 
 def _one_line(error: Exception) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator
 
 import numpy as np
@@ -171,8 +172,10 @@ class Traffic:
         where = f"on bus {self.channel} " if self.channel is not None else ""
         there = f"; its buses: {', '.join(names)}" if names else ""
         wanted = f"{self._base:#x} BASE_SAMPLE"
+        paths = self.recording.paths
         return (
-            f"{', '.join(self.recording.paths)}: {self.frames} frames, but no sample ({wanted}) {where}in them{there}"
+            f"{', '.join(paths)}: {self.frames} frames, but no sample ({wanted}) {where}in them{there}; for messages "
+            f"other than those of lever.dbc, `lever map {shlex.quote(paths[0])} --dbc FILE` finds the signals"
         )
 
 

@@ -61,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
     from ..signals.mapping import as_toml
     from ..signals.plots import KINDS, OTHER, write
     from ..signals.proposal import propose
+    from ..signals.recorded import notes_of
     from ..tables import print_tables
 
     start, length = check_part(args)
@@ -77,6 +78,8 @@ def run(args: argparse.Namespace) -> int:
     changing = [signal for signal in others if signal.changes()]
     rows = [_row("", signal) for signal in changing]
     print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json, inputs=read)
+    for note in notes_of(signals):
+        layout.say(f"{note}.")
     if len(changing) < len(others):
         layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
     print(*layout.command_lines(_command(args, mapping, proposed), layout.terminal_width()), sep="\n")

@@ -13,10 +13,11 @@ from ..errors import LeverError
 from ..near_names import near_names
 from ..results.summary import Mapped, MessageCounts
 from .bus_signals import BusSignals, find, load_database
+from .clock import RunningClock
 from .inputs import Input, recorded_samples, understood
 from .mapping import Mapping
 from .own import own_mapping
-from .recorded import Signal
+from .recorded import Signal, notes_of
 from .resample import Samples
 from .tables import is_table, read_table
 from .units import split_name
@@ -96,7 +97,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
     fields = {key: find(database, source.signal, file) for key, source in mapping.sources.items()}
     reader = BusSignals(database, fields.values(), mapping.protected)
     recording = Recording(paths)
-    frames = _collect(reader, recording, reading.start, reading.length, progress)
+    frames, set_back = _collect(reader, recording, reading.start, reading.length, progress)
     inputs, buses = {}, set[str]()
     for key, source in mapping.sources.items():
         message, signal = fields[key]
@@ -109,7 +110,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
     unprotected = sum(counts.frames for name, counts in reader.counts.items() if name not in mapping.protected)
     used = sum(counts.frames for counts in reader.counts.values())
     return Loaded(
-        *(samples, inputs, notes, [str(path) for path in recording.paths], sorted(buses), frames, used),
+        *(samples, inputs, [*set_back, *notes], [str(path) for path in recording.paths], sorted(buses), frames, used),
         *(reader.counts, unprotected, recording.damaged, recording.ends_early),
     )
 
@@ -124,8 +125,9 @@ def _of_table(path: str, reading: Reading) -> Loaded:
         signal = column(columns, source.signal, path).between(start, start + reading.length)
         inputs[key] = understood(key, source, signal)
     samples, notes = recorded_samples(inputs, reading.clock)
+    of_file = notes_of(each.signal for each in inputs.values())
     rows = max(len(each.signal.time) for each in inputs.values())
-    return Loaded(samples, inputs, notes, [path], [], rows, 0)
+    return Loaded(samples, inputs, [*of_file, *notes], [path], [], rows, 0)
 
 
 def all_signals(
@@ -165,11 +167,16 @@ def _check_there(path: str) -> None:
         raise LeverError(f"cannot read {path}: no such file")
 
 
-def _collect(reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None) -> int:
-    """Hands the frames of a part to the reader; returns how many there are."""
+def _collect(
+    reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None
+) -> tuple[int, tuple[str, ...]]:
+    """Hand the frames of a part to the reader; return how many there are, and where their clock was set back."""
     frames = 0
     first_us: int | None = None
-    for chunk in recording.chunks():
+    clock = RunningClock(1e6 * LATE)
+    for recorded in recording.chunks():
+        chunk = recorded.copy()
+        chunk["time_us"] = clock.running(recorded["time_us"])
         first_us = int(chunk["time_us"][0]) if first_us is None else first_us
         since = (chunk["time_us"] - first_us) * 1e-6
         part = chunk[(since >= (start or -math.inf)) & (since < start + length)]
@@ -183,7 +190,7 @@ def _collect(reader: BusSignals, recording: Recording, start: float, length: flo
         first = first_us + round(1e6 * start)
         for path in recording.paths:
             reader.add_fd(path, first, first + round(1e6 * min(length, _EVER)))
-    return frames
+    return frames, clock.note(seconds=1e-6)
 
 
 _EVER = 1e9  # [s]

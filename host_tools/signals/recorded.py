@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,6 +24,8 @@ class Signal:
     """As it is written there; empty without one."""
     words: str = ""
     """What the database says of it."""
+    notes: tuple[str, ...] = ()
+    """What its reader had to decide, a sentence each, for the user to see."""
 
     @cached_property
     def period(self) -> float:
@@ -44,6 +47,11 @@ class Signal:
         """The part from `start` to `end` [s]."""
         inside = (self.time >= start) & (self.time < end)
         return replace(self, time=self.time[inside], values=self.values[inside])
+
+
+def notes_of(signals: Iterable[Signal]) -> list[str]:
+    """Return the notes of all signals, each once."""
+    return list(dict.fromkeys(note for each in signals for note in each.notes))
 
 
 def ordered(signal: Signal) -> tuple[Signal, int]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import gc
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from ..errors import LeverError
 from ..extras import require
 from ..unheard import unheard
 from . import text_table
+from .clock import RunningClock
 from .recorded import Signal
 from .units import factor, split_name
 
@@ -25,6 +27,9 @@ _TIME = re.compile(
 
 Columns = dict[str, tuple[Array, str]]
 """Values and unit by name, all of one length."""
+
+_SET_BACK = 1.0
+"""[s] by which the time of a row goes back where the clock was set; by less, rows are out of order."""
 
 
 def is_table(path: str) -> bool:
@@ -64,10 +69,17 @@ def signals_of(columns: Columns, where: str, time: str | None = None) -> list[Si
     name = find_time(columns, where, time)
     at = seconds(*columns[name], f"{where}: {name}")
     return [
-        Signal(label, at, np.asarray(values, np.float64), unit)
+        _signal(label, at, values, unit)
         for label, (values, unit) in columns.items()
         if label != name and values.dtype.kind in "biuf"
     ]
+
+
+def _signal(name: str, recorded: FloatArray, values: Array, unit: str, words: str = "") -> Signal:
+    """A column over its recorded times [s], which go on where their clock was set back."""
+    clock = RunningClock(_SET_BACK)
+    time = clock.running(recorded)
+    return Signal(name, time, np.asarray(values, np.float64), unit, words, clock.note())
 
 
 def find_time(columns: Columns, where: str, wanted: str | None = None) -> str:
@@ -116,7 +128,11 @@ def _some(names: list[str]) -> str:
 
 
 def _text(path: str, time: str | None) -> list[Signal]:
-    return signals_of(text_table.read(path), path, time)
+    signals = signals_of(text_table.read(path), path, time)
+    if (encoding := text_table.encoding_of(path)) == text_table.UTF_8:
+        return signals
+    note = f"The text is not UTF-8: it is read as {encoding}"
+    return [replace(each, notes=(*each.notes, note)) for each in signals]
 
 
 def _parquet(path: str, time: str | None) -> list[Signal]:
@@ -142,9 +158,8 @@ def _mf4(path: str, time: str | None) -> list[Signal]:
                 values = channel.samples.astype(np.float64)
                 if channel.invalidation_bits is not None:
                     values = np.where(np.asarray(channel.invalidation_bits, bool), np.nan, values)
-                signals[channel.name] = Signal(
-                    channel.name, start + channel.timestamps, values, channel.unit or "", channel.comment or ""
-                )
+                at = start + channel.timestamps
+                signals[channel.name] = _signal(channel.name, at, values, channel.unit or "", channel.comment or "")
     return list(signals.values())
 
 
@@ -222,5 +237,5 @@ def _of_arrays(arrays: Mapping[str, Array], where: str, time: str | None) -> lis
         if name not in times and fitting and values.dtype.kind in "biuf":
             chosen = (own or fitting)[0]
             at = seconds(series[chosen], split_name(chosen)[1], f"{where}: {chosen}")
-            signals.append(Signal(name, at, values.astype(np.float64), split_name(name)[1]))
+            signals.append(_signal(name, at, values, split_name(name)[1]))
     return signals

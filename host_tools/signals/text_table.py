@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import gzip
 import io
 import re
 import zlib
 from itertools import islice
+from typing import IO
 
 import numpy as np
 
@@ -15,6 +17,10 @@ from ..arrays import Array
 from ..errors import LeverError
 from .units import is_unit, normal, split_name
 
+UTF_8, WESTERN = "utf-8-sig", "cp1252"
+"""Encodings: the second is that of spreadsheets in Western Europe and America."""
+
+_BLOCK = 1 << 20
 _DELIMITERS = ",;\t| "
 _LOOKED_AT = 200
 """Lines at the beginning, among which the header ends."""
@@ -52,25 +58,45 @@ def is_text_table(path: str) -> bool:
     return not _start(path)[0].startswith("(")
 
 
-def _open(path: str) -> io.TextIOBase:
+def _open(path: str) -> IO[bytes]:
+    """The bytes of a text that may be compressed."""
     with open(path, "rb") as file:
         packed = file.read(2) == b"\x1f\x8b"
-    if packed:
-        return gzip.open(path, "rt", encoding="utf-8-sig", errors="replace")
-    return open(path, encoding="utf-8-sig", errors="replace", newline="")
+    return gzip.open(path, "rb") if packed else open(path, "rb")
+
+
+def encoding_of(path: str) -> str:
+    """Return UTF_8, or WESTERN for a text that is not."""
+    decoder = codecs.getincrementaldecoder(UTF_8)()
+    try:
+        with _open(path) as file:
+            while block := file.read(_BLOCK):
+                decoder.decode(block)
+            decoder.decode(b"", final=True)
+    except UnicodeDecodeError:
+        return WESTERN
+    return UTF_8
 
 
 def _start(path: str) -> list[str]:
     try:
         with _open(path) as file:
-            return [line.rstrip("\r\n") for line in islice(file, _LOOKED_AT)] or [""]
+            start = b"".join(islice(file, _LOOKED_AT))
     except (OSError, EOFError, zlib.error) as error:
         raise LeverError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
+    return _decoded(start).splitlines() or [""]
 
 
 def _text(path: str) -> str:
     with _open(path) as file:
-        return file.read()
+        return _decoded(file.read())
+
+
+def _decoded(text: bytes) -> str:
+    try:
+        return text.decode(UTF_8)
+    except UnicodeDecodeError:
+        return text.decode(WESTERN, errors="replace")
 
 
 def _fields(line: str, delimiter: str) -> list[str]:

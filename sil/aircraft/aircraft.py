@@ -25,7 +25,7 @@ sum passes a first-order low-pass with that corner: what flight control computer
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -103,12 +103,19 @@ def load(name_or_path: str, **changes: Any) -> Aircraft:
     return aircraft
 
 
+_OF_SCENARIO = ("model", "gearing")
+"""Keys of [aircraft] that are not the aircraft's own."""
+
+
 def read_aircraft(values: Any, place: Place) -> Coupled:
     """Reader of the table [aircraft] of a scenario: `model` is a name or a file, `gearing` the pitch over the lever's
     angle, and every other key one of the aircraft's."""
     if not isinstance(values, dict):
         raise place.error(f"{values!r} is not a table")
-    changes = {name: value for name, value in values.items() if name not in ("model", "gearing")}
+    changes = {name: value for name, value in values.items() if name not in _OF_SCENARIO}
+    known = [field.name for field in fields(Aircraft)]
+    if unknown := next((name for name in changes if name not in known), None):
+        raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")
     if not isinstance(values.get("model"), str):
         raise place.at("model").error(f"must be one of {', '.join(names())}, or the path of a .toml file")
     try:

@@ -274,7 +274,9 @@ def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) 
 
 
 def _override(values: dict[str, Any], override: str) -> None:
-    """Puts "key.subkey=value" into the table; a number as subkey goes into a list, as in base.0.rms="0.2 g".
+    """Put "key.subkey=value" into the table; a number as subkey goes into a list, as in base.0.rms="0.2 g".
+
+    The number after the last of a list appends to it.
 
     Settings and choices of the estimator may stand without the name of their table, as in all commands.
     """
@@ -287,12 +289,27 @@ def _override(values: dict[str, Any], override: str) -> None:
         parents = ["estimator"]
     elif not parents and last not in Scenario.__dataclass_fields__:
         parents = ["settings"] if near_names(last, (row.name for row in settings_table())) else []
+    at = ""
     try:
-        for parent in parents:
-            target = target[int(parent)] if isinstance(target, list) else target.setdefault(parent, {})
-        if isinstance(target, list):
-            target[int(last)] = value_of(written)
-        else:
+        for parent, child in zip(parents, [*parents, last][1:], strict=True):
+            nothing: Any = [] if child.isdecimal() else {}
+            target = target[int(parent)] if isinstance(target, list) else target.setdefault(parent, nothing)
+            at = f"{at}.{parent}".removeprefix(".")
+        if not isinstance(target, list):
             target[last] = value_of(written)
+        elif int(last) == len(target):
+            target.append(value_of(written))
+        else:
+            target[int(last)] = value_of(written)
     except (AttributeError, IndexError, TypeError, ValueError):
-        raise ScenarioError(f"--set {override}: the scenario has no {key.strip()!r}") from None
+        raise ScenarioError(f"--set {override}: the scenario has no {key.strip()!r}{_entries(target, at)}") from None
+
+
+def _entries(target: Any, path: str) -> str:
+    """How to name an entry of a list, or a further one."""
+    if not isinstance(target, list):
+        return ""
+    count = len(target)
+    return (
+        f"; {path} has {count} entr{'y' if count == 1 else 'ies'}, counted from 0: {path}.{count}={{...}} appends one"
+    )
