@@ -8,7 +8,7 @@ from pathlib import Path
 
 import lever_cdkf
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.errors import LeverError
 
 PUBLIC = ["Config", "Estimator", "Result", "estimate", "load_scenario", "run_samples", "simulate"]
 
@@ -31,7 +31,7 @@ def test_what_is_no_scenario(root: Path) -> None:
     for nothing in (5, None):
         with pytest.raises(LeverError, match="is no scenario: give its name"):
             lever_cdkf.load_scenario(nothing)  # type: ignore[arg-type]
-    assert lever_cdkf.load_scenario(root / "sil" / "scenarios" / "steady.toml").title
+    assert lever_cdkf.load_scenario(root / "sil" / "lever_sil" / "scenarios" / "steady.toml").title
 
 
 def test_a_scenario_runs_without_a_bus() -> None:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.firmware.native import Config
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.firmware.native import Config
 from processes import PATIENCE
 
 pytestmark = pytest.mark.usefixtures("installed")
@@ -49,9 +49,9 @@ def test_can_logger_opens_and_waits(tmp_path: Path) -> None:
 
 def test_the_tree_is_what_is_tested(root: Path) -> None:
     """An edit of a Python file counts without a build step, here and in every process that a test starts."""
-    code = "from lever_cdkf import host_tools, sil; print(sil.__file__, host_tools.__file__)"
+    code = "import lever_cdkf, lever_sil; print(lever_cdkf.__file__, lever_sil.__file__)"
     files = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert files == [str(root / folder / "__init__.py") for folder in ("sil", "host_tools")]
+    assert files == [str(root / folder / "__init__.py") for folder in ("host_tools/lever_cdkf", "sil/lever_sil")]
 
 
 def test_versions_agree(installed: str, root: Path) -> None:
