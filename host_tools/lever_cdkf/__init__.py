@@ -13,17 +13,31 @@ if TYPE_CHECKING:
     from lever_sil.run.runner import simulate
     from lever_sil.scenarios.scenario import load as load_scenario
 
+    from .errors import LeverError
     from .firmware.native import Config, Estimator, run_samples
     from .signals.estimate import estimate
     from .signals.result import Result
 
-__all__ = ["Config", "Estimator", "Result", "estimate", "load_scenario", "run_samples", "simulate"]
+    __version__: str
+
+__all__ = [
+    "Config",
+    "Estimator",
+    "LeverError",
+    "Result",
+    "__version__",
+    "estimate",
+    "load_scenario",
+    "run_samples",
+    "simulate",
+]
 
 _NATIVE = "lever_cdkf.firmware.native"
 _HOMES = {
     "Config": (_NATIVE, "Config"),
     "Estimator": (_NATIVE, "Estimator"),
     "estimate": ("lever_cdkf.signals.estimate", "estimate"),
+    "LeverError": ("lever_cdkf.errors", "LeverError"),
     "Result": ("lever_cdkf.signals.result", "Result"),
     "run_samples": (_NATIVE, "run_samples"),
     "simulate": ("lever_sil.run.runner", "simulate"),
@@ -32,6 +46,10 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from .provenance import version
+
+        return version()
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
