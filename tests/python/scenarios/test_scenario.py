@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.native import Estimator
-from lever_cdkf.sil.plants import excitation
-from lever_cdkf.sil.scenarios import scenario
-from lever_cdkf.sil.scenarios.random_streams import stream
-from lever_cdkf.sil.scenarios.scenario import Scenario
-from lever_cdkf.sil.toml_tables import ScenarioError
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.native import Estimator
+from lever_sil.plants import excitation
+from lever_sil.scenarios import scenario
+from lever_sil.scenarios.random_streams import stream
+from lever_sil.scenarios.scenario import Scenario
+from lever_sil.toml_tables import ScenarioError
 
 REQUIRED = {
     "steady", "fatigue_drift", "sudden_grip", "base_only", "base_dither", "poor_excitation", "sensor_dropout",

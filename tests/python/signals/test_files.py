@@ -15,8 +15,8 @@ import pyarrow
 import pytest
 from asammdf import MDF
 from asammdf import Signal as Channel
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.signals.tables import is_table, read_table
+from lever_cdkf import cli
+from lever_cdkf.signals.tables import is_table, read_table
 from pyarrow import parquet
 from python.conftest import Refused
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight

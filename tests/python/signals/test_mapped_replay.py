@@ -9,8 +9,8 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.native import Config, enum_names, run_samples
+from lever_cdkf import cli
+from lever_cdkf.firmware.native import Config, enum_names, run_samples
 from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
 
