@@ -22,7 +22,7 @@ _PACKAGES = {"udp_multicast": "msgpack", "gs_usb": "gs_usb"}
 
 
 def add_bus_options(parser: argparse.ArgumentParser) -> None:
-    """--interface, --channel, --bitrate, --bus-option and those of identifiers.py, for open_bus() and chosen_options()."""
+    """--interface, --channel and others, with those of identifiers.py, for open_bus() and chosen_options()."""
     parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser …")
     parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
     parser.add_argument("--bitrate", metavar="RATE", type=int, help="[bit/s] for interfaces that set it")

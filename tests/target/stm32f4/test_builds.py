@@ -96,13 +96,15 @@ def test_an_aircraft_and_identifiers_of_the_build_are_those_of_the_library(folde
 def test_a_build_refuses_what_does_not_go_together(tmp_path: Path) -> None:
     (tmp_path / "bad.settings").write_text("gap_limit = 1\ntrim_corner = 3\n")
     (tmp_path / "bad.aircraft").write_text(AIRCRAFT.replace("alarm = 3", "alarm = 9"))
-    for option, said in (
-        (f"-DLEVER_SETTINGS_FILE={tmp_path / 'bad.settings'}", "gap_limit does not fit the other settings"),
-        (f"-DLEVER_AIRCRAFT_FILE={tmp_path / 'bad.aircraft'}", "bad.aircraft: the response of the aircraft cannot"),
-        ("-DLEVER_ID_OFFSET=0x5E1", "identifiers of 11 bits leave room for 0x5E0 at most"),
-        ("-DLEVER_ID_BASE=0x20000000", "up to 0x1FFFF800"),
+    for number, (option, said) in enumerate(
+        (
+            (f"-DLEVER_SETTINGS_FILE={tmp_path / 'bad.settings'}", "gap_limit does not fit the other settings"),
+            (f"-DLEVER_AIRCRAFT_FILE={tmp_path / 'bad.aircraft'}", "bad.aircraft: the response of the aircraft cannot"),
+            ("-DLEVER_ID_OFFSET=0x5E1", "identifiers of 11 bits leave room for 0x5E0 at most"),
+            ("-DLEVER_ID_BASE=0x20000000", "up to 0x1FFFF800"),
+        )
     ):
-        done = configure(tmp_path / "build", option)
+        done = configure(tmp_path / f"build{number}", option)
         assert done.returncode != 0
         assert said in " ".join(done.stderr.split())
 
