@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..can.identifiers import add_identifier_options
 from ..files import check_not_input
 from ..formats import add_format_option, chosen_formats
 from ..layout import say
@@ -64,6 +65,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "replay", help="run the firmware on recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log; several are one recording in pieces")
+    add_identifier_options(parser)
     parser.add_argument(
         "--each", action="store_true", help="every LOG is a separate recording: one table, one page, a row for each"
     )

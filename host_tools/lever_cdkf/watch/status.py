@@ -31,7 +31,7 @@ PLATFORM_FAULTS = {
 }
 """Conditions of its machine, by enum lever_platform_fault."""
 
-SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector"}
+SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector", 16: "settings or aircraft of its build"}
 """Bits of enum message_self_test (firmware/can/messages.h)."""
 
 SILENT_AFTER = 1.0
