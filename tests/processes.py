@@ -27,10 +27,17 @@ def lever(*arguments: str | Path) -> str:
 
 @contextlib.contextmanager
 def full_disk(size: int) -> Iterator[None]:
-    """No file that this process writes may become larger than `size` bytes (Python ignores SIGXFSZ)."""
+    """No file that this process writes may become larger than `size` bytes (Python ignores SIGXFSZ).
+
+    Modules are imported without writing their bytecode: Python would keep a .pyc that is cut off, and fail to load it
+    ever after.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    writes_no_bytecode = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        sys.dont_write_bytecode = writes_no_bytecode
