@@ -142,5 +142,5 @@ def test_the_ports_start_with_them() -> None:
     others = {
         str(file.relative_to(ports)) for file in ports.rglob("*.c") if "lever_config_default(" in file.read_text()
     }
-    assert makers == {"linux/options.c", "stm32f4/main.c"}
+    assert makers == {"build/check.c", "linux/options.c", "stm32f4/main.c"}
     assert others == {"embedded/self_test.c"}

@@ -40,7 +40,8 @@ _chosen = Identifiers()
 
 
 def add_identifier_options(parser: argparse.ArgumentParser, *aliases: str) -> None:
-    """--id-offset and --id-base; `aliases` of the former."""
+    """--id-offset and --id-base, which the command line makes the choice of the process; `aliases` of the former."""
+    parser.set_defaults(prepare=use)
     either = parser.add_mutually_exclusive_group()
     either.add_argument(
         "--id-offset",

@@ -23,6 +23,7 @@ LEFT_OUT = re.compile(
     | link\.\w+_receiver\.(tolerance\..*|data_id_base)
     | link\.(has_sample|sample\..*)             # there is none between two samples
     | link\.(period_us|publish_us)
+    | settings_sum
     | bounce\.aircraft""",
     re.VERBOSE,
 )
