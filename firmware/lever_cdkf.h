@@ -26,7 +26,7 @@
  * Every call is bounded; lever_update() is the expensive one: 2,500 instructions and 3,940 cycles on a Cortex-M4F on
  * average (lever model, as shipped), 7,400 instructions when the parameters learn (once a learn_period), 17,500 at the
  * first sample after a gap; with an aircraft and a mitigation 3,470 on average, and 18,400 at a sample with a margin
- * (25 a second). 37 KiB of code, 1.80 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
+ * (25 a second). 37 KiB of code, 1.84 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
 #ifndef LEVER_CDKF_H
@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 1,872 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 1,896 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[1856];
+    uint8_t rest[1880];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -173,7 +173,8 @@ enum lever_mode {
     LEVER_MODE_ALIGN = 1,  /* averaging the first samples; estimates are the first guess */
     LEVER_MODE_RUN = 2,    /* estimating */
     LEVER_MODE_COAST = 3,  /* no usable theta or theta_dot: predicting, uncertainty grows */
-    LEVER_MODE_FROZEN = 4, /* by command: states are estimated, parameters held */
+    LEVER_MODE_FROZEN = 4, /* by command: states are estimated and sensors judged, parameters held; only what a sensor
+                              that then proves wrong has taught in the last two seconds is taken back */
     LEVER_MODE_FAULT = 5   /* the filter had to be restarted too often; only a reset leaves this mode */
 };
 
@@ -319,15 +320,15 @@ const char *lever_parameter_unit(uint8_t model, uint32_t index);
 
 /* Conditions present at the last sample; none of them stops the estimator. HEALTH has those since the last HEALTH. */
 enum lever_fault {
-    LEVER_FAULT_THETA = 1,          /* theta missing or invalid */
-    LEVER_FAULT_THETA_DOT = 2,      /* theta_dot missing or invalid */
-    LEVER_FAULT_TORQUE = 4,         /* motor torque missing or invalid, taken as what was asked for */
-    LEVER_FAULT_BASE = 8,           /* base acceleration invalid, the last one held */
-    LEVER_FAULT_GAP = 16,           /* samples were missing before this one */
+    LEVER_FAULT_THETA = 1,     /* theta missing or invalid */
+    LEVER_FAULT_THETA_DOT = 2, /* theta_dot missing or invalid */
+    LEVER_FAULT_TORQUE = 4,    /* motor torque missing (taken as what was asked for), far off (last one held), wrong */
+    LEVER_FAULT_BASE = 8,      /* base acceleration missing or far off (last one held), or wrong */
+    LEVER_FAULT_GAP = 16,      /* samples were missing before this one */
     LEVER_FAULT_COMMUNICATION = 32, /* a frame since the last sample was corrupt, repeated or out of sequence */
     LEVER_FAULT_INNOVATION = 64,    /* innovations persistently larger than their predicted covariance */
     LEVER_FAULT_EXCITATION = 128,   /* too little motion to learn from; the parameters stand, and grow uncertain */
-    LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model */
+    LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model, in any mode */
     LEVER_FAULT_RECOVERED = 512,    /* an invalid factor or estimate was refused and restarted at this sample */
     LEVER_FAULT_CHANGE = 1024,      /* the pilot has changed suddenly within the last second; learning anew */
     LEVER_FAULT_PLATFORM = 2048,    /* the machine reports a fault of its own: lever_platform() */
@@ -441,7 +442,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1591 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1615 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -34,17 +34,19 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
         alignment_start_state(estimator, y, sample->valid);
         if (alignment->time > (settings->align_time - (0.5f * settings->sample_period))) {
             estimator->mode = LEVER_MODE_RUN;
+            learning_resume(&estimator->learning, &estimator->cdkf);
         }
     }
 }
 
 void alignment_begin(estimator_t *estimator, const checked_t *sample)
 {
-    const float presumed = 2.0f * estimator->setup.settings->excitation_least;
+    averages_t *averages = &estimator->averages;
     (void)memset(&estimator->alignment, 0, sizeof estimator->alignment);
-    estimator->averages.excitation_square = presumed * presumed;
-    estimator->averages.motion_square = presumed * presumed;
-    estimator->averages.innovation = 1.0f;
+    averages->excitation_square = 0.0f; /* nothing is learnt before the lever is seen to move */
+    averages->motion_square = 0.0f;
+    (void)memset(averages->last, 0, sizeof averages->last);
+    averages->innovation = 1.0f;
     alignment_step(estimator, sample, 0.0f);
 }
 

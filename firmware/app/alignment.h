@@ -18,7 +18,7 @@ typedef struct checked {
     bool gripped;     /* it is valid */
 } checked_t;
 
-/* Begins with this sample. Excitation is presumed until it has been measured, so that annealing is not cut short. */
+/* Begins with this sample. */
 void alignment_begin(estimator_t *estimator, const checked_t *sample);
 
 /* Averages angles until align_time has passed, then starts the state. Without any angle the trim is taken to be where

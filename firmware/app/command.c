@@ -28,6 +28,9 @@ static void carry_out(estimator_t *estimator, const lever_command_t *command)
     if (restart) {
         estimator_start_over(estimator);
     }
+    if (estimator->frozen && (command->request == (uint8_t)LEVER_REQUEST_RUN)) {
+        learning_resume(&estimator->learning, &estimator->cdkf);
+    }
     if ((command->request == (uint8_t)LEVER_REQUEST_RUN) || (command->request == (uint8_t)LEVER_REQUEST_FREEZE)) {
         estimator->frozen = (command->request == (uint8_t)LEVER_REQUEST_FREEZE);
     }

@@ -12,6 +12,8 @@
 #define INNOVATION_TOLERATED 3.0f /* mean of nis / nis_size; expected 1 */
 #define INNOVATION_MOST 1.0e6f    /* a single value is not averaged beyond this, so that the mean recovers */
 #define MOTION_TIME 0.1f          /* [s] */
+#define NOISE_LIKE_MOTION 0.2f    /* of the noise of theta_dot, in squares: what a mean of products may be by chance */
+#define RATE_OF_ANGLE 2.0f        /* presumed rate over angle, in corners of the trim */
 #define CLOCK_LEAST 0.25f         /* of a sample_period: a clock that advances by less as good as stands */
 #define OTHER_MOST 1.0e4f         /* plausible samples but of theta [rad/s], [N m], [m/s^2] */
 #define HALF_TURN_OF_TIME 0x80000000u
@@ -101,6 +103,21 @@ static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
     return (z_ddot + ahead) * estimator->setup.base_scale;
 }
 
+/* An input that is plausible, but for some samples far from where it was. Only successive samples are compared: not
+ * after a gap, nor when it was missing before, as `fault` of the last sample says. */
+static bool has_jumped(
+    estimator_t *estimator, enum monitor_input input, enum lever_fault fault, float change, float elapsed)
+{
+    monitor_t *monitor = &estimator->learning.monitor;
+    const bool known = ((estimator->faults & (uint32_t)fault) == 0u) || (monitor->jump[input].refused > 0.0f);
+    const bool successive = (elapsed > 0.0f) && (elapsed < (1.5f * estimator->setup.settings->sample_period));
+    const bool jumped = successive && known && monitor_is_jump(monitor, input, change, elapsed);
+    if (jumped) {
+        estimator->corrupt++;
+    }
+    return jumped;
+}
+
 /* Notes in the faults what is missing, `elapsed` seconds after the last sample. */
 static void check(
     estimator_t *estimator, const lever_sample_t *sample, float own_torque, float elapsed, checked_t *checked)
@@ -108,7 +125,10 @@ static void check(
     monitor_t *monitor = &estimator->learning.monitor;
     const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
-    const bool torque = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
+    const bool measured = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
+    const float tau_m = sample->tau_m * estimator->setup.torque_scale;
+    const bool torque =
+        measured && !has_jumped(estimator, MONITOR_TORQUE, LEVER_FAULT_TORQUE, tau_m - estimator->last_tau_m, elapsed);
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);
     checked->y[0] = sample->theta;
     checked->y[1] = sample->theta_dot;
@@ -117,11 +137,14 @@ static void check(
     checked->base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
     checked->grip_force = sample->grip_force;
-    checked->tau_m = torque ? (sample->tau_m * estimator->setup.torque_scale) : own_torque;
+    const bool jumped = checked->base && has_jumped(estimator, MONITOR_BASE, LEVER_FAULT_BASE,
+                                             sample->z_ddot - estimator->raw_z_ddot, elapsed);
+    checked->tau_m = measured ? (torque ? tau_m : estimator->last_tau_m) : own_torque;
     if (torque && monitor_takes_torque(estimator->samples)) {
         monitor_add_torque(monitor, own_torque, checked->tau_m);
     }
-    checked->z_ddot = checked->base ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
+    checked->z_ddot =
+        (checked->base && !jumped) ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
     estimator->last_z_ddot = checked->z_ddot;
     estimator->last_tau_m = checked->tau_m;
     estimator->time_us = sample->time_us;
@@ -131,7 +154,7 @@ static void check(
     note(estimator, !checked->valid[0], LEVER_FAULT_THETA);
     note(estimator, !checked->valid[1], LEVER_FAULT_THETA_DOT);
     note(estimator, !torque || monitor->torque_wrong, LEVER_FAULT_TORQUE);
-    note(estimator, !checked->base || monitor->base_wrong, LEVER_FAULT_BASE);
+    note(estimator, !checked->base || jumped || monitor->base_wrong, LEVER_FAULT_BASE);
     note(estimator, estimator->communication_fault, LEVER_FAULT_COMMUNICATION);
     estimator->communication_fault = false;
 }
@@ -154,10 +177,34 @@ static bool restart_if_invalid(estimator_t *estimator, const checked_t *sample, 
     return !valid;
 }
 
+/* The measured motion exceeds excitation_least and what the noise of the sensor may look like. */
 static bool is_excited(const estimator_t *estimator)
 {
-    const float least = squared(estimator->setup.settings->excitation_least);
-    return (estimator->averages.excitation_square >= least) && (estimator->averages.motion_square >= (0.25f * least));
+    const averages_t *averages = &estimator->averages;
+    const float least = squared(estimator->setup.settings->excitation_least) +
+                        (NOISE_LIKE_MOTION * squared(estimator->cdkf.output_noise[1]));
+    return (averages->excitation_square >= least) && (averages->motion_square >= (0.25f * least));
+}
+
+/* The mean square of the rate, as the product of successive samples: unlike motion, the noise of a sensor differs from
+ * sample to sample. The prediction is no evidence of motion: the base drives it on a lever that is locked. Where only
+ * theta is measured, a motion well above the trim's corner is presumed. */
+static void average_motion(estimator_t *estimator, const checked_t *sample, float elapsed)
+{
+    averages_t *averages = &estimator->averages;
+    const uint32_t i = sample->valid[1] ? 1u : 0u;
+    const float angle = sample->y[0] - (estimator->setup.constants.trim ? 0.0f : trim_angle(&estimator->trim));
+    const float now = sample->valid[1] ? sample->y[1] : ((RATE_OF_ANGLE * estimator->trim.corner) * angle);
+    const float square = now * averages->last[i];
+    if (sample->valid[i]) {
+        averages->last[i] = now;
+    }
+    if (sample->valid[i] && (elapsed < TRIM_OUTAGE)) {
+        const float share = share_of(elapsed, estimator->setup.settings->excitation_time);
+        averages->excitation_square += share * (square - averages->excitation_square);
+        averages->excitation_square = greater(averages->excitation_square, 0.0f);
+        averages->motion_square += share_of(elapsed, MOTION_TIME) * (square - averages->motion_square);
+    }
 }
 
 /* The levels have settled, and the base acceleration is known. */
@@ -177,9 +224,6 @@ static void average(estimator_t *estimator, float elapsed)
     const float time = estimator->setup.settings->excitation_time;
     averages_t *averages = &estimator->averages;
     const float share = share_of(elapsed, time);
-    const float square = squared(estimator->cdkf.x[1]);
-    averages->excitation_square += share * (square - averages->excitation_square);
-    averages->motion_square += lesser(elapsed * (1.0f / MOTION_TIME), 1.0f) * (square - averages->motion_square);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);
     }
@@ -212,8 +256,7 @@ static lesson_t update_filter(estimator_t *estimator, const checked_t *sample)
     const lesson_t lesson = {
         .walks = !estimator->frozen, .measured = measured && is_settled(estimator), .excited = is_excited(estimator)};
     innovation_t innovation[CDKF_OUTPUTS];
-    cdkf_measurement_update(
-        &estimator->cdkf, sample->y, sample->valid, lesson.walks && lesson.measured && lesson.excited, innovation);
+    cdkf_measurement_update(&estimator->cdkf, sample->y, sample->valid, lesson.measured, innovation);
     if (lesson.excited && lesson.measured) {
         noise_estimation_add(&estimator->learning.noise, innovation, sample->valid);
         whiteness_add(&estimator->learning.whiteness, innovation[sample->valid[1] ? 1u : 0u].value);
@@ -234,8 +277,8 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
         alignment_begin_grip(estimator, sample);
     }
     note(estimator, (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
-    estimator->trim.unsettled -= elapsed;
     const bool restarted = restart_if_invalid(estimator, sample, learnt);
+    average_motion(estimator, sample, elapsed);
     average(estimator, elapsed);
     note(estimator, !lesson.excited, LEVER_FAULT_EXCITATION);
     note(estimator, learning->bounded, LEVER_FAULT_BOUND);
@@ -262,10 +305,18 @@ static uint32_t periods_in(const estimator_t *estimator, float elapsed)
     return periods;
 }
 
+/* Sensors are judged while nothing is estimated yet. The first block of RUN begins with its first sample. */
+static void watch_alignment(estimator_t *estimator, float elapsed)
+{
+    static const lesson_t none = {.walks = false, .measured = false, .excited = true};
+    (void)learning_step(&estimator->learning, &estimator->setup, &estimator->cdkf, &none, elapsed);
+}
+
 /* A sample `elapsed` seconds after the last one. */
 static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed)
 {
     const uint32_t periods = periods_in(estimator, elapsed);
+    estimator->trim.unsettled -= elapsed; /* before this sample may set it */
     note(estimator, elapsed < (CLOCK_LEAST * estimator->setup.settings->sample_period), LEVER_FAULT_CLOCK);
     if (periods > 1u) {
         estimator->lost += periods - 1u;
@@ -277,6 +328,7 @@ static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last
         learning_skip(&estimator->learning, &estimator->setup, &estimator->cdkf, elapsed);
         alignment_begin(estimator, sample);
     } else if (estimator->mode == LEVER_MODE_ALIGN) {
+        watch_alignment(estimator, elapsed);
         alignment_step(estimator, sample, elapsed);
     } else {
         prediction_advance(estimator, sample, last, elapsed, periods);

@@ -25,10 +25,11 @@ typedef struct alignment {
 
 /* Slow averages for health. */
 typedef struct averages {
-    float excitation_square; /* mean square of theta_dot [rad^2/s^2] */
-    float motion_square;     /* the same over MOTION_TIME: whether the lever moves now */
-    float innovation;        /* mean of nis / nis_size; expected 1 */
-    float restarts;          /* number of restarts within about RESTART_MEMORY */
+    float excitation_square;  /* mean square of the measured rate, without the noise of its sensor [rad^2/s^2] */
+    float motion_square;      /* the same over MOTION_TIME: whether the lever moves now */
+    float last[MODEL_STATES]; /* deviations of the last sample that measured each output [rad, rad/s] */
+    float innovation;         /* mean of nis / nis_size; expected 1 */
+    float restarts;           /* number of restarts within about RESTART_MEMORY */
 } averages_t;
 
 typedef struct estimator {

@@ -177,11 +177,12 @@ static bool judge(
     score_t constant[CDKF_CONSIDERED];
     cdkf_constant_scores(cdkf, constant);
     const bool on_lever = counts && (setup->model == (uint8_t)LEVER_MODEL_LEVER);
+    const bool stands = !lesson->walks; /* parameters that are held are compared with as they are */
     *step = constant[CDKF_STEP];
     hands_step(&learning->hands, &setup->constants, cdkf->x[1], period, on_lever);
     const bool force_wrong = grip_force_judge(&learning->force, setup, &learning->hands);
     bool base_wrong = false;
-    if (is_known(learning) && !learning->hands.off) {
+    if ((is_known(learning) || stands) && !learning->hands.off) {
         base_wrong = monitor_step(&learning->monitor, &sudden, period);
     } else {
         monitor_trust_base(&learning->monitor);
@@ -199,9 +200,9 @@ static bool judge(
         /* as before */
     }
     const bool taught = teaches(learning, lesson);
-    const bool settled = taught && (cdkf->trust >= 1.0f) && (learning->changed <= TRANSIENT);
+    const bool settled = taught && ((cdkf->trust >= 1.0f) || stands) && (learning->changed <= TRANSIENT);
     whiteness_step(&learning->whiteness, period, settled);
-    if (settled) {
+    if (settled && !stands) { /* of an arm that has changed meanwhile it would say the same */
         calibration_step(&learning->calibration, cdkf, constant, period);
     }
     if (!taught) {
@@ -210,38 +211,25 @@ static bool judge(
     return taught;
 }
 
-static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson)
+/* The parameters take what the block says, and walk. */
+static void adapt(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const score_t *step, float period,
+    bool taught, bool excited)
 {
     const lever_settings_t *s = setup->settings;
     const bool joint = (setup->estimator == (uint8_t)LEVER_ESTIMATOR_JOINT);
     const adaptation_t adaptation = setup_adaptation(setup);
-    const float period = learning->elapsed;
     float variance[MODEL_PARAMETERS];
     correction_t correction;
-    learning->elapsed = 0.0f;
-    learning->wait = (learning->wait > period) ? (learning->wait - period) : 0.0f;
-    if (!lesson->excited) {
-        learning->wait = AWAKE;
-    }
-    learning->changed = (learning->changed > period) ? (learning->changed - period) : 0.0f;
-    if (learning->hands.off) {
-        disturb(s, cdkf, 1.0f);
-    }
-    cdkf->disturbance -= cdkf->disturbance * share_of(period, DISTURBANCE_TIME);
-    score_t step;
-    follow_grip(learning, setup, cdkf, period);
-    const bool taught = judge(learning, setup, cdkf, lesson, period, &step);
     if (taught) {
         estimate_noise(learning, setup, cdkf, period);
     } else {
         noise_estimation_begin(&learning->noise);
     }
     cdkf_learn(cdkf, period, s->caution_time, &correction);
-    learning->bounded = correction.bounded;
     float more = 0.0f;
     if (taught) {
         if (cdkf->acting > (uint32_t)CDKF_STEP) {
-            cdkf_learn_step(cdkf, &step);
+            cdkf_learn_step(cdkf, step);
         }
         more = detect_change(learning, setup, cdkf, &correction, period);
     }
@@ -251,38 +239,73 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     cdkf_forget(cdkf, period, joint);
     cdkf_walk(cdkf, period, variance, joint);
     if (learning->changed > 0.0f) {
-        adaptation_start(&adaptation, cdkf); /* the jump is no drift */
-    } else if (taught || !lesson->excited) {
-        adaptation_step(&adaptation, period, correction.w, lesson->excited, cdkf);
+        adaptation_start(&adaptation, cdkf);                   /* the jump is no drift */
+    } else if (taught || (!excited && (cdkf->trust > 0.0f))) { /* before anything is learnt, it starts later */
+        adaptation_step(&adaptation, period, correction.w, excited, cdkf);
     } else {
         cdkf->growth = 0.0f; /* what cannot be learnt again is not forgotten */
     }
+}
+
+/* The parameters stay as they are. What they learnt in the last two seconds can still be taken back. */
+static void hold(learning_t *learning, cdkf_t *cdkf, float period)
+{
+    learning->changed = 0.0f;
+    learning->gripping = 0.0f;
+    noise_estimation_begin(&learning->noise);
+    cdkf_drop_pending(cdkf);
+    cdkf_end_step(cdkf);
+    keep(learning, cdkf, period);
+}
+
+/* The end of a block. */
+static void end_block(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson)
+{
+    const float period = learning->elapsed;
+    score_t step;
+    learning->elapsed = 0.0f;
+    learning->wait = (learning->wait > period) ? (learning->wait - period) : 0.0f;
+    if (!lesson->excited) {
+        learning->wait = AWAKE;
+    }
+    learning->changed = (learning->changed > period) ? (learning->changed - period) : 0.0f;
+    if (learning->hands.off) {
+        disturb(setup->settings, cdkf, 1.0f);
+    }
+    cdkf->disturbance -= cdkf->disturbance * share_of(period, DISTURBANCE_TIME);
+    follow_grip(learning, setup, cdkf, period);
+    const bool taught = judge(learning, setup, cdkf, lesson, period, &step);
+    if (lesson->walks) {
+        adapt(learning, setup, cdkf, &step, period, taught, lesson->excited);
+    } else {
+        hold(learning, cdkf, period);
+    }
+    learning->bounded = scaling_bound(&cdkf->scaling, cdkf->w);
     cdkf_draw(cdkf, setup->model_in_use, &setup->constants);
 }
 
 bool learning_step(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float elapsed)
 {
     const lever_settings_t *s = setup->settings;
-    bool due = false;
-    if (lesson->walks) {
-        learning->elapsed += elapsed;
-        due = (learning->elapsed > (s->learn_period - (0.5f * s->sample_period)));
-    } else {
-        learning->elapsed = 0.0f;
-        learning->changed = 0.0f;
-        learning->gripping = 0.0f;
-        learning->bounded = false;
-        cdkf_end_step(cdkf);
-    }
+    learning->elapsed += elapsed;
+    const bool due = (learning->elapsed > (s->learn_period - (0.5f * s->sample_period)));
     if (due) {
-        learn(learning, setup, cdkf, lesson);
+        end_block(learning, setup, cdkf, lesson);
     }
     return due;
+}
+
+void learning_resume(learning_t *learning, cdkf_t *cdkf)
+{
+    learning->elapsed = 0.0f;
+    cdkf_drop_pending(cdkf);
+    monitor_trust_base(&learning->monitor);
+    whiteness_start(&learning->whiteness);
 }
 
 void learning_skip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float elapsed)
 {
     static const lesson_t none = {true, false, false};
     learning->elapsed += elapsed;
-    learn(learning, setup, cdkf, &none);
+    end_block(learning, setup, cdkf, &none);
 }

@@ -34,7 +34,7 @@ typedef struct learning {
     bool calm;          /* innovations have been as expected since the last change */
     bool held_again;    /* it is the first after hands off */
     bool moved;         /* it is complete, and has moved the lever: levels and state are to begin anew */
-    bool bounded;       /* a parameter rested on a bound then */
+    bool bounded;       /* a parameter rests on a bound */
 } learning_t;
 
 /* Starts, for parameters at their first guess. */
@@ -42,14 +42,18 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf);
 
 /* What may be learnt from a sample. */
 typedef struct lesson {
-    bool walks;    /* the parameters may walk: not frozen */
+    bool walks;    /* the parameters may learn and walk: not frozen, nor aligning */
     bool measured; /* there was an output, the base acceleration is valid, and the levels have settled */
     bool excited;  /* there was enough motion lately: at rest, only the walk goes on */
 } lesson_t;
 
-/* After the measurement update with a sample, `elapsed` seconds after the last one. Returns true when the parameters
- * have learnt. */
+/* After the measurement update with a sample, `elapsed` seconds after the last one. Sensors, hands and model are judged
+ * in every mode, once a learn_period; the parameters learn where they may walk. Returns true at the end of a block. */
 bool learning_step(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const lesson_t *lesson, float elapsed);
+
+/* The parameters learn again, from now on, after having been held: verdicts that compare with their response begin
+ * anew. */
+void learning_resume(learning_t *learning, cdkf_t *cdkf);
 
 /* After `elapsed` seconds without samples: the parameters learn what is pending, and walk for that time. */
 void learning_skip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float elapsed);

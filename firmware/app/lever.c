@@ -90,14 +90,15 @@ bool instance_is_estimating(const lever_t *lever)
            ((lever->estimator.faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
 }
 
-/* The estimate carries a margin: it is one, of an arm that the model is like, from sensors that work. */
+/* The estimate is trustworthy enough for a margin: it has been learnt, the model fits and the sensors work. */
 static bool carries_margin(const lever_t *lever)
 {
     const uint32_t broken = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_CLOCK |
                             (uint32_t)LEVER_FAULT_BOUND | (uint32_t)LEVER_FAULT_RECOVERED |
                             (uint32_t)LEVER_FAULT_MISMATCH | (uint32_t)LEVER_FAULT_HANDS_OFF;
     const enum lever_mode mode = lever->estimator.mode;
-    return ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) && ((lever->estimator.faults & broken) == 0u);
+    return ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) && ((lever->estimator.faults & broken) == 0u) &&
+           (lever->estimator.cdkf.trust >= 1.0f);
 }
 
 void instance_watch(lever_t *lever)

@@ -12,6 +12,8 @@
 #define SURPRISE_MOST 100.0f /* of a single sample */
 #define SPIKE 8.0f           /* standard deviations */
 #define SPIKE_TIME 0.02f     /* longer than this it is no spike [s] */
+#define JUMP_MEMORY 1.0f     /* of the mean square of changes [s] */
+#define JUMP_COUNTED 4.0f    /* in mean squares: a larger change counts as this, so that jumps hardly raise the mean */
 #define BASE_MEMORY 0.5f     /* [s] */
 #define BASE_MEMORY_AGAIN 0.2f
 #define BASE_WRONG 0.4f    /* gain of the base's response below which it is wrong, */
@@ -68,6 +70,19 @@ bool monitor_is_spike(monitor_t *monitor, const cdkf_t *cdkf, uint32_t i, float 
     const bool far = (square > (noise * noise)) && (square > (level * cdkf_output_variance(cdkf, i)));
     monitor->refused[i] = far ? (monitor->refused[i] + elapsed) : 0.0f;
     return far && (monitor->refused[i] < SPIKE_TIME);
+}
+
+bool monitor_is_jump(monitor_t *monitor, enum monitor_input input, float change, float elapsed)
+{
+    static const float least[MONITOR_INPUTS] = {2.0f, 0.3f}; /* a smaller jump does no harm [m/s^2], [N m] */
+    jump_t *of = &monitor->jump[input];
+    const float floor = (least[input] * least[input]) * (1.0f / (SPIKE * SPIKE));
+    const float expected = greater(of->square, floor);
+    const float square = change * change;
+    const bool far = square > ((SPIKE * SPIKE) * expected);
+    of->square += share_of(elapsed, JUMP_MEMORY) * (lesser(square, JUMP_COUNTED * expected) - of->square);
+    of->refused = far ? (of->refused + elapsed) : 0.0f;
+    return far && (of->refused < SPIKE_TIME);
 }
 
 void monitor_add(monitor_t *monitor, float ratio, float elapsed)

@@ -3,6 +3,7 @@
  *   stuck    it has not changed by a bit for a while, and the innovations say that it should have. For the base
  *            acceleration, which innovations tell late, it is enough that it did change all the time before
  *   spike    an output far outside of what is expected of it, for some samples; a longer one is believed
+ *   jump     an input far outside of how it usually changes from sample to sample, likewise
  *   base     the response to the base acceleration is not about once what it should be: no sensor, the wrong sign, the
  *            wrong unit. By the innovations: a sudden error of the accelerometer's gain (filter/cdkf.h, score_t)
  *   torque   the motor torque that is measured does not follow the one that is asked for: gain or sign are wrong, or the
@@ -34,11 +35,20 @@ typedef struct agreement {
     float product;
 } agreement_t;
 
+enum monitor_input { MONITOR_BASE, MONITOR_TORQUE, MONITOR_INPUTS };
+
+/* How an input changes from sample to sample. */
+typedef struct jump {
+    float square;  /* mean square of the changes */
+    float refused; /* time for which samples have been jumps [s] */
+} jump_t;
+
 typedef struct monitor {
     stillness_t stillness[MONITOR_SIGNALS];
     float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been spikes [s] */
-    float surprise;              /* mean of nis / nis_size over 0.1 s; expected 1 */
-    score_t base;                /* of CDKF_BASE_GAIN, with exponential forgetting */
+    jump_t jump[MONITOR_INPUTS];
+    float surprise; /* mean of nis / nis_size over 0.1 s; expected 1 */
+    score_t base;   /* of CDKF_BASE_GAIN, with exponential forgetting */
     agreement_t torque;
     bool base_wrong; /* the base acceleration is not used */
     bool torque_wrong;
@@ -87,6 +97,10 @@ bool monitor_has_just_stuck(monitor_t *monitor);
 /* Output i of the coming measurement update, `elapsed` seconds after the last; true when it is a spike. Innovations are
  * now `level` times as large as expected, in squares. */
 bool monitor_is_spike(monitor_t *monitor, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed);
+
+/* An input that has changed by `change` since it was believed last, `elapsed` seconds after the last sample; true when
+ * it is a jump, and what was believed last is better. */
+bool monitor_is_jump(monitor_t *monitor, enum monitor_input input, float change, float elapsed);
 
 /* Any signal is stuck. */
 bool monitor_has_stuck(const monitor_t *monitor);

@@ -156,7 +156,6 @@ typedef struct score {
 typedef struct correction {
     float w[MODEL_PARAMETERS];
     float variance[MODEL_PARAMETERS];
-    bool bounded; /* w rests on a bound of the model */
 } correction_t;
 
 /* The pending scores: of an error of CDKF_BASE_GAIN that has just come about, and of each considered error as if it had

@@ -67,7 +67,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
     }
     considered_learn(cdkf->considered, cdkf->acting, cdkf->trust, u);
     cdkf_drop_pending(cdkf);
-    correction->bounded = scaling_bound(&cdkf->scaling, cdkf->w);
+    (void)scaling_bound(&cdkf->scaling, cdkf->w);
     for (uint32_t i = 0u; i < L; i++) {
         correction->variance[i] -= factor_variance(cdkf->s, L, i);
         correction->w[i] = cdkf->w[i] - correction->w[i];

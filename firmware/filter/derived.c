@@ -46,7 +46,7 @@ static deviation_t deviation_of(const cdkf_t *cdkf, const derived_couple_t value
         add(&moments, first[j], second[j]);
         add(&moments, SIGMA_SECOND * (plus.first + minus.first), SIGMA_SECOND * (plus.second + minus.second));
     }
-    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
         const float *w = cdkf->considered[c].w;
         const float sigma = cdkf->considered_sigma[c];
         add(&moments, sigma * factor_dot_three(w, first), sigma * factor_dot_three(w, second));

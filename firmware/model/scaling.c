@@ -59,11 +59,10 @@ float scaling_prior_sigma(const scaling_t *scaling, uint32_t i)
 
 bool scaling_bound(const scaling_t *scaling, float w[MODEL_PARAMETERS])
 {
-    bool bounded = false;
+    bool rests = false;
     for (uint32_t i = 0u; i < L; i++) {
-        const float kept = greater(scaling->least[i], lesser(scaling->greatest[i], w[i]));
-        bounded = bounded || (kept != w[i]);
-        w[i] = kept;
+        w[i] = greater(scaling->least[i], lesser(scaling->greatest[i], w[i]));
+        rests = rests || !((w[i] > scaling->least[i]) && (w[i] < scaling->greatest[i]));
     }
-    return bounded;
+    return rests;
 }

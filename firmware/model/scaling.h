@@ -35,7 +35,7 @@ void scaling_pair(const scaling_t *scaling, const float p[MODEL_PARAMETERS], con
 /* Standard deviation of w_i before the first sample. */
 float scaling_prior_sigma(const scaling_t *scaling, uint32_t i);
 
-/* Keeps w within its bounds. Returns true when it rests on one. */
+/* Keeps w within its bounds. Returns true when it then rests on one, clipped or not. */
 bool scaling_bound(const scaling_t *scaling, float w[MODEL_PARAMETERS]);
 
 #endif

@@ -54,6 +54,7 @@ class Bus:
         """As they should be: `count` samples, with or without GRIP_SAMPLE, and COMMANDs that ask for dither [N m]."""
         self.count = count
         self.period = period
+        self.dither = dither
         self.random = random
         self.frames = np.zeros(0, FRAME)
         self.order: FloatArray = np.zeros(0)
@@ -114,6 +115,14 @@ Fault = Callable[[Bus, Interval], None]
 
 def nothing(bus: Bus, time: Interval) -> None:
     """As it should be."""
+
+
+def freeze(bus: Bus, time: float) -> None:
+    """Let the COMMANDs from a time [s] on also ask to freeze the parameters."""
+    for number, index in enumerate(bus.sent("COMMAND", (0.0, np.inf))):
+        if bus.frames["of"][index] * bus.period >= time:
+            data = command(number & 15, request="freeze", dither_rms=bus.dither)
+            bus.frames["change"][index] = np.frombuffer(data, np.uint8)
 
 
 # --- frames that are damaged -----------------------------------------------------------------------------------------

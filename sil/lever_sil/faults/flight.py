@@ -25,6 +25,8 @@ from .readings import SIGNALS, Readings
 
 DITHER = 0.3
 """rms that COMMANDs ask for [N m]."""
+FREEZE = 12.0
+"""From here on the parameters are held in flights that are frozen [s]."""
 _NOISE = {**NOISE, "grip_force": GRIP_NOISE}
 
 
@@ -71,9 +73,13 @@ class Pilot:
         on_bus: bus.Fault = bus.nothing,
         on_readings: readings.Fault = readings.nothing,
         grip: bool = False,
+        frozen: bool = False,
     ) -> Record:
-        """A flight with faults in a time [s]; `grip`: there is a sensor of the grip force."""
+        """A flight with faults in a time [s]; `grip`: there is a sensor of the grip force; `frozen`: the parameters are
+        held from FREEZE on."""
         sent, read = self._right(grip)
+        if frozen:
+            bus.freeze(sent, FREEZE)
         on_readings(read, sent.samples(time))
         on_bus(sent, time)
         return self._fly(Plant(self.lanes), self.grip_force if grip else None, config, sent, read)

@@ -35,7 +35,7 @@ ERROR = 3.0
 UNHEARD = 20
 """Samples without an answer, from which on the silence of the bus is a flag."""
 CALM = 0.5
-"""[s] in mode RUN without a fault of GONE: the firmware is back."""
+"""[s] of estimating without a fault of GONE: the firmware is back."""
 AT_LAST = 5.0
 """End of a flight that the error after a fault is of [s]."""
 
@@ -109,19 +109,25 @@ def judge(must: Must, record: Record, plain: Record, truth: Mapping[str, FloatAr
     if mode not in must.mode:
         verdict.broken.append(f"mode {mode}")
     flagged = is_flagged(record)
-    away = ((faults & fault_mask(*GONE)) != 0) | (modes != lib.LEVER_MODE_RUN)
+    away = ((faults & fault_mask(*GONE)) != 0) | ~is_estimating(record)
     verdict.hold("back", _back(away, end), BACK)
     _judge_errors(record, truth, flagged, begin, verdict)
     return verdict
 
 
+def is_estimating(record: Record) -> BoolArray:
+    """At every sample: mode RUN, or FROZEN, where the state is estimated."""
+    mode = record.health["mode"]
+    estimating: BoolArray = (mode == lib.LEVER_MODE_RUN) | (mode == lib.LEVER_MODE_FROZEN)
+    return estimating
+
+
 def is_flagged(record: Record) -> BoolArray:
     """At every sample: a fault of WARNED, a mode without estimates, or nothing at all."""
     health = record.health
-    estimating = (health["mode"] == lib.LEVER_MODE_RUN) | (health["mode"] == lib.LEVER_MODE_FROZEN)
     taken = np.diff(health["samples"].astype(np.int64), prepend=0) != 0
     since = np.arange(len(taken)) - np.maximum.accumulate(np.where(taken, np.arange(len(taken)), 0))
-    flagged: BoolArray = ((health["faults"] & fault_mask(*WARNED)) != 0) | ~estimating | (since >= UNHEARD)
+    flagged: BoolArray = ((health["faults"] & fault_mask(*WARNED)) != 0) | ~is_estimating(record) | (since >= UNHEARD)
     return flagged
 
 

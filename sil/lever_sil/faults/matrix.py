@@ -62,9 +62,10 @@ def run(rows: Iterable[Row], seeds: int, show: Show) -> list[Result]:
 def flights(rows: Sequence[Row], pilot: Pilot) -> Iterator[Verdict]:
     """Each row flown by a pilot."""
     config = Config()
-    plain: dict[bool, Record] = {}
+    plain: dict[tuple[bool, bool], Record] = {}
     for row in rows:
-        if row.grip not in plain:
-            plain[row.grip] = pilot.fly(config, row.time, grip=row.grip)
-        record = pilot.fly(config, row.time, row.on_bus, row.on_readings, row.grip)
-        yield judge(row.must, record, plain[row.grip], pilot.truth, row.time)
+        like = row.grip, row.frozen
+        if like not in plain:
+            plain[like] = pilot.fly(config, row.time, grip=row.grip, frozen=row.frozen)
+        record = pilot.fly(config, row.time, row.on_bus, row.on_readings, row.grip, row.frozen)
+        yield judge(row.must, record, plain[like], pilot.truth, row.time)

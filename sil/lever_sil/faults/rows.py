@@ -23,6 +23,8 @@ MOTION = Motion(duration=40.0, dither=0.0)
 TIME = (15.0, 25.0)
 """Of the faults [s]."""
 MESSAGES = (*bus.SAMPLES, "COMMAND")
+FROZEN = "_frozen"
+"""End of the name of a row that is flown with frozen parameters."""
 _SHORT = {"LEVER_SAMPLE": "lever", "BASE_SAMPLE": "base", "GRIP_SAMPLE": "grip", "COMMAND": "command"}
 _SIGNAL = {"theta": "θ", "theta_dot": "θ̇", "tau_m": "τ_m", "z_ddot": "z̈", "grip_force": "grip force"}
 _FLAG = {
@@ -76,6 +78,8 @@ class Row:
     time: Interval = TIME
     grip: bool = False
     """There is a sensor of the grip force."""
+    frozen: bool = False
+    """The parameters are held, from before the fault on."""
     quick: bool = False
 
 
@@ -312,9 +316,23 @@ def _clocks() -> Iterator[Row]:
         yield Row(f"clock_jumps_{name}", title, must, on_readings=readings.clock_offset(seconds), time=(15.0, 16.0))
 
 
+def _frozen(row: Row) -> Row:
+    """The same while the parameters are held, which hides no fault."""
+    mode = tuple(dict.fromkeys("frozen" if name in ("run", "coast") else name for name in row.must.mode))
+    return replace(
+        row,
+        name=f"{row.name}{FROZEN}",
+        title=f"{row.title}, parameters frozen",
+        must=replace(row.must, mode=mode),
+        frozen=True,
+    )
+
+
 def _table() -> Iterator[Row]:
     for part in (_damaged, _counters, _missing, _late, _other_senders, _commands, _readings, _clocks):
         yield from part()
+    for part in (_missing, _readings, _clocks):
+        yield from map(_frozen, part())
 
 
 ROWS = {row.name: row for row in _table()}
@@ -328,6 +346,7 @@ _CLOCK = "it is samples at another rate, which is no fault: the firmware has no 
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
     "theta_gain_drift": _TWO_RATES,
+    "theta_drift_frozen": "f_n is that at the angle shown, which is off, and k_p that is held does not make up for it",
     "theta_dot_step": _OFFSET,
     "theta_dot_gain_half": _TWO_RATES,
     "theta_dot_gain_double": _TWO_RATES,
@@ -342,5 +361,10 @@ KNOWN: dict[str, str] = {
     "clock_half": _CLOCK,
     "clock_1.1": _CLOCK,
     "clock_2": _CLOCK,
+}
+KNOWN |= {
+    name: KNOWN[name.removesuffix(FROZEN)]
+    for name in ROWS
+    if name.endswith(FROZEN) and name.removesuffix(FROZEN) in KNOWN
 }
 """Rows that some pilot's flight does not meet, and why."""

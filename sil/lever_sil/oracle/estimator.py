@@ -26,6 +26,8 @@ MOST_SUBSTEPS = 12  # predictions through a gap
 MOST_STEPS = 24  # of a level, when an output is back
 LEVEL_NOISE = 22.2  # noise bandwidth of a level, in corners
 MOTION_TIME = 0.1  # [s] of the shorter average of motion
+NOISE_LIKE_MOTION = 0.2  # of the noise of θ̇, in squares
+RATE_OF_ANGLE = 2.0  # presumed rate over angle, in corners of the trim [rad/s]
 VELOCITY_KEPT = 0.99998  # of the base's, in a step
 UNKNOWN = 10.0  # process noise for an unknown base acceleration, in those that are set
 SPIKE = 8.0  # standard deviations
@@ -103,8 +105,8 @@ class Estimator:
         self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, not whole, self.detrended)
         self.considered_sigma = np.array([*(settings[f"{name}_sigma"] for name in CONSIDERED), 0.0])
         self.step_input, self.begin_rate = Detrend(), 0.0
-        presumed = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], until measured
-        self.excitation_square, self.motion_square = presumed, presumed
+        self.excitation_square, self.motion_square = 0.0, 0.0  # [(rad/s)²]
+        self.last_motion = [0.0, 0.0]  # deviations when θ, θ̇ were measured last, of θ as a rate [rad/s]
         self.nis = 0.0
         self.average_nis, self.surprise = 1.0, 1.0  # per output, over a long time and a short one
         self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
@@ -133,6 +135,7 @@ class Estimator:
         """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) and
         the grip force [N] as the sensors show them."""
         duration = time - self.time
+        self.unsettled -= counted(duration)
         substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
         dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
         inputs = (self._true_base(u[0], duration, base_valid), u[1] / self.settings["tau_m_gain"])
@@ -151,7 +154,7 @@ class Estimator:
         if back:
             self._end_outage(y, valid)
         self._correct(y, valid, duration)
-        self._average_motion(duration)
+        self._average_motion(y, valid, duration)
 
     def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Measurement update, and learning when it is due."""
@@ -161,7 +164,7 @@ class Estimator:
         self.nis = 0.0
         if valid.any():
             noise = np.diag(self.learning.noise.output_noise)
-            innovation = self.belief.update(y, valid, noise, learn=lesson.measured and excited)
+            innovation = self.belief.update(y, valid, noise, learn=lesson.measured)
             self.nis = innovation.normalised_square
             self._average_innovation(self.nis / int(valid.sum()), duration)
             self.learning.add(innovation, valid, lesson)
@@ -174,13 +177,13 @@ class Estimator:
         self.considered_sigma[STEP] = self.learning.step_sigma
         if self.learning.moved:
             self._begin_grip(np.where(valid, y, self.belief.x))
-        self.unsettled -= counted(duration)
 
     def _is_settled(self) -> bool:
         return bool(self.unsettled < 0.5 * self.settings["sample_period"])
 
     def _is_excited(self) -> bool:
-        least = self.settings["excitation_least"] ** 2
+        noise = self.learning.noise.output_noise[1]
+        least = self.settings["excitation_least"] ** 2 + NOISE_LIKE_MOTION * noise**2
         return bool(self.excitation_square >= least and self.motion_square >= 0.25 * least)
 
     def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
@@ -332,15 +335,27 @@ class Estimator:
 
     def _average_innovation(self, square: float, duration: float) -> None:
         share = min(duration / self.settings["excitation_time"], 1.0)
-        if self.unsettled - counted(duration) <= 0.0:
+        if self.unsettled <= 0.0:
             self.average_nis += share * (square - self.average_nis)
         self.surprise += min(duration / SURPRISE_TIME, 1.0) * (min(square, SURPRISE_MOST) - self.surprise)
 
-    def _average_motion(self, duration: float) -> None:
-        """The mean square of the rate, over a long time and a short one."""
-        square = float(self.belief.x[1]) ** 2
+    def _average_motion(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
+        """Average the measured square of the rate, over a long time and a short one.
+
+        White noise of the sensor drops out of the product of successive samples. Without θ̇ a rate is presumed from θ.
+        """
+        if not valid.any():
+            return
+        i = 1 if valid[1] else 0
+        now = float(y[i])
+        if i == 0:
+            angle = now - (0.0 if self.detrended else self.trim)
+            now = RATE_OF_ANGLE * 2.0 * math.pi * self.settings["trim_corner"] * angle
+        square, self.last_motion[i] = now * self.last_motion[i], now
+        if duration >= OUTAGE:
+            return
         share = min(duration / self.settings["excitation_time"], 1.0)
-        self.excitation_square += share * (square - self.excitation_square)
+        self.excitation_square = max(self.excitation_square + share * (square - self.excitation_square), 0.0)
         self.motion_square += min(duration / MOTION_TIME, 1.0) * (square - self.motion_square)
 
     # --- estimates -------------------------------------------------------------------------------------------------

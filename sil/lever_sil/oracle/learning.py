@@ -138,7 +138,7 @@ class Learning:
         self.belief.limit(self.greatest_sigma)
         if self.changed > 0.0:
             self._start_walk()  # the jump is no drift
-        elif taught or not lesson.excited:
+        elif (taught and lesson.excited) or (not lesson.excited and self.trust > 0.0):
             self._adapt_walk(correction, period, lesson.excited)
         else:
             self.growth = 0.0  # what cannot be learnt again is not forgotten

@@ -65,6 +65,10 @@ TEST_EACH(COMBINATIONS, without_excitation_nothing_is_learnt_and_nothing_winds_u
 {
     config = config_of(test_round);
     config.adaptation = (uint8_t)((test_round + 1u) % (uint32_t)LEVER_ADAPTATION_COUNT);
+    config.settings.z_ddot_gain_sigma = 0.0f; /* considered errors are not capped */
+    config.settings.z_ddot_delay_sigma = 0.0f;
+    config.settings.tau_m_gain_sigma = 0.0f;
+    config.settings.lever_friction_sigma = 0.0f;
     for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
         *parameter_setting(i, "_walk") *= 10.0f;
     }
@@ -72,6 +76,7 @@ TEST_EACH(COMBINATIONS, without_excitation_nothing_is_learnt_and_nothing_winds_u
     const cdkf_t *cdkf = &lever->estimator.cdkf;
     (void)run(2000u);
     let_rest();
+    simulation.base_rms = 1.0e-4; /* an acceleration that stands still is none */
     while (!has_fault(LEVER_FAULT_EXCITATION)) {
         TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1u));
     }
@@ -333,11 +338,10 @@ TEST(what_was_under_way_ends_when_it_is_frozen)
     learning_t *learning = start_learning(400u);
     learning->gripping = 1.0f;
     learning->changed = 1.0f;
-    learning->bounded = true;
     lever->estimator.cdkf.acting = (uint32_t)CDKF_CONSIDERED;
     request(LEVER_REQUEST_FREEZE);
-    (void)run(1u);
-    TEST_ASSERT_TRUE((learning->gripping == 0.0f) && (learning->changed == 0.0f) && !learning->bounded);
+    (void)run(20u);
+    TEST_ASSERT_TRUE((learning->gripping == 0.0f) && (learning->changed == 0.0f));
     TEST_ASSERT_EQUAL_UINT32(CDKF_CALIBRATION, lever->estimator.cdkf.acting);
 }
 
@@ -359,4 +363,108 @@ TEST(before_the_arm_is_known_nothing_is_held_against_the_base)
     learning->monitor.base.information = 50.0f;
     (void)run(1u);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, learning->monitor.base.information);
+}
+
+/* --- frozen ------------------------------------------------------------------------------------------------------- */
+
+enum wrong { BASE_STUCK, BASE_SIGN, THETA_STUCK, TORQUE_SIGN, WRONGS };
+
+/* `count` samples of a lever whose motor does what is asked of it, or the contrary. */
+static void fly_wrong(uint32_t count, enum wrong wrong, lever_sample_t *last)
+{
+    for (uint32_t k = 0u; k < count; k++) {
+        if ((k % 500u) == 0u) {
+            dither(0.1f);
+        }
+        lever_sample_t sample = sample_after(1u);
+        const float asked = health().torque;
+        sample.tau_m = (wrong == TORQUE_SIGN) ? -asked : asked;
+        simulation.tau_m = (double)sample.tau_m;
+        sample.theta = (wrong == THETA_STUCK) ? last->theta : sample.theta;
+        sample.z_ddot = (wrong == BASE_STUCK) ? last->z_ddot : sample.z_ddot;
+        sample.z_ddot *= (wrong == BASE_SIGN) ? -1.0f : 1.0f;
+        if (wrong == WRONGS) {
+            *last = sample;
+        }
+        (void)lever_update(lever, &sample);
+    }
+}
+
+/* Flagged while frozen as quickly as ever, and no longer when it is right again. The parameters stay as they are. */
+/* R55 */
+TEST_EACH(WRONGS, a_sensor_that_fails_while_frozen_is_found_and_believed_again_when_it_is_right)
+{
+    static const enum lever_fault fault[WRONGS] = {
+        LEVER_FAULT_BASE, LEVER_FAULT_BASE, LEVER_FAULT_THETA, LEVER_FAULT_TORQUE};
+    lever_sample_t last;
+    config = config_of(0u);
+    start();
+    simulation.torque_rms = 0.0;
+    fly_wrong(8000u, WRONGS, &last);
+    request(LEVER_REQUEST_FREEZE);
+    fly_wrong(3000u, WRONGS, &last);
+    const lever_estimate_t before = estimate();
+    TEST_ASSERT_FALSE(has_fault(fault[test_round]));
+    fly_wrong(2000u, (enum wrong)test_round, &last);
+    TEST_ASSERT_TRUE(has_fault(fault[test_round]));
+    fly_wrong(3000u, WRONGS, &last);
+    TEST_ASSERT_FALSE(has_fault(fault[test_round]));
+    TEST_ASSERT_EQUAL(LEVER_MODE_FROZEN, health().mode);
+    const lever_estimate_t after = estimate();
+    assert_same_parameters(&before, &after);
+}
+
+/* R55 */
+TEST(a_sample_without_base_while_frozen_disturbs_the_state_for_a_while_only)
+{
+    config = config_of(0u);
+    start();
+    (void)run(4000u);
+    request(LEVER_REQUEST_FREEZE);
+    (void)run(1000u);
+    lever_sample_t sample = sample_after(1u);
+    sample.z_ddot_valid = false;
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_TRUE(lever->estimator.cdkf.disturbance > 0.0f);
+    (void)run(4000u);
+    TEST_ASSERT_TRUE(lever->estimator.cdkf.disturbance < (1.0e-3f * config.settings.theta_dot_process_noise));
+}
+
+/* --- standing still ----------------------------------------------------------------------------------------------- */
+
+/* A lever that is locked from power-on in a cabin that vibrates; freed, it is learnt. */
+/* R56 */
+TEST(a_lever_that_stands_still_teaches_nothing_until_it_moves)
+{
+    config = config_of(0u);
+    start();
+    const lever_estimate_t before = estimate();
+    for (uint32_t k = 0u; k < 20000u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.theta = (float)(SIMULATION_TRIM + (simulation.theta_noise * random_normal(&simulation.source)));
+        sample.theta_dot = (float)(simulation.theta_dot_noise * random_normal(&simulation.source));
+        sample.theta_dot_valid = ((k < 10000u) || ((k % 2u) == 0u));
+        (void)lever_update(lever, &sample);
+        TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_BOUND));
+    }
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_EXCITATION));
+    const lever_estimate_t after = estimate();
+    assert_same_parameters(&before, &after);
+    (void)run(2000u);
+    TEST_ASSERT_TRUE(!has_fault(LEVER_FAULT_EXCITATION) && (estimate().parameter[2] != before.parameter[2]));
+}
+
+/* R9 */
+TEST(a_parameter_that_rests_on_a_bound_is_reported_while_nothing_is_learnt)
+{
+    config = config_of(0u);
+    config.settings.c_p = model_lever.parameter[1].greatest;
+    start();
+    let_rest();
+    simulation.base_rms = 1.0e-4;
+    (void)run(2000u);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_BOUND) && has_fault(LEVER_FAULT_EXCITATION));
+    request(LEVER_REQUEST_FREEZE);
+    (void)run(100u);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_BOUND));
 }

@@ -109,6 +109,21 @@ TEST(a_gap_up_to_gap_limit_is_coasted_through_and_a_longer_one_aligns_anew)
 }
 
 /* R29 */
+TEST(levels_settle_for_the_whole_of_their_time_after_a_gap)
+{
+    run_for(3000u);
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_SETTLING));
+    lever_sample_t sample = sample_after(490u);
+    (void)lever_update(lever, &sample);
+    for (uint32_t k = 0u; k < 899u; k++) {
+        TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_SETTLING));
+        (void)run(1u);
+    }
+    (void)run(2u);
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_SETTLING));
+}
+
+/* R29 */
 TEST(a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk)
 {
     config.settings.z_ddot_gain_sigma = 0.0f; /* of a standard deviation that does not grow */

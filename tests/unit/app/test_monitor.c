@@ -320,3 +320,26 @@ TEST(the_verdict_on_the_torque_waits_until_enough_is_asked)
         TEST_ASSERT_EQUAL(row[i].is, monitor.torque_wrong);
     }
 }
+
+/* --- jumps of inputs ---------------------------------------------------------------------------------------------- */
+
+/* Motion of 0.3 N m at 10 Hz, and every fiftieth sample 30 N m off; a step is believed after 20 ms. */
+/* R31 */
+TEST(an_input_far_from_where_it_was_is_a_jump_for_20_ms)
+{
+    float last = 0.0f;
+    uint32_t refused = 0u;
+    for (uint32_t k = 1u; k <= 5000u; k++) {
+        const bool off = ((k % 50u) == 0u);
+        const float value = (0.42f * (float)sin(0.0628 * (double)k)) + (off ? 30.0f : 0.0f);
+        const bool jump = monitor_is_jump(&monitor, MONITOR_TORQUE, value - last, PERIOD);
+        TEST_ASSERT_EQUAL(off, jump);
+        last = jump ? last : value;
+    }
+    while (monitor_is_jump(&monitor, MONITOR_TORQUE, 1.0f, PERIOD)) {
+        refused++;
+    }
+    TEST_ASSERT_UINT32_WITHIN(1u, 19u, refused);
+    TEST_ASSERT_FALSE(monitor_is_jump(&monitor, MONITOR_BASE, 1.9f, PERIOD)); /* does no harm */
+    TEST_ASSERT_TRUE(monitor_is_jump(&monitor, MONITOR_BASE, 2.1f, PERIOD));
+}

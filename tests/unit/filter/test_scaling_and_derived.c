@@ -66,6 +66,8 @@ TEST(w_is_kept_within_its_bounds)
         TEST_ASSERT_TRUE(scaling_bound(&scaling, w) && (w[i] == scaling.greatest[i]));
         w[i] = scaling.least[i] - 0.01f;
         TEST_ASSERT_TRUE(scaling_bound(&scaling, w) && (w[i] == scaling.least[i]));
+        TEST_ASSERT_TRUE(scaling_bound(&scaling, w) && (w[i] == scaling.least[i])); /* it rests there */
+        w[i] += 0.01f;
         TEST_ASSERT_FALSE(scaling_bound(&scaling, w));
     }
 }
