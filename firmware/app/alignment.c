@@ -35,6 +35,7 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
         if (alignment->time > (settings->align_time - (0.5f * settings->sample_period))) {
             estimator->mode = LEVER_MODE_RUN;
             learning_resume(&estimator->learning, &estimator->cdkf);
+            hands_begin(&estimator->learning.hands);
         }
     }
 }

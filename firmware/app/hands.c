@@ -14,6 +14,15 @@ void hands_start(hands_t *hands)
     hands->residual = 1.0f;
 }
 
+void hands_begin(hands_t *hands)
+{
+    hands->begin = 0.0f;
+    hands->impulse = 0.0f;
+    hands->drive = 0.0f;
+    hands->elapsed = 0.0f;
+    hands->idle = false;
+}
+
 float hands_predict(
     hands_t *hands, const model_constants_t *constants, const model_step_t *step, const float x[MODEL_STATES])
 {

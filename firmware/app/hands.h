@@ -28,6 +28,9 @@ typedef struct hands {
 
 void hands_start(hands_t *hands);
 
+/* A block begins, at rest; what was found of the hands stays. */
+void hands_begin(hands_t *hands);
+
 /* A step of the model, from the state x = [theta, theta_dot] on (deviations from the trim in preload trim). Returns the
  * impulse without hands [N m s]. */
 float hands_predict(
