@@ -447,7 +447,7 @@ bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
 
 /* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and
  * its digest. A replay of such a log may begin anywhere, and proves itself equal to the bit at each snapshot
- * (host_tools/replay). All memory is the caller's; cost: firmware/can/README.md.
+ * (host_tools/lever_cdkf/replay). All memory is the caller's; cost: firmware/can/README.md.
  *
  *     lever_recorder_t recorder;
  *     lever_recorder_init(&recorder, 500000);

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from lever_cdkf.host_tools import cli
+from lever_cdkf import cli
 
 LEVER = str(Path(sys.executable).with_name("lever"))
 PATIENCE = 120.0

@@ -12,10 +12,10 @@ sys.path[0] = str(ROOT / "tests")
 
 from accuracy import tables, tuning  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
-from lever_cdkf.host_tools.errors import LeverError  # noqa: E402
-from lever_cdkf.host_tools.files import write_text  # noqa: E402
-from lever_cdkf.host_tools.progress import Progress  # noqa: E402
-from lever_cdkf.sil.run import seeds  # noqa: E402
+from lever_cdkf.errors import LeverError  # noqa: E402
+from lever_cdkf.files import write_text  # noqa: E402
+from lever_cdkf.progress import Progress  # noqa: E402
+from lever_sil.run import seeds  # noqa: E402
 
 _DESCRIPTION = f"""\
 Runs each scenario of the tables of accuracy in README.md and sil/README.md with seeds 1 to {tables.SEEDS}, and compares

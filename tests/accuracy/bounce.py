@@ -1,4 +1,4 @@
-"""The tables in sil/bounce/README.md, from the flights of `lever bounce`.
+"""The tables in sil/lever_sil/bounce/README.md, from the flights of `lever bounce`.
 
 `cmake --build build --target bounce-tables` flies all conditions and compares, bounce-accept flies and writes. The
 tables name the flight in which a figure was worst, which test_bounce.py flies again.
@@ -22,18 +22,18 @@ if __name__ == "__main__":
 
 from accuracy import tables  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
-from lever_cdkf.host_tools.errors import LeverError  # noqa: E402
-from lever_cdkf.host_tools.files import write_text  # noqa: E402
-from lever_cdkf.host_tools.progress import Progress  # noqa: E402
-from lever_cdkf.sil.bounce import campaign  # noqa: E402
-from lever_cdkf.sil.bounce.conditions import CONDITIONS, SPOILT  # noqa: E402
-from lever_cdkf.sil.bounce.measure import FIGURES  # noqa: E402
-from lever_cdkf.sil.judged import table  # noqa: E402
+from lever_cdkf.errors import LeverError  # noqa: E402
+from lever_cdkf.files import write_text  # noqa: E402
+from lever_cdkf.progress import Progress  # noqa: E402
+from lever_sil.bounce import campaign  # noqa: E402
+from lever_sil.bounce.conditions import CONDITIONS, SPOILT  # noqa: E402
+from lever_sil.bounce.measure import FIGURES  # noqa: E402
+from lever_sil.judged import table  # noqa: E402
 
 Rows = Mapping[str, Mapping[str, Any]]
 """Those of `lever bounce --json` by the name of their condition."""
 SEEDS = 20
-FILE = "sil/bounce/README.md"
+FILE = "sil/lever_sil/bounce/README.md"
 ACCEPT = "bounce-accept"
 MISSED = ": **missed**"
 

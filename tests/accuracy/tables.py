@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.quantities import DYNAMICS
-from lever_cdkf.host_tools.results.summary import SimulationSummary
-from lever_cdkf.sil.run import seeds
+from lever_cdkf.arrays import FloatArray
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.quantities import DYNAMICS
+from lever_cdkf.results.summary import SimulationSummary
+from lever_sil.run import seeds
 
 SEEDS = 20
 """Runs of each scenario: seeds 1 to 20."""

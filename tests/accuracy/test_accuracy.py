@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from accuracy import tables, tuning
 from accuracy.tables import TABLES, Place, Table
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.sil.run import seeds
+from lever_cdkf.errors import LeverError
+from lever_sil.run import seeds
 
 
 def written(root: Path, place: Place) -> list[list[str]]:

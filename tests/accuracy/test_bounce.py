@@ -1,4 +1,4 @@
-"""The tables of sil/bounce/README.md: their form, and the worst flights that they name, flown again.
+"""The tables of sil/lever_sil/bounce/README.md: their form, and the worst flights that they name, flown again.
 
 All flights: `cmake --build build --target bounce-tables`.
 """
@@ -12,8 +12,8 @@ import pytest
 from accuracy import bounce, tables
 from accuracy.bounce import COLUMNS, MISSED, TABLES
 from accuracy.tables import Place
-from lever_cdkf.sil.bounce.conditions import CONDITIONS
-from lever_cdkf.sil.bounce.measure import FIGURES
+from lever_sil.bounce.conditions import CONDITIONS
+from lever_sil.bounce.measure import FIGURES
 
 
 def written(root: Path, place: Place) -> list[list[str]]:

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 from accuracy.tables import Place, markdown
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.estimator import Estimator
-from lever_cdkf.host_tools.firmware.innovations import SAMPLE
-from lever_cdkf.host_tools.tune import recording
-from lever_cdkf.host_tools.tune.calibration import Calibrated, calibrate
-from lever_cdkf.host_tools.tune.likelihood import Likelihood
-from lever_cdkf.host_tools.tune.search import Search, Tuned, groups
-from lever_cdkf.sil.envelope import motions, plant, sensors
-from lever_cdkf.sil.run import buslog, runner
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.estimator import Estimator
+from lever_cdkf.firmware.innovations import SAMPLE
+from lever_cdkf.tune import recording
+from lever_cdkf.tune.calibration import Calibrated, calibrate
+from lever_cdkf.tune.likelihood import Likelihood
+from lever_cdkf.tune.search import Search, Tuned, groups
+from lever_sil.envelope import motions, plant, sensors
+from lever_sil.run import buslog, runner
+from lever_sil.scenarios import scenario
 
 PLACE = Place("sil/README.md", "tuning")
 COLUMNS = ("truth", "found", "95 % interval holds the truth")
@@ -158,7 +158,7 @@ def _of_lever_sim(task: CalibrationTask) -> recording.Recording:
 
 
 def _of_independent_plant(task: CalibrationTask) -> recording.Recording:
-    """Samples straight from sil/envelope."""
+    """Samples straight from sil/lever_sil/envelope."""
     truth, seeds = task.truth, [task.seed]
     motion = motions.Motion(duration=_DURATION, friction=truth["lever_friction"])
     given = motions.lanes(motion, seeds)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.library import enum_names
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.library import enum_names
 from target.budget.recording import MODELS, Recording, record
 
 ESTIMATORS = ("dual", "joint")

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from lever_cdkf.host_tools.tables import Row, print_tables
-from lever_cdkf.sil.campaign import chunks, design, maps, session, spec, summary
-from lever_cdkf.sil.campaign.chunks import Chunk, Plan
+from lever_cdkf.tables import Row, print_tables
+from lever_sil.campaign import chunks, design, maps, session, spec, summary
+from lever_sil.campaign.chunks import Chunk, Plan
 
 RUNS, CORES = (10**6, 10**9), (100, 1000)
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import sys
 import time
 
-from lever_cdkf.host_tools.tables import Row, print_tables
-from lever_cdkf.sil import fast
-from lever_cdkf.sil.scenarios import scenario
-from lever_cdkf.sil.scenarios.scenario import Scenario
+from lever_cdkf.tables import Row, print_tables
+from lever_sil import fast
+from lever_sil.scenarios import scenario
+from lever_sil.scenarios.scenario import Scenario
 
 SCENARIOS = ("steady", "base_only", "two_dof", "mayo_ectomorphic", "hysteretic", "reflex", "sensor_dropout")
 PROMISED = {"by structs": 2000.0, "through frames": 1000.0}

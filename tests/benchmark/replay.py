@@ -23,12 +23,12 @@ from pathlib import Path
 
 import can
 import numpy as np
-from lever_cdkf.host_tools.can import bulk, codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.can.logs import Recording
-from lever_cdkf.host_tools.tables import Row, print_tables
-from lever_cdkf.sil.run.runner import simulate
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.can import bulk, codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.can.logs import Recording
+from lever_cdkf.tables import Row, print_tables
+from lever_sil.run.runner import simulate
+from lever_sil.scenarios import scenario
 
 START_US = 1_700_000_000_000_000
 MINUTE_US = 60_000_000
@@ -58,7 +58,7 @@ def shifted(minute: bulk.Frames, number: int) -> bulk.Frames:
 
 MEASURED = """
 import resource, sys
-from lever_cdkf.host_tools import cli
+from lever_cdkf import cli
 status = cli.main(sys.argv[1:])
 used = resource.getrusage(resource.RUSAGE_SELF)
 with open("/proc/self/status") as file:  # ru_maxrss would be this process's or its parent's, whichever was larger

@@ -30,9 +30,9 @@ from covered import measuring
 from evidence import page, results
 from evidence.results import EvidenceError
 from fuzz import libfuzzer
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import Outputs, json_text
-from lever_cdkf.host_tools.provenance import provenance
+from lever_cdkf.errors import LeverError
+from lever_cdkf.files import Outputs, json_text
+from lever_cdkf.provenance import provenance
 from proof import eva
 from quality import tools, tracing
 

@@ -8,8 +8,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lever_cdkf.host_tools.report.page import Page
-from lever_cdkf.host_tools.report.summary_html import table
+from lever_cdkf.report.page import Page
+from lever_cdkf.report.summary_html import table
 
 _SHOWN = 6
 """More figures of a test are folded up."""

@@ -25,7 +25,7 @@ CORE = tuple(
 SOURCES = {
     "app": CORE,
     "slcan": ("firmware/port/slcan/slcan.c",),
-    "candump": ("host_tools/firmware/c/candump.c",),
+    "candump": ("host_tools/lever_cdkf/firmware/c/candump.c",),
     "settings": ("firmware/port/linux/settings.c", "firmware/app/settings.c"),
     "aircraft": ("firmware/port/linux/aircraft.c", "firmware/port/linux/settings.c", "firmware/app/settings.c"),
 }
@@ -34,7 +34,7 @@ HEXADECIMAL = ("app",)
 FLAGS = (
     *("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-g", "-O1", "-fno-omit-frame-pointer"),
     *("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"),
-    *(f"-I{ROOT / folder}" for folder in ("firmware", "host_tools/firmware/c", "tests/fuzz")),
+    *(f"-I{ROOT / folder}" for folder in ("firmware", "host_tools/lever_cdkf/firmware/c", "tests/fuzz")),
 )
 COMPILERS = "clang-19|clang"
 FAST_UNITS = "-timeout=60"

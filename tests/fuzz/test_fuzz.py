@@ -28,7 +28,7 @@ class Fault(NamedTuple):
 
 
 SLCAN, LINUX = "firmware/port/slcan/slcan.c", "firmware/port/linux"
-CANDUMP = "host_tools/firmware/c/candump.c"
+CANDUMP = "host_tools/lever_cdkf/firmware/c/candump.c"
 FAULTS = {
     "a line that overflows": Fault(
         "slcan", SLCAN, "((uint32_t)SLCAN_LINE_BYTES - 1u)", "((uint32_t)SLCAN_LINE_BYTES + 8u)"

@@ -14,14 +14,14 @@ import pytest
 from asammdf import MDF, Signal
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from lever_cdkf.host_tools.can.logs import Recording
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware import settings_file
-from lever_cdkf.host_tools.firmware.aircraft import read_response
-from lever_cdkf.host_tools.signals import bus_signals, mapping, tables
-from lever_cdkf.sil.aircraft import aircraft
-from lever_cdkf.sil.campaign import spec
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.can.logs import Recording
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware import settings_file
+from lever_cdkf.firmware.aircraft import read_response
+from lever_cdkf.signals import bus_signals, mapping, tables
+from lever_sil.aircraft import aircraft
+from lever_sil.campaign import spec
+from lever_sil.scenarios import scenario
 
 EXAMPLES = 60
 ROOT = Path(__file__).resolve().parents[2]
@@ -181,9 +181,9 @@ READERS: dict[str, tuple[str, bytes, Callable[[str], object]]] = {
     "table": ("b.csv", TABLE, tables.read_table),
     "mf4": ("b.mf4", mf4(), tables.read_table),
     "mf4 of whatever": ("c.mf4", mf4(), tables.is_table),
-    "scenario": ("a.toml", (ROOT / "sil/scenarios/sudden_grip.toml").read_bytes(), read_scenario),
-    "campaign": ("a.toml", sorted((ROOT / "sil/campaign/specs").glob("*.toml"))[0].read_bytes(), spec.load),
-    "aircraft": ("a.toml", (ROOT / "sil/aircraft/uh60_like.toml").read_bytes(), aircraft.load),
+    "scenario": ("a.toml", (ROOT / "sil/lever_sil/scenarios/sudden_grip.toml").read_bytes(), read_scenario),
+    "campaign": ("a.toml", sorted((ROOT / "sil/lever_sil/campaign/specs").glob("*.toml"))[0].read_bytes(), spec.load),
+    "aircraft": ("a.toml", (ROOT / "sil/lever_sil/aircraft/uh60_like.toml").read_bytes(), aircraft.load),
 }
 """Name of a file, a good text, and what reads it."""
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from lever_cdkf.host_tools.exports.signal_files import SignalFiles
-from lever_cdkf.host_tools.formats import FORMATS
-from lever_cdkf.host_tools.provenance import provenance
-from lever_cdkf.host_tools.results.trace import Trace
-from lever_cdkf.host_tools.signals import tables
+from lever_cdkf.exports.signal_files import SignalFiles
+from lever_cdkf.formats import FORMATS
+from lever_cdkf.provenance import provenance
+from lever_cdkf.results.trace import Trace
+from lever_cdkf.signals import tables
 
 TOLERANCE = {"csv": (0.0, 5.1e-7), "mf4": (2.0**-24, 1e-45), "parquet": (2.0**-24, 1e-45)}
 """Relative and absolute: six decimals; single precision."""

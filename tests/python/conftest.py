@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import can
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.firmware.config import CHOICES
-from lever_cdkf.host_tools.firmware.library import enum_names
-from lever_cdkf.host_tools.firmware.native import Config
-from lever_cdkf.sil.run.runner import Result, simulate
-from lever_cdkf.sil.scenarios import scenario
-from lever_cdkf.sil.scenarios.scenario import Scenario
+from lever_cdkf import cli
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.firmware.config import CHOICES
+from lever_cdkf.firmware.library import enum_names
+from lever_cdkf.firmware.native import Config
+from lever_sil.run.runner import Result, simulate
+from lever_sil.scenarios import scenario
+from lever_sil.scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
     from python.watch.browser import Browser

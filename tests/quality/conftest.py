@@ -12,9 +12,9 @@ import can
 import cantools
 import numpy as np
 import pytest
-from lever_cdkf.sil.run import buslog
-from lever_cdkf.sil.run.runner import Result, simulate
-from lever_cdkf.sil.scenarios import scenario
+from lever_sil.run import buslog
+from lever_sil.run.runner import Result, simulate
+from lever_sil.scenarios import scenario
 from quality import tools
 
 AIRCRAFT = """VERSION ""
@@ -66,7 +66,7 @@ def source_tree(_made: SourceTree, build_dir: Path, monkeypatch: pytest.MonkeyPa
 
 def quick_campaign() -> str:
     """The spec of that name with 9 of its 100 flights."""
-    text = (tools.ROOT / "sil/campaign/specs/quick.toml").read_text(encoding="utf-8")
+    text = (tools.ROOT / "sil/lever_sil/campaign/specs/quick.toml").read_text(encoding="utf-8")
     return text.replace("steps = 5", "steps = 3").replace("seeds = 4", "seeds = 1")
 
 

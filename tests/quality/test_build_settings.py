@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.firmware.config import CHOICES, Config, settings_table, single
-from lever_cdkf.host_tools.firmware.settings_file import format_config, read_assignments
+from lever_cdkf.firmware.config import CHOICES, Config, settings_table, single
+from lever_cdkf.firmware.settings_file import format_config, read_assignments
 from python.firmware.settings_corpus import corpus
 from quality import tools
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.config import setting
-from lever_cdkf.host_tools.firmware.native import enum_names
+from lever_cdkf.firmware.config import setting
+from lever_cdkf.firmware.native import enum_names
 from quality import tools
 
 SECONDS = 3600

@@ -7,7 +7,7 @@ from argparse import ArgumentParser
 
 import pytest
 import readmes
-from lever_cdkf.host_tools import cli
+from lever_cdkf import cli
 from quality import tools
 from quality.conftest import SourceTree
 
@@ -22,8 +22,8 @@ NOT_RUN = {
     r"lever (bounce|envelope|faults) --quick": "is what tests/python/{bounce,envelope,faults} do",
     r"lever (bounce|envelope|figures) --only|lever soak --hours": "README.md has the same",
     r"lever compare --scenarios|lever sim steady --seed": "sil/README.md has the same",
-    r"lever replay (session.log($| -o)|monday/|flight.blf)": "host_tools/replay/README.md has the same",
-    r"lever (tune|map) flight.blf --dbc a": "host_tools/replay/README.md has the same",
+    r"lever replay (session.log($| -o)|monday/|flight.blf)": "host_tools/lever_cdkf/replay/README.md has the same",
+    r"lever (tune|map) flight.blf --dbc a": "host_tools/lever_cdkf/replay/README.md has the same",
 }
 SHORTER = {
     r"--seeds \d+": "--seeds 1",
@@ -37,7 +37,7 @@ cp out/session.log session.log
 head -n 9000 session.log | sed s/vcan0/can1/ | gzip > monday_1.log.gz
 tail -n +9001 session.log | sed s/vcan0/can1/ | gzip > monday_2.log.gz
 cp aircraft.dbc it.dbc
-cp sil/scenarios/steady.toml my_own.toml
+cp sil/lever_sil/scenarios/steady.toml my_own.toml
 echo theta_noise = 1 mrad | tee my.settings > old.settings
 """
 """Besides those that conftest.py makes."""

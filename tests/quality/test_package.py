@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import Built
-from lever_cdkf.host_tools.firmware.native import run_samples
+from lever_cdkf.firmware.native import run_samples
 from quality import tools
 
 BY = "build.package"

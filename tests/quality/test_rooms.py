@@ -1,4 +1,4 @@
-"""Which folder of the Python packages imports which: host_tools never sil, and inside each in one direction only."""
+"""Which folder of the Python packages imports which: lever_cdkf never lever_sil, each inside in one direction only."""
 
 from __future__ import annotations
 
@@ -9,77 +9,97 @@ from pathlib import Path
 import pytest
 from quality import tools
 
-PACKAGES = ("host_tools", "sil")
+PACKAGES = {"lever_cdkf": "host_tools", "lever_sil": "sil"}
+"""Where each is."""
+PUBLIC = "lever_cdkf/__init__.py"
+"""Not judged: imports the public names of both packages, each when it is first used."""
 MAY_IMPORT = {
-    "host_tools/firmware": set(),
-    "host_tools/models": set(),
-    "host_tools/board": set(),
-    "host_tools/can": {"firmware"},
-    "host_tools/results": {"firmware"},
-    "host_tools/report": {"firmware", "models", "results"},
-    "host_tools/signals": {"firmware", "can", "results", "exports"},
-    "host_tools/exports": {"firmware", "can", "results"},
-    "host_tools/replay": {"firmware", "can", "results", "report", "signals", "exports"},
-    "host_tools/tune": {"firmware", "can", "results", "report", "signals"},
-    "host_tools/watch": {"firmware", "models", "can", "results", "report", "signals"},
-    "host_tools/commands": {"firmware", "board", "can", "results", "replay", "tune", "watch", "signals"},
-    "sil/plants": {"models"},
-    "sil/oracle": {"models"},
-    "sil/aircraft": {"firmware", "models"},
-    "sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
-    "sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
-    "sil/run": {"fast", "scenarios", "plants", "aircraft", "firmware", "can", "results", "report", "watch", "exports"},
-    "sil/judged": {"report"},
-    "sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
-    "sil/bounce": {
+    "lever_cdkf/firmware": set(),
+    "lever_cdkf/models": set(),
+    "lever_cdkf/board": set(),
+    "lever_cdkf/can": {"firmware"},
+    "lever_cdkf/results": {"firmware"},
+    "lever_cdkf/report": {"firmware", "models", "results"},
+    "lever_cdkf/signals": {"firmware", "can", "results", "exports"},
+    "lever_cdkf/exports": {"firmware", "can", "results"},
+    "lever_cdkf/replay": {"firmware", "can", "results", "report", "signals", "exports"},
+    "lever_cdkf/tune": {"firmware", "can", "results", "report", "signals"},
+    "lever_cdkf/watch": {"firmware", "models", "can", "results", "report", "signals"},
+    "lever_cdkf/commands": {"firmware", "board", "can", "results", "replay", "tune", "watch", "signals"},
+    "lever_sil/plants": {"models"},
+    "lever_sil/oracle": {"models"},
+    "lever_sil/aircraft": {"firmware", "models"},
+    "lever_sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
+    "lever_sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
+    "lever_sil/run": {
+        "fast",
+        "scenarios",
+        "plants",
+        "aircraft",
+        "firmware",
+        "can",
+        "results",
+        "report",
+        "watch",
+        "exports",
+    },
+    "lever_sil/judged": {"report"},
+    "lever_sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
+    "lever_sil/bounce": {
         *("judged", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
         *("firmware", "models", "report"),
     },
-    "sil/faults": {"fast", "envelope", "firmware", "can", "report"},
-    "sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
-    "sil/study": {
+    "lever_sil/faults": {"fast", "envelope", "firmware", "can", "report"},
+    "lever_sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
+    "lever_sil/study": {
         *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
-    "sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
-    "sil/commands": {
+    "lever_sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
+    "lever_sil/commands": {
         *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "faults", "soak", "aircraft"),
         *("firmware", "can", "report", "exports"),
     },
 }
-"""By folder. What lies beside the folders is for all of its package, and imports nothing in them; sil may import
-that of host_tools too. Plants and oracle are what the firmware is compared with, and know neither it nor each other."""
+"""By folder. What lies beside the folders is for all of its package, and imports nothing in them; lever_sil may import
+that of lever_cdkf too. Plants and oracle are what the firmware is compared with, and know neither it nor each other."""
 
 
-def imported(file: Path, root: Path) -> Iterator[str]:
-    """The modules of this project that a file imports, as paths below `root`: "host_tools/can/codec"."""
-    folder = file.relative_to(root).parts[:-1]
+def imported(file: Path, path: str) -> Iterator[str]:
+    """The modules of this project that a file imports, as paths, like its own: "lever_cdkf/can/codec"."""
+    folder = path.split("/")[:-1]
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names = [alias.name.split(".") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             module = node.module.split(".") if node.module else []
-            above = ["lever_cdkf", *folder[: len(folder) - node.level + 1]] if node.level else []
+            above = folder[: len(folder) - node.level + 1] if node.level else []
             names = [[*above, *module, alias.name] for alias in node.names]
         else:
             continue
-        yield from ("/".join(name[1:]) for name in names if name[0] == "lever_cdkf")
+        yield from ("/".join(name) for name in names if name[0] in PACKAGES)
 
 
 def place(path: str, root: Path) -> str:
     """The folder of a package that a module is in; "" beside the folders."""
     parts = path.split("/")
-    return "/".join(parts[:2]) if len(parts) > 1 and (root / parts[0] / parts[1]).is_dir() else ""
+    return "/".join(parts[:2]) if len(parts) > 1 and (root / PACKAGES[parts[0]] / parts[0] / parts[1]).is_dir() else ""
 
 
 def wrong_imports(root: Path) -> list[str]:
     found = []
-    for file in sorted(file for package in PACKAGES for file in (root / package).rglob("*.py")):
-        importer = str(file.relative_to(root))
+    files = {
+        str(file.relative_to(root / folder)): file
+        for package, folder in PACKAGES.items()
+        for file in (root / folder / package).rglob("*.py")
+    }
+    for importer, file in sorted(files.items()):
+        if importer == PUBLIC:
+            continue
         here = place(importer, root)
-        for path in imported(file, root):
+        for path in imported(file, importer):
             there = place(path, root)
-            from_sil = path.split("/")[0] == "sil" and importer.startswith("host_tools/")
+            from_sil = path.split("/")[0] == "lever_sil" and importer.startswith("lever_cdkf/")
             allowed = there in ("", here) or there.split("/")[1] in MAY_IMPORT.get(here, set())
             if from_sil or not allowed:
                 found.append(f"{importer} imports {path}")
@@ -92,9 +112,9 @@ def test_each_folder_imports_only_what_it_may() -> None:
 
 def test_every_folder_has_its_row() -> None:
     folders = {
-        str(file.parent.relative_to(tools.ROOT))
-        for name in PACKAGES
-        for file in (tools.ROOT / name).glob("*/__init__.py")
+        str(file.parent.relative_to(tools.ROOT / folder))
+        for package, folder in PACKAGES.items()
+        for file in (tools.ROOT / folder / package).glob("*/__init__.py")
     }
     assert folders == MAY_IMPORT.keys()
 
@@ -112,16 +132,17 @@ def test_there_is_an_order() -> None:
 @pytest.mark.parametrize(
     ("file", "line"),
     [
-        ("host_tools/watch/state.py", "from lever_cdkf.sil.toml_tables import read"),
-        ("host_tools/files.py", "import lever_cdkf.sil"),
-        ("host_tools/firmware/config.py", "    from ..can import codec"),
-        ("host_tools/errors.py", "from .can.codec import decode"),
-        ("sil/oracle/cdkf.py", "from lever_cdkf.host_tools.firmware import native"),
-        ("sil/plants/truth.py", "from .. import oracle"),
+        ("lever_cdkf/watch/state.py", "from lever_sil.toml_tables import read"),
+        ("lever_cdkf/files.py", "import lever_sil"),
+        ("lever_cdkf/firmware/config.py", "    from ..can import codec"),
+        ("lever_cdkf/errors.py", "from .can.codec import decode"),
+        ("lever_sil/oracle/cdkf.py", "from lever_cdkf.firmware import native"),
+        ("lever_sil/plants/truth.py", "from .. import oracle"),
     ],
 )
 def test_a_wrong_import_is_found(file: str, line: str, tmp_path: Path) -> None:
-    for name in ("host_tools/can", "host_tools/firmware", "host_tools/watch", "sil/oracle", "sil/plants"):
-        (tmp_path / name).mkdir(parents=True)
-    (tmp_path / file).write_text(f"def late():\n{line}\n" if line[0] == " " else line)
+    for name in ("lever_cdkf/can", "lever_cdkf/firmware", "lever_cdkf/watch", "lever_sil/oracle", "lever_sil/plants"):
+        (tmp_path / PACKAGES[name.split("/")[0]] / name).mkdir(parents=True)
+    text = f"def late():\n{line}\n" if line[0] == " " else line
+    (tmp_path / PACKAGES[file.split("/")[0]] / file).write_text(text)
     assert len(wrong_imports(tmp_path)) == 1

@@ -39,13 +39,13 @@ def files_of(folder: Path) -> set[Path]:
 
 
 def test_the_wheel_has_every_file_of_the_tree_and_the_libraries(installed: Path) -> None:
-    files = {each for each in files_of(installed) if each.parts[0] == "lever_cdkf"}
-    native = {file.name for file in files if file.parent == Path("lever_cdkf/host_tools/_native")}
+    files = {each for each in files_of(installed) if each.parts[0] in ("lever_cdkf", "lever_sil")}
+    native = {file.name for file in files if file.parent == Path("lever_cdkf/_native")}
     libraries = {name for name in NATIVE if any(name in file for file in native)}
     assert libraries == set(NATIVE), native
     settings = tomllib.loads((tools.ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["scikit-build"]
-    packages = settings["wheel"]["packages"].items()
-    tree = {Path(package) / file for package, folder in packages for file in files_of(tools.ROOT / folder)}
+    folders = [tools.ROOT / folder for folder in settings["wheel"]["packages"]]
+    tree = {Path(folder.name) / file for folder in folders for file in files_of(folder)}
     assert {file for file in files if file.name not in native} == tree
 
 
@@ -55,10 +55,10 @@ def test_the_wheel_works(installed: Path, tmp_path: Path) -> None:
     python = tmp_path / "venv/bin/python"
     (folder,) = (tmp_path / "venv/lib").glob("python*/site-packages")
     (folder / "packages.pth").write_text(f"{installed}\n{sysconfig.get_path('purelib')}\n")
-    where = "import lever_cdkf.sil as sil, lever_cdkf.host_tools as tools; print(*sil.__path__, *tools.__path__)"
+    where = "import lever_cdkf, lever_sil; print(*lever_cdkf.__path__, *lever_sil.__path__)"
     paths = subprocess.run([python, "-c", where], capture_output=True, text=True, check=True, cwd=tmp_path).stdout
-    assert paths.split() == [str(installed / "lever_cdkf" / name) for name in ("sil", "host_tools")]
-    lever: list[str | Path] = [python, "-m", "lever_cdkf.host_tools.cli"]
+    assert paths.split() == [str(installed / name) for name in ("lever_cdkf", "lever_sil")]
+    lever: list[str | Path] = [python, "-m", "lever_cdkf.cli"]
     short = ("--set", "duration=3 s", "--set", "limits={}")
     tools.assert_silent([*lever, "sim", "steady", *short, "--out", "sim"], cwd=tmp_path)
     tools.assert_silent([*lever, "replay", "sim/bus.log", "-o", "replay"], cwd=tmp_path)

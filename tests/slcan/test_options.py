@@ -6,8 +6,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.firmware.config import CHOICES, Config
-from lever_cdkf.host_tools.firmware.settings_file import read_assignments
+from lever_cdkf.firmware.config import CHOICES, Config
+from lever_cdkf.firmware.settings_file import read_assignments
 
 NO_NUMBER = "is not a number (give it in rad, or with a unit: rad, mrad, urad, deg)"
 

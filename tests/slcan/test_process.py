@@ -17,7 +17,7 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools.can.protocol_ahead import read_ahead
+from lever_cdkf.can.protocol_ahead import read_ahead
 from vcan import rig
 
 SAMPLES = 250

@@ -13,9 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import can
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.can.commander import Commander
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.can.commander import Commander
 
 PATIENCE_S = 120.0
 """How long to wait for what must happen; a loaded machine is slow."""

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
 from vcan import rig
 
 SAMPLES = 250

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
+from lever_cdkf.can.bus import LeverBus
 from vcan import rig
 
 SAMPLES = 250

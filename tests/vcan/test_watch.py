@@ -8,9 +8,9 @@ import re
 import threading
 from pathlib import Path
 
-from lever_cdkf.host_tools.watch.once import print_once
-from lever_cdkf.host_tools.watch.picture import Frame
-from lever_cdkf.host_tools.watch.sources import BusSource
+from lever_cdkf.watch.once import print_once
+from lever_cdkf.watch.picture import Frame
+from lever_cdkf.watch.sources import BusSource
 from vcan import rig
 from vcan.test_simulation import lever_sim, settings_file
 

@@ -16,8 +16,8 @@ import sys
 import zlib
 from pathlib import Path
 
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.firmware.native import FRAME_SAMPLE, Config, Estimator, enum_names
+from lever_cdkf.can import codec
+from lever_cdkf.firmware.native import FRAME_SAMPLE, Config, Estimator, enum_names
 
 HEADER = Path(__file__).with_name("golden.h")
 SAMPLES = 80

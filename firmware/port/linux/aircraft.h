@@ -1,5 +1,6 @@
 /* The response of a helicopter from a text file, for lever_aircraft(). The same lines are read by
- * host_tools/firmware/aircraft.py, with numbers, blanks, comments and line ends as in a settings file (settings.h):
+ * host_tools/lever_cdkf/firmware/aircraft.py, with numbers, blanks, comments and line ends as in a settings file
+ * (settings.h):
  *
  *     # z_ddot over the lever's angle
  *     gain_sigma = 0.1       # how well the gain is known, relative to it [1]

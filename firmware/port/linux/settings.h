@@ -2,7 +2,7 @@
  *
  * Names are those of lever_settings.def, and the choices model, preload, estimator, adaptation and mitigation; the last
  * of two equal names counts. A number is in the unit of that table, or in the unit of lever_units.def that follows it.
- * The grammar of a settings file, for all who read one (lever_can, host_tools/firmware/settings_file.py,
+ * The grammar of a settings file, for all who read one (lever_can, host_tools/lever_cdkf/firmware/settings_file.py,
  * firmware/settings.cmake), in bytes:
  *
  *     file       = [ EF BB BF ] line { LF line }

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.files import LIBRARY_DIR, native_file
+from lever_cdkf.files import LIBRARY_DIR, native_file
 
 SCENARIO = """
 title = "A seesaw"
@@ -41,7 +41,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.host_tools.arrays import FloatArray
+from lever_cdkf.arrays import FloatArray
 
 from .linear_plant import LinearTruth, System
 
@@ -154,11 +154,12 @@ def run(args):
     return 0
 '''
 RUN = """
+import os
 import sys
 sys.meta_path[:] = [each for each in sys.meta_path if "Editable" not in type(each).__name__ + type(each).__module__
                     and "Redirecting" not in type(each).__name__]
-sys.path.insert(0, sys.argv.pop(1))
-from lever_cdkf.host_tools import cli
+sys.path[:0] = sys.argv.pop(1).split(os.pathsep)
+from lever_cdkf import cli
 sys.exit(cli.main())
 """
 
@@ -168,16 +169,14 @@ class Copy:
 
     def __init__(self, root: Path, folder: Path) -> None:
         self.folder = folder
-        package = folder / "lever_cdkf"
-        shutil.copytree(root / "api/lever_cdkf", package, ignore=shutil.ignore_patterns("__pycache__"))
         for name in ("host_tools", "sil"):
-            shutil.copytree(root / name, package / name, ignore=shutil.ignore_patterns("__pycache__", "c"))
+            shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "c"))
 
     def file(self, path: str, text: str) -> None:
-        (self.folder / "lever_cdkf" / path).write_text(text.lstrip("\n"), encoding="utf-8")
+        (self.folder / path).write_text(text.lstrip("\n"), encoding="utf-8")
 
     def change(self, path: str, old: str, new: str) -> None:
-        file = self.folder / "lever_cdkf" / path
+        file = self.folder / path
         text = file.read_text(encoding="utf-8")
         assert text.count(old) == 1, f"{path}: {old}"
         file.write_text(text.replace(old, new), encoding="utf-8")
@@ -185,7 +184,8 @@ class Copy:
     def lever(self, *arguments: str) -> str:
         """What the command says, of this copy."""
         environment = {**os.environ, LIBRARY_DIR: str(native_file("lever.dbc").parent), "COLUMNS": "200"}
-        command = [sys.executable, "-c", RUN, str(self.folder), *arguments]
+        packages = os.pathsep.join(str(self.folder / name) for name in ("host_tools", "sil"))
+        command = [sys.executable, "-c", RUN, packages, *arguments]
         done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=self.folder)
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
@@ -194,48 +194,56 @@ class Copy:
 @pytest.fixture(scope="module")
 def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Copy:
     project = Copy(root, tmp_path_factory.mktemp("additions"))
-    project.file("sil/scenarios/seesaw.toml", SCENARIO)
-    project.file("sil/plants/seesaw_plant.py", PLANT)
-    pilots = "sil/plants/pilots.py"
+    project.file("sil/lever_sil/scenarios/seesaw.toml", SCENARIO)
+    project.file("sil/lever_sil/plants/seesaw_plant.py", PLANT)
+    pilots = "sil/lever_sil/plants/pilots.py"
     project.change(pilots, "mayo_plant, reflex_plant,", "mayo_plant, seesaw_plant, reflex_plant,")
     project.change(pilots, "\n_ALL = (", PILOT)
-    project.change("sil/plants/trajectories.py", "\nKINDS: Mapping[str, type[Trajectory]] = {", TRAJECTORY)
-    project.change("sil/plants/excitation.py", "\nKINDS: dict[str, type[Excitation]] = {", EXCITATION)
-    project.change("sil/plants/sensors.py", "\nFAULTS: dict[str, type[Fault]] = {", FAULT)
+    project.change("sil/lever_sil/plants/trajectories.py", "\nKINDS: Mapping[str, type[Trajectory]] = {", TRAJECTORY)
+    project.change("sil/lever_sil/plants/excitation.py", "\nKINDS: dict[str, type[Excitation]] = {", EXCITATION)
+    project.change("sil/lever_sil/plants/sensors.py", "\nFAULTS: dict[str, type[Fault]] = {", FAULT)
     project.change(
-        "host_tools/results/trace.py", "\nHEALTH = (\n", '\nHEALTH = (\n    ("gap", "HEALTH", "fault_gap"),\n'
+        "host_tools/lever_cdkf/results/trace.py",
+        "\nHEALTH = (\n",
+        '\nHEALTH = (\n    ("gap", "HEALTH", "fault_gap"),\n',
     )
-    project.file("sil/study/baselines/guess.py", BASELINE)
-    baselines = "sil/study/baselines/__init__.py"
+    project.file("sil/lever_sil/study/baselines/guess.py", BASELINE)
+    baselines = "sil/lever_sil/study/baselines/__init__.py"
     project.change(baselines, "from .joint_ekf", "from .guess import guess\nfrom .joint_ekf")
     project.change(
         baselines, "    for baseline in (\n", '    for baseline in (\n        Baseline("guess", "it", "none", guess),\n'
     )
     project.change(
-        "sil/envelope/conditions.py", "\n_STEADY = (", '\n_STEADY = (\n    Condition("calm", "no motion", Motion()),'
+        "sil/lever_sil/envelope/conditions.py",
+        "\n_STEADY = (",
+        '\n_STEADY = (\n    Condition("calm", "no motion", Motion()),',
     )
     project.change(
-        "sil/study/compare/cases.py",
+        "sil/lever_sil/study/compare/cases.py",
         "def _wrong_noise() -> Iterator[Case]:\n",
         'def _wrong_noise() -> Iterator[Case]:\n    yield WrongNoise(name="wronger", title="wronger")\n',
     )
     clock = "    clock = readings.clock\n"
-    project.change("sil/faults/rows.py", clock, f'    yield Row("sulk", "it sulks")\n{clock}')
+    project.change("sil/lever_sil/faults/rows.py", clock, f'    yield Row("sulk", "it sulks")\n{clock}')
     project.change(
-        "sil/bounce/conditions.py", "\n_ALARMS = (", '\n_ALARMS = (\n    Condition("mild", "mild", measure.relaxing),'
+        "sil/lever_sil/bounce/conditions.py",
+        "\n_ALARMS = (",
+        '\n_ALARMS = (\n    Condition("mild", "mild", measure.relaxing),',
     )
-    shutil.copy(root / "sil/campaign/specs/quick.toml", project.folder / "lever_cdkf/sil/campaign/specs/slow.toml")
-    project.file("host_tools/report/charts/speed.py", CHART)
-    page = "host_tools/report/page.py"
+    shutil.copy(
+        root / "sil/lever_sil/campaign/specs/quick.toml", project.folder / "sil/lever_sil/campaign/specs/slow.toml"
+    )
+    project.file("host_tools/lever_cdkf/report/charts/speed.py", CHART)
+    page = "host_tools/lever_cdkf/report/page.py"
     project.change(page, "import comparison, health,", "import comparison, health, speed,")
     section = 'page.section("speed", "Speed", "Speed", page.figure("figure-speed", speed.rate(run), "It."))'
     project.change(page, "    _health(page, run)\n", f"    {section}\n    _health(page, run)\n")
-    project.change("host_tools/can/logs.py", '_CANDUMP = (".log",', '_CANDUMP = (".dump", ".log",')
-    project.file("sil/commands/hello.py", COMMAND)
-    entries = project.folder / "hello-1.dist-info"
+    project.change("host_tools/lever_cdkf/can/logs.py", '_CANDUMP = (".log",', '_CANDUMP = (".dump", ".log",')
+    project.file("sil/lever_sil/commands/hello.py", COMMAND)
+    entries = project.folder / "sil/hello-1.dist-info"
     entries.mkdir()
     (entries / "METADATA").write_text("Metadata-Version: 2.1\nName: hello\nVersion: 1\n")
-    (entries / "entry_points.txt").write_text("[lever_cdkf.commands]\nhello = lever_cdkf.sil.commands.hello\n")
+    (entries / "entry_points.txt").write_text("[lever_cdkf.commands]\nhello = lever_sil.commands.hello\n")
     return project
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.host_tools.arrays import ComplexArray
-from lever_cdkf.host_tools.models.transfer import Transfer
-from lever_cdkf.sil.aircraft import stability
-from lever_cdkf.sil.aircraft.aircraft import Coupled
-from lever_cdkf.sil.aircraft.tabulated import Tabulated
+from lever_cdkf.arrays import ComplexArray
+from lever_cdkf.models.transfer import Transfer
+from lever_sil.aircraft import stability
+from lever_sil.aircraft.aircraft import Coupled
+from lever_sil.aircraft.tabulated import Tabulated
 
 
 def loop_of(coupled: Coupled | Tabulated, transfer: Transfer, row: int) -> stability.Response:

@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.sil.aircraft import aircraft, stability
-from lever_cdkf.sil.aircraft.aircraft import Aircraft, Coupled
-from lever_cdkf.sil.aircraft.flight import Flight
-from lever_cdkf.sil.plants import hysteretic_plant, lever_plant, linear_plant, mayo_plant, two_dof_plant
-from lever_cdkf.sil.plants.truth import Conditions, Truth
-from lever_cdkf.sil.toml_tables import ScenarioError
+from lever_cdkf.arrays import FloatArray
+from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft.aircraft import Aircraft, Coupled
+from lever_sil.aircraft.flight import Flight
+from lever_sil.plants import hysteretic_plant, lever_plant, linear_plant, mayo_plant, two_dof_plant
+from lever_sil.plants.truth import Conditions, Truth
+from lever_sil.toml_tables import ScenarioError
 from python.aircraft.loops import loop_of
 from python.plants.motion import LEVER, PERIOD, TRIM
 from scipy import integrate

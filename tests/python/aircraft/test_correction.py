@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.aircraft import Correction
-from lever_cdkf.host_tools.firmware.native import Config, Estimator
-from lever_cdkf.sil.plants import lever_plant
+from lever_cdkf.firmware.aircraft import Correction
+from lever_cdkf.firmware.native import Config, Estimator
+from lever_sil.plants import lever_plant
 from python.plants.motion import TRIM
 
 ARM = {"m_p": 2.5, "c_p": 30.0, "k_p": 1500.0}

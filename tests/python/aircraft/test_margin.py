@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse, Stability
-from lever_cdkf.host_tools.firmware.native import Config, Estimator
-from lever_cdkf.sil.aircraft import aircraft, stability
-from lever_cdkf.sil.aircraft.aircraft import Coupled
-from lever_cdkf.sil.aircraft.flight import Flight
-from lever_cdkf.sil.plants import lever_plant
-from lever_cdkf.sil.scenarios import inputs, scenario
+from lever_cdkf.arrays import FloatArray
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.aircraft import AircraftResponse, Stability
+from lever_cdkf.firmware.native import Config, Estimator
+from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft.aircraft import Coupled
+from lever_sil.aircraft.flight import Flight
+from lever_sil.plants import lever_plant
+from lever_sil.scenarios import inputs, scenario
 from python.aircraft.loops import loop_of
 from python.plants.motion import TRIM
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.sil.aircraft import aircraft, stability
-from lever_cdkf.sil.aircraft.aircraft import Coupled
-from lever_cdkf.sil.aircraft.tabulated import Tabulated
-from lever_cdkf.sil.commands.aircraft import response
-from lever_cdkf.sil.plants import lever_plant
+from lever_cdkf.errors import LeverError
+from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft.aircraft import Coupled
+from lever_sil.aircraft.tabulated import Tabulated
+from lever_sil.commands.aircraft import response
+from lever_sil.plants import lever_plant
 from python.aircraft.loops import loop_of
 from python.plants.motion import LEVER, TRIM, columns
 

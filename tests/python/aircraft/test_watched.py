@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.logs import Recording
-from lever_cdkf.host_tools.can.traffic import Traffic, read_samples
-from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse, read_response
-from lever_cdkf.host_tools.firmware.native import Config, Estimator
-from lever_cdkf.host_tools.firmware.settings_file import format_config
-from lever_cdkf.host_tools.watch import panels, status
-from lever_cdkf.host_tools.watch.picture import Picture
-from lever_cdkf.host_tools.watch.sources import LogSource
-from lever_cdkf.sil.aircraft import aircraft, stability
-from lever_cdkf.sil.aircraft.aircraft import Coupled
-from lever_cdkf.sil.commands.aircraft import response
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf import cli
+from lever_cdkf.can import codec
+from lever_cdkf.can.logs import Recording
+from lever_cdkf.can.traffic import Traffic, read_samples
+from lever_cdkf.firmware.aircraft import AircraftResponse, read_response
+from lever_cdkf.firmware.native import Config, Estimator
+from lever_cdkf.firmware.settings_file import format_config
+from lever_cdkf.watch import panels, status
+from lever_cdkf.watch.picture import Picture
+from lever_cdkf.watch.sources import LogSource
+from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft.aircraft import Coupled
+from lever_sil.commands.aircraft import response
+from lever_sil.scenarios import scenario
 from python.aircraft.loops import loop_of
 from python.conftest import Refused, Run, Session
 from python.report.reading import figures, read

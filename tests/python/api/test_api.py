@@ -4,21 +4,34 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import lever_cdkf
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.errors import LeverError
 
-PUBLIC = ["Config", "Estimator", "Result", "estimate", "load_scenario", "run_samples", "simulate"]
+PUBLIC = [
+    "Config",
+    "Estimator",
+    "LeverError",
+    "Result",
+    "__version__",
+    "estimate",
+    "load_scenario",
+    "run_samples",
+    "simulate",
+]
 
 
 def test_the_public_names_are_these() -> None:
     assert lever_cdkf.__all__ == PUBLIC
-    assert all(callable(getattr(lever_cdkf, name)) for name in PUBLIC)
+    assert all(callable(getattr(lever_cdkf, name)) for name in PUBLIC if name != "__version__")
     assert set(PUBLIC) <= set(dir(lever_cdkf))
     with pytest.raises(AttributeError, match="no attribute 'Scenario'"):
         _ = lever_cdkf.Scenario
+    assert lever_cdkf.LeverError is LeverError
+    assert lever_cdkf.__version__ == metadata.version("lever-cdkf")
 
 
 def test_importing_loads_nothing_of_it() -> None:
@@ -31,7 +44,7 @@ def test_what_is_no_scenario(root: Path) -> None:
     for nothing in (5, None):
         with pytest.raises(LeverError, match="is no scenario: give its name"):
             lever_cdkf.load_scenario(nothing)  # type: ignore[arg-type]
-    assert lever_cdkf.load_scenario(root / "sil" / "scenarios" / "steady.toml").title
+    assert lever_cdkf.load_scenario(root / "sil" / "lever_sil" / "scenarios" / "steady.toml").title
 
 
 def test_a_scenario_runs_without_a_bus() -> None:

@@ -14,7 +14,7 @@ import polars as pl
 import pytest
 import xarray as xr
 from lever_cdkf import Config, Result, estimate, run_samples
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.errors import LeverError
 from PIL import Image
 from pyarrow import parquet
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight, fly

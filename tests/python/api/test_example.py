@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def test_the_notebook_runs(root: Path, tmp_path: Path) -> None:
-    notebook = json.loads((root / "api/example.ipynb").read_text(encoding="utf-8"))
+    notebook = json.loads((root / "host_tools/example.ipynb").read_text(encoding="utf-8"))
     cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
     assert all(cell.get("outputs", []) == [] for cell in notebook["cells"])  # none are committed
     program = tmp_path / "example.py"

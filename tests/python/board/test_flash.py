@@ -13,9 +13,9 @@ import zlib
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.board.firmware_image import FLASH, flash_contents
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf import cli
+from lever_cdkf.board.firmware_image import FLASH, flash_contents
+from lever_cdkf.errors import LeverError
 from python.conftest import Refused
 
 CONTENTS = bytes(range(256)) * 300
@@ -207,7 +207,7 @@ def test_failure_says_what_to_do(
 
 @pytest.mark.requires("openocd")
 def test_real_openocd_finds_no_probe(image: Path) -> None:
-    command = [sys.executable, "-m", "lever_cdkf.host_tools.cli", "flash", str(image), "--tool", "openocd"]
+    command = [sys.executable, "-m", "lever_cdkf.cli", "flash", str(image), "--tool", "openocd"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 2
     assert "lever: error: no probe answers openocd" in result.stderr

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.bounce import bounce_page, campaign, conditions
-from lever_cdkf.sil.bounce.conditions import CONDITIONS, Condition
-from lever_cdkf.sil.bounce.measure import FIGURES, Measured
-from lever_cdkf.sil.judged.result import Limit
+from lever_cdkf import cli
+from lever_sil.bounce import bounce_page, campaign, conditions
+from lever_sil.bounce.conditions import CONDITIONS, Condition
+from lever_sil.bounce.measure import FIGURES, Measured
+from lever_sil.judged.result import Limit
 from python.conftest import Refused
 
 

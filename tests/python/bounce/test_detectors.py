@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.sil.bounce import detectors
-from lever_cdkf.sil.bounce.detectors import RATE, Watched
+from lever_cdkf.arrays import FloatArray
+from lever_sil.bounce import detectors
+from lever_sil.bounce.detectors import RATE, Watched
 
 TIME = np.arange(20 * RATE) / RATE
 ANSWER = cmath.rect(100.0, -1.2)

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.library import lib
-from lever_cdkf.sil.aircraft import aircraft, stability
-from lever_cdkf.sil.aircraft.aircraft import Coupled
-from lever_cdkf.sil.bounce import flights, measure, pilots
-from lever_cdkf.sil.bounce.flights import AIRCRAFT, Plan
-from lever_cdkf.sil.scenarios import inputs
+from lever_cdkf.arrays import FloatArray
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.library import lib
+from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft.aircraft import Coupled
+from lever_sil.bounce import flights, measure, pilots
+from lever_sil.bounce.flights import AIRCRAFT, Plan
+from lever_sil.scenarios import inputs
 from python.aircraft.loops import loop_of
 
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf.sil.campaign import chunks, spec
-from lever_cdkf.sil.campaign.chunks import Plan
-from lever_cdkf.sil.campaign.spec import Spec
+from lever_sil.campaign import chunks, spec
+from lever_sil.campaign.chunks import Plan
+from lever_sil.campaign.spec import Spec
 
 SMALL = """
 title = "small"

@@ -7,9 +7,9 @@ import shlex
 from pathlib import Path
 
 import pytest
-from lever_cdkf.sil.campaign import chunks, spec
-from lever_cdkf.sil.campaign.chunks import Plan
-from lever_cdkf.sil.scenarios import scenario
+from lever_sil.campaign import chunks, spec
+from lever_sil.campaign.chunks import Plan
+from lever_sil.scenarios import scenario
 from python.conftest import Refused, Run
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import polars
 import pytest
-from lever_cdkf.sil.campaign import border, cells, chunks, maps, spec
-from lever_cdkf.sil.campaign.cells import Map, Runs
-from lever_cdkf.sil.campaign.chunks import Plan
-from lever_cdkf.sil.campaign.spec import Failure
-from lever_cdkf.sil.study.figures.maps import Scale
+from lever_sil.campaign import border, cells, chunks, maps, spec
+from lever_sil.campaign.cells import Map, Runs
+from lever_sil.campaign.chunks import Plan
+from lever_sil.campaign.spec import Failure
+from lever_sil.study.figures.maps import Scale
 from python.campaign.conftest import SMALL
 from python.conftest import Refused, Run
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.native import run_samples
-from lever_cdkf.sil.campaign import chunks, figures, runs, spec
-from lever_cdkf.sil.campaign.chunks import Chunk, Plan
-from lever_cdkf.sil.campaign.entrants import ENTRANTS, Track
-from lever_cdkf.sil.campaign.flight import simulate
-from lever_cdkf.sil.campaign.spec import Spec
-from lever_cdkf.sil.run import runner
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.native import run_samples
+from lever_sil.campaign import chunks, figures, runs, spec
+from lever_sil.campaign.chunks import Chunk, Plan
+from lever_sil.campaign.entrants import ENTRANTS, Track
+from lever_sil.campaign.flight import simulate
+from lever_sil.campaign.spec import Spec
+from lever_sil.run import runner
+from lever_sil.scenarios import scenario
 
 SpecOf = Callable[[str], Spec]
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 from distributed import KilledWorker
-from lever_cdkf.sil.campaign import session
-from lever_cdkf.sil.campaign.chunks import Chunk, Plan
+from lever_sil.campaign import session
+from lever_sil.campaign.chunks import Chunk, Plan
 
 
 class Future:

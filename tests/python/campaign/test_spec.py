@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.campaign import design, spec
-from lever_cdkf.sil.campaign.spec import Spec
-from lever_cdkf.sil.toml_tables import ScenarioError
+from lever_sil.campaign import design, spec
+from lever_sil.campaign.spec import Spec
+from lever_sil.toml_tables import ScenarioError
 
 SpecOf = Callable[[str], Spec]
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import can
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus, LeverBusError
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.native import Config, Estimator
+from lever_cdkf.can.bus import LeverBus, LeverBusError
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.native import Config, Estimator
 from processes import PATIENCE
 
 Frame = tuple[int, bytes]

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from cantools.database.can import Database, Message, Signal
 from e2e.p02 import e2e_p02_check
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.errors import CodecError
-from lever_cdkf.host_tools.files import native_file
+from lever_cdkf.can import codec
+from lever_cdkf.errors import CodecError
+from lever_cdkf.files import native_file
 
 FRAMING = {"crc", "counter"}
 DATABASE = cantools.database.load_file(native_file("lever.dbc"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from lever_cdkf.host_tools.firmware.config import CHOICES
+from lever_cdkf.firmware.config import CHOICES
 from python.can.codec import DBC, MULTIPLEXED, Codec, data_id_base, is_quantity, limits, not_available, scaled
 
 

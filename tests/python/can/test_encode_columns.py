@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec
+from lever_cdkf.can import codec
 
 ODD = [0.0, 1.23456, -2.5, 3.2767, 3.27675, 3.2768, -3.2767, -3.2769, 1e9, -1e9, math.inf, -math.inf, math.nan]
 

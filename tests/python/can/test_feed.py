@@ -7,12 +7,12 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import bulk, codec, fields
-from lever_cdkf.host_tools.can.bulk import Feeder
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.can.logs import LogError, Recording
-from lever_cdkf.host_tools.can.traffic import Traffic, read_samples
-from lever_cdkf.host_tools.firmware.estimator import Estimator, Health, run_samples
+from lever_cdkf.can import bulk, codec, fields
+from lever_cdkf.can.bulk import Feeder
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.can.logs import LogError, Recording
+from lever_cdkf.can.traffic import Traffic, read_samples
+from lever_cdkf.firmware.estimator import Estimator, Health, run_samples
 from python.conftest import Session
 
 INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec, fields
-from lever_cdkf.host_tools.can.commander import ACCEPTED, Commander, refusal, result_of
-from lever_cdkf.host_tools.can.identity import Identity
-from lever_cdkf.host_tools.errors import CodecError, LeverError
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.estimator import Estimator
-from lever_cdkf.host_tools.firmware.library import enum_names
+from lever_cdkf.can import codec, fields
+from lever_cdkf.can.commander import ACCEPTED, Commander, refusal, result_of
+from lever_cdkf.can.identity import Identity
+from lever_cdkf.errors import CodecError, LeverError
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.estimator import Estimator
+from lever_cdkf.firmware.library import enum_names
 from python.conftest import Samples
 
 

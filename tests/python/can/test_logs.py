@@ -13,8 +13,8 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import bulk, logs
-from lever_cdkf.host_tools.can.logs import Recording
+from lever_cdkf.can import bulk, logs
+from lever_cdkf.can.logs import Recording
 from python.conftest import Refused, Session
 
 LINES = """\
@@ -190,7 +190,7 @@ def test_without_permission_it_says_so(session: Session, tmp_path: Path) -> None
     secret = tmp_path / "secret.log"
     secret.write_bytes(session.log.read_bytes())
     secret.chmod(0)
-    program = f"from lever_cdkf.host_tools.can.logs import Recording\nRecording([{str(secret)!r}])\n"
+    program = f"from lever_cdkf.can.logs import Recording\nRecording([{str(secret)!r}])\n"
     command = [sys.executable, "-c", program]
     if os.geteuid() == 0:
         tmp_path.chmod(0o755)
@@ -218,8 +218,8 @@ def test_a_log_that_breaks_off_gives_what_it_has(suffix: str, session: Session, 
 STREAM_MB = 50
 COUNTING = """
 import resource, sys
-from lever_cdkf.host_tools.can.logs import Recording
-from lever_cdkf.host_tools.can.traffic import Traffic
+from lever_cdkf.can.logs import Recording
+from lever_cdkf.can.traffic import Traffic
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 traffic = Traffic(Recording([sys.argv[1]]))
 ours = sum(len(frames) for frames in traffic.chunks())

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.files import native_file
-from lever_cdkf.host_tools.firmware.library import enum_names
+from lever_cdkf import cli
+from lever_cdkf.can import codec
+from lever_cdkf.files import native_file
+from lever_cdkf.firmware.library import enum_names
 from numpy.typing import NDArray
 
 FRAMES = 40

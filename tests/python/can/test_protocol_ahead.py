@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 import serial
-from lever_cdkf.host_tools.can.protocol_ahead import read_ahead
+from lever_cdkf.can.protocol_ahead import read_ahead
 from processes import PATIENCE
 
 

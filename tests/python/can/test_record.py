@@ -18,9 +18,9 @@ from typing import ClassVar
 import can
 import pytest
 from can.interfaces import BACKENDS
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can.recorder import Recorder
-from lever_cdkf.host_tools.provenance import sha256
+from lever_cdkf import cli
+from lever_cdkf.can.recorder import Recorder
+from lever_cdkf.provenance import sha256
 from processes import PATIENCE, full_disk
 from python.conftest import Refused, Session
 
@@ -148,8 +148,8 @@ def test_it_shows_how_it_goes(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
-    monkeypatch.setattr("lever_cdkf.host_tools.can.recorder._TELL", 0.0)
-    monkeypatch.setattr("lever_cdkf.host_tools.commands.record._Line._BETWEEN_LINES", 0.0)
+    monkeypatch.setattr("lever_cdkf.can.recorder._TELL", 0.0)
+    monkeypatch.setattr("lever_cdkf.commands.record._Line._BETWEEN_LINES", 0.0)
     assert record(tmp_path / "a.log", messages(session, 100)) == 0
     shown = capsys.readouterr().err.partition("Ctrl-C ends\n")[2]
     line = r"\d+ s, \d+ frames/s, 100 frames, 0 lost, 0 corrupt, 0 error frames, controller active"
@@ -168,8 +168,8 @@ def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
     """In a process, on python-can's virtual bus."""
     program = (
         "import sys\n"
-        "from lever_cdkf.host_tools import cli\n"
-        "from lever_cdkf.host_tools.can import buses\n"
+        "from lever_cdkf import cli\n"
+        "from lever_cdkf.can import buses\n"
         "buses._IN_PROCESS = ()\n"
         "sys.exit(cli.main(['record', '--interface=virtual', '--channel=x', '-o', 'a.log']))\n"
     )

@@ -13,17 +13,17 @@ from typing import Any
 
 import can
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.commands import dbc, settings
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import native_file
-from lever_cdkf.host_tools.firmware.config import CHOICES
-from lever_cdkf.host_tools.firmware.native import settings_table
+from lever_cdkf import cli
+from lever_cdkf.can import codec
+from lever_cdkf.commands import dbc, settings
+from lever_cdkf.errors import LeverError
+from lever_cdkf.files import native_file
+from lever_cdkf.firmware.config import CHOICES
+from lever_cdkf.firmware.native import settings_table
 from processes import LEVER as LEVER_SCRIPT
 from python.conftest import Refused
 
-LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
+LEVER = [sys.executable, "-m", "lever_cdkf.cli"]
 
 
 def entry(name: str, load: Any) -> Any:
@@ -266,7 +266,7 @@ def test_broken_plug_in_does_not_take_the_others_along(commands: list[Any], caps
 def test_help_loads_nothing_heavy() -> None:
     code = (
         "import sys, importlib.metadata\n"
-        "from lever_cdkf.host_tools import cli\n"
+        "from lever_cdkf import cli\n"
         "cli.main(['--help'])\n"
         "known = {'numpy', 'cffi', 'cantools', 'can', 'rich', 'scipy', 'plotly', 'textual', 'tornado'}\n"
         "heavy = known & set(sys.modules)\n"

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.extras import PACKAGES
+from lever_cdkf import cli
+from lever_cdkf.extras import PACKAGES
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -36,7 +36,7 @@ sys.meta_path.insert(0, Blocker())
 """
 _STATUSES = """
 import json, sys
-from lever_cdkf.host_tools import cli
+from lever_cdkf import cli
 statuses = [cli.main(arguments) for arguments in json.loads(sys.argv[1])]
 print(*statuses)
 """
@@ -171,7 +171,7 @@ def test_importing_python_can_loads_nothing_of_this_package(without: Without) ->
 
 def test_commands_do_not_load_asammdf_for_nothing(without: Without) -> None:
     code = (
-        "import sys; from lever_cdkf.host_tools import cli\n"
+        "import sys; from lever_cdkf import cli\n"
         "cli.main(['sim', 'steady', '--set', 'duration=1 s', '--set', 'limits={}'])\n"
         "print('can' in sys.modules, 'asammdf' in sys.modules)"
     )

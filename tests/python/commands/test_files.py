@@ -10,10 +10,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import files, progress
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import check_writable, write_texts
-from lever_cdkf.host_tools.tables import Tables, print_tables
+from lever_cdkf import files, progress
+from lever_cdkf.errors import LeverError
+from lever_cdkf.files import check_writable, write_texts
+from lever_cdkf.tables import Tables, print_tables
 from processes import full_disk
 from python.conftest import Refused
 

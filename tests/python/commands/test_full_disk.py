@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lever_cdkf.sil.study.figures import runs
+from lever_sil.study.figures import runs
 from processes import full_disk
 from python.conftest import Run
 from python.study.shown import SHORT

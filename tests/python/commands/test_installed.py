@@ -6,14 +6,16 @@ import re
 import signal
 import subprocess
 import sys
+import sysconfig
 import time
 from collections.abc import Callable
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.firmware.native import Config
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.firmware.native import Config
 from processes import PATIENCE
 
 pytestmark = pytest.mark.usefixtures("installed")
@@ -49,9 +51,21 @@ def test_can_logger_opens_and_waits(tmp_path: Path) -> None:
 
 def test_the_tree_is_what_is_tested(root: Path) -> None:
     """An edit of a Python file counts without a build step, here and in every process that a test starts."""
-    code = "from lever_cdkf import host_tools, sil; print(sil.__file__, host_tools.__file__)"
+    code = "import lever_cdkf, lever_sil; print(lever_cdkf.__file__, lever_sil.__file__)"
     files = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert files == [str(root / folder / "__init__.py") for folder in ("sil", "host_tools")]
+    assert files == [str(root / folder / "__init__.py") for folder in ("host_tools/lever_cdkf", "sil/lever_sil")]
+
+
+def test_editors_and_type_checkers_find_the_packages(root: Path) -> None:
+    """They run no import hook: they follow the folders that the .pth files of the environment name."""
+    files = Path(sysconfig.get_path("purelib")).glob("*.pth")
+    lines = [line for file in files for line in file.read_text(encoding="utf-8").splitlines()]
+    folders = [line for line in lines if not line.startswith("import ")]
+    for name, folder in (("lever_cdkf", "host_tools"), ("lever_sil", "sil")):
+        spec = PathFinder.find_spec(name, folders)
+        assert spec is not None
+        assert spec.origin == str(root / folder / name / "__init__.py")
+        assert (root / folder / name / "py.typed").is_file()
 
 
 def test_versions_agree(installed: str, root: Path) -> None:

@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.commands import sim
-from lever_cdkf.sil.plants import excitation, trajectories
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf import cli
+from lever_sil.commands import sim
+from lever_sil.plants import excitation, trajectories
+from lever_sil.scenarios import scenario
 
 
 def test_every_kind_and_every_key_is_described(root: Path) -> None:

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from lever_cdkf.sil.scenarios import scenario
+from lever_sil.scenarios import scenario
 from python.conftest import Refused, Run
 
 SHORT = ("--set", "duration=1 s", "--set", "converged_after=0.2 s", "--set", "limits={}")
@@ -61,7 +61,7 @@ def test_a_file_of_ones_own_can_be_run_and_seeded(lever: Run, tmp_path: Path) ->
 
 
 def test_settings_prints_a_settings_file_for_the_firmware(lever: Run, tmp_path: Path) -> None:
-    from lever_cdkf.host_tools.firmware.settings_file import make_config, read_assignments
+    from lever_cdkf.firmware.settings_file import make_config, read_assignments
 
     status, out, _ = lever("sim", "high_noise", "--settings")
     assert status == 0

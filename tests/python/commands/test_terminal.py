@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 import readmes
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.help_text import HelpFormatter
-from lever_cdkf.host_tools.layout import command_lines, wrapped
-from lever_cdkf.host_tools.tables import Row, print_tables
+from lever_cdkf import cli
+from lever_cdkf.help_text import HelpFormatter
+from lever_cdkf.layout import command_lines, wrapped
+from lever_cdkf.tables import Row, print_tables
 from processes import LEVER
 
 Shown = Callable[..., str]

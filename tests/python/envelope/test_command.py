@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.sil.envelope import campaign, conditions, envelope_page, firmware
-from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition
-from lever_cdkf.sil.envelope.measure import fault_mask
-from lever_cdkf.sil.envelope.motions import Motion
-from lever_cdkf.sil.judged import table
-from lever_cdkf.sil.judged.result import Limit
+from lever_cdkf import cli
+from lever_cdkf.firmware.config import Config
+from lever_sil.envelope import campaign, conditions, envelope_page, firmware
+from lever_sil.envelope.condition import ClosedLoop, Condition
+from lever_sil.envelope.measure import fault_mask
+from lever_sil.envelope.motions import Motion
+from lever_sil.judged import table
+from lever_sil.judged.result import Limit
 from python.conftest import Refused
 
 QUICK = {

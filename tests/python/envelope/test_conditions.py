@@ -7,12 +7,12 @@ from dataclasses import fields
 from typing import Any
 
 import pytest
-from lever_cdkf.sil.envelope.condition import Condition
-from lever_cdkf.sil.envelope.conditions import CONDITIONS
-from lever_cdkf.sil.envelope.measure import FIGURES
-from lever_cdkf.sil.envelope.motions import Motion
-from lever_cdkf.sil.envelope.sensors import Sensors
-from lever_cdkf.sil.judged.result import Limit
+from lever_sil.envelope.condition import Condition
+from lever_sil.envelope.conditions import CONDITIONS
+from lever_sil.envelope.measure import FIGURES
+from lever_sil.envelope.motions import Motion
+from lever_sil.envelope.sensors import Sensors
+from lever_sil.judged.result import Limit
 
 COVERED = ", ".join(f"{name} covered ≥ 90" for name in ("f_n", "zeta", "m_p", "c_p", "k_p"))
 FLAGGED, BACK = "; or flagged ≥ 90", "learnt ≤ 0.1, back ≤ 1"

@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
-from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.sil.envelope import measure, motions, pilots, plant
-from lever_cdkf.sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
-from lever_cdkf.sil.envelope.measure import FIGURES, Outcome, fault_mask
-from lever_cdkf.sil.envelope.motions import Motion, Recording
-from lever_cdkf.sil.envelope.sensors import NOISE, Fault, Sensors, measured
-from lever_cdkf.sil.plants import lever_plant as sil_plant
-from lever_cdkf.sil.plants.truth import Conditions
+from lever_cdkf.arrays import ComplexArray, FloatArray
+from lever_cdkf.firmware.config import settings_table
+from lever_sil.envelope import measure, motions, pilots, plant
+from lever_sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
+from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
+from lever_sil.envelope.motions import Motion, Recording
+from lever_sil.envelope.sensors import NOISE, Fault, Sensors, measured
+from lever_sil.plants import lever_plant as sil_plant
+from lever_sil.plants.truth import Conditions
 
 QUIET = Motion(duration=8.0, process_noise=0.0)
 SEEDS = range(3)

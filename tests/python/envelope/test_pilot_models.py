@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from lever_cdkf.sil.envelope import campaign
-from lever_cdkf.sil.envelope.conditions import CONDITIONS
+from lever_sil.envelope import campaign
+from lever_sil.envelope.conditions import CONDITIONS
 
 
 @pytest.mark.parametrize("name", ["two_dof_seat", "mayo_random_hand"])

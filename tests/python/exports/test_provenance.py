@@ -13,12 +13,12 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools import provenance as origin
-from lever_cdkf.host_tools.commands.signal_options import input_files
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.files import native_file, shared_library
-from lever_cdkf.host_tools.provenance import provenance, with_provenance
+from lever_cdkf import cli
+from lever_cdkf import provenance as origin
+from lever_cdkf.commands.signal_options import input_files
+from lever_cdkf.errors import LeverError
+from lever_cdkf.files import native_file, shared_library
+from lever_cdkf.provenance import provenance, with_provenance
 from python.conftest import Session
 
 
@@ -74,8 +74,8 @@ def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
         )
         return done.stdout.strip()
 
-    package = tmp_path / "host_tools"
-    package.mkdir()
+    package = tmp_path / "host_tools/lever_cdkf"
+    package.mkdir(parents=True)
     shutil.copy(str(origin.__file__), package / "provenance.py")
     monkeypatch.setattr(origin, "__file__", str(package / "provenance.py"))
     asked = origin.revision.__wrapped__
@@ -86,10 +86,11 @@ def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
     assert asked() == git("rev-parse", "--short=12", "HEAD")
     (package / "provenance.py").write_text("")
     assert asked() == git("rev-parse", "--short=12", "HEAD") + "-dirty"
-    inside = tmp_path / "env/site-packages/lever_cdkf/host_tools"  # an environment in somebody's own tree
-    inside.mkdir(parents=True)
-    monkeypatch.setattr(origin, "__file__", str(inside / "provenance.py"))
-    assert asked() is None
+    for folder in ("env/site-packages/lever_cdkf", "env/lever_cdkf"):  # in somebody's own tree
+        inside = tmp_path / folder
+        inside.mkdir(parents=True)
+        monkeypatch.setattr(origin, "__file__", str(inside / "provenance.py"))
+        assert asked() is None
 
 
 def test_rows_in_json_have_it(session: Session, tmp_path: Path) -> None:

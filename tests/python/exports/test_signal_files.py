@@ -17,12 +17,12 @@ import pandas as pd
 import polars as pl
 import pytest
 from asammdf import MDF
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.exports.signal_files import SignalFiles
-from lever_cdkf.host_tools.formats import FORMATS
-from lever_cdkf.host_tools.provenance import provenance
-from lever_cdkf.host_tools.results.trace import Trace
+from lever_cdkf import cli
+from lever_cdkf.errors import LeverError
+from lever_cdkf.exports.signal_files import SignalFiles
+from lever_cdkf.formats import FORMATS
+from lever_cdkf.provenance import provenance
+from lever_cdkf.results.trace import Trace
 from mcap.reader import make_reader
 from processes import full_disk
 from pyarrow import parquet

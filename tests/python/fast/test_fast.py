@@ -7,22 +7,22 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.can.commander import KEEP, Commander
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.native import lib, run_samples
-from lever_cdkf.sil import fast
-from lever_cdkf.sil.aircraft import aircraft
-from lever_cdkf.sil.aircraft.aircraft import Coupled
-from lever_cdkf.sil.aircraft.flight import Flight
-from lever_cdkf.sil.fast import aircraft as fast_aircraft
-from lever_cdkf.sil.fast import plants
-from lever_cdkf.sil.fast.library import Struct
-from lever_cdkf.sil.fast.library import lib as loop_lib
-from lever_cdkf.sil.run import in_process, loop
-from lever_cdkf.sil.scenarios import inputs, scenario
-from lever_cdkf.sil.scenarios.scenario import Scenario
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.can.commander import KEEP, Commander
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.native import lib, run_samples
+from lever_sil import fast
+from lever_sil.aircraft import aircraft
+from lever_sil.aircraft.aircraft import Coupled
+from lever_sil.aircraft.flight import Flight
+from lever_sil.fast import aircraft as fast_aircraft
+from lever_sil.fast import plants
+from lever_sil.fast.library import Struct
+from lever_sil.fast.library import lib as loop_lib
+from lever_sil.run import in_process, loop
+from lever_sil.scenarios import inputs, scenario
+from lever_sil.scenarios.scenario import Scenario
 
 SAME = 1e-9
 """[rad], [rad/s]: the C and Python may have different sines."""

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.library import lib
-from lever_cdkf.sil.envelope import firmware
-from lever_cdkf.sil.envelope.condition import ClosedLoop
-from lever_cdkf.sil.envelope.motions import PERIOD, STRIDE
-from lever_cdkf.sil.faults import bus, faults_page, judge, matrix, readings, table
-from lever_cdkf.sil.faults.flight import Pilot, Record
-from lever_cdkf.sil.faults.rows import KNOWN, MOTION, ROWS, TIME
+from lever_cdkf import cli
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.library import lib
+from lever_sil.envelope import firmware
+from lever_sil.envelope.condition import ClosedLoop
+from lever_sil.envelope.motions import PERIOD, STRIDE
+from lever_sil.faults import bus, faults_page, judge, matrix, readings, table
+from lever_sil.faults.flight import Pilot, Record
+from lever_sil.faults.rows import KNOWN, MOTION, ROWS, TIME
 from python.conftest import Refused
 
 

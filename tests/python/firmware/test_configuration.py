@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.config import CHOICES
-from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
-from lever_cdkf.host_tools.firmware.native import Config, Setting, settings_table
+from lever_cdkf.firmware.config import CHOICES
+from lever_cdkf.firmware.library import enum_names, ffi, lib
+from lever_cdkf.firmware.native import Config, Setting, settings_table
 
 ROWS = settings_table()
 

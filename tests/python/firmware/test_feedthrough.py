@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.native import Config, Estimator, Feedthrough
-from lever_cdkf.sil.study.firmware import EXACT
+from lever_cdkf.firmware.native import Config, Estimator, Feedthrough
+from lever_sil.study.firmware import EXACT
 from numpy.typing import NDArray
 
 ComplexArray = NDArray[np.complex128]

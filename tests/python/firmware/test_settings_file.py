@@ -14,10 +14,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.errors import SettingsError
-from lever_cdkf.host_tools.firmware.config import CHOICES, choice_value, single
-from lever_cdkf.host_tools.firmware.native import Config, settings_table
-from lever_cdkf.host_tools.firmware.settings_file import format_config, make_config, parse_assignment, read_assignments
+from lever_cdkf.errors import SettingsError
+from lever_cdkf.firmware.config import CHOICES, choice_value, single
+from lever_cdkf.firmware.native import Config, settings_table
+from lever_cdkf.firmware.settings_file import format_config, make_config, parse_assignment, read_assignments
 from python.firmware.settings_corpus import corpus
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.models.linear import Linear, LinearBlackBox, LinearPhysical
+from lever_cdkf.models.linear import Linear, LinearBlackBox, LinearPhysical
 from numpy.typing import NDArray
 from scipy.linalg import expm
 

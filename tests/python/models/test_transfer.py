@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.models.transfer import Transfer, roots
+from lever_cdkf.models.transfer import Transfer, roots
 from scipy import signal
 
 

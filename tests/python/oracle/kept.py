@@ -10,11 +10,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.host_tools.arrays import Array
+from lever_cdkf.arrays import Array
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = Path(os.environ.get("LEVER_BUILD_DIR", ROOT / "build")) / "tests/oracle"
-OF = ("sil/oracle/*.py", "host_tools/models/*.py", "firmware/lever_settings.def", "tests/python/oracle/*.py")
+OF = (
+    "sil/lever_sil/oracle/*.py",
+    "host_tools/lever_cdkf/models/*.py",
+    "firmware/lever_settings.def",
+    "tests/python/oracle/*.py",
+)
 
 
 @functools.cache

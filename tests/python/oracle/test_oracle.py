@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.native import settings_table
-from lever_cdkf.host_tools.models.linear import Hand
-from lever_cdkf.sil.oracle import Lever, cdkf
+from lever_cdkf.firmware.native import settings_table
+from lever_cdkf.models.linear import Hand
+from lever_sil.oracle import Lever, cdkf
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.native import Config, enum_names, run_samples
-from lever_cdkf.sil import oracle
-from lever_cdkf.sil.oracle.estimator import model_of
-from lever_cdkf.sil.oracle.scale import PARAMETERS
+from lever_cdkf.firmware.native import Config, enum_names, run_samples
+from lever_sil import oracle
+from lever_sil.oracle.estimator import model_of
+from lever_sil.oracle.scale import PARAMETERS
 from numpy.typing import NDArray
 from python.oracle.kept import values_of
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
-from lever_cdkf.sil.oracle import cdkf
-from lever_cdkf.sil.oracle.belief import Augmented, Belief, Motion, TwoStage
-from lever_cdkf.sil.oracle.scale import Scale
+from lever_sil.oracle import cdkf
+from lever_sil.oracle.belief import Augmented, Belief, Motion, TwoStage
+from lever_sil.oracle.scale import Scale
 from numpy.typing import NDArray
 
 Array = NDArray[Any]  # of floats

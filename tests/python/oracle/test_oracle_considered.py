@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.native import Config, run_samples
-from lever_cdkf.sil.oracle.estimator import model_of
+from lever_cdkf.firmware.native import Config, run_samples
+from lever_sil.oracle.estimator import model_of
 from numpy.typing import NDArray
 
 Array = NDArray[Any]

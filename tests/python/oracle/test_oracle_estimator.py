@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.native import settings_table
-from lever_cdkf.host_tools.models.detrend import Detrend
-from lever_cdkf.sil.oracle import Estimator, Lever, Start, cdkf
-from lever_cdkf.sil.oracle.change import ChangeDetection
+from lever_cdkf.firmware.native import settings_table
+from lever_cdkf.models.detrend import Detrend
+from lever_sil.oracle import Estimator, Lever, Start, cdkf
+from lever_sil.oracle.change import ChangeDetection
 from numpy.typing import NDArray
 from scipy.signal import butter, freqs
 

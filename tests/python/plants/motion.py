@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import sympy
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.host_tools.units import GRAVITY
-from lever_cdkf.sil.plants.lever_plant import Lever
-from lever_cdkf.sil.plants.truth import Body, Conditions, Truth
+from lever_cdkf.arrays import FloatArray
+from lever_cdkf.units import GRAVITY
+from lever_sil.plants.lever_plant import Lever
+from lever_sil.plants.truth import Body, Conditions, Truth
 
 PERIOD, TRIM = 1e-3, 0.35
 LEVER = Lever(0.45, 1.2, 0.5, 0.020, 0.5, 5.0, math.radians(20), math.radians(18))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.plants.hysteretic_plant import REFERENCE, Hysteretic
+from lever_sil.plants.hysteretic_plant import REFERENCE, Hysteretic
 from python.plants.motion import LEVER, TRIM, columns
 
 RISE = 0.45 * math.cos(TRIM)

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.units import GRAVITY
-from lever_cdkf.sil.plants.lever_plant import LeverTruth, Preload, Truth
+from lever_cdkf.units import GRAVITY
+from lever_sil.plants.lever_plant import LeverTruth, Preload, Truth
 from python.plants.motion import LEVER, PERIOD, TRIM, body, columns, lagrange, moved
 from scipy import integrate
 

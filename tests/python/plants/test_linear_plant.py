@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.plants.linear_plant import BlackBox, LinearTruth, Physical
+from lever_sil.plants.linear_plant import BlackBox, LinearTruth, Physical
 from python.plants.motion import PERIOD, TRIM, body, columns, moved
 from scipy import signal
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.plants.mayo_plant import HANDS, Mayo
+from lever_sil.plants.mayo_plant import HANDS, Mayo
 from python.plants.motion import PERIOD, TRIM, body, columns, moved
 from scipy import signal
 

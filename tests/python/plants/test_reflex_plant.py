@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.plants.reflex_plant import Reflex
+from lever_sil.plants.reflex_plant import Reflex
 from python.plants.motion import LEVER, TRIM, body, columns, moved
 
 ARM = (3.2, 50.0, 1800.0)

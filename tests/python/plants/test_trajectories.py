@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.sil.plants import trajectories
-from lever_cdkf.sil.toml_tables import Place, ScenarioError
+from lever_cdkf.arrays import FloatArray
+from lever_sil.plants import trajectories
+from lever_sil.toml_tables import Place, ScenarioError
 
 TIME = np.arange(40_000, dtype=np.float64) * 1e-3
 

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.sil.plants import lever_plant
-from lever_cdkf.sil.plants.hysteretic_plant import Hysteretic
-from lever_cdkf.sil.plants.lever_plant import STOP_RATE, Lever, LeverTruth
-from lever_cdkf.sil.plants.linear_plant import BlackBox, Physical
-from lever_cdkf.sil.plants.mayo_plant import HANDS, Mayo
-from lever_cdkf.sil.plants.reflex_plant import Reflex
-from lever_cdkf.sil.plants.truth import Truth
-from lever_cdkf.sil.plants.two_dof_plant import TwoDof
+from lever_cdkf.arrays import FloatArray
+from lever_sil.plants import lever_plant
+from lever_sil.plants.hysteretic_plant import Hysteretic
+from lever_sil.plants.lever_plant import STOP_RATE, Lever, LeverTruth
+from lever_sil.plants.linear_plant import BlackBox, Physical
+from lever_sil.plants.mayo_plant import HANDS, Mayo
+from lever_sil.plants.reflex_plant import Reflex
+from lever_sil.plants.truth import Truth
+from lever_sil.plants.two_dof_plant import TwoDof
 from python.plants.motion import LEVER, PERIOD, TRIM, body, columns, moved
 from scipy import integrate
 

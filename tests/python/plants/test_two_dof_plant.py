@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import FloatArray
-from lever_cdkf.host_tools.models.transfer import BAND
-from lever_cdkf.sil.plants.two_dof_plant import TRUNK_DAMPING, TRUNK_MASS, TRUNK_STIFFNESS, TwoDof
+from lever_cdkf.arrays import FloatArray
+from lever_cdkf.models.transfer import BAND
+from lever_sil.plants.two_dof_plant import TRUNK_DAMPING, TRUNK_MASS, TRUNK_STIFFNESS, TwoDof
 from python.plants.motion import LEVER, PERIOD, TRIM, body, columns, lagrange
 from scipy import integrate
 

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.replay.outputs import FILES
+from lever_cdkf.replay.outputs import FILES
 from processes import LEVER, PATIENCE, full_disk
 from python.conftest import Refused, Session
 

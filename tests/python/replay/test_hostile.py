@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
+from lever_cdkf import cli
 from python.conftest import Session
 
 TAG = "<svg onload=alert(1)>"

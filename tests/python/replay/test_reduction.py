@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.replay.reduction import Ends, Groups, Stretches
-from lever_cdkf.host_tools.report.series import Welch, welch
+from lever_cdkf.replay.reduction import Ends, Groups, Stretches
+from lever_cdkf.report.series import Welch, welch
 
 Trace = dict[str, np.ndarray]
 

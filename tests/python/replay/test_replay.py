@@ -14,13 +14,13 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.formats import FORMATS
-from lever_cdkf.host_tools.replay import engine, reduction
-from lever_cdkf.host_tools.replay.outputs import FILES
-from lever_cdkf.host_tools.replay.summary import verdict
-from lever_cdkf.host_tools.results.summary import ReplaySummary, of
+from lever_cdkf import cli
+from lever_cdkf.can import codec
+from lever_cdkf.formats import FORMATS
+from lever_cdkf.replay import engine, reduction
+from lever_cdkf.replay.outputs import FILES
+from lever_cdkf.replay.summary import verdict
+from lever_cdkf.results.summary import ReplaySummary, of
 from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.firmware.native import Config, lib
-from lever_cdkf.host_tools.replay.engine import Options, replay
-from lever_cdkf.host_tools.results.summary import ReplaySummary, Snapshots
-from lever_cdkf.sil.run import buslog
-from lever_cdkf.sil.run.runner import simulate
-from lever_cdkf.sil.scenarios.scenario import Scenario, load
+from lever_cdkf.can import codec
+from lever_cdkf.firmware.native import Config, lib
+from lever_cdkf.replay.engine import Options, replay
+from lever_cdkf.results.summary import ReplaySummary, Snapshots
+from lever_sil.run import buslog
+from lever_sil.run.runner import simulate
+from lever_sil.scenarios.scenario import Scenario, load
 
 CUTS = int(os.environ.get("LEVER_CUTS", "12"))
 """Places at which the log is cut; 1,000 once: replay/README.md."""

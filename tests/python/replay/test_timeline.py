@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.replay.timeline import WRAP, Timeline
+from lever_cdkf.replay.timeline import WRAP, Timeline
 
 START = 1_700_000_000_000_000
 

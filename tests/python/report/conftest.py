@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.report import write_report
-from lever_cdkf.sil.run.runner import Result, simulate
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.report import write_report
+from lever_sil.run.runner import Result, simulate
+from lever_sil.scenarios import scenario
 
 SCENARIO = """
 title = "Short & sudden"

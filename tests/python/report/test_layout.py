@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.report import screenshot
-from lever_cdkf.host_tools.report.figure import Figure, axis, line
-from lever_cdkf.host_tools.report.page import Page
-from lever_cdkf.host_tools.report.summary_html import table
+from lever_cdkf.report import screenshot
+from lever_cdkf.report.figure import Figure, axis, line
+from lever_cdkf.report.page import Page
+from lever_cdkf.report.summary_html import table
 from python.report.test_report import FIGURES
 from python.watch.browser import Browser
 

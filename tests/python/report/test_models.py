@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.report import write_report
-from lever_cdkf.sil.plants import pilots
-from lever_cdkf.sil.run.runner import Result
+from lever_cdkf.report import write_report
+from lever_sil.plants import pilots
+from lever_sil.run.runner import Result
 from scipy import signal
 
 from .conftest import run

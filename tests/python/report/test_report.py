@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.native import enum_names
-from lever_cdkf.host_tools.report import screenshot, summary_html, write_report
-from lever_cdkf.host_tools.report.charts.health import FAULT_WORDS
-from lever_cdkf.host_tools.report.run import COHERENT, Run
-from lever_cdkf.sil.run.runner import Result
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.native import enum_names
+from lever_cdkf.report import screenshot, summary_html, write_report
+from lever_cdkf.report.charts.health import FAULT_WORDS
+from lever_cdkf.report.run import COHERENT, Run
+from lever_sil.run.runner import Result
 
 from .reading import Reader, figures, first_number, read, unpack
 
@@ -379,8 +379,8 @@ def test_a_longer_run_makes_no_larger_page(report: Path, result: Result, tmp_pat
 def test_nothing_slow_is_imported() -> None:
     """Neither scipy nor plotly's Python classes: each takes longer than all the rest."""
     code = """
-import sys, numpy as np, lever_cdkf.host_tools.report.page
-from lever_cdkf.host_tools.report import write_report
+import sys, numpy as np, lever_cdkf.report.page
+from lever_cdkf.report import write_report
 slow = {"scipy", "pandas", "plotly.graph_objs", "plotly.io", "matplotlib", "cantools"} & set(sys.modules)
 sys.exit(f"imports {slow}" if slow else 0)
 """

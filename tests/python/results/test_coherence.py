@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.results.coherence import Coherence
+from lever_cdkf.results.coherence import Coherence
 
 signal = pytest.importorskip("scipy.signal")
 

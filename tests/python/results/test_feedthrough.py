@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.host_tools.results.feedthrough import COLUMNS, FREQUENCIES, Feedthrough
+from lever_cdkf.results.feedthrough import COLUMNS, FREQUENCIES, Feedthrough
 
 
 def test_each_frequency_is_as_last_sent_before_each_time() -> None:

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.results import nis, whiteness
-from lever_cdkf.host_tools.results.nis import Innovations, Nis
+from lever_cdkf.results import nis, whiteness
+from lever_cdkf.results.nis import Innovations, Nis
 from scipy import stats
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.results import whiteness
-from lever_cdkf.host_tools.results.whiteness import AVERAGE, LAGS
+from lever_cdkf.results import whiteness
+from lever_cdkf.results.whiteness import AVERAGE, LAGS
 from scipy import signal, stats
 
 SIZE = 20  # samples at 1 kHz in an average

@@ -5,7 +5,7 @@ import io
 import can
 import numpy as np
 import pytest
-from lever_cdkf.sil.run.buslog import Frames, lines
+from lever_sil.run.buslog import Frames, lines
 
 
 def some_frames(count: int, last_us: int) -> Frames:

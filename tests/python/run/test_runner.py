@@ -11,12 +11,12 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.errors import LeverError, SettingsError
-from lever_cdkf.sil.run import loop, runner
-from lever_cdkf.sil.scenarios import inputs, scenario
-from lever_cdkf.sil.scenarios.scenario import Scenario
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.errors import LeverError, SettingsError
+from lever_sil.run import loop, runner
+from lever_sil.scenarios import inputs, scenario
+from lever_sil.scenarios.scenario import Scenario
 from python.conftest import PuppetBus, estimate
 
 MakeBus = Callable[[Scenario], LeverBus]
@@ -263,7 +263,7 @@ def test_files_are_complete_or_not_there(short: Scenario, tmp_path: Path, monkey
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("lever_cdkf.host_tools.exports.csv.write_csv_rows", broken)
+    monkeypatch.setattr("lever_cdkf.exports.csv.write_csv_rows", broken)
     with pytest.raises(LeverError, match=r"cannot write .*trace.csv: No space left on device"):
         runner.simulate(short, PuppetBus(always), tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []

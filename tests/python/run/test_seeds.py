@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lever_cdkf.host_tools import cli, interrupts
-from lever_cdkf.host_tools.results.nis import Nis
-from lever_cdkf.host_tools.results.summary import Estimator, Firmware, Quality, Scenario, SimulationSummary, Truth
-from lever_cdkf.host_tools.results.whiteness import Whiteness
-from lever_cdkf.sil.run import seeds
+from lever_cdkf import cli, interrupts
+from lever_cdkf.results.nis import Nis
+from lever_cdkf.results.summary import Estimator, Firmware, Quality, Scenario, SimulationSummary, Truth
+from lever_cdkf.results.whiteness import Whiteness
+from lever_sil.run import seeds
 from python.conftest import Refused, Run
 
 SHORT = ("duration=1 s", "converged_after=0.2 s")

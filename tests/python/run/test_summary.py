@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf import load_scenario, simulate
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.native import enum_names
-from lever_cdkf.host_tools.firmware.quantities import quantities
-from lever_cdkf.host_tools.results import whiteness
-from lever_cdkf.host_tools.results.summary import Firmware, SimulationSummary, of, read, text
-from lever_cdkf.host_tools.results.trace import Trace
-from lever_cdkf.host_tools.results.whiteness import Whiteness
-from lever_cdkf.sil.run import loop, summary
-from lever_cdkf.sil.scenarios import inputs
-from lever_cdkf.sil.scenarios.scenario import Scenario
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.native import enum_names
+from lever_cdkf.firmware.quantities import quantities
+from lever_cdkf.results import whiteness
+from lever_cdkf.results.summary import Firmware, SimulationSummary, of, read, text
+from lever_cdkf.results.trace import Trace
+from lever_cdkf.results.whiteness import Whiteness
+from lever_sil.run import loop, summary
+from lever_sil.scenarios import inputs
+from lever_sil.scenarios.scenario import Scenario
 from scipy import stats
 
 COUNT = 10_000

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.results import trace
-from lever_cdkf.sil.run import loop
-from lever_cdkf.sil.run.columns import columns_of
-from lever_cdkf.sil.scenarios import scenario
-from lever_cdkf.sil.scenarios.scenario import Scenario
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.results import trace
+from lever_sil.run import loop
+from lever_sil.run.columns import columns_of
+from lever_sil.scenarios import scenario
+from lever_sil.scenarios.scenario import Scenario
 from python.conftest import PuppetBus, estimate, health
 
 COLUMNS = """

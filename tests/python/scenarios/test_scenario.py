@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.native import Estimator
-from lever_cdkf.sil.plants import excitation
-from lever_cdkf.sil.scenarios import scenario
-from lever_cdkf.sil.scenarios.random_streams import stream
-from lever_cdkf.sil.scenarios.scenario import Scenario
-from lever_cdkf.sil.toml_tables import ScenarioError
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.native import Estimator
+from lever_sil.plants import excitation
+from lever_sil.scenarios import scenario
+from lever_sil.scenarios.random_streams import stream
+from lever_sil.scenarios.scenario import Scenario
+from lever_sil.toml_tables import ScenarioError
 
 REQUIRED = {
     "steady", "fatigue_drift", "sudden_grip", "base_only", "base_dither", "poor_excitation", "sensor_dropout",
@@ -60,7 +60,8 @@ def test_a_scenario_says_what_it_is_and_starts_from_a_wrong_guess(name: str) -> 
     loaded = scenario.load(name)
     assert loaded.name == name
     assert len(loaded.title) > 10
-    assert "first guess" in loaded.description.lower()
+    told = "first guess" in loaded.description.lower()
+    assert told, f"{name}: its description does not say how far the pilot is from the first guess; add a sentence on it"
     truth = loaded.truth(loaded.time())
     if loaded.pilot.model == loaded.config.choices["model"]:
         guesses = {name: (loaded.config.settings[name], true[0]) for name, true in truth.parameters.items()}
@@ -215,11 +216,29 @@ def test_what_is_nested_too_deeply_is_refused(load: Load, value: str) -> None:
         ("pilot.m_p.first=3 kg", "the scenario has no 'pilot.m_p.first'"),
         ("title.x=3", "the scenario has no 'title.x'"),
         ("colour=red", "unknown key 'colour'"),
+        (
+            "torque.1={kind='firmware',rms='1 N m'}",
+            r"no 'torque.1'; torque has 0 entries, .* torque.0=\{...\} appends one",
+        ),
+        ("aircraft={name='uh60_like'}", "aircraft: unknown key 'name'; allowed: model, gearing, title"),
     ],
 )
 def test_a_wrong_override_is_refused(load: Load, override: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load(LEAST, override)
+
+
+def test_an_override_appends_to_a_list(load: Load) -> None:
+    """One that the scenario has, and one that it has not."""
+    entry = "{kind='sine',rms='0.05 g',frequency='3 Hz'}"
+    loaded = load(LEAST, f"base.0={entry}", f"base.1={entry}", "base.1.frequency=5 Hz")
+    assert [each.frequency for each in loaded.base if isinstance(each, excitation.Sine)] == [3.0, 5.0]
+
+
+def test_a_number_of_unit_1_needs_no_unit(load: Load) -> None:
+    loaded = load(LEAST + "[aircraft]\nmodel = 'uh60_like'\ngearing = 0.5\nlock_number = '7'\n")
+    assert loaded.aircraft is not None
+    assert (loaded.aircraft.gearing, loaded.aircraft.aircraft.lock_number) == (0.5, 7.0)
 
 
 def test_an_unknown_scenario_or_file_is_refused_with_what_there_is() -> None:

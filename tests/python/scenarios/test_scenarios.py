@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.run import runner
-from lever_cdkf.sil.scenarios import inputs, scenario
+from lever_sil.run import runner
+from lever_sil.scenarios import inputs, scenario
 
 BROKEN = {
     "moving_pilot": "20 s", "grip_moves": "60 s", "friction": "35 s", "hands_off": "50 s", "rough_air": "20 s",

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
+from lever_cdkf import cli
 from pyarrow import parquet
 from python.report.reading import figures, read
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +15,8 @@ import pyarrow
 import pytest
 from asammdf import MDF
 from asammdf import Signal as Channel
-from lever_cdkf.host_tools.signals.tables import is_table, read_table
+from lever_cdkf import cli
+from lever_cdkf.signals.tables import is_table, read_table
 from pyarrow import parquet
 from python.conftest import Refused
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight
@@ -181,3 +184,52 @@ def test_what_is_no_table(name: str, content: bytes, said: str, tmp_path: Path, 
     (tmp_path / name).write_bytes(content)
     assert said in refused("replay", tmp_path / name, "--map", "theta=a", "z_ddot=b", "-o", tmp_path / "out")
     assert not list(tmp_path.glob("out/*"))
+
+
+def as_csv(columns: Columns, path: Path, encoding: str = "utf-8", decimal: str = ".") -> None:
+    """With units in brackets, semicolons between."""
+    heads = ("Time [s]", "Winkel [°]", "Rate [°/s]", "Nz [g]")
+    pd.DataFrame(dict(zip(heads, columns.values(), strict=True))).to_csv(
+        path, sep=";", decimal=decimal, index=False, encoding=encoding
+    )
+
+
+def test_a_spreadsheets_encoding(columns: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What `lever map` proposes for a table in cp1252 is what `lever replay` takes; both say how they read it."""
+    path = tmp_path / "flight.csv"
+    as_csv(columns, path, "cp1252", ",")
+    assert cli.main(["map", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "read as cp1252" in said
+    command = next(line for line in said.splitlines() if line.startswith("lever replay"))
+    assert cli.main([*shlex.split(command)[1:], "-o", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out/summary.json").read_text())
+    assert "read as cp1252" in summary["verdict"]
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "write"), [("csv", as_csv), ("npz", as_npz), ("mat", as_nested_mat), ("parquet", as_parquet)]
+)
+@pytest.mark.parametrize("first", [0.0, 36000.0])
+def test_a_clock_that_is_set_back_loses_nothing(
+    suffix: str, write: Callable[[Columns, Path], None], first: float, columns: Columns, tmp_path: Path
+) -> None:
+    """All rows make samples, estimates are those of the undisturbed file, and the verdict says where it happened."""
+    path, half = tmp_path / f"flight.{suffix}", len(columns["Time"]) // 2
+    time = columns["Time"] + first
+    time[half:] -= time[half]
+    write({**columns, "Time": time}, path)
+    names = {"csv": ("Winkel", "Rate", "Nz"), "mat": ("log.lever.LvrAng", "log.lever.LvrRate", "log.imu.Nz")}
+    angle, rate, nz = names.get(suffix, ("LvrAng", "LvrRate", "Nz"))
+    summary = replayed(
+        tmp_path / "out",
+        path,
+        "--map",
+        f"theta={angle},unit=deg",
+        f"theta_dot={rate},unit=deg/s",
+        f"z_ddot={nz},unit=g",
+    )
+    assert summary["samples"] == len(time)
+    assert "goes back at 10 s by" in summary["verdict"]
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)

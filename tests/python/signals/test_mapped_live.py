@@ -20,13 +20,13 @@ import pytest
 from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 from cantools.database.can import Database
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.exit_status import INTERRUPTED
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.signals.mapping import read_mapping
-from lever_cdkf.host_tools.signals.online import Online
-from lever_cdkf.host_tools.watch.mapped import MappedBusSource
-from lever_cdkf.host_tools.watch.picture import Picture
+from lever_cdkf import cli
+from lever_cdkf.exit_status import INTERRUPTED
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.signals.mapping import read_mapping
+from lever_cdkf.signals.online import Online
+from lever_cdkf.watch.mapped import MappedBusSource
+from lever_cdkf.watch.picture import Picture
 from processes import PATIENCE
 from python.signals.flight import GRAVITY, MAPPED, NATURAL_FREQUENCY, Flight
 from python.signals.test_mapped_replay import frequency, replayed

@@ -9,8 +9,8 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.native import Config, enum_names, run_samples
+from lever_cdkf import cli
+from lever_cdkf.firmware.native import Config, enum_names, run_samples
 from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
 
@@ -47,6 +47,32 @@ def test_every_log_of_the_bus(suffix: str, folder: Path, flight: Flight, tmp_pat
     assert mapping["inputs"]["z_ddot"]["gravity"] == "included"
     assert mapping["unprotected_frames"] == 2 * len(flight.time)
     assert summary["recording"]["frames_left_out"] == {"other_identifiers": round(1.2 * len(flight.time))}
+
+
+def test_a_blf_that_is_cut_off_says_so(folder: Path, tmp_path: Path) -> None:
+    """Its header holds the length that it had; python-can reads what is left without a word."""
+    whole = (folder / "flight.blf").read_bytes()
+    log = tmp_path / "cut.blf"
+    log.write_bytes(whole[: len(whole) // 2])
+    summary = replayed(tmp_path / "out", log, "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    assert f"The log is incomplete: {log.name}: {len(whole) // 2:,} bytes of the {len(whole):,}" in summary["verdict"]
+    whole_summary = replayed(
+        tmp_path / "whole", folder / "flight.blf", "--dbc", folder / "foreign.dbc", "--map", *MAPPED
+    )
+    assert "incomplete" not in whole_summary["verdict"]
+
+
+def test_a_bus_whose_recorder_was_set_back_loses_nothing(folder: Path, flight: Flight, tmp_path: Path) -> None:
+    lines = (folder / "flight.log").read_text().splitlines()
+    stamps = [float(line[1 : line.index(")")]) for line in lines]
+    half = len(lines) // 2
+    moved = [stamp + (3600.0 if index < half else 0.0) for index, stamp in enumerate(stamps)]
+    log = tmp_path / "set_back.log"
+    log.write_text("".join(f"({at:.6f}{line[line.index(')') :]}\n" for at, line in zip(moved, lines, strict=True)))
+    summary = replayed(tmp_path / "out", log, "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    assert summary["samples"] == len(flight.time)
+    assert "The recorded time goes back at 9.999 s by 3,600 s" in summary["verdict"]
+    assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
 
 
 def test_columns_of_a_csv(folder: Path, flight: Flight, tmp_path: Path) -> None:

@@ -13,12 +13,12 @@ from typing import ClassVar
 import can
 import pytest
 from can.interfaces import BACKENDS
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.signals.mapping import read_mapping
-from lever_cdkf.host_tools.signals.online import Online
-from lever_cdkf.host_tools.watch.mapped import MappedBusSource
-from lever_cdkf.host_tools.watch.picture import Picture
+from lever_cdkf import cli
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.signals.mapping import read_mapping
+from lever_cdkf.signals.online import Online
+from lever_cdkf.watch.mapped import MappedBusSource
+from lever_cdkf.watch.picture import Picture
 from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY
 from python.signals.test_mapped_replay import frequency, replayed

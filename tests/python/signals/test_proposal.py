@@ -11,11 +11,11 @@ import cantools.database
 import numpy as np
 import pytest
 from cantools.database.can import Database
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.provenance import provenance
-from lever_cdkf.host_tools.signals import plots, proposal
-from lever_cdkf.host_tools.signals.bus_signals import load_database
-from lever_cdkf.host_tools.signals.recorded import Signal
+from lever_cdkf import cli
+from lever_cdkf.provenance import provenance
+from lever_cdkf.signals import plots, proposal
+from lever_cdkf.signals.bus_signals import load_database
+from lever_cdkf.signals.recorded import Signal
 from python.conftest import Refused
 from python.signals.databases import AIRCRAFT, WITH_TORQUE, WITHHELD, Aircraft, database
 from python.signals.flight import NATURAL_FREQUENCY, Flight, write_log

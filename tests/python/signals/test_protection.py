@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from e2e.p01 import e2e_p01_protect
 from e2e.p05 import e2e_p05_protect
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.signals.mapping import read_mapping
-from lever_cdkf.host_tools.signals.reading import Loaded, Reading, read
+from lever_cdkf.errors import LeverError
+from lever_cdkf.signals.mapping import read_mapping
+from lever_cdkf.signals.reading import Loaded, Reading, read
 from python.conftest import Session
 
 DATABASE = """VERSION ""

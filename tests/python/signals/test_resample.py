@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.signals.recorded import Signal
-from lever_cdkf.host_tools.signals.resample import sample
+from lever_cdkf.errors import LeverError
+from lever_cdkf.signals.recorded import Signal
+from lever_cdkf.signals.resample import sample
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]

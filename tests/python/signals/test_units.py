@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.signals.units import check_plausible, factor, gravity_in, guess
+from lever_cdkf.errors import LeverError
+from lever_cdkf.signals.units import check_plausible, factor, gravity_in, guess
 
 
 @pytest.mark.parametrize(

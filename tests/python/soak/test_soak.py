@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.library import struct_dtype
-from lever_cdkf.sil.scenarios import inputs
-from lever_cdkf.sil.soak import flights, soak
+from lever_cdkf import cli
+from lever_cdkf.firmware.library import struct_dtype
+from lever_sil.scenarios import inputs
+from lever_sil.soak import flights, soak
 
 Content = dict[str, Any]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.firmware.native import settings_table
-from lever_cdkf.sil.oracle import Lever
-from lever_cdkf.sil.study.data import Batch, Knowledge, Truth
+from lever_cdkf.arrays import Array
+from lever_cdkf.firmware.native import settings_table
+from lever_sil.oracle import Lever
+from lever_sil.study.data import Batch, Knowledge, Truth
 
 SETTINGS = {setting.name: setting.default for setting in settings_table()}
 PILOT = np.array([2.5, 42.0, 1500.0])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 
-from lever_cdkf.sil.study.figures import catalogue, runs
-from lever_cdkf.sil.study.figures.description import Figure
+from lever_sil.study.figures import catalogue, runs
+from lever_sil.study.figures.description import Figure
 
 SHORT = runs.Extent(duration=4.0, runs=4)
 SEED = 4

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
-from lever_cdkf.sil.study.baselines import BASELINES, Baseline
-from lever_cdkf.sil.study.data import Batch
+from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
+from lever_sil.study.baselines import BASELINES, Baseline
+from lever_sil.study.data import Batch
 from python.study.baseline_runs import Plan, lever, resting_angle, simulate
 
 NEARLY_CONSTANT: dict[str, Any] = {

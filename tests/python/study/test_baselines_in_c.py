@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.study.baselines import BASELINES
-from lever_cdkf.sil.study.baselines.algorithm1 import ParameterFilter
-from lever_cdkf.sil.study.baselines.dual_ekf import DualEkf
-from lever_cdkf.sil.study.baselines.joint_ekf import JointEkf
-from lever_cdkf.sil.study.baselines.joint_ukf import JointUkf
-from lever_cdkf.sil.study.baselines.recursion import Recursion, follow
-from lever_cdkf.sil.study.compare import campaign, cases
-from lever_cdkf.sil.study.data import Batch
+from lever_sil.study.baselines import BASELINES
+from lever_sil.study.baselines.algorithm1 import ParameterFilter
+from lever_sil.study.baselines.dual_ekf import DualEkf
+from lever_sil.study.baselines.joint_ekf import JointEkf
+from lever_sil.study.baselines.joint_ukf import JointUkf
+from lever_sil.study.baselines.recursion import Recursion, follow
+from lever_sil.study.compare import campaign, cases
+from lever_sil.study.data import Batch
 
 REFERENCES: dict[str, tuple[Callable[[Batch], Recursion], float]] = {
     "joint_ekf": (JointEkf, 1e-5),

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
-from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.sil.study.baselines.algorithm1 import ParameterFilter
-from lever_cdkf.sil.study.baselines.dual_ekf import DualEkf
-from lever_cdkf.sil.study.baselines.joint_ekf import JointEkf
-from lever_cdkf.sil.study.baselines.joint_ukf import JointUkf, UnscentedTransform
-from lever_cdkf.sil.study.baselines.recursion import factor, follow
-from lever_cdkf.sil.study.data import Batch
+from lever_cdkf.arrays import Array
+from lever_sil.study.baselines.algorithm1 import ParameterFilter
+from lever_sil.study.baselines.dual_ekf import DualEkf
+from lever_sil.study.baselines.joint_ekf import JointEkf
+from lever_sil.study.baselines.joint_ukf import JointUkf, UnscentedTransform
+from lever_sil.study.baselines.recursion import factor, follow
+from lever_sil.study.data import Batch
 from python.study.baseline_runs import PERIOD, Plan, lever, simulate
 
 SETTLE, STIFFNESS = 12.0, 500.0

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.arrays import Array
-from lever_cdkf.host_tools.models.linear import LinearBlackBox, LinearPhysical
-from lever_cdkf.sil.study.baselines.balance import Ratios, Same
-from lever_cdkf.sil.study.baselines.lms import Nlms
-from lever_cdkf.sil.study.baselines.regression import Equations, equations
-from lever_cdkf.sil.study.baselines.rls import Rls
+from lever_cdkf.arrays import Array
+from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
+from lever_sil.study.baselines.balance import Ratios, Same
+from lever_sil.study.baselines.lms import Nlms
+from lever_sil.study.baselines.regression import Equations, equations
+from lever_sil.study.baselines.rls import Rls
 from python.study.baseline_runs import Plan, lever, resting_angle, simulate
 from scipy.signal import freqs
 from scipy.stats import chi2

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
-from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.host_tools.models.lever import Lever
-from lever_cdkf.sil.study import bound, linearised
-from lever_cdkf.sil.study.data import Batch, Knowledge, Truth
-from lever_cdkf.sil.study.matched import Condition, matched
+from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.models.lever import Lever
+from lever_sil.study import bound, linearised
+from lever_sil.study.data import Batch, Knowledge, Truth
+from lever_sil.study.matched import Condition, matched
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 

@@ -14,13 +14,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import interrupts
-from lever_cdkf.host_tools.firmware.native import enum_names, settings_table
-from lever_cdkf.host_tools.provenance import provenance
-from lever_cdkf.host_tools.report import figure as drawing
-from lever_cdkf.sil.scenarios import scenario
-from lever_cdkf.sil.study.baselines import BASELINES
-from lever_cdkf.sil.study.compare import (
+from lever_cdkf import interrupts
+from lever_cdkf.firmware.native import enum_names, settings_table
+from lever_cdkf.provenance import provenance
+from lever_cdkf.report import figure as drawing
+from lever_sil.scenarios import scenario
+from lever_sil.study.baselines import BASELINES
+from lever_sil.study.compare import (
     campaign,
     charts,
     compare_page,
@@ -30,11 +30,11 @@ from lever_cdkf.sil.study.compare import (
     table,
     verdicts,
 )
-from lever_cdkf.sil.study.compare.campaign import Outcome, Results
-from lever_cdkf.sil.study.compare.cases import Matched, Plan, References, Stepped, cases
-from lever_cdkf.sil.study.compare.entrants import entrants
-from lever_cdkf.sil.study.compare.evaluation import Row
-from lever_cdkf.sil.study.data import Batch, Estimates
+from lever_sil.study.compare.campaign import Outcome, Results
+from lever_sil.study.compare.cases import Matched, Plan, References, Stepped, cases
+from lever_sil.study.compare.entrants import entrants
+from lever_sil.study.compare.evaluation import Row
+from lever_sil.study.data import Batch, Estimates
 from numpy.typing import NDArray
 from python.conftest import Refused, Run
 from python.report.reading import Reader, figures, unpack

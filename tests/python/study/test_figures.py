@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.host_tools.firmware.native import Config, Estimator
-from lever_cdkf.sil.study.data import Batch
-from lever_cdkf.sil.study.figures import catalogue, grip, runs
-from lever_cdkf.sil.study.figures.description import LOOKS, Band, Curve, Points, Row, Surface, Trace, number
-from lever_cdkf.sil.study.firmware import EXACT
-from lever_cdkf.sil.study.matched import Condition, matched
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.native import Config, Estimator
+from lever_sil.study.data import Batch
+from lever_sil.study.figures import catalogue, grip, runs
+from lever_sil.study.figures.description import LOOKS, Band, Curve, Points, Row, Surface, Trace, number
+from lever_sil.study.firmware import EXACT
+from lever_sil.study.matched import Condition, matched
 from numpy.typing import NDArray
 from python.study.shown import SEED, SHORT, figure_of
 from scipy.integrate import solve_ivp

@@ -22,12 +22,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from fontTools.ttLib import TTFont
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.provenance import provenance
-from lever_cdkf.host_tools.report import screenshot
-from lever_cdkf.sil.study.figures import catalogue, figures_page, printed, runs
-from lever_cdkf.sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
-from lever_cdkf.sil.study.figures.typesetting import colours, css, in_html, in_mathtext
+from lever_cdkf import cli
+from lever_cdkf.provenance import provenance
+from lever_cdkf.report import screenshot
+from lever_sil.study.figures import catalogue, figures_page, printed, runs
+from lever_sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
+from lever_sil.study.figures.typesetting import colours, css, in_html, in_mathtext
 from PIL import Image
 from PIL.PngImagePlugin import PngImageFile
 from python.report.reading import figures, read, unpack

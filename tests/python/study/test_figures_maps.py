@@ -11,8 +11,8 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from lever_cdkf.sil.study.figures import data, figures_page, maps, printed
-from lever_cdkf.sil.study.figures.maps import Chart, Line, MapFigure, Scale
+from lever_sil.study.figures import data, figures_page, maps, printed
+from lever_sil.study.figures.maps import Chart, Line, MapFigure, Scale
 from numpy.typing import NDArray
 from PIL import Image
 from python.report.reading import figures, read

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.errors import SettingsError
-from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.sil.plants import lever_plant
-from lever_cdkf.sil.study.data import Batch
-from lever_cdkf.sil.study.matched import Condition, matched
+from lever_cdkf.errors import SettingsError
+from lever_cdkf.firmware.config import settings_table
+from lever_sil.plants import lever_plant
+from lever_sil.study.data import Batch
+from lever_sil.study.matched import Condition, matched
 from numpy.typing import NDArray
 from scipy import signal
 from scipy.stats import chi2, kstest
@@ -128,7 +128,7 @@ def test_inputs_have_their_rms_and_band(name: str) -> None:
 
 @pytest.mark.parametrize("preload", ["fixed", "trim"])
 def test_the_lever_starts_at_rest_and_has_the_dynamics_of_the_plant(preload: lever_plant.Preload) -> None:
-    """sil/plants/lever_plant.py shares no code with the model here."""
+    """sil/lever_sil/plants/lever_plant.py shares no code with the model here."""
     settings = {"arm_preload_angle": 0.45, "lever_preload_angle": 0.3}
     batch = matched(Condition(preload=preload, settings=settings), 6, 2.0, 5)
     assert batch.truth.p is not None

@@ -6,8 +6,8 @@ Seeds are fixed, so this is no lottery: a change of the firmware that costs accu
 from __future__ import annotations
 
 import pytest
-from lever_cdkf.sil.study.compare import campaign, evaluation, verdicts
-from lever_cdkf.sil.study.compare.cases import Plan
+from lever_sil.study.compare import campaign, evaluation, verdicts
+from lever_sil.study.compare.cases import Plan
 
 RUNS = {("lever_fixed_dither_quiet", "linear_black_box_fixed_base_rough"): 10, ("step_up", "step_down"): 20}
 """Of each case."""

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.sil.envelope import conditions
-from lever_cdkf.sil.envelope.condition import ClosedLoop, Condition
-from lever_cdkf.sil.envelope.measure import FIGURES, Outcome
-from lever_cdkf.sil.envelope.motions import FREQUENCIES, PERIOD, Motion
-from lever_cdkf.sil.envelope.sensors import Fault, Sensors
-from lever_cdkf.sil.study.baselines.joint_ekf import Joint
-from lever_cdkf.sil.study.data import Batch
-from lever_cdkf.sil.study.peers import campaign, filters, logs, tables
-from lever_cdkf.sil.study.peers.campaign import ESTIMATORS, Result
+from lever_cdkf import cli
+from lever_sil.envelope import conditions
+from lever_sil.envelope.condition import ClosedLoop, Condition
+from lever_sil.envelope.measure import FIGURES, Outcome
+from lever_sil.envelope.motions import FREQUENCIES, PERIOD, Motion
+from lever_sil.envelope.sensors import Fault, Sensors
+from lever_sil.study.baselines.joint_ekf import Joint
+from lever_sil.study.data import Batch
+from lever_sil.study.peers import campaign, filters, logs, tables
+from lever_sil.study.peers.campaign import ESTIMATORS, Result
 from numpy.typing import NDArray
 from python.conftest import Refused
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.scenarios import scenario
-from lever_cdkf.sil.study.recorded import recorded, usable
-from lever_cdkf.sil.toml_tables import ScenarioError
+from lever_sil.scenarios import scenario
+from lever_sil.study.recorded import recorded, usable
+from lever_sil.toml_tables import ScenarioError
 
 
 def test_measured_is_the_truth_with_the_noise_of_the_sensors() -> None:

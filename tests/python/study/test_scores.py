@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.sil.study import scores
-from lever_cdkf.sil.study.data import Estimates
-from lever_cdkf.sil.study.matched import Condition, matched
+from lever_sil.study import scores
+from lever_sil.study.data import Estimates
+from lever_sil.study.matched import Condition, matched
 from numpy.typing import NDArray
 
 Array = NDArray[Any]  # of floats

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.config import settings_table
-from lever_cdkf.host_tools.models.detrend import Detrend
-from lever_cdkf.host_tools.models.lever import Lever
-from lever_cdkf.sil.plants import lever_plant
-from lever_cdkf.sil.plants.truth import Conditions
-from lever_cdkf.sil.study.data import Batch
-from lever_cdkf.sil.study.steps import Step, follow, stepped
+from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.models.detrend import Detrend
+from lever_cdkf.models.lever import Lever
+from lever_sil.plants import lever_plant
+from lever_sil.plants.truth import Conditions
+from lever_sil.study.data import Batch
+from lever_sil.study.steps import Step, follow, stepped
 from numpy.typing import NDArray
 from scipy.stats import chi2
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf.sil.run import buslog, runner
-from lever_cdkf.sil.scenarios import scenario
+from lever_sil.run import buslog, runner
+from lever_sil.scenarios import scenario
 
 Simulate = Callable[..., Path]
 

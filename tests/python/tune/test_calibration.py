@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.tune import recording
-from lever_cdkf.host_tools.tune.calibration import NAMES, Calibrated, calibrate
-from lever_cdkf.host_tools.tune.likelihood import Likelihood
-from lever_cdkf.host_tools.tune.recording import Recording
+from lever_cdkf.tune import recording
+from lever_cdkf.tune.calibration import NAMES, Calibrated, calibrate
+from lever_cdkf.tune.likelihood import Likelihood
+from lever_cdkf.tune.recording import Recording
 from python.tune.conftest import NOISE, Simulate
 
 WITHIN = (0.01, 0.3e-3, 0.03)

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.firmware.settings_file import make_config, read_assignments
-from lever_cdkf.host_tools.tune import calibration
+from lever_cdkf import cli
+from lever_cdkf.can import codec
+from lever_cdkf.firmware.settings_file import make_config, read_assignments
+from lever_cdkf.tune import calibration
 from python.conftest import Refused, Run
 from python.report.reading import figures, read, unpack
 from python.tune.conftest import NOISE, Simulate

@@ -7,9 +7,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.innovations import innovations
-from lever_cdkf.host_tools.firmware.native import run_samples
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.innovations import innovations
+from lever_cdkf.firmware.native import run_samples
 from numpy.typing import NDArray
 from python.tune import textbook
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.tune import recording, validation
-from lever_cdkf.host_tools.tune.likelihood import Likelihood
-from lever_cdkf.host_tools.tune.search import Search, Tuned, groups
+from lever_cdkf.tune import recording, validation
+from lever_cdkf.tune.likelihood import Likelihood
+from lever_cdkf.tune.search import Search, Tuned, groups
 from python.tune.conftest import NOISE, WALK, Simulate
 
 

@@ -4,7 +4,7 @@ many sets of parameters at once."""
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.host_tools.firmware.innovations import SAMPLE
+from lever_cdkf.firmware.innovations import SAMPLE
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete
 

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import can
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.can.commander import Commander
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.watch.picture import Frame
-from lever_cdkf.host_tools.watch.sources import as_frame
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.can.commander import Commander
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.watch.picture import Frame
+from lever_cdkf.watch.sources import as_frame
 from python.conftest import swing
 
-LEVER = [sys.executable, "-m", "lever_cdkf.host_tools.cli"]
+LEVER = [sys.executable, "-m", "lever_cdkf.cli"]
 
 
 class Flight:

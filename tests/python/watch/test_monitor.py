@@ -12,10 +12,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.watch.picture import Frame
-from lever_cdkf.host_tools.watch.sources import Source
-from lever_cdkf.host_tools.watch.terminal import SPANS, TALL, Monitor
+from lever_cdkf import cli
+from lever_cdkf.watch.picture import Frame
+from lever_cdkf.watch.sources import Source
+from lever_cdkf.watch.terminal import SPANS, TALL, Monitor
 from processes import PATIENCE
 from python.conftest import Refused
 from python.watch.conftest import LEVER, Flight

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.report import screenshot
+from lever_cdkf.can import codec
+from lever_cdkf.report import screenshot
 from processes import PATIENCE
 from python.watch.browser import Browser
 
@@ -132,7 +132,7 @@ LABELS = """
 def test_a_scenario_that_starts_over_is_told_and_no_label_lies_on_another(
     width: int, browser: Browser, start_lever: Start, tmp_path: Path
 ) -> None:
-    steady = (resources.files("lever_cdkf.sil.scenarios") / "steady.toml").read_text()
+    steady = (resources.files("lever_sil.scenarios") / "steady.toml").read_text()
     (tmp_path / "brief.toml").write_text(re.sub("(?m)^duration = .*$", 'duration = "2 s"', steady))
     process = start_lever("live", "--scenario", str(tmp_path / "brief.toml"), "--port", "0")
     browser.begin(width, 844)

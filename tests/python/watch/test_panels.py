@@ -8,11 +8,11 @@ import io
 import math
 
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.firmware.library import ffi, lib
-from lever_cdkf.host_tools.watch import panels
-from lever_cdkf.host_tools.watch.picture import ERROR, Estimated, Picture
-from lever_cdkf.host_tools.watch.sources import Source
+from lever_cdkf import cli
+from lever_cdkf.firmware.library import ffi, lib
+from lever_cdkf.watch import panels
+from lever_cdkf.watch.picture import ERROR, Estimated, Picture
+from lever_cdkf.watch.sources import Source
 from python.conftest import Session
 from python.watch.conftest import Flight
 from rich.table import Table

@@ -9,13 +9,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.commander import KEEP, result_of
-from lever_cdkf.host_tools.firmware.config import Config, model_parameters
-from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
-from lever_cdkf.host_tools.watch import status
-from lever_cdkf.host_tools.watch.paired import Paired
-from lever_cdkf.host_tools.watch.picture import ERROR, FOREIGN, ROWS, STALE_AFTER, STEP, Frame, Picture
+from lever_cdkf.can import codec
+from lever_cdkf.can.commander import KEEP, result_of
+from lever_cdkf.firmware.config import Config, model_parameters
+from lever_cdkf.firmware.library import enum_names, ffi, lib
+from lever_cdkf.watch import status
+from lever_cdkf.watch.paired import Paired
+from lever_cdkf.watch.picture import ERROR, FOREIGN, ROWS, STALE_AFTER, STEP, Frame, Picture
 from python.watch.conftest import Flight
 
 

@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.arrays import ComplexArray, FloatArray
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.commander import KEEP
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.library import enum_names
-from lever_cdkf.host_tools.watch.server import Server
-from lever_cdkf.host_tools.watch.sources import Source
-from lever_cdkf.host_tools.watch.state import WITHOUT_TORQUE, State, command_of
-from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
+from lever_cdkf import cli
+from lever_cdkf.arrays import ComplexArray, FloatArray
+from lever_cdkf.can import codec
+from lever_cdkf.can.commander import KEEP
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.library import enum_names
+from lever_cdkf.watch.server import Server
+from lever_cdkf.watch.sources import Source
+from lever_cdkf.watch.state import WITHOUT_TORQUE, State, command_of
+from lever_cdkf.watch.transfer import FREQUENCIES
 from processes import PATIENCE
 from python.conftest import Refused, swing
 from python.watch.conftest import Flight
@@ -352,7 +352,7 @@ def test_dither_is_kept_alive_as_long_as_a_page_is_open(
     on_server: Callable[..., FlightSource], flight: Flight, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = SimpleNamespace(monotonic=lambda: flight.sample * 1e-3)
-    monkeypatch.setattr("lever_cdkf.host_tools.watch.sources.time", clock)
+    monkeypatch.setattr("lever_cdkf.watch.sources.time", clock)
 
     async def story(server: Server) -> None:
         async with Visitor(server) as visitor:
@@ -397,7 +397,7 @@ def test_a_full_bus_keeps_nobody_waiting_but_who_asked(on_server: Callable[..., 
 @pytest.mark.requirement("S9")
 def test_a_page_cannot_fill_the_bus(on_server: Callable[..., FlightSource], monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
-    monkeypatch.setattr("lever_cdkf.host_tools.watch.server._now", lambda: clock[0])
+    monkeypatch.setattr("lever_cdkf.watch.server._now", lambda: clock[0])
 
     async def story(server: Server) -> None:
         async with Visitor(server) as flooding, Visitor(server) as other:
@@ -418,7 +418,7 @@ def test_a_page_cannot_fill_the_bus(on_server: Callable[..., FlightSource], monk
 def test_a_page_that_connects_anew_cannot_fill_the_bus_either(
     on_server: Callable[..., FlightSource], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lever_cdkf.host_tools.watch.server._now", lambda: 0.0)
+    monkeypatch.setattr("lever_cdkf.watch.server._now", lambda: 0.0)
 
     async def story(server: Server) -> None:
         for _ in range(5):

@@ -11,15 +11,15 @@ from types import SimpleNamespace
 
 import can
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.config import CHOICES
-from lever_cdkf.host_tools.watch import sources
-from lever_cdkf.host_tools.watch.picture import ERROR, FOREIGN, Frame, Picture
-from lever_cdkf.host_tools.watch.sources import BusSource, LogSource, Source
-from lever_cdkf.host_tools.watch.transfer import FREQUENCIES
-from lever_cdkf.sil.run.live_source import SimulationSource
-from lever_cdkf.sil.scenarios.scenario import load
+from lever_cdkf.can import codec
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.config import CHOICES
+from lever_cdkf.watch import sources
+from lever_cdkf.watch.picture import ERROR, FOREIGN, Frame, Picture
+from lever_cdkf.watch.sources import BusSource, LogSource, Source
+from lever_cdkf.watch.transfer import FREQUENCIES
+from lever_sil.run.live_source import SimulationSource
+from lever_sil.scenarios.scenario import load
 from processes import PATIENCE
 from python.watch.conftest import Flight
 

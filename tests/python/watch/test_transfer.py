@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.firmware.config import Config
-from lever_cdkf.host_tools.firmware.estimator import Estimator
-from lever_cdkf.host_tools.watch.picture import Feedthrough
-from lever_cdkf.host_tools.watch.transfer import FREQUENCIES, SIGMAS, Geometry
+from lever_cdkf.firmware.config import Config
+from lever_cdkf.firmware.estimator import Estimator
+from lever_cdkf.watch.picture import Feedthrough
+from lever_cdkf.watch.transfer import FREQUENCIES, SIGMAS, Geometry
 
 DEGREES = 180.0 / math.pi
 SENT = [Feedthrough(f, complex(math.nan), 0.01 * f, 0.002 * f) for f in range(2, 9)]

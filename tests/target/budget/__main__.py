@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path[0] = str(Path(__file__).resolve().parents[2])
 
-from lever_cdkf.host_tools.errors import LeverError  # noqa: E402
+from lever_cdkf.errors import LeverError  # noqa: E402
 from target.budget import hot_spots, image, images, quick, report  # noqa: E402
 from target.budget.recording import MODELS  # noqa: E402
 

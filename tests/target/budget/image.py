@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.library import enum_names
-from lever_cdkf.host_tools.firmware.native import Config
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.library import enum_names
+from lever_cdkf.firmware.native import Config
 from numpy.typing import NDArray
 
 from .recording import MODELS, Recording

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.host_tools.firmware.library import enum_names
+from lever_cdkf.firmware.library import enum_names
 from numpy.typing import NDArray
 
 from . import cycles, image, sizes, stack, trace

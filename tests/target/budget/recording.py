@@ -12,11 +12,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.bus import LeverBus
-from lever_cdkf.host_tools.firmware.library import struct_dtype
-from lever_cdkf.sil.run import loop
-from lever_cdkf.sil.scenarios.scenario import Scenario, load
+from lever_cdkf.can import codec
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.firmware.library import struct_dtype
+from lever_sil.run import loop
+from lever_sil.scenarios.scenario import Scenario, load
 from numpy.typing import NDArray
 
 SCENARIOS = Path(__file__).with_name("scenarios")

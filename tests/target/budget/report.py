@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from lever_cdkf.host_tools.files import write_text
-from lever_cdkf.host_tools.progress import Progress
-from lever_cdkf.host_tools.tables import Row, Tables, print_tables
+from lever_cdkf.files import write_text
+from lever_cdkf.progress import Progress
+from lever_cdkf.tables import Row, Tables, print_tables
 
 from . import golden, guide, image, measure, port_sizes
 

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.errors import LeverError
 
 from .image import call_graph, core_objects, run_tool
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import readmes
-from lever_cdkf.host_tools.firmware.native import FRAME_SAMPLE, Config, Estimator
+from lever_cdkf.firmware.native import FRAME_SAMPLE, Config, Estimator
 from target.budget import golden, guide, port_sizes, stack
 from target.budget.recording import FRAME, record
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Built
-from lever_cdkf.host_tools.errors import LeverError
-from lever_cdkf.host_tools.firmware.aircraft import AircraftResponse
-from lever_cdkf.host_tools.firmware.config import CHOICES, Config
-from lever_cdkf.host_tools.firmware.library import enum_names, ffi, lib
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.aircraft import AircraftResponse
+from lever_cdkf.firmware.config import CHOICES, Config
+from lever_cdkf.firmware.library import enum_names, ffi, lib
 from target.budget import image, measure, stack, trace
 from target.budget.recording import MODELS, record
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import unicorn
-from lever_cdkf.host_tools.errors import LeverError
+from lever_cdkf.errors import LeverError
 from numpy.typing import NDArray
 from unicorn import arm_const
 from unicorn.unicorn_py3 import unicorn as engine

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import can
-from lever_cdkf.host_tools.can import codec
+from lever_cdkf.can import codec
 from target.bxcan.board import Board
 from target.bxcan.frame import Frame
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from lever_cdkf.host_tools.firmware.native import lib
+from lever_cdkf.firmware.native import lib
 from target.bxcan.board import MS, Board
 from target.bxcan.bus import Peer
 from target.bxcan.frame import Frame

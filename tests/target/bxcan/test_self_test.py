@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.firmware.native import lib
+from lever_cdkf.can import codec
+from lever_cdkf.firmware.native import lib
 from target.bxcan import memory
 from target.bxcan.board import MS, Board
 from target.bxcan.bxcan import RX0_IRQ, TX_IRQ

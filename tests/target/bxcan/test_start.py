@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from lever_cdkf.host_tools.firmware.native import lib
+from lever_cdkf.firmware.native import lib
 from target.bxcan import bxcan, filters
 from target.bxcan.board import MS, Board
 from target.bxcan.bxcan import ABOM, INAK, INRQ, NART, RFLM, TTCM, TXFP

@@ -8,12 +8,12 @@ from collections.abc import Callable
 import can
 import numpy as np
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.host_tools.can.commander import result_of
-from lever_cdkf.host_tools.firmware.config import CHOICES
-from lever_cdkf.host_tools.firmware.native import lib
-from lever_cdkf.sil.run import loop
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.can import codec
+from lever_cdkf.can.commander import result_of
+from lever_cdkf.firmware.config import CHOICES
+from lever_cdkf.firmware.native import lib
+from lever_sil.run import loop
+from lever_sil.scenarios import scenario
 from target.bxcan.board import MS, Board, BoardBus
 from target.bxcan.bus import Peer
 from target.bxcan.frame import Frame

@@ -16,10 +16,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.can import codec
-from lever_cdkf.sil.commands import sim as commands
-from lever_cdkf.sil.run import buslog, loop
-from lever_cdkf.sil.scenarios import scenario
+from lever_cdkf.can import codec
+from lever_sil.commands import sim as commands
+from lever_sil.run import buslog, loop
+from lever_sil.scenarios import scenario
 
 LEVER = str(Path(sys.executable).with_name("lever"))
 SCENARIOS = {"lever": "steady", "linear_physical": "linear_physical", "linear_black_box": "linear_black_box"}

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 import serial
-from lever_cdkf.host_tools import cli
-from lever_cdkf.host_tools.board import qemu
-from lever_cdkf.host_tools.firmware.config import CHOICES
+from lever_cdkf import cli
+from lever_cdkf.board import qemu
+from lever_cdkf.firmware.config import CHOICES
 from vcan import rig
 
 QEMU = pytest.mark.requires(qemu.PROGRAM)

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from lever_cdkf.host_tools.can import codec
+from lever_cdkf.can import codec
 
 ANSWER_TIME = 120.0
 """Longest wait for an answer of the board [s], on a machine with much else to do."""

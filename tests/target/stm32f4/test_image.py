@@ -9,7 +9,7 @@ import zlib
 from pathlib import Path
 
 import pytest
-from lever_cdkf.host_tools.board.firmware_image import flash_contents
+from lever_cdkf.board.firmware_image import flash_contents
 from target.stm32f4 import elf
 
 SOURCES = Path(__file__).resolve().parents[3]

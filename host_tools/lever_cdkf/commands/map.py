@@ -1,0 +1,131 @@
+"""`lever map`."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import layout
+from ..errors import LeverError
+from ..files import check_not_input
+from ..tables import Row, add_json_option
+from .signal_options import add_part_options, check_part
+
+if TYPE_CHECKING:
+    from ..signals.mapping import Mapping
+    from ..signals.proposal import Candidate
+    from ..signals.recorded import Signal
+
+_DESCRIPTION = """\
+Looks at the signals of a log and proposes which of them are the firmware's inputs: the angle of the lever (theta), its
+rate (theta_dot), the vertical acceleration of its base (z_ddot), the motor's torque (tau_m), the force of the hand
+(grip_force). It goes by names, units and words of the database, and by the values: gravity in an acceleration, a rate
+that is the slope of an angle. It may be wrong: look at the plots, and at the reasons.
+
+LOG is a log of a bus, with its database (--dbc), or a file of columns: .csv, .parquet, .mat, .npz, .mf4 with signals.
+The proposal is printed as the options of `lever replay` and `lever tune`; --toml writes it as a mapping file, to be
+edited and given as --map FILE.toml.
+"""
+_EPILOG = """\
+examples:
+  lever map flight.blf --dbc aircraft.dbc
+  lever map flight.blf --dbc aircraft.dbc --toml aircraft.toml -o signals.html
+  lever map flight.csv --json proposal.json
+"""
+_LOOKED_AT = 60.0
+_SPARK = 40
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "map", help="propose which signals of any log are the inputs", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    parser.add_argument("log", metavar="LOG", help="a recorded log, or a file of columns")
+    parser.add_argument("--dbc", metavar="FILE", help="database of the messages (DBC, ARXML, KCD, SYM)")
+    parser.add_argument("--channel", metavar="NAME", help="the bus that is looked at (default: all)")
+    parser.add_argument("--time", metavar="COLUMN", help="the column of time of a file (default: by its name)")
+    parser.add_argument("--toml", metavar="FILE", type=Path, help="write the proposal as a mapping file")
+    parser.add_argument(
+        "-o", "--out", metavar="FILE", type=Path, help="write plots of what changes: .html, .pdf, .svg, .png"
+    )
+    add_part_options(parser, _LOOKED_AT)
+    add_json_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..files import write_text
+    from ..provenance import provenance
+    from ..signals.mapping import as_toml
+    from ..signals.plots import KINDS, OTHER, write
+    from ..signals.proposal import propose
+    from ..signals.recorded import notes_of
+    from ..tables import print_tables
+
+    start, length = check_part(args)
+    read = [args.log, *([args.dbc] if args.dbc else [])]
+    if args.out is not None and args.out.suffix.lower() not in KINDS:
+        raise LeverError(f"cannot write {args.out}: plots are {', '.join(KINDS)}; --toml FILE writes the mapping")
+    for path in (args.toml, args.out, args.json):
+        check_not_input(path, read)
+    signals = _signals(args, start, length)
+    mapping, proposed = propose(signals, args.log)
+    mapping = replace(mapping, time=args.time)
+    inputs = {each.signal.name: each.key for each in proposed}
+    others = [signal for signal in signals if signal.name not in inputs]
+    changing = [signal for signal in others if signal.changes()]
+    rows = [_row("", signal) for signal in changing]
+    print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json, inputs=read)
+    for note in notes_of(signals):
+        layout.say(f"{note}.")
+    if len(changing) < len(others):
+        layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
+    print(*layout.command_lines(_command(args, mapping, proposed), layout.terminal_width()), sep="\n")
+    origin = provenance(read)
+    if args.toml is not None:
+        write_text(args.toml, origin.comment() + as_toml(mapping))
+    if args.out is not None:
+        shown = [(each.key, each.signal) for each in proposed]
+        write(args.out, shown + [(OTHER, each) for each in changing], Path(args.log).name, origin)
+    if written := [str(path) for path in (args.toml, args.out) if path is not None]:
+        layout.say(f"Written: {', '.join(written)}")
+    return 0
+
+
+def _signals(args: argparse.Namespace, start: float, length: float) -> list[Signal]:
+    from ..signals.reading import all_signals
+
+    return all_signals(args.log, args.dbc, args.channel, args.time, start, length)
+
+
+def _proposed(each: Candidate) -> Row:
+    return {**_row(each.key, each.signal), "why": "; ".join(each.why)}
+
+
+def _row(key: str, signal: Signal) -> Row:
+    import numpy as np
+
+    from ..signals.plots import sparkline
+
+    present = signal.values[np.isfinite(signal.values)]
+    return {
+        **({"input": key} if key else {}),
+        "signal": signal.name,
+        "unit": signal.unit,
+        "rate [Hz]": float(f"{1.0 / signal.period:.4g}") if np.isfinite(signal.period) else None,
+        "least": float(present.min()) if len(present) else None,
+        "median": float(np.median(present)) if len(present) else None,
+        "greatest": float(present.max()) if len(present) else None,
+        "plot": sparkline(signal, _SPARK),
+    }
+
+
+def _command(args: argparse.Namespace, mapping: Mapping, proposed: list[Candidate]) -> str:
+    """How to use the proposal."""
+    database = f" --dbc {shlex.quote(args.dbc)}" if args.dbc else ""
+    turned = {key: ",sign=-1" if source.sign == -1 else "" for key, source in mapping.sources.items()}
+    entries = [shlex.quote(f"{each.key}={each.signal.name}{turned[each.key]}") for each in proposed]
+    time = [shlex.quote(f"time={args.time}")] if args.time else []
+    return f"lever replay {shlex.quote(args.log)}{database} --map {' '.join([*entries, *time])}"

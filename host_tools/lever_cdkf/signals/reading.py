@@ -1,0 +1,210 @@
+"""From logs or a file to samples: what is asked for, and what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from ..can.logs import Recording
+from ..can.traffic import LATE
+from ..errors import LeverError
+from ..near_names import near_names
+from ..results.summary import Mapped, MessageCounts
+from .bus_signals import BusSignals, find, load_database
+from .clock import RunningClock
+from .inputs import Input, recorded_samples, understood
+from .mapping import Mapping
+from .own import own_mapping
+from .recorded import Signal, notes_of
+from .resample import Samples
+from .tables import is_table, read_table
+from .units import split_name
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How samples are made of something that does not speak lever.dbc."""
+
+    mapping: Mapping | None = None
+    """None: a file that this tool has written, whose columns it knows."""
+    database: str | None = None
+    """Path of the DBC, for logs of a bus."""
+    channel: str | None = None
+    clock: str | None = None
+    start: float = 0.0
+    """[s] since the first frame or row."""
+    length: float = float("inf")
+
+
+@dataclass
+class Loaded:
+    """The samples, and where they come from."""
+
+    samples: Samples
+    inputs: dict[str, Input]
+    notes: list[str]
+    """What was guessed or is odd, a sentence each."""
+    paths: list[str]
+    buses: list[str]
+    frames: int
+    """Of the part of the log, or rows of that of the file."""
+    used: int
+    """Frames of mapped messages."""
+    counts: dict[str, MessageCounts] = field(default_factory=dict)
+    """By mapped message."""
+    unprotected: int = 0
+    """Frames of mapped messages without E2E protection in the mapping."""
+    damaged: int = 0
+    ends_early: list[str] = field(default_factory=list)
+
+    def summary(self) -> Mapped:
+        """What summary.json says of it."""
+        return Mapped(
+            inputs={key: each.summary(self.samples, key) for key, each in self.inputs.items()},
+            clock=self.samples.clock,
+            sample_period_s=self.samples.period,
+            disordered_values=self.samples.disordered,
+            messages=self.counts,
+            unprotected_frames=self.unprotected,
+            notes=self.notes,
+        )
+
+
+def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> Loaded:
+    """Samples of recorded logs, one after another in time, or of one file of columns. Raises LeverError."""
+    paths = [str(path) for path in logs]
+    for path in paths:
+        _check_there(path)
+    if any(is_table(path) for path in paths):
+        if len(paths) > 1:
+            raise LeverError(f"{', '.join(paths)}: files of columns are recordings of their own: add --each")
+        return _of_table(paths[0], reading)
+    if reading.database is None:
+        raise LeverError(f"{paths[0]}: --map needs the database of its messages: add --dbc FILE")
+    if reading.mapping is None:
+        raise LeverError(
+            f"--dbc needs --map KEY=MESSAGE.SIGNAL: `lever map {paths[0]} --dbc {reading.database}` proposes it"
+        )
+    return _of_bus(paths, reading, reading.mapping, reading.database, progress)
+
+
+def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, progress: Progress | None) -> Loaded:
+    database = load_database(file)
+    fields = {key: find(database, source.signal, file) for key, source in mapping.sources.items()}
+    reader = BusSignals(database, fields.values(), mapping.protected)
+    recording = Recording(paths)
+    frames, set_back = _collect(reader, recording, reading.start, reading.length, progress)
+    inputs, buses = {}, set[str]()
+    for key, source in mapping.sources.items():
+        message, signal = fields[key]
+        channel = source.channel or reading.channel
+        decoded, bus = reader.signal(message, signal.name, channel, ", ".join(paths))
+        buses.add(bus)
+        named = replace(source, signal=f"{message.name}.{signal.name}", channel=bus)
+        inputs[key] = understood(key, named, decoded)
+    samples, notes = recorded_samples(inputs, reading.clock)
+    unprotected = sum(counts.frames for name, counts in reader.counts.items() if name not in mapping.protected)
+    used = sum(counts.frames for counts in reader.counts.values())
+    return Loaded(
+        *(samples, inputs, [*set_back, *notes], [str(path) for path in recording.paths], sorted(buses), frames, used),
+        *(reader.counts, unprotected, recording.damaged, recording.ends_early),
+    )
+
+
+def _of_table(path: str, reading: Reading) -> Loaded:
+    mapping = reading.mapping
+    columns = read_table(path, None if mapping is None else mapping.time)
+    mapping = mapping or own_mapping(columns, path)
+    start = _beginning(columns) + reading.start
+    inputs = {}
+    for key, source in mapping.sources.items():
+        signal = column(columns, source.signal, path).between(start, start + reading.length)
+        inputs[key] = understood(key, source, signal)
+    samples, notes = recorded_samples(inputs, reading.clock)
+    of_file = notes_of(each.signal for each in inputs.values())
+    rows = max(len(each.signal.time) for each in inputs.values())
+    return Loaded(samples, inputs, [*of_file, *notes], [path], [], rows, 0)
+
+
+def all_signals(
+    log: str, database: str | None, channel: str | None, time: str | None, start: float, length: float
+) -> list[Signal]:
+    """Every signal of a log or file, in a part of it. Raises LeverError."""
+    _check_there(log)
+    if is_table(log):
+        signals = read_table(log, time)
+        first = _beginning(signals) + start
+        return [each.between(first, first + length) for each in signals]
+    if database is None:
+        raise LeverError(f"{log}: a log of a bus needs the database of its messages: add --dbc FILE")
+    loaded = load_database(database)
+    wanted = [(message, each) for message in loaded.messages for each in message.signals]
+    reader, recording = BusSignals(loaded, wanted, {}), Recording([log])
+    _collect(reader, recording, start, length, None)
+    signals = [
+        reader.signal(message, each.name, channel or bus, log)[0]
+        for message in loaded.messages
+        for bus in reader.buses(message)[:1]
+        if channel is None or channel in reader.buses(message)
+        for each in message.signals
+    ]
+    if not signals:
+        raise LeverError(f"{log}: none of its frames is of a message of {database}: is it the database of this bus?")
+    return signals
+
+
+def _beginning(columns: Sequence[Signal]) -> float:
+    """The first time of a file [s]."""
+    return min((float(each.time[0]) for each in columns if len(each.time)), default=0.0)
+
+
+def _check_there(path: str) -> None:
+    if path != "-" and not Path(path).exists():
+        raise LeverError(f"cannot read {path}: no such file")
+
+
+def _collect(
+    reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None
+) -> tuple[int, tuple[str, ...]]:
+    """Hand the frames of a part to the reader; return how many there are, and where their clock was set back."""
+    frames = 0
+    first_us: int | None = None
+    clock = RunningClock(1e6 * LATE)
+    for recorded in recording.chunks():
+        chunk = recorded.copy()
+        chunk["time_us"] = clock.running(recorded["time_us"])
+        first_us = int(chunk["time_us"][0]) if first_us is None else first_us
+        since = (chunk["time_us"] - first_us) * 1e-6
+        part = chunk[(since >= (start or -math.inf)) & (since < start + length)]
+        frames += len(part)
+        reader.add(part, recording)
+        if progress is not None:
+            progress(recording.done, recording.size)
+        if since[-1] > start + length + LATE:
+            break
+    if reader.fd and first_us is not None:
+        first = first_us + round(1e6 * start)
+        for path in recording.paths:
+            reader.add_fd(path, first, first + round(1e6 * min(length, _EVER)))
+    return frames, clock.note(seconds=1e-6)
+
+
+_EVER = 1e9  # [s]
+
+
+def column(columns: Sequence[Signal], name: str, where: str) -> Signal:
+    """A column by its name, or by the part after the last dot. Raises LeverError."""
+    for matches in (
+        [each for each in columns if each.name == name],
+        [each for each in columns if each.name.lower() in (name.lower(), split_name(name)[0].lower())],
+        [each for each in columns if each.name.rpartition(".")[2] == name.rpartition(".")[2]],
+    ):
+        if len(matches) == 1:
+            return matches[0]
+    names = [each.name for each in columns]
+    near = near_names(name, names) or names[:8]
+    raise LeverError(f"{where}: no column {name}; there are {', '.join(near)}{' …' if len(names) > len(near) else ''}")

@@ -1,0 +1,55 @@
+"""bounce.html: the table, and of each condition the flight in which it was worst."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from lever_cdkf.firmware.aircraft import ALARM, WARNING
+from lever_cdkf.report.figure import Figure, axis, band, line, time_axis
+from lever_cdkf.report.page import Page
+
+from ..judged import judged_page
+from .campaign import Result
+from .flights import AIRCRAFT
+from .measure import Excerpt
+
+_MOST = 15.0  # [dB]
+
+
+def build(results: Sequence[Result], seeds: int) -> str:
+    """The whole page."""
+    page = Page(
+        "Collective bounce: seen coming, and stopped",
+        f"{seeds} random pilots with each of {len(AIRCRAFT)} aircraft ({', '.join(AIRCRAFT)}), the firmware as shipped "
+        "in the loop. Charts: of each condition the flight in which its first figure was worst.",
+        "lever bounce",
+    )
+    charts = [
+        None if result.excerpt is None else _chart(result.excerpt, str(result.worst_run(result.condition.figures[0])))
+        for result in results
+    ]
+    return judged_page.build(page, results, charts, "Gearing is collective pitch over the lever's angle.")
+
+
+def _chart(shown: Excerpt, flight: str) -> Figure:
+    """The margin with the limits of warning and alarm, what the lever does, what the cabin does, and when what came."""
+    rows = [axis("margin [dB]", range=[-5.0, _MOST], weight=1.5), axis("lever [°]"), axis("cabin [m/s²]")]
+    figure = Figure(rows, time_axis(float(shown.time[-1])), height=480)
+    margin = np.minimum(shown.margin, _MOST)
+    low, high = margin - 2.0 * shown.sigma, np.minimum(margin + 2.0 * shown.sigma, _MOST)
+    figure.add(*band(shown.time, low, high, "estimate ±2σ", "estimate-band"))
+    figure.add(
+        line(shown.time, np.minimum(shown.true, _MOST), f"truth ({flight})", "truth", line_dash="dash", zorder=1)
+    )
+    figure.add(line(shown.time, margin, "estimate", "estimate"))
+    figure.add(
+        line(shown.time, shown.theta, "θ", "text", 1), line(shown.time, shown.correction, "correction", "good", 1)
+    )
+    figure.add(line(shown.time, shown.z_ddot, "z̈", "torque", 2))
+    figure.level(0.0, WARNING, ALARM)
+    figure.mark(list(shown.moments.values()))
+    for place, (name, moment) in enumerate(shown.moments.items()):
+        side = {"xanchor": "right" if place == 0 else "left", "yanchor": "bottom", "showarrow": False}
+        figure.annotations.append({"x": moment, "y": 1.0, "yref": "paper", "text": name} | side)
+    return figure

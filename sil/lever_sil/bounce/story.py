@@ -1,0 +1,56 @@
+"""Two flights of one pilot who relaxes, with mitigation and without: the first picture of the demo's report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from lever_cdkf.firmware.library import lib
+from lever_cdkf.report.figure import Figure, axis, band, line, time_axis
+from lever_cdkf.report.page import Story
+from lever_cdkf.units import GRAVITY
+
+from . import pilots
+from .conditions import BOTH
+from .flights import STRIDE, Plan, fly
+from .measure import geared
+
+TITLE = "Collective bounce, seen coming and stopped"
+CAPTION = (
+    "A pilot in a UH-60-like helicopter in gusts of 0.05 g relaxes: from 10 to 40 s the damping of his arm falls from "
+    "42 to 18 N s/m, and with it the gain margin of the loop through arm, lever and rotor. The same flight twice: "
+    "without mitigation it ends in a limit cycle, with cancellation and lever damping it goes on. The dotted line is "
+    "where the firmware raises its alarm; it knows the helicopter by a table of its response. Made by the same "
+    "simulation as <code>lever bounce</code>."
+)
+_BEYOND = 1.2  # gearing over critical in the end
+_MOST = 10.0  # [dB]
+
+
+def tell() -> Story:
+    """Margin, lever, correction and cabin in both flights. Raises LeverError."""
+    plan = geared(Plan("uh60_like", 1, pilots.relaxing(1), 1.0), _BEYOND)
+    without, mitigated = fly(plan), fly(replace(plan, mitigation=BOTH))
+    rows = [axis("gain margin [dB]", range=[-5.0, _MOST])]
+    rows += [axis(title) for title in ("lever [°]", "correction [°]", "cabin [g]")]
+    figure = Figure(rows, time_axis(plan.duration), height=620)
+    time, said = mitigated.notes[::5], mitigated.stability[::5]
+    margin, sigma = (np.minimum(said[name], _MOST) for name in ("gain_margin", "gain_margin_sigma"))
+    figure.add(*band(time, margin - 2.0 * sigma, np.minimum(margin + 2.0 * sigma, _MOST), "±2σ", "estimate-band"))
+    true = np.minimum(mitigated.margins(5), _MOST)
+    figure.add(line(time, true, "margin without mitigation, truth", "truth", line_dash="dash", zorder=1))
+    figure.add(line(time, margin, "estimate", "estimate"))
+    for flown, name, colour in ((without, "without mitigation", "fault"), (mitigated, "with it", "good")):
+        angle, z_ddot = np.degrees(flown.theta - flown.theta[0]), flown.z_ddot / GRAVITY
+        figure.add(
+            line(time, angle[:: 5 * STRIDE], name, colour, 1), line(time, z_ddot[:: 5 * STRIDE], name, colour, 3)
+        )
+    correction = np.degrees(mitigated.correction[:: 5 * STRIDE])
+    figure.add(line(time, correction, "with it", "good", 2))
+    figure.level(0.0)
+    alarms = mitigated.notes[mitigated.stability["state"] == lib.LEVER_BOUNCE_ALARM]
+    for alarm in alarms[:1].tolist():
+        figure.mark([alarm])
+        word = {"text": "alarm", "showarrow": False, "xanchor": "right"}
+        figure.annotations.append({"x": alarm, "y": 0.8 * _MOST, **word})
+    return Story(TITLE, figure, CAPTION)

@@ -1,0 +1,173 @@
+"""`lever compare`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from lever_cdkf.errors import LeverError
+from lever_cdkf.extras import require
+from lever_cdkf.files import make_folder
+from lever_cdkf.layout import say
+from lever_cdkf.progress import Progress
+from lever_cdkf.tables import Row, add_json_option
+
+from .names import check_names
+
+_DESCRIPTION = """\
+Runs the firmware's estimators and published ones on the same data and ranks them in each case: errors, errors against
+those of a Kalman filter linearised at the truth and against the posterior Cramér-Rao bound, consistency of the stated
+uncertainty (normalised estimation error squared, NEES; normalised innovation squared, NIS), time to follow a step of
+the pilot, processor time per sample (step). Cases are matched random walks, sudden changes of the
+pilot's grip, wrong settings of the noise, and the scenarios of `lever sim`. A difference is called significant by
+paired bootstrap over runs, at 5 % for all comparisons together (Holm); below 8 runs there is no verdict. With --out
+also writes into DIR
+
+  compare.csv      every figure of every estimator in every case
+  compare.html     verdicts, figures and tables as one page for a browser
+  FIGURE.pdf .svg  each figure of the page for print, two columns of a journal wide; FIGURE.csv: its numbers
+  provenance.json  version, revision, date and command that made them
+
+With --envelope instead: the firmware beside joint EKF and UKF in the conditions of `lever envelope` (8 pilots each),
+these given the true process noise and the trim, with and without a fourth-order high-pass (_hp) in front.
+Prints rms error of the natural frequency and how often the truth is within the stated ±2σ, median and worst pilot;
+--json writes them as numbers.
+"""
+_EPILOG = """\
+examples:
+  lever compare --list
+  lever compare --quick --out out/quick
+  lever compare --scenarios step_up step_down --seeds 20
+  lever compare --models lever --estimators dual joint joint_ekf --seeds 20 --out out/lever
+  lever compare --out out/compare                the whole campaign, some ten minutes of processor time
+  lever compare --envelope --quick               some conditions of `lever envelope`, a minute on two cores
+  lever compare --envelope --scenarios steady retrim --estimators firmware joint_ekf_hp
+
+Times per sample are processor times, batched over runs for the baselines: compare them as ratios, and with care.
+"""
+_QUICK_CASES = ("lever_fixed_dither_rough", "linear_black_box_trim_base_rough", "step_up", "steady")
+_QUICK_SEEDS, _QUICK_DURATION, _SEEDS = 8, 12.0, 40
+_SEED = 1
+_LIST = "lever compare --list"
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    compare = subparsers.add_parser(
+        "compare", help="compare all estimators on the same data", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    compare.add_argument("--list", action="store_true", help="print cases and estimators, and stop")
+    compare.add_argument(
+        "--envelope", action="store_true", help="joint EKF and UKF in the conditions of lever envelope"
+    )
+    compare.add_argument("--scenarios", nargs="+", metavar="NAME", help="cases of --list (default: all)")
+    compare.add_argument("--models", nargs="+", metavar="MODEL", help="only cases of these models (default: all)")
+    compare.add_argument("--estimators", nargs="+", metavar="NAME", help="estimators of --list (default: all)")
+    compare.add_argument("--seeds", type=int, metavar="N", help=f"runs of each case (default: {_SEEDS})")
+    compare.add_argument("--seed", type=int, metavar="N", help=f"seed of the first (default: {_SEED})")
+    compare.add_argument("--duration", type=float, metavar="SECONDS", help="of each run (default: each case's own)")
+    compare.add_argument(
+        "--quick", action="store_true", help=f"a few cases, {_QUICK_SEEDS} runs of {_QUICK_DURATION:g} s: a preview"
+    )
+    compare.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one a core)")
+    compare.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files (default: no files)")
+    add_json_option(compare)
+    compare.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """`lever compare`."""
+    from lever_cdkf.tables import print_tables
+
+    if args.list and not args.envelope:
+        print_tables(_listed(), args.json)
+        return 0
+    require("study")
+
+    from ..study.compare import campaign, evaluation, table, verdicts
+    from ..study.compare.cases import Plan
+
+    if args.envelope:
+        from . import compare_envelope
+
+        _check(args.seeds, args.duration, args.jobs)
+        return compare_envelope.run(args)
+    names, estimators = _cases(args), _estimators(args)
+    seeds = args.seeds if args.seeds is not None else (_QUICK_SEEDS if args.quick else _SEEDS)
+    duration = args.duration if args.duration is not None else (_QUICK_DURATION if args.quick else None)
+    _check(seeds, duration, args.jobs)
+    todo = campaign.tasks(names, estimators, Plan(seeds, duration, _SEED if args.seed is None else args.seed))
+    if not todo:
+        raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
+    if args.out is not None:
+        make_folder(args.out)  # before a campaign that could then not be kept
+    with Progress("compare") as progress:
+        results = campaign.run(todo, args.jobs, progress.show)
+    rows = evaluation.judge(results)
+    claims = verdicts.claims(rows) if results.plan.is_whole else []
+    by_case = verdicts.verdicts(rows, *evaluation.compare(results, rows))
+    tables = table.tables(rows, claims)
+    print_tables(tables, args.json)
+    for case, verdict in by_case.items():
+        say(f"{case}: {verdict}")
+    if args.out is not None:
+        from lever_cdkf.files import Outputs, write_text, writing
+        from lever_cdkf.provenance import provenance, with_provenance
+
+        from ..study.compare import compare_page, printed
+
+        with Outputs(args.out) as outputs:
+            write_text(outputs.path("compare.csv"), table.csv_text(rows))
+            names = ["compare.csv", "compare.html"]
+            origin = provenance()
+            page, figures = compare_page.build(results, rows, by_case, claims, tables)
+            write_text(outputs.path("compare.html"), with_provenance(page, origin))
+            for name, content in printed.files(figures, origin):
+                names.append(name)
+                path = outputs.path(name)
+                with writing(path):
+                    path.write_bytes(content)
+            write_text(outputs.path("provenance.json"), origin.with_outputs(outputs.written(*names)).text())
+            outputs.finish()
+        say(f"Written to {args.out}: compare.html, compare.csv, figures as .pdf, .svg and .csv, provenance.json")
+    return 0
+
+
+def _listed() -> dict[str, list[Row]]:
+    from ..study.compare.cases import cases
+    from ..study.compare.entrants import entrants
+
+    by_name = {entrant.name: entrant for case in cases().values() for entrant in entrants(case).values()}
+    return {
+        "cases": [{"name": case.name, "duration [s]": case.duration, "title": case.title} for case in cases().values()],
+        "estimators": [{"name": entrant.name, "title": entrant.title} for entrant in by_name.values()],
+    }
+
+
+def _cases(args: argparse.Namespace) -> list[str]:
+    from ..study.compare.cases import cases
+
+    chosen = args.scenarios or (_QUICK_CASES if args.quick else cases())
+    check_names("scenario", chosen, cases(), _LIST)
+    models = {case.model for case in cases().values()}
+    check_names("model", args.models or (), models, _LIST)
+    return [name for name in chosen if not args.models or cases()[name].model in args.models]
+
+
+def _estimators(args: argparse.Namespace) -> list[str]:
+    from ..study.compare.cases import cases
+    from ..study.compare.entrants import entrants
+
+    names = list(dict.fromkeys(name for case in cases().values() for name in entrants(case)))
+    check_names("estimator", args.estimators or (), names, _LIST)
+    return list(args.estimators or names)
+
+
+def _check(seeds: int | None, duration: float | None, jobs: int) -> None:
+    if seeds is not None and seeds < 1:
+        raise LeverError(f"--seeds {seeds}: must be at least 1")
+    if jobs < 1:
+        raise LeverError(f"--jobs {jobs}: must be at least 1")
+    if duration is not None and not 1.0 <= duration <= 3600.0:
+        raise LeverError(f"--duration {duration:g}: must be from 1 to 3600 s")

@@ -1,0 +1,55 @@
+"""`lever compare --envelope`."""
+
+from __future__ import annotations
+
+import argparse
+
+from lever_cdkf.errors import LeverError
+from lever_cdkf.layout import say
+from lever_cdkf.progress import Progress
+from lever_cdkf.tables import Row, print_tables, write_json
+
+from ..envelope import conditions
+from ..study.peers import campaign, tables
+from ..study.peers.filters import PEERS
+from .names import check_names
+
+SEEDS = 8
+_NOT_HERE = ("models", "duration", "seed", "out")
+
+
+def run(args: argparse.Namespace) -> int:
+    """The firmware and its peers in the conditions of `lever envelope`."""
+    if args.list:
+        print_tables(_listed(), args.json)
+        return 0
+    for name in _NOT_HERE:
+        if getattr(args, name) is not None:
+            raise LeverError(f"--{name} does not go with --envelope")
+    check_names("condition", args.scenarios or (), conditions.CONDITIONS, "lever compare --envelope --list")
+    check_names("estimator", args.estimators or (), campaign.ESTIMATORS, "lever compare --envelope --list")
+    wanted = args.scenarios or [name for name, one in conditions.CONDITIONS.items() if one.quick or not args.quick]
+    seeds = args.seeds if args.seeds is not None else SEEDS
+    todo = campaign.tasks(
+        [one for name, one in conditions.CONDITIONS.items() if name in wanted],
+        seeds,
+        args.estimators or campaign.ESTIMATORS,
+    )
+    with Progress("compare") as progress:
+        results = campaign.run(todo, args.jobs, progress.show)
+    print_tables(tables.tables(results, seeds))
+    for sentence in tables.verdicts(results):
+        say(sentence)
+    if args.json is not None:
+        write_json(args.json, {"peers": tables.rows(results)})
+        say(f"Written: {args.json}")
+    return 0
+
+
+def _listed() -> dict[str, list[Row]]:
+    titles = {campaign.FIRMWARE: "as shipped, with the settings of the condition"}
+    titles |= {name: peer.title for name, peer in PEERS.items()}
+    return {
+        "conditions": [{"name": name, "title": one.title} for name, one in conditions.CONDITIONS.items()],
+        "estimators": [{"name": name, "title": title} for name, title in titles.items()],
+    }

@@ -1,0 +1,293 @@
+"""How right the estimates were, and whether the firmware said so: figures of a condition, a value for each run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from lever_cdkf.arrays import BoolArray, FloatArray
+from lever_cdkf.firmware.library import lib
+from numpy.typing import NDArray
+
+from ..judged import result as judged
+from ..judged.result import Values, largest, mean
+from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
+from .motions import Recording
+
+FLAGS = ("THETA", "THETA_DOT", "BASE", "INNOVATION", "BOUND", "MISMATCH", "CALIBRATION", "HANDS_OFF")
+"""Faults that say "do not trust this". CHANGE alone does not."""
+QUANTITIES = ("f_n", "zeta", *PARAMETERS)
+WITHIN = 0.05
+"""Settled is a natural frequency that stays within so much of the truth."""
+FOLLOWED = 8.0
+"""Errors and settling are followed for so long after an event [s]."""
+_CALM = 0.5  # [s] without a flag: the firmware is back
+_PENDING = 0.05  # [s] in which what was gathered before a flag may still be learnt
+
+
+def fault_mask(*names: str) -> int:
+    """The bits of these faults of the façade."""
+    mask = 0
+    for name in names:
+        mask |= int(getattr(lib, f"LEVER_FAULT_{name}"))
+    return mask
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What happened in a condition and what the firmware made of it."""
+
+    recording: Recording
+    track: Track
+    window: tuple[float, float]
+    """Judged from and to [s]."""
+    events: tuple[tuple[float, float], ...] = ()
+    """Faults or changes, from and to [s]."""
+    reference: Outcome | None = None
+    """The same where it does not happen, or is given in the settings."""
+
+    def during(self, start: float, end: float) -> BoolArray:
+        """Which estimates are of this time [s]."""
+        inside: BoolArray = (self.track.time >= start) & (self.track.time < end)
+        return inside
+
+    @cached_property
+    def judged(self) -> BoolArray:
+        """Which estimates are judged."""
+        return self.during(*self.window)
+
+    def error(self, quantity: str) -> FloatArray:
+        """Estimate minus truth (times, runs)."""
+        return self.track.value[quantity] - self.recording.truth[quantity]
+
+    def deviation(self, quantity: str) -> FloatArray:
+        """Size of the error in standard deviations that the firmware states."""
+        return np.abs(self.error(quantity)) / self.track.sigma[quantity]
+
+    def flagged(self, *names: str) -> BoolArray:
+        """Where the firmware shows any of these faults."""
+        shown: BoolArray = (self.track.faults & fault_mask(*names)) != 0
+        return shown
+
+
+def _percent(true: BoolArray, axis: int | tuple[int, ...] = 0) -> Values:
+    share: Values = 100.0 * np.mean(true, axis=axis)
+    return share
+
+
+def _percent_rms(errors: NDArray[Any], axis: int | tuple[int, ...] = 0) -> Values:
+    """Of real or complex errors."""
+    rms: Values = 100.0 * np.sqrt(np.mean(np.abs(errors) ** 2, axis=axis))
+    return rms
+
+
+def _rms(quantity: str, outcome: Outcome) -> Values:
+    return _percent_rms((outcome.error(quantity) / outcome.recording.truth[quantity])[outcome.judged])
+
+
+def _covered(quantity: str, outcome: Outcome) -> Values:
+    return _percent(outcome.deviation(quantity)[outcome.judged] <= 2.0)
+
+
+def _largest(quantity: str, outcome: Outcome) -> Values:
+    largest: Values = outcome.deviation(quantity)[outcome.judged].max(axis=0)
+    return largest
+
+
+def _share(names: tuple[str, ...], outcome: Outcome) -> Values:
+    return _percent(outcome.flagged(*names)[outcome.judged])
+
+
+def _running(outcome: Outcome) -> Values:
+    return _percent(outcome.track.mode[outcome.judged] == lib.LEVER_MODE_RUN)
+
+
+def _settled(outcome: Outcome) -> Values:
+    """From the end of the last event until the error stays small."""
+    start = outcome.events[-1][1]
+    after = outcome.during(start, start + FOLLOWED)
+    wrong = (np.abs(outcome.error("f_n")) > WITHIN * outcome.recording.truth["f_n"])[after]
+    time = outcome.track.time[after] - start
+    step = time[1] - time[0]
+    last = np.where(wrong, time[:, None] + step, 0.0).max(axis=0)
+    settled: Values = np.where(wrong[-1], math.inf, last)
+    return settled
+
+
+def _lag(outcome: Outcome) -> Values:
+    """By which c_p is late on a ramp: its mean error over its slope."""
+    truth, time = outcome.recording.truth["c_p"][outcome.judged], outcome.track.time[outcome.judged]
+    slope = (truth[-1] - truth[0]) / (time[-1] - time[0])
+    lag: Values = -outcome.error("c_p")[outcome.judged].mean(axis=0) / slope
+    return lag
+
+
+def _until_flagged(names: tuple[str, ...], outcome: Outcome) -> Values:
+    """From the begin of each event until one of the faults shows; the slowest."""
+    delays = []
+    for start, end in outcome.events:
+        inside = outcome.during(start, end)
+        shown = outcome.flagged(*names)[inside]
+        delay = outcome.track.time[inside][shown.argmax(axis=0)] - start
+        delays.append(np.where(shown.any(axis=0), delay, math.inf))
+    slowest: Values = np.max(delays, axis=0)
+    return slowest
+
+
+def _back(outcome: Outcome) -> Values:
+    """From the end of each event until the firmware learns again and shows no flag for a while; the slowest."""
+    delays = []
+    for _, end in outcome.events:
+        after = outcome.during(end, end + FOLLOWED)
+        shown = outcome.flagged(*FLAGS, "SETTLING")[after]
+        time = outcome.track.time[after] - end
+        calm = round(_CALM / (time[1] - time[0]))
+        run = np.lib.stride_tricks.sliding_window_view(shown, calm, axis=0).any(axis=-1)
+        delays.append(np.where(run.all(axis=0), math.inf, time[run.argmin(axis=0)]))
+    slowest: Values = np.max(delays, axis=0)
+    return slowest
+
+
+def _learnt(within: float, outcome: Outcome) -> Values:
+    """Greatest change of a parameter in an event, `within` seconds after its begin, in its standard deviations."""
+    changes = [np.zeros(outcome.track.faults.shape[1])]
+    for start, end in outcome.events:
+        inside = outcome.during(start + within + _PENDING, end)
+        if inside.any():
+            value, sigma = (outcome.track.parameters(which)[inside] for which in ("value", "sigma"))
+            changes.append(np.max(np.abs(value - value[0]) / sigma[0], axis=(0, 2)))
+    greatest: Values = np.max(changes, axis=0)
+    return greatest
+
+
+def _against(compute: Callable[[Outcome], Values], outcome: Outcome) -> Values:
+    """A figure over that of the reference."""
+    if outcome.reference is None:
+        raise ValueError("this condition has no reference")
+    ratio: Values = compute(outcome) / compute(replace(outcome.reference, window=outcome.window))
+    return ratio
+
+
+def _relative_sigma(quantity: str, outcome: Outcome) -> Values:
+    """Stated standard deviation, relative, mean over time."""
+    relative = outcome.track.sigma[quantity] / outcome.track.value[quantity]
+    mean: Values = relative[outcome.judged].mean(axis=0)
+    return mean
+
+
+def _sigma_ratio(outcome: Outcome) -> Values:
+    ratios = [_against(partial(_relative_sigma, name), outcome) for name in PARAMETERS]
+    widest: Values = np.max(ratios, axis=0)
+    return widest
+
+
+def _judged_feedthrough(outcome: Outcome) -> tuple[NDArray[np.complex128], Feedthrough]:
+    """True theta/z_ddot, and the firmware's at the judged times."""
+    truth, stated = outcome.recording.response, outcome.track.feedthrough
+    if truth is None or stated is None:
+        raise ValueError("this condition has no theta/z_ddot")
+    at = outcome.judged[::RESPONSE_STRIDE]
+    return truth, Feedthrough(stated.response[at], stated.gain_sigma[at], stated.phase_sigma[at])
+
+
+def _response_rms(outcome: Outcome) -> Values:
+    """Over times and frequencies, relative to the rms of the truth over the band."""
+    truth, stated = _judged_feedthrough(outcome)
+    scale = np.sqrt(np.mean(np.abs(truth) ** 2, axis=-1, keepdims=True))
+    return _percent_rms((stated.response - truth) / scale, (0, 2))
+
+
+def _response_covered(outcome: Outcome) -> Values:
+    """Gain and phase both."""
+    truth, stated = _judged_feedthrough(outcome)
+    ratio = truth / stated.response
+    gain = np.abs(np.abs(ratio) - 1.0) <= 2.0 * stated.gain_sigma
+    return _percent(gain & (np.abs(np.angle(ratio)) <= 2.0 * stated.phase_sigma), (0, 2))
+
+
+def _pooled_rms(values: Values) -> float:
+    return math.sqrt(float(np.mean(values**2)))
+
+
+@dataclass(frozen=True)
+class Figure(judged.Figure):
+    """One way to measure an outcome."""
+
+    compute: Callable[[Outcome], Values] = field(kw_only=True)
+
+
+def _figure(
+    unit: str,
+    meaning: str,
+    compute: Callable[[Outcome], Values],
+    pool: Callable[[Values], float],
+    more_is_worse: bool = True,
+) -> Figure:
+    return Figure(unit, meaning, pool, more_is_worse, compute=compute)
+
+
+def _figures() -> dict[str, Figure]:
+    figures = {}
+    for name in QUANTITIES:
+        rms, ratio = partial(_rms, name), partial(_against, partial(_rms, name))
+        figures[f"{name} rms"] = _figure("%", f"rms error of {name}", rms, _pooled_rms)
+        figures[f"{name} covered"] = _figure(
+            "%", f"share of time with the true {name} within ±2σ", partial(_covered, name), mean, False
+        )
+        figures[f"{name} largest"] = _figure("σ", f"largest error of {name}", partial(_largest, name), largest)
+        figures[f"σ({name}) ratio"] = _figure(
+            "1", f"σ of {name} ÷ that of the reference", partial(_against, partial(_relative_sigma, name)), mean
+        )
+        figures[f"{name} ratio"] = _figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
+    return figures | {
+        "flagged": _figure("%", "share of time with a fault that forbids trust", partial(_share, FLAGS), mean),
+        "mismatch": _figure("%", "share of time with MISMATCH", partial(_share, ("MISMATCH",)), mean, False),
+        "running": _figure("%", "share of time in mode RUN", _running, mean, False),
+        "settled": _figure("s", f"until f_n stays within {100 * WITHIN:g} %", _settled, largest),
+        "lag": _figure("s", "delay with which c_p is followed", _lag, mean),
+        "to flag": _figure("s", "until a fault shows", partial(_until_flagged, FLAGS), largest),
+        "to HANDS_OFF": _figure("s", "until HANDS_OFF shows", partial(_until_flagged, ("HANDS_OFF",)), largest),
+        "back": _figure("s", "until flags are off and learning goes on", _back, largest),
+        "learnt at once": _figure("σ", "greatest change of a parameter in the event", partial(_learnt, 0.0), largest),
+        "learnt": _figure("σ", "the same from 0.5 s after its begin on", partial(_learnt, 0.5), largest),
+        "learnt late": _figure("σ", "the same from 2 s after its begin on", partial(_learnt, 2.0), largest),
+        "σ ratio": _figure("1", "widest relative σ of a parameter ÷ that of the reference", _sigma_ratio, largest),
+        "θ/z̈ rms": _figure("%", "complex rms error of theta/z_ddot over 2 to 8 Hz", _response_rms, _pooled_rms),
+        "θ/z̈ covered": _figure("%", "share of it whose gain and phase are within ±2σ", _response_covered, mean, False),
+    }
+
+
+@dataclass(frozen=True)
+class Excerpt:
+    """The natural frequency in the run in which it was worst, for a chart: columns at a few hundred times."""
+
+    time: FloatArray
+    """[s]"""
+    truth: FloatArray
+    """[Hz]; nothing for a pilot that has none."""
+    value: FloatArray
+    sigma: FloatArray
+    flagged: BoolArray
+
+
+def excerpt(outcome: Outcome, points: int = 600) -> Excerpt:
+    """The part of an outcome that a reader gets to see."""
+    truth, run = outcome.recording.truth.get("f_n"), 0
+    if truth is not None:
+        run = int(np.argmax(_rms("f_n", outcome)))
+    track = outcome.track
+    at = np.arange(0, len(track.time), max(1, len(track.time) // points))
+    return Excerpt(
+        time=track.time[at],
+        truth=np.empty(0) if truth is None else truth[at, run],
+        value=track.value["f_n"][at, run],
+        sigma=track.sigma["f_n"][at, run],
+        flagged=outcome.flagged(*FLAGS)[at, run],
+    )
+
+
+FIGURES: Mapping[str, Figure] = _figures()

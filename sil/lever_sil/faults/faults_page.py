@@ -1,0 +1,114 @@
+"""faults.html: the table, and of each fault that is not met as demanded the flight in which it was worst."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+
+import numpy as np
+from lever_cdkf.report.figure import Figure, axis, band, dots, line, time_axis
+from lever_cdkf.report.page import Page
+from lever_cdkf.report.summary_html import table
+
+from .judge import BACK, ERROR, RIGHT, SIGMAS, SILENT, WARNED, Excerpt
+from .matrix import Result
+from .rows import KNOWN
+from .table import HOLDS, demands, lines, missed, state
+
+_FEW = 12
+"""Of so few faults all have a chart."""
+_STYLE = """
+.missed { color: var(--bad); }
+#table :is(td, th):nth-child(-n+4) { text-align: left; white-space: normal; }
+#table :is(td, th) { vertical-align: top; }
+#table td:nth-child(n+2):nth-child(-n+4) { min-width: 10rem; }
+"""
+_NAMES = {"f_n": "natural frequency [Hz]", "zeta": "damping ratio", "m_p": "m_p [kg]", "c_p": "c_p [N s/m]",
+          "k_p": "k_p [N/m]"}  # fmt: skip
+
+
+def build(results: Sequence[Result], seeds: int) -> str:
+    """The whole page."""
+    page = Page(
+        "Faults of bus, senders and sensors",
+        f"{seeds} random pilot{'s' if seeds > 1 else ''} a fault, the worst of them. The fault lasts from 15 to 25 s "
+        "of 40 s; frames pass the firmware's E2E check, and its dither moves the lever.",
+        "lever faults",
+    )
+    page.section("table", "Table", "Faults and what the firmware must do", _table(results), _legend())
+    for result in results:
+        if result.broken or len(results) <= _FEW:
+            _section(page, result)
+    return page.html(_verdict(results), _STYLE)
+
+
+def _verdict(results: Sequence[Result]) -> str:
+    broken = [result.row.name for result in results if result.broken]
+    links = ", ".join(f'<a href="#{name}">{name}</a>' for name in broken)
+    silent = sum(result.silent for result in results)
+    met = f"{len(results) - len(broken)} of {len(results)} faults are met as demanded"
+    wrong = f"in {silent} an estimate is wrong for {SILENT:g} s or more without a flag"
+    named = f" Not met: {links}." if broken else ""
+    return f'<p class="verdict {"bad" if broken else "good"}">{met}; {wrong}.{named}</p>'
+
+
+def _table(results: Sequence[Result]) -> str:
+    header = (
+        "fault",
+        "",
+        "must",
+        "result",
+        "to flag<br>[samples]",
+        "back<br>[s]",
+        "error after<br>[%]",
+        "silent<br>[s]",
+        "right<br>[%]",
+    )
+    return table(header, (_cells(result) for result in results))
+
+
+def _cells(result: Result) -> list[str]:
+    (row,) = lines([result])
+    word = state(result)
+    name = html.escape(result.row.name)
+    if word != HOLDS:
+        name, word = f'<a href="#{name}">{name}</a>', f'<strong class="missed">{word}</strong>: {missed(result)}'
+    figures = ("to flag", "back [s]", "error after [%]", "silent [s]", "right [%]")
+    shown = ["never" if row[column] is None else str(row[column]) for column in figures]
+    return [name, html.escape(result.row.title), html.escape(demands(result.row.must)), word, *shown]
+
+
+def _section(page: Page, result: Result) -> None:
+    """Why it is not met, and a chart."""
+    name, shown = result.row.name, result.shown.excerpt
+    why = f"<p>Known: {html.escape(KNOWN[name])}.</p>" if result.broken and name in KNOWN else ""
+    chart = page.figure(f"chart-{name}", None if shown is None else _chart(shown, result), "")
+    page.section(name, name, f"{html.escape(result.row.title)}: {state(result)}", why, chart)
+
+
+def _chart(shown: Excerpt, result: Result) -> Figure:
+    """What was longest wrong, over time; dots at the foot where a flag says so."""
+    low, high = shown.value - SIGMAS * shown.sigma, shown.value + SIGMAS * shown.sigma
+    values = np.concatenate((shown.truth, shown.value[np.isfinite(shown.value)]))
+    floor, ceiling = 0.8 * float(np.percentile(values, 1.0)), 1.2 * float(np.percentile(values, 99.0))
+    figure = Figure(
+        [axis(_NAMES[shown.quantity], range=[floor, ceiling])], time_axis(float(shown.time[-1])), height=260
+    )
+    figure.add(*band(shown.time, low, high, f"estimate ±{SIGMAS:g}σ", "estimate-band"))
+    figure.add(line(shown.time, shown.truth, "truth", "truth", line_dash="dash", zorder=1))
+    figure.add(line(shown.time, shown.value, "estimate", "estimate"))
+    if shown.flagged.any():
+        at = shown.time[shown.flagged]
+        figure.add(dots(at, np.full(at.shape, floor + 0.02 * (ceiling - floor)), "flagged", "fault"))
+    figure.mark(list(result.row.time))
+    return figure
+
+
+def _legend() -> str:
+    return " ".join((
+        f"<p>Of every fault, besides: estimates are finite; none is off by more than {SIGMAS:g}σ for {SILENT:g} s",
+        f"without a flag, and {RIGHT:g} % of the samples without a flag are within {SIGMAS:g}σ; each sample is",
+        f"answered; torque keeps its limits; the firmware learns again {BACK:g} s after the fault and knows the",
+        f"natural frequency to {ERROR:g} % in the last 5 s. Flagged is any of {', '.join(WARNED)}, a mode without",
+        "estimates, and silence.</p>",
+    ))  # fmt: skip

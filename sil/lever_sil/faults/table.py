@@ -1,0 +1,107 @@
+"""The results as rows: for a terminal, and for other programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from lever_cdkf.tables import Row
+
+from . import judge
+from .matrix import Result
+from .rows import KNOWN
+
+HOLDS, MISSED, SILENT = "holds", "MISSED", "SILENT"
+_WORD = {"silent": "wrong without a flag", "right": "too rarely right"}
+
+
+def state(result: Result) -> str:
+    """In a word."""
+    if result.silent:
+        return SILENT
+    return MISSED if result.broken else HOLDS
+
+
+def missed(result: Result) -> str:
+    """What it does not keep."""
+    return ", ".join(_WORD.get(what, what) for what in result.broken)
+
+
+def demands(must: judge.Must) -> str:
+    """What a row demands, in short."""
+    parts = []
+    if must.unaffected:
+        parts.append("not a bit changes")
+    if must.flags:
+        parts.append(f"{' or '.join(must.flags)} within {must.within} sample{'s' if must.within > 1 else ''}")
+    if must.after:
+        parts.append(f"{' or '.join(must.after)} at its end")
+    if not must.unaffected:
+        parts.append(f"mode {' or '.join(must.mode)}")
+    if must.torque_ends is not None:
+        parts.append(f"no torque after {must.torque_ends:g} s")
+    return ", ".join(parts)
+
+
+def lines(results: Sequence[Result]) -> list[Row]:
+    """For a terminal."""
+    return [
+        {
+            "fault": result.row.name,
+            "result": state(result),
+            "missed": missed(result),
+            "to flag": _whole(result, "to flag"),
+            "back [s]": _number(result.worst("back")),
+            "error after [%]": _number(result.worst("error after")),
+            "silent [s]": _number(result.worst("silent")),
+            "right [%]": round(result.covered, 1),
+        }
+        for result in results
+    ]
+
+
+def _whole(result: Result, figure: str) -> str:
+    """A figure that not all rows have."""
+    if not result.row.must.flags:
+        return ""
+    value = result.worst(figure)
+    return "never" if math.isinf(value) else f"{value:.0f}"
+
+
+def _number(value: float) -> float | None:
+    """JSON has no infinity, "never"."""
+    return float(f"{value:.3g}") if math.isfinite(value) else None
+
+
+def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
+    """As JSON has them: of every figure the worst flight."""
+    return [
+        {
+            "name": result.row.name,
+            "title": result.row.title,
+            "must": demands(result.row.must),
+            "result": state(result),
+            "broken": result.broken,
+            "known": KNOWN.get(result.row.name),
+            "covered": _number(result.covered),
+            "worst": {name: _number(result.worst(name)) for name in result.verdicts[0].measured if name != "covered"},
+        }
+        for result in results
+    ]
+
+
+def counts(results: Sequence[Result]) -> dict[str, int]:
+    """How many rows there are, how many miss what they must, how many of these are not known to, and in how many the
+    firmware was silently wrong."""
+    return {
+        "count": len(results),
+        "missed": sum(bool(result.broken) for result in results),
+        "unexpected": len(unexpected(results)),
+        "silent": sum(result.silent for result in results),
+    }
+
+
+def unexpected(results: Sequence[Result]) -> list[str]:
+    """Rows that miss what they must, and are not known to."""
+    return [result.row.name for result in results if result.broken and result.row.name not in KNOWN]

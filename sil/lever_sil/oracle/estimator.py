@@ -1,0 +1,438 @@
+"""The estimator as the firmware runs it: inputs, trim, gaps, alignment, around a belief (belief.py) and its learning.
+
+In preload trim all signals are deviations from their levels (detrend), so x is, too; in preload fixed they are as they
+come. What finds sensors stuck or wrong, and hands off, is not repeated here: compare runs in which it finds nothing.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from lever_cdkf.arrays import Array
+from lever_cdkf.models.detrend import Detrend
+from lever_cdkf.models.lever import Lever
+from lever_cdkf.models.linear import Hand, LinearBlackBox, LinearPhysical
+from numpy.typing import NDArray
+
+from . import cdkf
+from .belief import STEP, Augmented, Belief, Force, TwoStage
+from .grip import OUTAGE, SETTLING, Grip
+from .learning import ADAPTATIONS, STEP_SIGMA, Learning, Lesson, counted, seconds
+from .scale import Scale
+
+ESTIMATORS = ("dual", "joint", "augmented")
+MOST_SUBSTEPS = 12  # predictions through a gap
+MOST_STEPS = 24  # of a level, when an output is back
+LEVEL_NOISE = 22.2  # noise bandwidth of a level, in corners
+MOTION_TIME = 0.1  # [s] of the shorter average of motion
+VELOCITY_KEPT = 0.99998  # of the base's, in a step
+UNKNOWN = 10.0  # process noise for an unknown base acceleration, in those that are set
+SPIKE = 8.0  # standard deviations
+SURPRISE_TIME = 0.1  # [s] of the shorter average of normalised innovations
+SURPRISE_MOST = 100.0  # of a single sample
+UNSETTLED = 4.0  # innovations while levels settle, in squares: as much larger as they may be
+SPIKE_TIME = 0.02  # [s] longer than this it is no spike
+STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
+CONSIDERED = ("z_ddot_gain", "z_ddot_delay", "tau_m_gain", "lever_friction")
+UNBOUNDED = np.array([[-math.inf, math.inf]] * 3)
+
+Model = Lever | LinearPhysical | LinearBlackBox | Hand
+
+
+def model_of(settings: Mapping[str, float], name: str, preload: str) -> Model:
+    """The model of that name in firmware/lever_settings.def."""
+    if name == "lever":
+        return Lever.from_settings(settings, preload)
+    if name == "hand":
+        return Hand.from_settings(settings, preload)
+    rest = settings["lever_preload_angle"]
+    return LinearPhysical(rest, preload) if name == "linear_physical" else LinearBlackBox(rest, preload)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the estimator starts: the first guess of the parameters is always the settings'."""
+
+    state: Array  # (2,) [rad, rad/s]
+    state_factor: Array  # (2, 2)
+    trim: float  # [rad]
+    input: tuple[float, float] = (0.0, 0.0)  # z̈ [m/s²], τ_m [N m] at that sample, compensated
+    measured_base: float = 0.0  # z̈ as the sensor shows it
+    time: float = 0.0  # [s]
+
+
+class Estimator:
+    """The square-root CDKF for state and parameters. `settings` are those of firmware/lever_settings.def, by name.
+
+    `estimator`: "dual" or "joint", as in the firmware; "augmented", the textbook's joint filter, which learns from
+    every sample at once, without caution, and has no change detection, noise estimation and grip force. `bounds` (3, 2)
+    are the model's least and greatest parameters in physical units.
+    """
+
+    def __init__(
+        self,
+        settings: Mapping[str, float],
+        start: Start,
+        preload: str = "trim",
+        adaptation: str = "robbins_monro",
+        bounds: Array = UNBOUNDED,
+        model: str = "lever",
+        estimator: str = "dual",
+    ) -> None:
+        for what, name, choices in (("adaptation", adaptation, ADAPTATIONS), ("estimator", estimator, ESTIMATORS)):
+            if name not in choices:
+                raise ValueError(f'{what}: "{name}" is none of {", ".join(choices)}')
+        self.settings = settings
+        self.scale = Scale.from_settings(settings, model)
+        self.model = model_of(settings, model, preload)
+        self.detrended = preload == "trim"
+
+        self.outputs = (Detrend(start.trim), Detrend())  # θ, whose level is the trim angle, and θ̇
+        self.inputs = (Detrend(), Detrend(), Detrend())  # z̈, τ_m, friction of 1 N m
+        self.origin = np.array((start.trim, 0.0)) if self.detrended else np.zeros(2)  # what x counts from
+        x = start.state.astype(np.float64) - self.origin
+        x_factor, w_factor = start.state_factor.astype(np.float64), np.diag(self.scale.sigma)
+        whole = estimator == "augmented"
+        self.belief: Belief = (
+            Augmented(w_factor, x, x_factor) if whole else TwoStage(w_factor, x, x_factor, joint=estimator == "joint")
+        )
+        self.grip: Grip | None = None
+        if isinstance(self.model, Lever) and not whole:
+            self.grip = Grip(self.model, settings, self.detrended)
+        self.learning = Learning(settings, self.scale, self.belief, adaptation, bounds, not whole, self.detrended)
+        self.considered_sigma = np.array([*(settings[f"{name}_sigma"] for name in CONSIDERED), 0.0])
+        self.step_input, self.begin_rate = Detrend(), 0.0
+        presumed = 4.0 * settings["excitation_least"] ** 2  # [(rad/s)²], until measured
+        self.excitation_square, self.motion_square = presumed, presumed
+        self.nis = 0.0
+        self.average_nis, self.surprise = 1.0, 1.0  # per output, over a long time and a short one
+        self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
+        self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
+        self.last_output = [0.0, 0.0]
+        self.ahead: Array = np.zeros(2)  # of the levels since the last sample of each output
+        self.base_missing = seconds(0.0)
+        self._wait_for_levels()
+        self.last_raw = start.input
+        self.last_input = start.input  # the same, as deviations in preload trim
+        self.velocity = 0.0  # of the base [m/s]
+        self.last_measured_base = start.measured_base
+        self.time = start.time
+
+    # --- one sample ------------------------------------------------------------------------------------------------
+
+    def step(
+        self,
+        time: float,
+        y: Array,
+        valid: NDArray[np.bool_],
+        u: tuple[float, float],
+        base_valid: bool = True,
+        force: float | None = None,
+    ) -> None:
+        """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) and
+        the grip force [N] as the sensors show them."""
+        duration = time - self.time
+        substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
+        dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
+        inputs = (self._true_base(u[0], duration, base_valid), u[1] / self.settings["tau_m_gain"])
+        for i in range(1, substeps + 1):
+            if i == substeps:
+                self._follow_base(base_valid, duration)
+            share = i / substeps
+            last = self.last_raw
+            between = (last[0] + share * (inputs[0] - last[0]), last[1] + share * (inputs[1] - last[1]))
+            self._advance(between, force if i == substeps else None, dt)
+            if i < substeps:
+                self._subtract_trim(y, none_valid, dt)
+        self.time, self.last_raw = time, inputs
+        valid = valid & ~self._are_spikes(y, valid, duration)
+        y, back = self._subtract_trim(y, valid, dt)
+        if back:
+            self._end_outage(y, valid)
+        self._correct(y, valid, duration)
+        self._average_motion(duration)
+
+    def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
+        """Measurement update, and learning when it is due."""
+        excited = self._is_excited()
+        measured = self._is_settled() and bool(valid.any()) and bool(self.base_missing <= 0.0)
+        lesson = Lesson(measured, excited, self.surprise)
+        self.nis = 0.0
+        if valid.any():
+            noise = np.diag(self.learning.noise.output_noise)
+            innovation = self.belief.update(y, valid, noise, learn=lesson.measured and excited)
+            self.nis = innovation.normalised_square
+            self._average_innovation(self.nis / int(valid.sum()), duration)
+            self.learning.add(innovation, valid, lesson)
+        rate = float(self.belief.x[1])
+        if self.grip is None:
+            self.learning.step(duration, lesson)
+        else:
+            grip = self.grip
+            self.learning.step(duration, lesson, lambda period: grip.end_block(rate, period, measured and excited))
+        self.considered_sigma[STEP] = self.learning.step_sigma
+        if self.learning.moved:
+            self._begin_grip(np.where(valid, y, self.belief.x))
+        self.unsettled -= counted(duration)
+
+    def _is_settled(self) -> bool:
+        return bool(self.unsettled < 0.5 * self.settings["sample_period"])
+
+    def _is_excited(self) -> bool:
+        least = self.settings["excitation_least"] ** 2
+        return bool(self.excitation_square >= least and self.motion_square >= 0.25 * least)
+
+    def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
+        """Outputs far from what is expected, until they have been for SPIKE_TIME. After an outage nothing is."""
+        noise = self.learning.noise.output_noise
+        state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
+        least = UNSETTLED if self.unsettled > 0.0 else 1.0
+        expected = np.maximum(max(self.average_nis, least) * (state**2 + noise**2), noise**2)
+        checked = valid & (np.array(self.missing) <= OUTAGE)
+        far = checked & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
+        for i in np.flatnonzero(checked):
+            self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
+        spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
+        return spikes
+
+    def _true_base(self, measured: float, duration: float, valid: bool) -> float:
+        """By a sensor that shows gain times the base acceleration, late by a delay; the last one when not valid."""
+        if not valid:
+            return self.last_raw[0]
+        slope = (measured - self.last_measured_base) / duration
+        self.last_measured_base = measured
+        return (measured + self.settings["z_ddot_delay"] * slope) / self.settings["z_ddot_gain"]
+
+    def _follow_base(self, valid: bool, duration: float) -> None:
+        """Its level has to settle again after an outage."""
+        if valid and self.base_missing > OUTAGE:
+            self._wait_for_levels()
+        self.base_missing = seconds(0.0) if valid else self.base_missing + counted(duration)
+
+    def _advance(self, raw: tuple[float, float], force: float | None, dt: float) -> None:
+        """One prediction, with the mean of the inputs at both ends. A base that is not known is noise."""
+        rate = float(self.origin[1] + self.belief.x[1])
+        stop = self._deviation(self.inputs[2], rate / (abs(rate) + STOP_RATE), dt)
+        base, torque = (self._deviation(detrend, value, dt) for detrend, value in zip(self.inputs, raw, strict=False))
+        u, last = (base, torque - self.settings["lever_friction"] * stop), self.last_input
+        if self.detrended:
+            self.origin = np.array([detrend.level for detrend in self.outputs])
+        z_ddot = 0.5 * (base + last[0])
+        mean, z_dot = (z_ddot, 0.5 * (u[1] + last[1])), self.velocity + 0.5 * dt * z_ddot
+        self.velocity = VELOCITY_KEPT * z_dot + 0.5 * dt * z_ddot
+        if self.base_missing > 0.0:
+            z_ddot, z_dot, force = 0.0, 0.0, None
+            self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
+        # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
+        slope = (base - last[0]) / dt
+        errors = np.array(
+            ((-base, slope, 0.0, 0.0, 0.0), (0.0, 0.0, -last[1], -stop, 0.0), (-self.velocity, base, 0.0, 0.0, 0.0))
+        )
+        self._predict((z_ddot, mean[1], z_dot), errors, dt, self._force(force, mean, errors, dt))
+        self.last_input = u
+
+    def _force(self, measured: float | None, u: tuple[float, float], errors: Array, dt: float) -> Force | None:
+        """The grip force as the belief takes it. What moves the lever besides acts on it, not on the hand."""
+        grip = self.grip
+        seen = None if grip is None else grip.step(measured, self.belief.x, u, errors[:2], self.trim, dt)
+        if grip is None or seen is None:
+            return None
+        angle = np.array((self.trim if self.detrended else 0.0, 0.0))
+        x, p = self.belief.x + angle, self.scale.physical(self.belief.w)
+        pushed, unpushed = (self.model.step(x, p, (u[0], torque, 0.0), self.trim, dt)[1] for torque in (1.0, 0.0))
+        kick = -1.0 / (float(pushed - unpushed) * grip.lever.length)
+        learn = bool(self._is_settled() and self._is_excited() and self.base_missing <= 0.0)
+        return Force(seen[0], grip.noise(dt), lambda a, b: grip.expected(a, b, dt), kick, seen[1], learn)
+
+    def _deviation(self, detrend: Detrend, value: float, dt: float) -> float:
+        deviation = detrend.step(value, self.settings["trim_corner"], dt)
+        return deviation if self.detrended else value
+
+    def _subtract_trim(self, y: Array, valid: NDArray[np.bool_], dt: float) -> tuple[Array, bool]:
+        """The outputs without their slow level, as x is in preload trim, and whether one is back after an outage.
+
+        Through a few missing samples a level goes `ahead` with the prediction, and takes a straight line when it
+        is back; after more of them it waits.
+        """
+        deviation, back = np.zeros(2), False
+        for i, detrend in enumerate(self.outputs):
+            waiting = bool(self.missing[i] > OUTAGE)
+            if valid[i]:
+                steps = 1 if waiting else min(round(float(self.missing[i]) / dt) + 1, MOST_STEPS)
+                elapsed = dt if waiting else float(self.missing[i]) + dt
+                for value in np.linspace(self.last_output[i], float(y[i]), steps + 1)[1:].tolist():
+                    deviation[i] = self._deviation(detrend, value, elapsed / steps)
+                back = back or waiting
+                self.last_output[i], self.ahead[i], self.missing[i] = float(y[i]), 0.0, seconds(0.0)
+                continue
+            if waiting:
+                detrend.hold()
+            elif self.detrended:
+                self.ahead[i] += dt * detrend.rate(float(self.belief.x[i]), self.settings["trim_corner"])
+            self.missing[i] += seconds(dt)
+        return deviation, back
+
+    def _end_outage(self, y: Array, valid: NDArray[np.bool_]) -> None:
+        """The state starts again where it is measured; levels must settle before anything can be learnt."""
+        if valid.all():
+            self.belief.start_state(y, np.diag(self.learning.noise.output_noise))
+        self._wait_for_levels()
+
+    def _begin_grip(self, x: Array) -> None:
+        """Levels and state begin anew where the lever is, with a step of its acceleration."""
+        self.learning.moved = False
+        if not isinstance(self.belief, TwoStage):
+            return
+        for detrend, value in zip(self.outputs, self.origin + self.ahead + x, strict=True):
+            detrend.begin(float(value))
+        for detrend in self.inputs:
+            detrend.begin(detrend.level)
+        if self.grip is not None:
+            self.grip.begin()
+        self.step_input.begin(0.0)
+        self.begin_rate = self.outputs[1].level
+        self.origin, self.ahead = np.array([detrend.level for detrend in self.outputs]), np.zeros(2)
+        self.belief.start_state(np.zeros(2), np.diag(self.learning.noise.output_noise))
+        self.belief.begin_step()
+        self.learning.step_sigma = STEP_SIGMA
+        self.last_input, self.velocity = (0.0, 0.0), 0.0
+
+    def _wait_for_levels(self) -> None:
+        self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
+
+    def _predict(self, u: tuple[float, ...], errors: Array, dt: float, force: Force | None) -> None:
+        """The trim is where it was at the last sample. `errors` (3, 4): of the inputs, per unit of each considered."""
+        trim = self.outputs[0].level
+        angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
+
+        def moved_by(x: Array, w: Array, u: tuple[float | Array, ...]) -> Array:
+            moved: Array = self.model.step(x + angle, self.scale.physical(w), u, trim, dt) - angle
+            return moved
+
+        def motion(x: Array, w: Array) -> Array:
+            return moved_by(x, w, u)
+
+        step = 0.0
+        if self.learning.step_sigma > 0.0 and isinstance(self.belief, TwoStage):
+            step = self._deviation(self.step_input, 1.0, dt)
+            self.belief.shift(np.array((dt * step * self.begin_rate, 0.0)))
+        x, w = self.belief.x[:, np.newaxis], self.belief.w[:, np.newaxis]
+        with_errors = np.concatenate((np.zeros((3, 1)), errors), axis=1)  # none, then a unit of each
+        moved = moved_by(x, w, tuple(np.array(u)[:, np.newaxis] + with_errors))
+        push = moved[:, 1:] - moved[:, :1]
+        push[:, STEP] = step * dt * np.array((0.5 * dt, 1.0))
+        self.belief.predict(motion, self._process_noise(dt), push, force)
+
+    def _process_noise(self, dt: float) -> Array:
+        """Factor (2, 3) of an integrated random walk of θ̇ (its covariance: van Loan 1978) plus a random walk of θ."""
+        own = self.settings["theta_process_noise"]
+        rate = self.learning.noise.process_noise + self.learning.disturbance
+        return math.sqrt(dt) * np.array([[own, rate * dt / 2.0, rate * dt / math.sqrt(12.0)], [0.0, rate, 0.0]])
+
+    def _average_innovation(self, square: float, duration: float) -> None:
+        share = min(duration / self.settings["excitation_time"], 1.0)
+        if self.unsettled - counted(duration) <= 0.0:
+            self.average_nis += share * (square - self.average_nis)
+        self.surprise += min(duration / SURPRISE_TIME, 1.0) * (min(square, SURPRISE_MOST) - self.surprise)
+
+    def _average_motion(self, duration: float) -> None:
+        """The mean square of the rate, over a long time and a short one."""
+        square = float(self.belief.x[1]) ** 2
+        share = min(duration / self.settings["excitation_time"], 1.0)
+        self.excitation_square += share * (square - self.excitation_square)
+        self.motion_square += min(duration / MOTION_TIME, 1.0) * (square - self.motion_square)
+
+    # --- estimates -------------------------------------------------------------------------------------------------
+
+    @property
+    def trim(self) -> float:
+        """The trim angle [rad]."""
+        return self.outputs[0].level
+
+    def state_deviations(self) -> Array:
+        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration included; that of
+        the level, too, which has the noise of the samples, and does not know the motion while it waits."""
+        sigma = self._with_considered(self.belief.joint_factor, self.belief.errors)[len(self.scale.names) :]
+        if not self.detrended:
+            return sigma
+        corner = self.settings["trim_corner"]
+        unknown = math.sqrt(self.excitation_square) * (np.array(self.missing) > OUTAGE)
+        unknown = unknown / np.array((2.0 * math.pi * corner, 1.0))
+        noise = self.learning.noise.output_noise**2 * LEVEL_NOISE * corner * self.settings["sample_period"]
+        total: Array = np.sqrt(sigma**2 + unknown**2 + noise)
+        return total
+
+    def _with_considered(self, factor: Array, errors: Array) -> Array:
+        """Standard deviations of what has the factor `factor`, and `errors` by a unit of each considered error."""
+        return cdkf.deviations(np.concatenate((factor, errors * self.considered_sigma), axis=1))
+
+    def parameters(self) -> tuple[Array, Array]:
+        """The model's parameters in its units, and their standard deviations to first order."""
+        w, n = self.belief.w, len(self.scale.names)
+        sigma = self._with_considered(self.belief.w_factor, self.belief.errors[:n])
+        return self.scale.physical(w), self.scale.slope(w) * sigma
+
+    def dynamics(self) -> tuple[Array, Array]:
+        """Natural frequency [Hz] and damping ratio [1] of the estimate; standard deviations by sigma points."""
+        points = self.scale.physical(cdkf.draw(self.belief.w, self.belief.w_factor))
+        values = self.model.dynamics(points, self.trim)
+        _, first, second = cdkf.differences(values)
+        slope = np.linalg.solve(self.belief.w_factor.T, first.T).T
+        errors = slope @ self.belief.errors[: len(self.scale.names)]
+        return values[:, 0], self._with_considered(np.concatenate((first, second), axis=1), errors)
+
+
+# --- a whole run -----------------------------------------------------------------------------------------------------
+
+
+def align(samples: Mapping[str, Array], settings: Mapping[str, float]) -> tuple[Start, int]:
+    """Where the firmware starts after `align_time`, and how many samples that took (at least one).
+
+    The trim is the mean angle; the state is the last sample, as uncertain as its noise. Raises ValueError if that
+    sample is not valid, for then the firmware goes on aligning.
+    """
+    time = samples["time_s"]
+    last = int(np.searchsorted(time, time[0] + settings["align_time"] - 0.5 * settings["sample_period"]))
+    if not (samples["theta_valid"][last] and samples["theta_dot_valid"][last]):
+        raise ValueError(f"align: theta or theta_dot is not valid at {time[last]} s, the end of align_time")
+    theta = samples["theta"][: last + 1][samples["theta_valid"][: last + 1].astype(bool)]
+    state = np.array((samples["theta"][last], samples["theta_dot"][last]))
+    factor = np.diag((settings["theta_noise"], settings["theta_dot_noise"]))
+    base, before = (float(samples["z_ddot"][k]) for k in (last, max(last - 1, 0)))
+    late = settings["z_ddot_delay"] * (base - before) / (float(time[last] - time[last - 1]) if last else 1.0)
+    inputs = ((base + late) / settings["z_ddot_gain"], float(samples["tau_m"][last]) / settings["tau_m_gain"])
+    return Start(state, factor, float(theta.mean()), inputs, base, float(time[last])), last + 1
+
+
+def columns(estimator: Estimator) -> tuple[str, ...]:
+    """Of what `run` returns."""
+    names = estimator.scale.names
+    return (
+        *("theta", "theta_dot", "theta_sigma", "theta_dot_sigma"),
+        *(*names, *(f"{name}_sigma" for name in names)),
+        *("natural_frequency", "damping_ratio", "natural_frequency_sigma", "damping_ratio_sigma"),
+        *("trim", "nis"),
+    )
+
+
+def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, every: int = 1) -> dict[str, Array]:
+    """Steps through the samples from index `first` on; estimates after every `every`th of them, an array a column.
+
+    `samples`: time_s, theta, theta_dot, z_ddot, tau_m and theta_valid, theta_dot_valid, z_ddot_valid, each of shape
+    (N,); an invalid tau_m must already be 0. grip_force [N] may be missing, or NaN.
+    """
+    rows = []
+    y = np.column_stack((samples["theta"], samples["theta_dot"]))
+    valid = np.column_stack((samples["theta_valid"], samples["theta_dot_valid"])).astype(bool)
+    base_valid = samples["z_ddot_valid"].astype(bool).tolist()
+    time, base, torque = (samples[name].tolist() for name in ("time_s", "z_ddot", "tau_m"))
+    forces = samples.get("grip_force", np.full(len(time), math.nan)).tolist()
+    for index in range(first, len(time)):
+        force = None if math.isnan(forces[index]) else forces[index]
+        estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index], force)
+        if (index - first) % every == 0:
+            x = (estimator.origin + estimator.ahead + estimator.belief.x, estimator.state_deviations())
+            others = (*estimator.parameters(), *estimator.dynamics(), (estimator.trim, estimator.nis))
+            rows.append(np.concatenate((*x, *others)))
+    return dict(zip(columns(estimator), np.array(rows).T, strict=True))

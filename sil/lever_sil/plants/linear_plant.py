@@ -1,0 +1,154 @@
+"""The linear truths, in double precision: theta moves as a mass on a spring and a damper does.
+
+    theta_ddot = -stiffness (theta - rest) - damping theta_dot + gain z_ddot + compliance tau_m
+
+    linear_physical [m, c, k]           stiffness k/m, damping c/m, gain 1, compliance 1/m
+    linear_black_box [a21, a22, b21]    stiffness -a21, damping -a22, gain b21, compliance 0
+
+with the signs of firmware/model/linear_*.c. The lever rests at the trim, a trajectory (preload trim), or at its own
+preload angle (preload fixed). Gravity has no part in it.
+
+Integration: as in lever_plant.py, the linearly implicit midpoint rule on the same substeps, with process noise on
+theta_dot.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from lever_cdkf.arrays import FloatArray
+from lever_cdkf.models.transfer import Transfer
+from numpy.typing import NDArray
+
+from .truth import Conditions, Dynamics, Truth
+
+
+@dataclass(frozen=True)
+class System:
+    """The coefficients of the equation above at every sample: arrays of equal length."""
+
+    stiffness: FloatArray
+    """Above 0 [1/s^2]."""
+    damping: FloatArray
+    """[1/s]"""
+    gain: FloatArray
+    """[rad/s^2 per m/s^2]"""
+    compliance: FloatArray
+    """[rad/s^2 per N m]"""
+    rest: FloatArray
+    """[rad]"""
+
+
+class LinearTruth(Truth):
+    """A truth that is such a system."""
+
+    @property
+    @abstractmethod
+    def system(self) -> System:
+        """Its coefficients."""
+
+    @property
+    def rest(self) -> FloatArray:
+        return self.system.rest
+
+    @property
+    def dynamics(self) -> Dynamics:
+        omega = np.sqrt(self.system.stiffness)
+        return Dynamics(omega / (2.0 * np.pi), self.system.damping / (2.0 * omega))
+
+    def transfer(self, samples: NDArray[np.intp]) -> Transfer:
+        system = self.system
+        denominator = (np.ones_like(system.damping), system.damping, system.stiffness)
+        return Transfer(system.gain[samples, None], np.stack(denominator, axis=1)[samples])
+
+    def body(self, conditions: Conditions) -> Plant:
+        return Plant(self.system, self.felt(conditions))
+
+    def felt(self, conditions: Conditions) -> Conditions:
+        """The conditions with the base acceleration that drives the system."""
+        return conditions
+
+
+@dataclass(frozen=True)
+class Physical(LinearTruth):
+    """Mass [kg], damper [N s/m] and spring [N/m] on the base, theta taken for metres and tau_m for newtons."""
+
+    model = "linear_physical"
+    m: FloatArray
+    c: FloatArray
+    k: FloatArray
+    trim: FloatArray
+
+    @property
+    def parameters(self) -> Mapping[str, FloatArray]:
+        return {"m": self.m, "c": self.c, "k": self.k}
+
+    @property
+    def system(self) -> System:
+        return System(self.k / self.m, self.c / self.m, np.ones_like(self.m), 1.0 / self.m, self.trim)
+
+
+@dataclass(frozen=True)
+class BlackBox(LinearTruth):
+    """a21 [1/s^2], a22 [1/s] and b21 [1]; no torque acts."""
+
+    model = "linear_black_box"
+    takes_torque = False
+    a21: FloatArray
+    a22: FloatArray
+    b21: FloatArray
+    trim: FloatArray
+
+    @property
+    def parameters(self) -> Mapping[str, FloatArray]:
+        return {"a21": self.a21, "a22": self.a22, "b21": self.b21}
+
+    @property
+    def system(self) -> System:
+        return System(-self.a21, -self.a22, self.b21, np.zeros_like(self.b21), self.trim)
+
+
+# One sample period, prepared: stiffness, damping, compliance, rest, [(gain z_ddot, noise), ...] of its substeps
+_Row = tuple[float, float, float, float, list[list[float]]]
+
+
+def _rows(system: System, conditions: Conditions) -> Iterator[_Row]:
+    """The sample periods between the samples, in order."""
+    columns = (system.stiffness, system.damping, system.compliance, system.rest)
+    for block in conditions.blocks():
+        at = block.periods
+        noise = block.kick + system.compliance[at, None] * block.push
+        drive = np.stack((system.gain[at, None] * block.z_ddot, noise), axis=2).tolist()
+        yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
+
+
+class Plant:
+    """System and motor: a truth.Body."""
+
+    def __init__(self, system: System, conditions: Conditions) -> None:
+        self.theta = float(system.rest[0])
+        self.theta_dot = 0.0
+        self.tau_m = 0.0
+        self.grip_force = math.nan
+        self._step = conditions.step
+        self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
+        self._rows = _rows(system, conditions)
+
+    def advance(self, command: float) -> None:
+        """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""
+        theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
+        stiffness, damping, compliance, rest, drive = next(self._rows)
+        step, lag_middle, lag = self._step, self._lag_middle, self._lag
+        half = 0.5 * step
+        for shake, noise in drive:
+            force = shake + compliance * (command + torque * lag_middle)
+            force -= stiffness * (theta + half * theta_dot - rest) + damping * theta_dot
+            change = (step * force + noise) / (1.0 + half * damping)
+            theta += step * (theta_dot + 0.5 * change)
+            theta_dot += change
+            torque *= lag
+        self.theta, self.theta_dot, self.tau_m = theta, theta_dot, command + torque

@@ -1,0 +1,177 @@
+"""What the inceptor's computer gets to see of lever and base.
+
+A sensor gives (1 + gain_error) x(t - delay) + bias + noise. Quantisation is that of the CAN codec, for which a value
+beyond its range is not valid; nothing is rounded here. A fault makes a reading wrong that still counts as valid. A
+Dropout says when a value is marked invalid or a whole frame is never sent.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from lever_cdkf.arrays import BoolArray, FloatArray
+from numpy.typing import NDArray
+
+from ..toml_tables import SIGNAL, choice, item, quantity, read_kind, read_table, tables
+
+VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
+FRAMES = ("lever_frame", "base_frame")
+
+
+@dataclass(frozen=True)
+class Corruption:
+    """What faults make of the readings of a sensor: factor * reading[source] + offset, an array a sample each."""
+
+    source: NDArray[np.intp]
+    factor: FloatArray
+    offset: FloatArray
+
+    def of(self, readings: FloatArray) -> FloatArray:
+        """All readings with the faults in them."""
+        return self.factor * readings[self.source] + self.offset
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault(ABC):
+    """What is wrong with a sensor from start (included) to end (excluded), without its being marked invalid."""
+
+    start: float = quantity("s", 0.0, least=0.0)
+    end: float = quantity("s", math.inf, above=0.0)
+
+    def __post_init__(self) -> None:
+        if not self.start < self.end:
+            raise ValueError(f"start {self.start:g} s is not before end {self.end:g} s")
+
+    @abstractmethod
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        """Adds the fault to `corruption` at the samples `inside`, at least one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stuck(Fault):
+    """The last reading before, noise and all, over and over."""
+
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        corruption.source[inside] = max(inside[0] - 1, 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scale(Fault):
+    """The reading times `factor`: 0 of a dead sensor, -1 of one wired the wrong way round."""
+
+    factor: float = quantity("1")
+
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        corruption.factor[inside] *= self.factor
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spikes(Fault):
+    """A `share` of the samples, drawn one by one, is off by `size`, up or down."""
+
+    share: float = quantity("1", above=0.0, greatest=1.0)
+    size: float = quantity(SIGNAL, above=0.0)
+
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        hit = rng.random(len(inside)) < self.share
+        corruption.offset[inside] += hit * rng.choice((-self.size, self.size), len(inside))
+
+
+FAULTS: dict[str, type[Fault]] = {"stuck": Stuck, "scale": Scale, "spikes": Spikes}
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One sensor; noise is the standard deviation of a sample, delay may be any part of a sample period."""
+
+    noise: float = quantity(SIGNAL, 0.0, least=0.0)
+    bias: float = quantity(SIGNAL, 0.0)
+    gain_error: float = quantity("1", 0.0, above=-1.0)
+    delay: float = quantity("s", 0.0, least=0.0)
+    fault: tuple[Fault, ...] = tables(read_kind(FAULTS))
+
+    def offsets(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """What is added to `count` samples: bias and noise."""
+        offsets: FloatArray = rng.standard_normal(count)
+        offsets *= self.noise
+        offsets += self.bias
+        return offsets
+
+    def lag(self, period: float) -> tuple[int, float]:
+        """The delay as whole sample periods and the part of one beyond, for linear interpolation."""
+        samples = self.delay / period
+        whole = math.floor(samples + 1e-9)
+        return whole, max(0.0, samples - whole)
+
+    def measure(self, signal: FloatArray, period: float, rng: np.random.Generator) -> FloatArray:
+        """All samples of a `signal` that is known beforehand; before its start it had its first value."""
+        whole, part = self.lag(period)
+        delayed = signal
+        if whole or part:
+            at = np.arange(len(signal)) - (whole + part)
+            delayed = np.interp(at, np.arange(len(signal)), signal)
+        return (1.0 + self.gain_error) * delayed + self.offsets(len(signal), rng)
+
+    def corruption(self, time: FloatArray, rng: np.random.Generator) -> Corruption:
+        """What its faults do at the times `time` [s]."""
+        count = len(time)
+        corruption = Corruption(np.arange(count), np.ones(count), np.zeros(count))
+        for fault in self.fault:
+            inside = np.flatnonzero((time >= fault.start) & (time < fault.end))
+            if len(inside):
+                fault.corrupt(inside, corruption, rng)
+        return corruption
+
+
+@dataclass(frozen=True)
+class Dropout:
+    """Something missing for `share` of the time between start and end, in bursts of `burst` on average."""
+
+    what: str = choice(*VALUES, *FRAMES)
+    share: float = quantity("1", above=0.0, greatest=1.0)
+    burst: float = quantity("s", 1e-3, above=0.0)
+    start: float = quantity("s", 0.0, least=0.0)
+    end: float = quantity("s", math.inf, above=0.0)
+
+    def missing(self, time: FloatArray, period: float, rng: np.random.Generator) -> BoolArray:
+        """True at the samples `time` [s] that are missing: Gilbert's two states, geometric bursts and pauses."""
+        inside = (time >= self.start) & (time < self.end)
+        if self.share == 1.0:
+            return inside
+        burst = max(1.0, self.burst / period)
+        pause = burst * (1.0 - self.share) / self.share
+        if pause < 1.0:
+            burst, pause = burst / pause, 1.0
+        turns = 2 + 2 * math.ceil(len(time) / (burst + pause)) + 64
+        lengths = np.stack((rng.geometric(1.0 / pause, turns), rng.geometric(1.0 / burst, turns)), axis=1).ravel()
+        pattern = np.repeat(np.tile((False, True), turns), lengths)
+        missing: BoolArray = inside & pattern[: len(time)]
+        return missing
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """All sensors; the defaults are the standard values: 1 mrad and 10 mrad/s of noise, a fair accelerometer and torque
+    sensor; no sensor of the grip force."""
+
+    theta: Sensor = item(read_table(Sensor), "rad", Sensor(noise=1e-3))
+    theta_dot: Sensor = item(read_table(Sensor), "rad/s", Sensor(noise=1e-2))
+    z_ddot: Sensor = item(read_table(Sensor), "m/s^2", Sensor(noise=0.01))
+    tau_m: Sensor = item(read_table(Sensor), "N m", Sensor(noise=2e-3))
+    grip_force: Sensor | None = item(read_table(Sensor), "N", None)
+    dropout: tuple[Dropout, ...] = tables(read_table(Dropout))
+
+
+def missing(
+    dropouts: Sequence[Dropout], what: str, time: FloatArray, period: float, rngs: Sequence[np.random.Generator]
+) -> BoolArray:
+    """True at the samples in which any of `dropouts` takes `what`; one random stream for each dropout."""
+    gone = np.zeros(len(time), dtype=np.bool_)
+    for dropout, rng in zip(dropouts, rngs, strict=True):
+        if dropout.what == what:
+            gone |= dropout.missing(time, period, rng)
+    return gone

@@ -1,0 +1,137 @@
+"""A whole simulation: the run over the bus, what comes out of it, and its files."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import can
+import numpy as np
+from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.errors import LeverError
+from lever_cdkf.exports.signal_files import SignalFiles
+from lever_cdkf.extras import missing
+from lever_cdkf.files import Outputs, make_folder, write_text, writing
+from lever_cdkf.formats import FORMATS
+from lever_cdkf.provenance import provenance
+from lever_cdkf.results.summary import SimulationSummary, text
+from lever_cdkf.results.trace import Trace
+from numpy.typing import NDArray
+
+from ..scenarios.scenario import Scenario
+from . import buslog, in_process, loop, summary
+from .buslog import Frames
+from .columns import columns_of, published
+from .loop import Progress, Recording
+
+if TYPE_CHECKING:
+    from lever_cdkf.report.page import Story
+
+_BOUND = 1e9
+"""[m/s^2, rad, rad/s, N m]"""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a simulation gives: the columns of trace.csv, the content of summary.json, and every frame on the bus."""
+
+    trace: Trace
+    summary: SimulationSummary
+    frames: Frames
+
+
+def simulate(
+    scenario: Scenario,
+    bus: can.BusABC | None = None,
+    out_dir: Path | None = None,
+    *,
+    channel: str = "lever",
+    realtime: bool = False,
+    progress: Progress | None = None,
+    formats: Sequence[str] = ("csv",),
+    inputs: Sequence[str | Path] = (),
+    story: Callable[[], Story] | None = None,
+    snapshots: float | None = None,
+) -> Result:
+    """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
+    it; with `out_dir` also writes bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra
+    `report`) and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the
+    scenario is from; `story` makes a first picture for the report; in this process the firmware sends its state each
+    `snapshots` seconds.
+
+    `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
+    files but for the wall times are the same either way. Raises LeverError.
+    """
+    start = clock.perf_counter()
+    if out_dir is not None:
+        make_folder(out_dir)  # before a run that could then not be kept
+    if bus is None and not realtime:
+        recording = in_process.run(scenario, channel, progress, snapshots)
+    else:
+        with ExitStack() as stack:
+            config, aircraft = scenario.config, scenario.known_aircraft
+            estimator = bus or stack.enter_context(
+                LeverBus(channel, config=config, aircraft=aircraft, snapshots=snapshots)
+            )
+            recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
+            recording.has_aircraft = isinstance(estimator, LeverBus)
+    _check_bounded(recording)
+    frames = recording.frames()
+    columns = columns_of(recording, frames)
+    untimed = summary.build(recording, columns)
+    if out_dir is not None:
+        files = _Files(out_dir, channel, formats, inputs, story)
+        files.write(Result(columns, untimed, frames), published(recording, frames), start)
+    return Result(columns, untimed.timed(clock.perf_counter() - start), frames)
+
+
+def _check_bounded(recording: Recording) -> None:
+    """Raises LeverError for a run that no arithmetic can judge."""
+    inputs = recording.inputs
+    signals = {"z_ddot": inputs.z_ddot, "theta": recording.theta, "theta_dot": recording.theta_dot}
+    for name, signal in (signals | {"tau_m": recording.tau_m}).items():
+        beyond = np.flatnonzero(~(np.abs(signal) < _BOUND))
+        if len(beyond):
+            raise LeverError(
+                f"{recording.scenario.file}: {name} grows beyond all bounds at {inputs.time[beyond[0]]:.4g} s: what "
+                "acts there, the pilot or the aircraft is out of scale (a wrong unit?)"
+            )
+
+
+@dataclass(frozen=True)
+class _Files:
+    """What is to be written."""
+
+    folder: Path
+    channel: str
+    formats: Sequence[str]
+    inputs: Sequence[str | Path]
+    story: Callable[[], Story] | None
+
+    def write(self, result: Result, published: NDArray[np.bool_], start: float) -> None:
+        """Writes the files; summary.json comes last, so that its wall time is of everything."""
+        from lever_cdkf.report import write_report
+
+        def elapsed() -> SimulationSummary:
+            return result.summary.timed(clock.perf_counter() - start)
+
+        origin = provenance(self.inputs)
+        with Outputs(self.folder, self.inputs, ("report.html", *FORMATS.values())) as outputs:
+            bus_log = outputs.path("bus.log")
+            with writing(bus_log), bus_log.open("wb") as file:
+                file.writelines(buslog.lines(result.frames, self.channel))
+            with SignalFiles(self.formats, outputs.path, origin) as signals:
+                signals.start(result.trace, 0, asdict(result.summary.estimator))
+                signals.add(result.trace, published, np.zeros_like(published))
+                signals.close()
+            origin = origin.with_outputs(outputs.written("bus.log", FORMATS["csv"]))
+            summary = replace(elapsed(), provenance=origin)
+            if not missing("report"):
+                story = None if self.story is None else self.story()
+                write_report(result.trace, summary, outputs.path("report.html"), story)
+            write_text(outputs.path("summary.json"), text(replace(elapsed(), provenance=origin)))
+            outputs.finish()

@@ -1,0 +1,282 @@
+"""What estimators are compared on. A new case is a line in `cases`; everything else finds it there."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+
+import numpy as np
+from lever_cdkf.arrays import Array, BoolArray
+from lever_cdkf.firmware.config import settings_table
+from numpy.typing import NDArray
+
+from ...scenarios import scenario as scenarios
+from .. import bound, linearised
+from ..data import Batch
+from ..detrended import detrended
+from ..matched import Condition, matched
+from ..recorded import recorded, usable
+from ..steps import Step, stepped
+
+PRIOR: Mapping[str, Mapping[str, float]] = {
+    "lever": {"m_p_sigma": 0.25, "c_p_sigma": 0.3, "k_p_sigma": 0.3},
+    "linear_physical": {"m_sigma": 0.25, "c_sigma": 0.3, "k_sigma": 0.3},
+    "linear_black_box": {},
+}
+"""Of the matched runs: the first guess is wrong by a quarter to a third, as in the shipped scenarios."""
+
+QUIET, ROUGH = 0.01, 0.1
+"""Low and high process noise [rad/s/√s]."""
+_MOST_RECORDED = 20  # runs
+DITHER = 0.3
+"""[N m] rms"""
+
+
+@dataclass(frozen=True)
+class References:
+    """Variances of w and of natural frequency and damping ratio relative to the truth, for the errors of all."""
+
+    linearised: Array
+    """(B, T, 5) of the Kalman filter linearised at the truth (linearised.py): of each run."""
+    bound: Array
+    """(T, 5) posterior Cramér–Rao bound (bound.py): of the mean over runs."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much of each case is run."""
+
+    seeds: int = 40
+    duration: float | None = None
+    """[s]; None: each case's own. Moments inside a run move in proportion."""
+    seed: int = 1
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether there is enough to judge what the firmware has to show."""
+        return self.seeds >= 20 and self.duration is None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case(ABC):
+    """Batches of one kind, with what is to be judged of them."""
+
+    name: str
+    title: str
+    kind: str
+    model: str = "lever"
+    preload: str = "trim"
+    duration: float
+    """[s] unless the plan has another."""
+    every: float = 0.1
+    """Time between two estimates that are looked at [s]."""
+
+    @abstractmethod
+    def batch(self, plan: Plan) -> Batch:
+        """What estimators get."""
+
+    @abstractmethod
+    def judged(self, time: Array, plan: Plan) -> BoolArray:
+        """(T,) at which of the times [s] errors count."""
+
+    @property
+    def own_settings(self) -> Mapping[str, float]:
+        """Settings by which this case differs from the firmware's defaults, but for noise: prior and lever."""
+        return {}
+
+    @property
+    def noise(self) -> Mapping[str, float]:
+        """Settings of the noise that this case has and the firmware's defaults have not."""
+        return {}
+
+    def change(self, plan: Plan) -> float | None:
+        """When the parameters jump [s]; None where they do not."""
+        return None
+
+    def references(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> References | None:
+        """What errors are held against; None where the truth is not drawn from the model."""
+        return None
+
+    def runs(self, plan: Plan) -> int:
+        """How many."""
+        return plan.seeds
+
+    def length(self, plan: Plan) -> float:
+        """[s]"""
+        return self.duration if plan.duration is None else plan.duration
+
+    def scaled(self, moment: float, plan: Plan) -> float:
+        """A moment of a run of the case's own duration [s], in one as long as the plan wants it."""
+        return moment * self.length(plan) / self.duration
+
+
+@dataclass(frozen=True, kw_only=True)
+class Matched(Case):
+    """Random walks that are exactly what a filter assumes (matched.py), judged from a quarter of the run on.
+
+    With preload trim all estimators get detrended signals; the references know the trim.
+    """
+
+    kind: str = "matched"
+    duration: float = 60.0
+    dither_rms: float = 0.0
+    process_noise: float = 0.05
+
+    @property
+    def own_settings(self) -> Mapping[str, float]:
+        return PRIOR[self.model]
+
+    @property
+    def noise(self) -> Mapping[str, float]:
+        return {"theta_dot_process_noise": self.process_noise}
+
+    def batch(self, plan: Plan) -> Batch:
+        exact = self._exact(plan)
+        if self.preload == "fixed":
+            return exact
+        defaults = {row.name: row.default for row in settings_table()}
+        return detrended(exact, defaults["trim_corner"], defaults["align_time"])
+
+    def judged(self, time: Array, plan: Plan) -> BoolArray:
+        return time >= self.scaled(15.0, plan)
+
+    def references(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> References:
+        exact = batch if self.preload == "fixed" else self._exact(plan)
+        return References(
+            linearised.variances(exact, at, linearised.covariances(exact, at)),
+            bound.variances(exact, at, bound.posterior_cramer_rao(exact, at)),
+        )
+
+    def _exact(self, plan: Plan) -> Batch:
+        condition = Condition(
+            self.model, self.preload, dither_rms=self.dither_rms, settings={**self.own_settings, **self.noise}
+        )
+        return matched(condition, self.runs(plan), self.length(plan), plan.seed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrongNoise(Matched):
+    """A matched case for firmware that is told wrong noise."""
+
+    kind: str = "wrong noise"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stepped(Case):
+    """A step of stiffness and damping (steps.py); errors are judged from 15 s to the step, while nothing happens."""
+
+    kind: str = "step"
+    duration: float = 45.0
+    every: float = 0.02
+    step: Step = field(default_factory=Step)
+
+    @property
+    def noise(self) -> Mapping[str, float]:
+        return {"theta_dot_process_noise": self.step.process_noise}
+
+    def batch(self, plan: Plan) -> Batch:
+        at = self.scaled(self.step.at, plan)
+        step = replace(self.step, model=self.model, at=at, duration=self.length(plan))
+        return stepped(step, self.runs(plan), plan.seed)
+
+    def judged(self, time: Array, plan: Plan) -> BoolArray:
+        return (time >= self.scaled(15.0, plan)) & (time < self.scaled(self.step.at, plan))
+
+    def change(self, plan: Plan) -> float:
+        return self.scaled(self.step.at, plan)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded(Case):
+    """A shipped scenario (recorded.py), judged as `lever sim` does: some time after the start and each jump."""
+
+    kind: str = "scenario"
+    every: float = 0.02
+
+    @cached_property
+    def _scenario(self) -> scenarios.Scenario:
+        return scenarios.load(self.name)
+
+    @property
+    def own_settings(self) -> Mapping[str, float]:
+        return self._scenario.settings or {}
+
+    def batch(self, plan: Plan) -> Batch:
+        return recorded(self.name, self.runs(plan), plan.seed, plan.duration)
+
+    def runs(self, plan: Plan) -> int:
+        """A run over the bus takes seconds."""
+        return min(plan.seeds, _MOST_RECORDED)
+
+    def judged(self, time: Array, plan: Plan) -> BoolArray:
+        jumps = np.array([jump for jump in self._scenario.changes() if jump < self.length(plan)])
+        last = jumps[np.searchsorted(jumps, time, side="right") - 1]
+        judged: BoolArray = time - last >= self.scaled(self._scenario.converged_after, plan)
+        return judged
+
+    def change(self, plan: Plan) -> float | None:
+        """The last one."""
+        jumps = [jump for jump in self._scenario.changes() if 0.0 < jump < self.length(plan)]
+        return jumps[-1] if jumps else None
+
+
+@cache
+def cases() -> Mapping[str, Case]:
+    """All there are, by name."""
+    return {case.name: case for case in (*_matched(), *_steps(), *_wrong_noise(), *_recorded())}
+
+
+_WITH_TORQUE = ("lever", "linear_physical")
+
+
+def _matched() -> Iterator[Case]:
+    for model in PRIOR:
+        for preload in ("fixed", "trim"):
+            for dither in (DITHER, 0.0):
+                if dither and model not in _WITH_TORQUE:
+                    continue
+                for level, noise in (("quiet", QUIET), ("rough", ROUGH)):
+                    shaken = "dither" if dither else "base"
+                    what = f"base and {dither:g} N m dither" if dither else "base only"
+                    yield Matched(
+                        name=f"{model}_{preload}_{shaken}_{level}",
+                        title=f"matched walk, {model}, preload {preload}, {what}, process noise {noise:g} rad/s/√s",
+                        model=model,
+                        preload=preload,
+                        dither_rms=dither,
+                        process_noise=noise,
+                    )
+
+
+def _steps() -> Iterator[Case]:
+    for model, noises in (("lever", (0.05, 0.1)), ("linear_black_box", (0.05,))):
+        for noise in noises:
+            for way, factor in (("up", 1.3), ("down", 0.7)):
+                yield Stepped(
+                    name=f"step_{way}{'_rough' if noise > 0.05 else ''}{'' if model == 'lever' else '_black_box'}",
+                    title=f"k_p and c_p × {factor:g}, seen by {model}, process noise {noise:g} rad/s/√s",
+                    model=model,
+                    step=Step(factor=factor, process_noise=noise),
+                )
+
+
+def _wrong_noise() -> Iterator[Case]:
+    for preload in ("fixed", "trim"):
+        title = f"told R and Q wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither"
+        yield WrongNoise(name=f"wrong_noise_{preload}", title=title, preload=preload, dither_rms=DITHER)
+
+
+def _recorded() -> Iterator[Case]:
+    for name in scenarios.names():
+        scenario = scenarios.load(name)
+        if usable(scenario):
+            choices = scenario.config.choices
+            yield Recorded(
+                name=name,
+                title=f"scenario of `lever sim`: {scenario.title}",
+                model=choices["model"],
+                preload=choices["preload"],
+                duration=scenario.duration,
+            )

@@ -1,0 +1,118 @@
+"""Which estimators are compared: the firmware's as they can be set up, and those of ../baselines, where a new one goes.
+
+The firmware's are `ours`. Names: dual and joint are told the true noise and adapt nothing; *_shipped have every default
+but what is known beforehand (the first guess, the lever); *_no_change are the same without change detection; *_r…_q…
+are shipped, too, and told a measurement noise (r) and a process noise (q) wrong by a factor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from lever_cdkf.firmware.config import settings_table
+
+from ..baselines import BASELINES
+from ..data import Estimator
+from ..firmware import Firmware
+from ..matched import KINDS
+from .cases import Case
+
+OURS = ("dual", "joint")
+_FACTORS = {"0.1": 0.1, "1": 1.0, "10": 10.0}
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """An estimator in the setting of a case."""
+
+    name: str
+    title: str
+    ours: bool
+    make: Callable[[Case], Estimator]
+    reference: str = ""
+    """The entrant against which errors are told besides."""
+
+
+def entrants(case: Case) -> dict[str, Entrant]:
+    """Those of a case, by name, ours first."""
+    if case.kind == "wrong noise":
+        chosen = _given_noise() + _wrong()
+    elif case.kind == "matched":
+        chosen = _given_noise() + _shipped() + _baselines(case)
+    else:
+        chosen = _shipped() + _no_change() + _baselines(case)
+    return {entrant.name: entrant for entrant in chosen}
+
+
+def _given_noise() -> list[Entrant]:
+    def maker(estimator: str) -> Callable[[Case], Estimator]:
+        def make(case: Case) -> Estimator:
+            align = {"align_time": 0.0} if case.preload == "fixed" else {}
+            still = {"change_threshold": 0.0, "noise_window": 0.0, **align}
+            return Firmware(case.model, case.preload, estimator, "fixed", {**case.own_settings, **case.noise, **still})
+
+        return make
+
+    return [Entrant(name, f"firmware, {name}, told the noise", True, maker(name)) for name in OURS]
+
+
+def _with(estimator: str, settings: Mapping[str, float]) -> Callable[[Case], Estimator]:
+    """The shipped firmware but for `settings`."""
+    return lambda case: Firmware(case.model, case.preload, estimator, settings={**case.own_settings, **settings})
+
+
+def _shipped() -> list[Entrant]:
+    return [
+        Entrant(
+            f"{name}_shipped",
+            f"firmware, {name}, as shipped",
+            True,
+            _with(name, {}),
+            reference=f"{name}_no_change",
+        )
+        for name in OURS
+    ]
+
+
+def _no_change() -> list[Entrant]:
+    still = {"change_threshold": 0.0}
+    return [
+        Entrant(f"{name}_no_change", f"firmware, {name}, without change detection", True, _with(name, still))
+        for name in OURS
+    ]
+
+
+def _wrong() -> list[Entrant]:
+    defaults = {row.name: row.default for row in settings_table()}
+
+    def scaled_noise(r: float, q: float) -> dict[str, float]:
+        factors = {"theta_noise": r, "theta_dot_noise": r, "theta_dot_process_noise": q}
+        return {name: factor * defaults[name] for name, factor in factors.items()}
+
+    return [
+        Entrant(
+            f"{name}_r{r}_q{q}",
+            f"firmware, {name}, as shipped, R × {r}, Q × {q}",
+            True,
+            _with(name, scaled_noise(r_factor, q_factor)),
+            reference=name,
+        )
+        for name in OURS
+        for r, r_factor in _FACTORS.items()
+        for q, q_factor in _FACTORS.items()
+    ]
+
+
+def _baselines(case: Case) -> list[Entrant]:
+    settings = {row.name: row.default for row in settings_table()}
+    model = KINDS[case.model].make(settings, case.preload)
+    return [
+        Entrant(name, f"{baseline.title} ({baseline.source})", False, _always(baseline.run))
+        for name, baseline in BASELINES.items()
+        if baseline.handles(model)
+    ]
+
+
+def _always(estimator: Estimator) -> Callable[[Case], Estimator]:
+    return lambda _case: estimator

@@ -1,0 +1,42 @@
+"""All figures by name, and how to get at those that somebody asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from lever_cdkf.errors import LeverError
+from lever_cdkf.near_names import did_you_mean
+
+from . import bode, consistency, grip, identification, linear
+from .description import Figure
+from .runs import Extent
+
+Make = Callable[[int, Extent], Figure]
+"""A figure of a seed; the same seed gives the same figure."""
+
+FIGURES: Mapping[str, Make] = {
+    "bode": bode.bode,
+    "excitation": linear.excitation,
+    "parameters": linear.parameters,
+    "states": linear.states,
+    "identification": identification.identification,
+    "grip": grip.grip,
+    "consistency": consistency.nees,
+}
+"""In the order of the page."""
+
+
+def chosen(names: Sequence[str], more: Sequence[str] = ()) -> list[str]:
+    """The names in the order of the page, `more` of them last; all without any. Raises LeverError for one that does not
+    exist."""
+    known = [*FIGURES, *more]
+    for name in names:
+        if name not in known:
+            hint = did_you_mean(name, known, f"there are {', '.join(known)}")
+            raise LeverError(f"unknown figure {name!r}; {hint}")
+    return [name for name in known if name in names or not names]
+
+
+def summary(name: str) -> str:
+    """The figure in a line."""
+    return (FIGURES[name].__doc__ or "").splitlines()[0]
