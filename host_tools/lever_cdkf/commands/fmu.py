@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
-from pathlib import Path
 from typing import Any
+
+from ..fmu.options import add_out_option, print_written
 
 FMUS = "lever_cdkf.fmus"
 """Entry point group of modules with further kinds of FMU: add_parser(subparsers), run(args) as of a command."""
 
 _DESCRIPTION = """\
-Makes an FMU (FMI 3.0 Co-Simulation) for Simulink, dSPACE VEOS, Silver, OpenModelica, FMPy and the like. It holds a binary
-for this machine, the C sources for others, and its documentation.
+Makes an FMU (FMI 3.0 Co-Simulation) for Simulink, dSPACE VEOS, Silver, OpenModelica, FMPy and the like. It holds a
+binary for this machine, the C sources for others, and its documentation.
 """
 _EPILOG = """\
 examples:
@@ -20,10 +21,12 @@ examples:
   lever fmu pilot -o pilot.fmu --scenario sudden_grip
       a pilot to test it, or another controller, against
 
-`lever fmu KIND --help` explains each. host_tools/fmu/README.md has how to connect them, and what to click in Simulink.
+`lever fmu KIND --help` explains each. host_tools/lever_cdkf/fmu/README.md says how to connect them, and what to click
+in Simulink.
 """
 _CONTROLLER = """\
-Makes an FMU of the estimator: the C core of the firmware, to the bit. A step is the setting sample_period, or a multiple.
+Makes an FMU of the estimator: the C core of the firmware, to the bit. A step is the setting sample_period, or a whole
+multiple.
 
   inputs      theta, theta_dot, z_ddot, tau_m and grip_force, each with a flag; what COMMAND asks for on the bus
   outputs     estimates with standard deviations, mode, faults by name, margin, correction and torque
@@ -34,7 +37,9 @@ It is of one model; --set model=linear_physical chooses another. Needs a C compi
 _CONTROLLER_EPILOG = """\
 examples:
   lever fmu controller -o lever.fmu
-  lever fmu controller -o lever.fmu --settings my.settings --set mitigation=cancellation --aircraft uh60_like,gearing=0.5
+  lever fmu controller -o lever.fmu --settings my.settings
+  lever fmu controller -o uh60.fmu --set mitigation=cancellation \\
+      --aircraft uh60_like,gearing=0.5
 
 What is wrong while it runs is a message to the importer: a value out of its range (logStatusError), a step that is no
 multiple (logStatusDiscard), an input that was never set (logStatusWarning). Faults and modes are logEvents.
@@ -68,13 +73,6 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
             kinds.choices[name].set_defaults(run=module.run)
 
 
-def add_out_option(parser: argparse.ArgumentParser, default: str) -> None:
-    """-o of a kind of FMU."""
-    parser.add_argument(
-        "-o", "--out", metavar="FILE", type=Path, default=Path(default), help="where to write it (default: %(default)s)"
-    )
-
-
 def run(args: argparse.Namespace) -> int:
     from ..firmware.settings_file import make_config, parse_assignment, read_assignments
     from ..fmu import archive
@@ -87,5 +85,5 @@ def run(args: argparse.Namespace) -> int:
     assignments |= dict(parse_assignment(text) for text in (*model, *args.set))
     aircraft = None if args.aircraft is None else chosen_aircraft(args.aircraft)
     archive.write(args.out, controller(make_config(assignments), aircraft))
-    print(f"Written to {args.out}, {args.out.stat().st_size / 1e6:.1f} MB")
+    print_written(args.out)
     return 0

@@ -15,6 +15,7 @@ from ..provenance import created, provenance
 from .binary import compile_library, compiler, headers, library_suffix, platform_tuple
 from .description import Model, build_description, model_description
 
+_LICENCE = "MIT; the text is in the file LICENSE of Lever CDKF.\n"
 _FMI = ("fmi3.c", "fmi3_unused.c", "fmi3_values.c", "fmu.h")
 """What every FMU has, in c/ beside this file."""
 
@@ -44,7 +45,9 @@ def core_c(*folders: str) -> dict[str, Path]:
     """The C of the estimator core by its path: all of it, or only the headers and what is in these folders."""
     root = native_file("sources/lever_cdkf.h").parent
     found = {path.relative_to(root).as_posix(): path for path in sorted(root.rglob("*")) if path.is_file()}
-    return {name: path for name, path in found.items() if not (folders and name.endswith(".c") and not name.startswith(folders))}
+    return {
+        name: path for name, path in found.items() if not folders or not name.endswith(".c") or name.startswith(folders)
+    }
 
 
 def check(path: Path) -> None:
@@ -81,12 +84,11 @@ def _fill(folder: Path, contents: Contents) -> None:
     (folder / "modelDescription.xml").write_bytes(model_description(model))
     library = folder / "binaries" / platform_tuple() / f"{model.identifier}{library_suffix()}"
     compile_library(sources, compiled, library)
-    _write_all(folder / "documentation", {"index.html": contents.page.encode(), "licenses/LICENSE.txt": _LICENCE.encode()})
+    _write_all(
+        folder / "documentation", {"index.html": contents.page.encode(), "licenses/LICENSE.txt": _LICENCE.encode()}
+    )
     _write_all(folder / "extra/lever_cdkf", {"provenance.json": provenance().text().encode()})
     _write_all(folder / "resources", contents.resources)
-
-
-_LICENCE = "MIT; the text is in the file LICENSE of Lever CDKF.\n"
 
 
 def _write_all(folder: Path, content: Mapping[str, bytes]) -> None:

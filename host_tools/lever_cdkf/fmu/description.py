@@ -40,12 +40,12 @@ class Model:
 
     def with_token(self, *content: bytes) -> Model:
         """With an instantiation token that depends on the description and on `content`: of this FMU alone."""
-        text = model_description(replace(self, token="")) + b"".join(content)
+        text = model_description(replace(self, token=""), made="") + b"".join(content)
         return replace(self, token=f"{{{uuid.uuid5(uuid.NAMESPACE_URL, text.hex())}}}")
 
 
-def model_description(model: Model) -> bytes:
-    """The content of modelDescription.xml."""
+def model_description(model: Model, made: str | None = None) -> bytes:
+    """The content of modelDescription.xml; `made`: when, in place of now."""
     root = Element(
         "fmiModelDescription",
         fmiVersion="3.0",
@@ -55,7 +55,7 @@ def model_description(model: Model) -> bytes:
         version=version(),
         license="MIT",
         generationTool=SOFTWARE,
-        generationDateAndTime=created().strftime("%Y-%m-%dT%H:%M:%SZ"),
+        generationDateAndTime=created().strftime("%Y-%m-%dT%H:%M:%SZ") if made is None else made,
         variableNamingConvention="flat",
     )
     SubElement(
@@ -79,10 +79,10 @@ def model_description(model: Model) -> bytes:
         _add_variable(variables, reference, variable)
     structure = SubElement(root, "ModelStructure")
     outputs = [str(at) for at, variable in enumerate(model.variables) if variable.role == "OUTPUT"]
-    for reference in outputs:
-        SubElement(structure, "Output", valueReference=reference, dependencies="")
-    for reference in outputs:
-        SubElement(structure, "InitialUnknown", valueReference=reference)
+    for output in outputs:
+        SubElement(structure, "Output", valueReference=output, dependencies="")
+    for output in outputs:
+        SubElement(structure, "InitialUnknown", valueReference=output)
     return _text(root)
 
 

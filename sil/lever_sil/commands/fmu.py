@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from lever_cdkf.fmu.options import add_out_option, print_written
+
 _DESCRIPTION = """\
-Makes an FMU of a simulated pilot with lever, motor, sensors and cabin, as `lever sim` has them, so that a controller can be
-tested against it. Outputs are what the sensors say, and the truth; inputs are the motor's torque and the correction.
+Makes an FMU of a simulated pilot with lever, motor, sensors and cabin, as `lever sim` has them, so that a controller
+can be tested against it. Outputs are what the sensors say, and the truth; inputs are the motor's torque and the
+correction of the lever's angle.
 """
 _EPILOG = """\
 examples:
@@ -15,14 +18,13 @@ examples:
   lever fmu pilot -o grip.fmu --scenario sudden_grip --set duration="30 s" --seeds 5
   lever fmu pilot -o bounce.fmu --scenario steady --aircraft uh60_like,gearing=0.5
 
-Every seed adds its columns of random numbers to the file, some 4 MB for a minute; the parameter `seed` chooses among them.
+Every seed adds its columns of random numbers to the file, some 7 MB for a minute; the parameter `seed` chooses among
+them.
 """
 _MOST_SEEDS = 1000
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
-    from lever_cdkf.commands.fmu import add_out_option
-
     parser = subparsers.add_parser(
         "pilot", help="a simulated pilot, lever, motor and cabin", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -46,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from lever_cdkf.errors import LeverError
     from lever_cdkf.fmu import archive
 
-    from ..fmu.pilot import pilot
+    from ..pilot_fmu.pilot import pilot
     from ..scenarios.scenario import load
 
     if not 1 <= args.seeds <= _MOST_SEEDS:
@@ -56,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     first = load(args.scenario, overrides).seed if args.seed is None else args.seed
     scenarios = [load(args.scenario, [*overrides, f"seed={seed}"]) for seed in range(first, first + args.seeds)]
     archive.write(args.out, pilot(scenarios))
-    print(f"Written to {args.out}, {args.out.stat().st_size / 1e6:.1f} MB")
+    print_written(args.out)
     return 0
 
 
@@ -65,7 +67,4 @@ def _aircraft(text: str | None) -> list[str]:
     if text is None:
         return []
     name, *changes = text.split(",")
-    given = {"gearing": "0.5 1"} | dict((change.partition("=")[0], change.partition("=")[2]) for change in changes)
-    if given["gearing"].replace(".", "", 1).isdecimal():
-        given["gearing"] += " 1"
-    return [f"aircraft.model={name}", *(f"aircraft.{key}={value}" for key, value in given.items())]
+    return [f"aircraft.model={name}", *(f"aircraft.{change}" for change in ("gearing=0.5", *changes))]

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 
-from lever_cdkf.firmware.quantities import DYNAMICS, Quantity, parameters
 from lever_cdkf.firmware.library import enum_names
+from lever_cdkf.firmware.quantities import DYNAMICS, Quantity, parameters
 from lever_cdkf.fmu.archive import Contents, c_string, core_c, own_c
 from lever_cdkf.fmu.description import Model
 from lever_cdkf.fmu.page import page

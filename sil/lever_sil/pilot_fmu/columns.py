@@ -37,7 +37,9 @@ def packed(scenario: Scenario) -> bytes:
     for offset, address in _pointers(loop.struct.pointer):
         pointers.append((offset, blocks.setdefault(address, len(blocks))))
     content = [arrays[address] for address in blocks]
-    content += [np.ascontiguousarray(np.broadcast_to(column, inputs.time.shape), np.float64).tobytes() for column in columns]
+    content += [
+        np.ascontiguousarray(np.broadcast_to(column, inputs.time.shape), np.float64).tobytes() for column in columns
+    ]
     image = bytes(ffi.buffer(loop.struct.pointer))
     head = struct.pack("<4Q", _MAGIC, len(image), len(pointers), len(content))
     table = b"".join(struct.pack("<2Q", *pointer) for pointer in pointers)
