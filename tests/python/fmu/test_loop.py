@@ -160,7 +160,9 @@ def test_sources_that_fmpy_compiles_are_the_same(fmus: Path, pilot: Path, tmp_pa
         folder = unpacked(fmus / f"{name}.fmu", tmp_path / name)
         (library,) = (folder / "binaries").glob("*/*.so")
         library.unlink()
-        build_platform_binary(folder, configuration="Release")
+        build = tmp_path / f"{name}_build"
+        build.mkdir()
+        build_platform_binary(folder, build, configuration="Release")
     loops = [Loop(Instance(tmp_path / "pilot"), Instance(tmp_path / "lever"))]
     loops.append(Loop(Instance(pilot), Instance(unpacked(fmus / "lever.fmu", tmp_path / "again"))))
     for _ in range(2000):
