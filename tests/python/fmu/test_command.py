@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import subprocess
 import zipfile
 from pathlib import Path
 
 import pytest
+from lever_cdkf.fmu.binary import headers
 from python.conftest import Refused, Run
 
 
@@ -30,6 +32,27 @@ def test_the_same_twice_is_the_same(fmus: Path, lever: Run, tmp_path: Path) -> N
         with zipfile.ZipFile(path) as archive:
             contents.append({name: archive.read(name) for name in archive.namelist() if name.startswith("sources/")})
     assert contents[0] == contents[1]
+
+
+def test_sources_compile_without_a_warning(controller: Path, pilot: Path) -> None:
+    """Under the project's warnings, as errors."""
+    warnings = (
+        "all",
+        "extra",
+        "pedantic",
+        "conversion",
+        "double-promotion",
+        "shadow",
+        "missing-prototypes",
+        "cast-qual",
+    )
+    options = ["-std=c99", "-fsyntax-only", "-Werror", *(f"-W{each}" for each in warnings), "-isystem", str(headers())]
+    for folder in (controller / "sources", pilot / "sources"):
+        sources = sorted(str(each) for each in folder.rglob("*.c"))
+        result = subprocess.run(
+            ["gcc", *options, "-I", str(folder), *sources], capture_output=True, text=True, check=False
+        )
+        assert (result.returncode, result.stderr) == (0, "")
 
 
 def test_what_is_wrong_is_one_line(refused: Refused, tmp_path: Path) -> None:

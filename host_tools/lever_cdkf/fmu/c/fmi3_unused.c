@@ -2,7 +2,7 @@
 #include "fmi3Functions.h"
 #include "fmu.h"
 
-#if defined(__GNUC__)
+#ifdef __GNUC__
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
