@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 1,856 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 1,872 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[1840];
+    uint8_t rest[1856];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -276,7 +276,11 @@ enum lever_bounce {
 
 /* How near the loop through arm, lever and rotor is to instability. */
 typedef struct lever_stability {
-    uint8_t state;     /* enum lever_bounce */
+    uint8_t state; /* enum lever_bounce; UNKNOWN while it is not valid, but an ALARM stays */
+    bool
+        valid; /* as in STABILITY: a sample with an output came within 20 ms or three sample periods, by the clock of the
+                   samples or lever_idle(), the sample clock advances, and the margin is known. Else, the numbers are those
+                   known last */
     float gain_margin; /* by which the loop may grow until it is unstable, at most 40 [dB] */
     float gain_margin_sigma;
     float modulus; /* least |1 - L| of the loop L, negative where it is unstable [1] */
@@ -300,8 +304,9 @@ typedef struct lever_correction {
     float weight; /* of the fade: 0 passive, 1 all of it */
 } lever_correction_t;
 
-/* After the last sample, or lever_idle(). It fades in within a second, and is 0 within 100 ms after a sensor, the
- * sample clock or the samples have failed; whoever gets none for 100 ms takes 0. */
+/* After the last sample, or lever_idle(). It fades in within a second while a command was accepted within the last second,
+ * as for torque, and is 0 within 100 ms after that has ended, or a sensor, the sample clock or the samples have failed;
+ * whoever gets none for 100 ms takes 0. */
 void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
 /* --- names ------------------------------------------------------------------------------------------------------ */
@@ -382,7 +387,11 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
  *   - a sample with a valid theta or theta_dot came within 20 ms or three sample periods, whichever is longer;
  *   - the sample clock advances;
  *   - a COMMAND, or lever_command(), was accepted within the last second of sample time: repeat one (keep-alive);
- *   - the platform reports none of ROM, SELF_TEST, WATCHDOG.
+ *   - the platform reports none of ROM, SELF_TEST, WATCHDOG, HARD_FAULT, and the settings are as lever_init() found them:
+ *     they are looked at each second, and a change raises LEVER_FAULT_PLATFORM for good;
+ *   - since LEVER_FAULT_HANDS_OFF, or a motor found to do other than it is asked (LEVER_FAULT_TORQUE, but not for a
+ *     torque that is only missing), a command has asked for torque anew, by a dither or a mitigation that it names, with
+ *     that fault gone.
  * Opening takes dither_fade. */
 
 /* Torque leaves, or will with the next sample; or mitigation adds to the angle. */
@@ -432,7 +441,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1584 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1591 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

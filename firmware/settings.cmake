@@ -132,3 +132,85 @@ static inline void lever_build_config(lever_config_t *config)
 #endif
 ]])
 endfunction()
+
+# lever_check_build(SETTINGS_FILE AIRCRAFT_FILE HEADERS SOURCES): has lever_config_check() look at the configuration in
+# lever_build.h, on this machine, and writes lever_build_port.h. With neither file there is nothing to check.
+function(lever_check_build settings_file aircraft_file headers sources)
+    set(aircraft "return NULL;")
+    if(settings_file OR aircraft_file)
+        set(tool "${headers}/check")
+        set(compiler "${CMAKE_C_COMPILER}")
+        if(CMAKE_CROSSCOMPILING)
+            find_program(LEVER_HOST_COMPILER NAMES cc gcc clang DOC "C compiler for this machine: it checks settings and aircraft")
+            set(compiler "${LEVER_HOST_COMPILER}")
+        endif()
+        if(NOT compiler)
+            message(FATAL_ERROR "Settings and aircraft of a build are checked on this machine, which has no C compiler: "
+                "apt install gcc, or -D LEVER_HOST_COMPILER=PATH")
+        endif()
+        set(firmware "${CMAKE_CURRENT_FUNCTION_LIST_DIR}")
+        set(programs "${firmware}/port/build/check.c" "${firmware}/port/linux/aircraft.c" "${firmware}/port/linux/settings.c")
+        execute_process(COMMAND "${compiler}" -std=c99 -O0 -ffp-contract=off -I "${firmware}" -I "${headers}" ${programs} ${sources} -lm -o "${tool}"
+            RESULT_VARIABLE status ERROR_VARIABLE error)
+        if(NOT status EQUAL 0)
+            message(FATAL_ERROR "${compiler} cannot compile the check of settings and aircraft:\n${error}")
+        endif()
+        set(from)
+        if(aircraft_file)
+            get_filename_component(from "${aircraft_file}" ABSOLUTE BASE_DIR "${CMAKE_SOURCE_DIR}")
+            set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${from}")
+        endif()
+        set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${programs} ${sources})
+        execute_process(COMMAND "${tool}" "LEVER_SETTINGS_FILE" ${from}
+            RESULT_VARIABLE status OUTPUT_VARIABLE initialiser ERROR_VARIABLE error)
+        if(NOT status EQUAL 0)
+            message(FATAL_ERROR "${error}")
+        endif()
+        if(aircraft_file)
+            message(STATUS "Aircraft of this build: ${from}")
+            set(aircraft "static const lever_aircraft_t aircraft = {\n${initialiser}    };\n    return &aircraft;")
+        endif()
+    endif()
+    file(CONFIGURE OUTPUT "${headers}/lever_build_port.h" @ONLY CONTENT [[
+/* Aircraft and identifiers of this build, for its port. Written by firmware/settings.cmake: do not edit. */
+#ifndef LEVER_BUILD_PORT_H
+#define LEVER_BUILD_PORT_H
+
+#include <stddef.h>
+
+#include "lever_cdkf.h"
+
+/* What LEVER_ID_OFFSET or LEVER_ID_BASE says, as port/identifiers.h has it. */
+#define LEVER_IDENTIFIERS @LEVER_IDENTIFIERS@
+
+/* What LEVER_AIRCRAFT_FILE says; NULL without one. */
+static inline const lever_aircraft_t *lever_build_aircraft(void)
+{
+    @aircraft@
+}
+
+#endif
+]])
+endfunction()
+
+# lever_check_identifiers(OFFSET BASE OUT): both as the word of port/identifiers.h.
+function(lever_check_identifiers offset base out)
+    if(NOT "${offset}" MATCHES "^(0x[0-9a-fA-F]+|[0-9]+)$")
+        message(FATAL_ERROR "LEVER_ID_OFFSET is ${offset}: it must be a number, such as 0x40")
+    endif()
+    math(EXPR shift "${offset}" OUTPUT_FORMAT HEXADECIMAL)
+    if(shift GREATER 1504) # IDENTIFIERS_OFFSET_MAX, which the compiler compares
+        message(FATAL_ERROR "LEVER_ID_OFFSET is ${offset}: identifiers of 11 bits leave room for 0x5E0 at most")
+    endif()
+    if(NOT "${base}" STREQUAL "")
+        if(NOT "${base}" MATCHES "^(0x[0-9a-fA-F]+|[0-9]+)$")
+            message(FATAL_ERROR "LEVER_ID_BASE is ${base}: it must be a number, such as 0x18FF0000")
+        endif()
+        math(EXPR shift "${base}" OUTPUT_FORMAT HEXADECIMAL)
+        if(NOT "${offset}" EQUAL 0 OR shift GREATER 536868864)
+            message(FATAL_ERROR "LEVER_ID_BASE is ${base}: it goes without LEVER_ID_OFFSET, up to 0x1FFFF800")
+        endif()
+        math(EXPR shift "${shift} + 0x80000000" OUTPUT_FORMAT HEXADECIMAL)
+    endif()
+    set(${out} "${shift}u" PARENT_SCOPE)
+endfunction()

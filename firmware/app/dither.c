@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define HIGHEST 0.1f     /* greatest corner, in samples^-1: what the integration below is good for */
+#define LEAST 1.0e-6f    /* a fade is never slower than over this change: one of 1e-40 would not end [N m] */
 #define SEED 2463534242u /* any but 0 (Marsaglia 2003) */
 
 /* Butterworth low-pass of second order behind the high-pass of trim.h, by semi-implicit Euler. */
@@ -86,7 +87,7 @@ void dither_reset(dither_t *dither)
 void dither_set(dither_t *dither, float rms, bool at_once)
 {
     const float target = lesser(rms, dither->rms_most);
-    const float change = fabsf(target - dither->level);
+    const float change = greater(fabsf(target - dither->level), LEAST);
     if (at_once) {
         dither->slope = change;
     } else if ((target < dither->target) || (target > dither->target)) { /* the same again goes on as it does */

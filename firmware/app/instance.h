@@ -35,7 +35,10 @@ struct lever {
     link_t link;
     bounce_t bounce;
     lever_platform_t platform; /* the port's last report, if there was one */
+    uint32_t settings_sum;     /* of the settings, as words, when they were checked */
+    uint32_t settings_us;      /* time of the sample with which that was last compared */
     bool has_platform;
+    bool settings_changed; /* since they were checked: their memory is faulty */
 };
 
 /* One sample, by struct or from the bus: the estimator first, then what is done about bounce, the motor's torque, and the
@@ -56,8 +59,14 @@ void instance_watch(lever_t *lever);
 /* Carries a command out, or says why not and changes nothing. */
 enum message_result instance_command(lever_t *lever, const lever_command_t *command);
 
+/* Of a command that is refused, carries out what ends dither or mitigation. */
+void instance_end(lever_t *lever, const lever_command_t *command);
+
 /* Bits of enum lever_fault: of the last sample, of the machine, and of the bus. */
 uint32_t instance_faults(const lever_t *lever);
+
+/* The estimate may be used, but for a value that is not finite. */
+bool instance_is_estimating(const lever_t *lever);
 
 /* Torque is not zero, or may become so. */
 bool instance_is_driving(const lever_t *lever);

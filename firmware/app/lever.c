@@ -7,9 +7,10 @@
 #include <stddef.h>
 #include <string.h>
 
-#define DITHER_MOST 1.0e4f /* plausible [N m] */
-#define MARGIN_US 40000u   /* least time between two margins */
-#define SILENCE_US 20000u  /* or 1.25 sample periods: mitigation.h */
+#define DITHER_MOST 1.0e4f   /* plausible [N m] */
+#define MARGIN_US 40000u     /* least time between two margins */
+#define SETTINGS_US 1000000u /* between two looks at the settings */
+#define SILENCE_US 20000u    /* or 1.25 sample periods: mitigation.h */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -18,6 +19,19 @@ static void choose_mitigation(bounce_t *bounce, uint8_t mitigation)
 {
     bounce->chosen = (mitigation != (uint8_t)LEVER_KEEP) ? mitigation : bounce->chosen;
     bounce->mitigates = bounce->mitigates || (bounce->chosen != (uint8_t)LEVER_MITIGATION_NONE);
+}
+
+/* Of all words, so that any word that changes changes it. */
+static uint32_t sum_of(const lever_settings_t *settings)
+{
+    const uint8_t *bytes = (const uint8_t *)settings;
+    uint32_t sum = 0u;
+    for (uint32_t i = 0u; i < (uint32_t)(sizeof *settings / sizeof(uint32_t)); i++) {
+        uint32_t word;
+        (void)memcpy(&word, &bytes[4u * i], sizeof word); /* cppcheck-suppress misra-c2012-21.15 ; D2 */
+        sum += word;
+    }
+    return sum;
 }
 
 lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
@@ -34,6 +48,7 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
         dither_init(&lever->dither, s->dither_low, s->dither_high, s->sample_period, rms_most, s->dither_fade);
         torque_gate_init(&lever->gate, s);
         link_init(&lever->link, s);
+        lever->settings_sum = sum_of(s);
     }
     return lever;
 }
@@ -43,10 +58,36 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
 /* COAST is closed by torque_sample_t.measured, once it has lasted. */
 static bool permits_torque(const lever_t *lever)
 {
-    const uint32_t broken =
-        (uint32_t)LEVER_PLATFORM_ROM | (uint32_t)LEVER_PLATFORM_SELF_TEST | (uint32_t)LEVER_PLATFORM_WATCHDOG;
+    const uint32_t broken = (uint32_t)LEVER_PLATFORM_ROM | (uint32_t)LEVER_PLATFORM_SELF_TEST |
+                            (uint32_t)LEVER_PLATFORM_WATCHDOG | (uint32_t)LEVER_PLATFORM_HARD_FAULT;
     const enum lever_mode mode = lever->estimator.mode;
-    return (mode >= LEVER_MODE_RUN) && (mode <= LEVER_MODE_FROZEN) && ((lever->platform.faults & broken) == 0u);
+    return (mode >= LEVER_MODE_RUN) && (mode <= LEVER_MODE_FROZEN) && ((lever->platform.faults & broken) == 0u) &&
+           !lever->settings_changed;
+}
+
+/* A missing torque sensor is none: the motor may still do what it is asked. */
+static bool is_harmful(const lever_t *lever)
+{
+    const learning_t *learning = &lever->estimator.learning;
+    return learning->monitor.torque_wrong || learning->hands.off;
+}
+
+/* A fault of the memory that the settings are in stays, whatever is in it later. */
+static void check_settings(lever_t *lever)
+{
+    const uint32_t time_us = lever->estimator.time_us;
+    if ((time_us - lever->settings_us) >= SETTINGS_US) {
+        lever->settings_us = time_us;
+        lever->settings_changed =
+            lever->settings_changed || (sum_of(lever->estimator.setup.settings) != lever->settings_sum);
+    }
+}
+
+bool instance_is_estimating(const lever_t *lever)
+{
+    const enum lever_mode mode = lever->estimator.mode;
+    return (mode >= LEVER_MODE_RUN) && (mode <= LEVER_MODE_FROZEN) &&
+           ((lever->estimator.faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
 }
 
 /* The estimate carries a margin: it is one, of an arm that the model is like, from sensors that work. */
@@ -92,10 +133,12 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
     const bool starts = (estimator->mode == LEVER_MODE_INIT);
     const enum lever_mode mode = estimator_update(estimator, sample, lever->gate.torque);
     const uint32_t faults = estimator->faults;
+    check_settings(lever);
     to_gate->elapsed_us = starts ? lever->gate.period_us : (estimator->time_us - last_us);
     to_gate->advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
     to_gate->measured = ((faults & blind) != blind);
     to_gate->permitted = permits_torque(lever);
+    to_gate->harmful = is_harmful(lever);
     return mode;
 }
 
@@ -119,7 +162,7 @@ void instance_mitigate(lever_t *lever)
         .drive = lever->gate.gain,
         .mitigation = lever->bounce.chosen,
         .advances = to_gate->advances,
-        .permitted = to_gate->permitted && ((faults & broken) == 0u),
+        .permitted = to_gate->permitted && !torque_gate_is_abandoned(&lever->gate) && ((faults & broken) == 0u),
         .sensed = ((faults & blind) == 0u),
         .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u),
         .same_theta = ((lever->bounce.same & (uint32_t)INSTANCE_SAME_THETA) != 0u),
@@ -175,6 +218,13 @@ static bool is_changed(const lever_t *lever, const setup_t *before, uint8_t chos
            (lever->dither.target > rms_before);
 }
 
+/* The command is more than a keep-alive: it names torque. */
+static bool asks_for_torque(const lever_command_t *command)
+{
+    const bool damps = (command->mitigation != (uint8_t)LEVER_KEEP) && mitigation_has_damping(command->mitigation);
+    return damps || ((command->dither_rms > 0.0f) && (command->dither_rms < (float)LEVER_KEEP));
+}
+
 /* Carries out what is not refused for the mode. Returns false, and changes nothing, when a value is not known. */
 static bool carry_out(lever_t *lever, const lever_command_t *command)
 {
@@ -188,6 +238,9 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
     const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
     if (known) {
         torque_gate_keep_alive(&lever->gate);
+        if (asks_for_torque(command)) {
+            torque_gate_ask(&lever->gate);
+        }
         choose_mitigation(&lever->bounce, command->mitigation);
         if (resets) {
             dither_reset(&lever->dither);
@@ -219,6 +272,21 @@ enum message_result instance_command(lever_t *lever, const lever_command_t *comm
     return result;
 }
 
+void instance_end(lever_t *lever, const lever_command_t *command)
+{
+    const bool ends_dither = (command->dither_rms <= 0.0f);
+    const bool ends_mitigation = (command->mitigation == (uint8_t)LEVER_MITIGATION_NONE);
+    if (ends_dither) {
+        dither_set(&lever->dither, 0.0f, false);
+    }
+    if (ends_mitigation) {
+        choose_mitigation(&lever->bounce, command->mitigation);
+    }
+    if (ends_dither || ends_mitigation) {
+        lever->link.pages |= (uint8_t)(1u << (uint32_t)MESSAGE_PAGE_CHOICES);
+    }
+}
+
 bool lever_command(lever_t *lever, const lever_command_t *command)
 {
     return instance_command(lever, command) == MESSAGE_RESULT_ACCEPTED;
@@ -229,7 +297,7 @@ bool lever_command(lever_t *lever, const lever_command_t *command)
 uint32_t instance_faults(const lever_t *lever)
 {
     uint32_t faults = lever->estimator.faults;
-    faults |= (lever->platform.faults != 0u) ? (uint32_t)LEVER_FAULT_PLATFORM : 0u;
+    faults |= ((lever->platform.faults != 0u) || lever->settings_changed) ? (uint32_t)LEVER_FAULT_PLATFORM : 0u;
     faults |= (lever->link.duplicate_us != 0u) ? (uint32_t)LEVER_FAULT_DUPLICATE : 0u;
     return faults;
 }
@@ -265,7 +333,12 @@ bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft)
 void lever_stability(const lever_t *lever, lever_stability_t *stability)
 {
     const margin_t *margin = &lever->bounce.margin;
-    stability->state = lever->bounce.state;
+    const uint8_t state = lever->bounce.state;
+    const bool is_now = instance_is_estimating(lever) && torque_gate_has_output(&lever->gate);
+    const bool stands = is_now || (state == (uint8_t)LEVER_BOUNCE_ALARM);
+    stability->state = stands ? state : (uint8_t)LEVER_BOUNCE_UNKNOWN;
+    stability->valid = is_now && (state != (uint8_t)LEVER_BOUNCE_UNKNOWN) && is_finite(margin->gain_sigma) &&
+                       is_finite(margin->modulus_sigma);
     stability->gain_margin = margin->gain;
     stability->gain_margin_sigma = margin->gain_sigma;
     stability->modulus = margin->modulus;

@@ -12,6 +12,7 @@
 #define DUPLICATE_US 2000000u
 #define HALF_TURN_OF_TIME 0x80000000u
 #define LONG_AGO_US 0x40000000u
+#define COUNTERS 16u
 
 /* The divided messages, in the order in which they are sent in each publish_period. */
 static const uint16_t parts[] = {(uint16_t)(BIT(OUTPUT_HEALTH) | BIT(OUTPUT_STABILITY)),
@@ -92,13 +93,16 @@ static bool is_measured(bool valid, float value, float most)
     return valid && (fabsf(value) < most);
 }
 
-/* Completes the sample with the LEVER_SAMPLE and GRIP_SAMPLE of the same counter, as far as they have come. */
+/* Completes the sample with the LEVER_SAMPLE and GRIP_SAMPLE of the same counter, as far as they have come. When the
+ * counters have gone round since the last sample, those may be of another one. */
 static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimator, const lever_frame_t *frame)
 {
     message_base_sample_t base;
     (void)message_base_sample_decode(&base, frame);
-    const bool paired = link->has_lever_sample && (link->lever_counter == e2e_counter(frame));
-    const bool gripped = link->has_grip_sample && (link->grip_counter == e2e_counter(frame));
+    const bool gone_round =
+        (estimator->mode != LEVER_MODE_INIT) && ((base.time_us - link->time_us) >= (COUNTERS * link->period_us));
+    const bool paired = !gone_round && link->has_lever_sample && (link->lever_counter == e2e_counter(frame));
+    const bool gripped = !gone_round && link->has_grip_sample && (link->grip_counter == e2e_counter(frame));
     const message_lever_sample_t *lever = &link->lever_sample;
     lever_sample_t *sample = &link->sample;
     sample->time_us = base.time_us;
@@ -119,16 +123,21 @@ static enum lever_frame_result on_base_sample(link_t *link, estimator_t *estimat
     return LEVER_FRAME_SAMPLE;
 }
 
-/* The sequence of commands: a second after the last accepted one it may start anywhere, but not with the same counter,
- * which is that of a sender that hangs. A refused one leaves the sequence. */
+/* The sequence of commands. A second after the last accepted one it goes on anywhere, but with a counter that follows that
+ * of the command before, refused or not, and is not that of the last accepted one: a sender that hangs repeats its own. A
+ * refused one does not advance the sequence. */
 static bool is_in_sequence(lever_t *lever, const lever_frame_t *frame)
 {
     e2e_receiver_t *receiver = &lever->link.command_receiver;
-    if (torque_gate_is_abandoned(&lever->gate) && (e2e_counter(frame) != receiver->last_counter)) {
+    const e2e_receiver_t before = *receiver;
+    const uint8_t counter = e2e_counter(frame);
+    const uint8_t next = (uint8_t)((lever->link.command_counter + 1u) & (COUNTERS - 1u));
+    const bool resumes = torque_gate_is_abandoned(&lever->gate) && !receiver->waiting;
+    const bool follows = (counter == next) && (counter != receiver->last_counter);
+    if (resumes) {
         e2e_receiver_init(receiver, (uint8_t)MESSAGE_COMMAND_DATA_ID, command_tolerance);
     }
-    const e2e_receiver_t before = *receiver;
-    const bool in_sequence = e2e_is_usable(e2e_check(receiver, frame));
+    const bool in_sequence = e2e_is_usable(e2e_check(receiver, frame)) && (follows || !resumes);
     if (!in_sequence) {
         *receiver = before;
     }
@@ -143,10 +152,7 @@ static enum message_result obey(lever_t *lever, const lever_frame_t *frame)
     (void)message_command_decode(&command, frame);
     if (!is_in_sequence(lever, frame)) {
         lever->estimator.late++;
-        if (command.dither_rms <= 0.0f) { /* off is obeyed in any order */
-            dither_set(&lever->dither, 0.0f, false);
-            lever->link.pages |= (uint8_t)BIT(MESSAGE_PAGE_CHOICES);
-        }
+        instance_end(lever, &command); /* what ends something is obeyed in any order */
     } else {
         result = instance_command(lever, &command);
         lever->estimator.corrupt += (result == MESSAGE_RESULT_ACCEPTED) ? 0u : 1u;
@@ -293,7 +299,7 @@ enum lever_mode link_step(lever_t *lever)
         due |= (was_driving || instance_is_driving(lever)) ? BIT(OUTPUT_MOTOR_COMMAND) : 0u;
         due |= mitigates ? BIT(OUTPUT_CORRECTION) : 0u;
         due |= (link->pages != 0u) ? BIT(OUTPUT_IDENTITY) : 0u;
-        due &= lever->has_platform ? UINT32_MAX : ~BIT(OUTPUT_PLATFORM);
+        due &= (lever->has_platform || lever->settings_changed) ? UINT32_MAX : ~BIT(OUTPUT_PLATFORM);
         due &= (lever->bounce.aircraft != NULL) ? UINT32_MAX : ~BIT(OUTPUT_STABILITY);
         link->due = (uint16_t)(link->due | due);
     }

@@ -12,14 +12,6 @@ static bool are_finite(const float value[LEVER_PARAMETERS])
     return is_finite(value[0]) && is_finite(value[1]) && is_finite(value[2]);
 }
 
-/* The estimate may be used, but for a value that is not finite. */
-static bool is_estimating(const lever_t *lever)
-{
-    const enum lever_mode mode = lever->estimator.mode;
-    return (mode >= LEVER_MODE_RUN) && (mode <= LEVER_MODE_FROZEN) &&
-           ((lever->estimator.faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
-}
-
 static uint16_t low_16(uint32_t value)
 {
     return (uint16_t)(value & 0xFFFFu);
@@ -69,7 +61,7 @@ static bool encode_parameters(lever_t *lever, lever_frame_t *frame)
     message_pilot_parameters_t message;
     estimator_parameters(&lever->estimator, message.parameter);
     message.model = lever->estimator.setup.model;
-    message.valid = is_estimating(lever) && are_finite(message.parameter);
+    message.valid = instance_is_estimating(lever) && are_finite(message.parameter);
     return message_pilot_parameters_encode(frame, &message);
 }
 
@@ -78,7 +70,7 @@ static bool encode_sigma(lever_t *lever, lever_frame_t *frame)
     message_pilot_sigma_t message;
     estimator_parameter_sigma(&lever->estimator, message.sigma);
     message.model = lever->estimator.setup.model;
-    message.valid = is_estimating(lever) && are_finite(message.sigma);
+    message.valid = instance_is_estimating(lever) && are_finite(message.sigma);
     return message_pilot_sigma_encode(frame, &message);
 }
 
@@ -90,7 +82,8 @@ static bool encode_dynamics(lever_t *lever, lever_frame_t *frame)
         .damping_ratio = dynamics.damping_ratio,
         .damping_ratio_sigma = dynamics.damping_ratio_sigma,
         .model = lever->estimator.setup.model,
-        .valid = is_estimating(lever) && is_finite(dynamics.natural_frequency_sigma + dynamics.damping_ratio_sigma)};
+        .valid = instance_is_estimating(lever) &&
+                 is_finite(dynamics.natural_frequency_sigma + dynamics.damping_ratio_sigma)};
     return message_pilot_dynamics_encode(frame, &message);
 }
 
@@ -104,7 +97,7 @@ static bool encode_feedthrough(lever_t *lever, lever_frame_t *frame)
         .gain_sigma = feedthrough.gain_sigma,
         .phase_sigma = feedthrough.phase_sigma,
         .frequency = link->frequency,
-        .valid = is_estimating(lever) && is_finite(feedthrough.gain_sigma + feedthrough.phase_sigma)};
+        .valid = instance_is_estimating(lever) && is_finite(feedthrough.gain_sigma + feedthrough.phase_sigma)};
     const bool is_last = (link->frequency == (uint8_t)MESSAGE_FEEDTHROUGH_HIGHEST);
     link->frequency = is_last ? (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST : (uint8_t)(link->frequency + 1u);
     return message_feedthrough_encode(frame, &message);
@@ -112,15 +105,15 @@ static bool encode_feedthrough(lever_t *lever, lever_frame_t *frame)
 
 static bool encode_stability(lever_t *lever, lever_frame_t *frame)
 {
-    const margin_t *margin = &lever->bounce.margin;
-    const message_stability_t message = {.gain_margin = margin->gain,
-        .gain_margin_sigma = margin->gain_sigma,
-        .modulus = margin->modulus,
-        .modulus_sigma = margin->modulus_sigma,
-        .frequency = margin->frequency,
-        .bounce = lever->bounce.state,
-        .valid = is_estimating(lever) && (lever->bounce.state != (uint8_t)LEVER_BOUNCE_UNKNOWN) &&
-                 is_finite(margin->gain_sigma) && is_finite(margin->modulus_sigma)};
+    lever_stability_t stability;
+    lever_stability(lever, &stability);
+    const message_stability_t message = {.gain_margin = stability.gain_margin,
+        .gain_margin_sigma = stability.gain_margin_sigma,
+        .modulus = stability.modulus,
+        .modulus_sigma = stability.modulus_sigma,
+        .frequency = stability.frequency,
+        .bounce = stability.state,
+        .valid = stability.valid};
     return message_stability_encode(frame, &message);
 }
 
@@ -143,21 +136,22 @@ static bool encode_link_health(lever_t *lever, lever_frame_t *frame)
         .corrupt = low_16(estimator->corrupt),
         .late = low_16(estimator->late),
         .model = estimator->setup.model,
-        .valid = is_estimating(lever)};
+        .valid = instance_is_estimating(lever)};
     return message_link_health_encode(frame, &message);
 }
 
 static bool encode_platform(lever_t *lever, lever_frame_t *frame)
 {
     const lever_platform_t *platform = &lever->platform;
-    const message_platform_health_t message = {.faults = platform->faults,
+    const uint32_t settings = lever->settings_changed ? (uint32_t)LEVER_PLATFORM_SELF_TEST : 0u;
+    const message_platform_health_t message = {.faults = (uint8_t)(platform->faults | settings),
         .transmit_errors = platform->transmit_errors,
         .receive_errors = platform->receive_errors,
         .bus_offs = platform->bus_offs,
         .overruns = (uint8_t)(platform->overruns & 0xFFu),
         .dropped = (uint8_t)(platform->dropped & 0xFFu),
         .model = lever->estimator.setup.model,
-        .valid = is_estimating(lever)};
+        .valid = instance_is_estimating(lever)};
     return message_platform_health_encode(frame, &message);
 }
 
@@ -194,7 +188,7 @@ static bool encode_state_estimate(lever_t *lever, lever_frame_t *frame)
     message.theta_dot = estimator_state(estimator, 1u);
     message.innovation = (estimator->nis_size != 0u) ? sqrtf(estimator->nis) : NAN;
     message.time_low = low_16(estimator->time_us);
-    message.valid = is_estimating(lever) && is_finite(message.theta) && is_finite(message.theta_dot);
+    message.valid = instance_is_estimating(lever) && is_finite(message.theta) && is_finite(message.theta_dot);
     return message_state_estimate_encode(frame, &message);
 }
 

@@ -70,9 +70,9 @@ static const state_row_t rows[] = {
 
     WORDS(dither.high_pass.level, dither.noise),
     WORDS(gate.torque, gate.counted),
-    FLAGS(gate.open, gate.open),
+    FLAGS(gate.open, gate.barred),
     WORDS(to_gate.elapsed_us, to_gate.elapsed_us),
-    FLAGS(to_gate.advances, to_gate.permitted),
+    FLAGS(to_gate.advances, to_gate.harmful),
 
     RECEIVER(lever_receiver),
     RECEIVER(base_receiver),
@@ -104,7 +104,8 @@ static const state_row_t rows[] = {
 
     BYTES(platform.faults, platform.bus_offs, ANY_BYTE),
     MEMBERS(platform.overruns, platform.dropped, 2u, ANY_HALF),
-    FLAGS(has_platform, has_platform),
+    WORDS(settings_us, settings_us),
+    FLAGS(has_platform, settings_changed),
 };
 
 uint32_t state_row_count(void)

@@ -11,6 +11,7 @@
 #define SILENCE_PERIODS 3u
 #define IDLE_US 5000u         /* longest time from a sample to torque_gate_idle(), or the next sample */
 #define CLOSING_US 40000.0f   /* so that a step of the port's clock is left of 50 ms */
+#define TORQUE_LEAST 1.0e-6f  /* a fade is never slower than that of this torque: one of 1e-40 would not end [N m] */
 #define MEMORY 0.25f          /* of the mean square [s], or in windows of torque_rms, of 1 s */
 #define MEMORY_PER_US 4.0e-6f /* 1 / that, in us */
 #define ROOM 0.2f             /* part of square_most in which the amplitude falls, at least */
@@ -55,7 +56,7 @@ void torque_gate_close(torque_gate_t *gate)
     if (gate->open) {
         gate->open = false;
         gate->gain = 0.0f;
-        gate->closing = fabsf(gate->torque) / CLOSING_US;
+        gate->closing = greater(fabsf(gate->torque), TORQUE_LEAST) / CLOSING_US;
     }
 }
 
@@ -109,7 +110,8 @@ void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *s
     if (sample->advances && sample->measured) {
         gate->output_left = gate->silence_us + 1u;
     }
-    const bool may_open = sample->advances && sample->permitted && is_fresh(gate);
+    gate->barred = gate->barred || sample->harmful;
+    const bool may_open = sample->advances && sample->permitted && !gate->barred && is_fresh(gate);
     if (gate->open && may_open) {
         drive(gate, asked, sample->elapsed_us);
     } else if (gate->open) {
@@ -130,6 +132,16 @@ void torque_gate_idle(torque_gate_t *gate, uint32_t elapsed_us)
 void torque_gate_keep_alive(torque_gate_t *gate)
 {
     gate->command_left = KEEP_ALIVE_US + 1u;
+}
+
+bool torque_gate_has_output(const torque_gate_t *gate)
+{
+    return gate->output_left != 0u;
+}
+
+void torque_gate_ask(torque_gate_t *gate)
+{
+    gate->barred = false; /* the next sample, before which nothing opens, bars it again if it is still harmful */
 }
 
 bool torque_gate_is_abandoned(const torque_gate_t *gate)

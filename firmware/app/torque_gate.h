@@ -4,7 +4,9 @@
  * gate is open while all of this holds:
  *   - the mode, the sample clock and the machine permit it: torque_sample_t;
  *   - a sample with a valid output came within 20 ms or three sample periods, whichever is longer;
- *   - a command was accepted within the last second (keep-alive).
+ *   - a command was accepted within the last second (keep-alive);
+ *   - it is not barred. Evidence that torque does harm, as the motor does not do what it is asked or nobody holds the
+ *     lever, bars it; a command that asks for torque anew ends that, once the evidence is gone.
  * Otherwise torque goes to exactly zero on a straight line within 40 ms, even if torque_slew is less than that takes.
  * Closing needs no sample: the port calls torque_gate_idle(). Opening takes dither_fade.
  *
@@ -40,6 +42,7 @@ typedef struct torque_gate {
     uint32_t command_left; /* the last accepted command */
     uint32_t counted;      /* time since the last sample of any kind that torque_gate_idle() has counted [us] */
     bool open;
+    bool barred; /* until torque is asked for anew */
 } torque_gate_t;
 
 /* A sample, to the gate. */
@@ -47,7 +50,8 @@ typedef struct torque_sample {
     uint32_t elapsed_us; /* since the last one, when the sample clock advances */
     bool advances;       /* it does */
     bool measured;       /* theta or theta_dot is valid */
-    bool permitted;      /* mode RUN or FROZEN (or COAST, which `measured` ends), no ROM, SELF_TEST or WATCHDOG fault */
+    bool permitted;      /* mode RUN or FROZEN (or COAST, which `measured` ends), no fault of the machine */
+    bool harmful;        /* the motor has been found wrong, or nobody holds the lever */
 } torque_sample_t;
 
 /* Closed. */
@@ -64,6 +68,12 @@ void torque_gate_close(torque_gate_t *gate);
 
 /* A command was accepted. */
 void torque_gate_keep_alive(torque_gate_t *gate);
+
+/* A sample with a valid output came within 20 ms or three sample periods. */
+bool torque_gate_has_output(const torque_gate_t *gate);
+
+/* A command asks for torque. */
+void torque_gate_ask(torque_gate_t *gate);
 
 /* No command was accepted within the last second. */
 bool torque_gate_is_abandoned(const torque_gate_t *gate);

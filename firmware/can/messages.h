@@ -252,7 +252,8 @@ enum message_self_test {
     MESSAGE_SELF_TEST_ROM = 1,
     MESSAGE_SELF_TEST_RAM = 2,
     MESSAGE_SELF_TEST_STACK = 4, /* was, once, deeper than it may be */
-    MESSAGE_SELF_TEST_GOLDEN = 8 /* the estimator did not give its golden vector at power-on */
+    MESSAGE_SELF_TEST_GOLDEN = 8,  /* the estimator did not give its golden vector at power-on */
+    MESSAGE_SELF_TEST_SETTINGS = 16 /* settings or aircraft of the build are refused: nothing is estimated */
 };
 
 /* A port sends this one itself, with e2e_protect(). */

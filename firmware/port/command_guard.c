@@ -7,14 +7,15 @@
 
 enum { FRAME_BYTES = 8, FRESHNESS_BYTES = 3 };
 
-/* Nothing changes but that dither may end. */
+/* Nothing changes but that something ends: dither, mitigation, learning, or the estimate with all of them. */
 static bool is_harmless(const lever_command_t *command)
 {
     const uint8_t keep = (uint8_t)LEVER_KEEP;
 
-    return (command->request == (uint8_t)LEVER_REQUEST_NONE) && (command->model == keep) &&
-           (command->preload == keep) && (command->estimator == keep) && (command->adaptation == keep) &&
-           (command->mitigation == keep) &&
+    return (command->request != (uint8_t)LEVER_REQUEST_RUN) && (command->request <= (uint8_t)LEVER_REQUEST_RESET) &&
+           (command->model == keep) && (command->preload == keep) && (command->estimator == keep) &&
+           (command->adaptation == keep) &&
+           ((command->mitigation == keep) || (command->mitigation == (uint8_t)LEVER_MITIGATION_NONE)) &&
            ((command->dither_rms >= (float)LEVER_KEEP) || (command->dither_rms <= 0.0f));
 }
 
@@ -103,13 +104,11 @@ enum port_result command_guard_receive(void *self, lever_frame_t *frame)
 {
     command_guard_t *const guard = self; /* cppcheck-suppress misra-c2012-11.5 ; D11 */
 
-    enum port_result result;
-    bool passes;
+    const enum port_result result = guard->receive(guard->self, frame);
 
-    do { /* no bus brings frames faster than they are looked at */
-        result = guard->receive(guard->self, frame);
-        passes = (result != PORT_DONE) || (!is_authenticator(guard, frame) &&
-                                              ((frame->id != (uint32_t)MESSAGE_COMMAND_ID) || may_pass(guard, frame)));
-    } while (!passes);
+    if ((result == PORT_DONE) && !is_authenticator(guard, frame) && (frame->id == (uint32_t)MESSAGE_COMMAND_ID) &&
+        !may_pass(guard, frame)) {
+        frame->id = COMMAND_GUARD_NOBODY;
+    }
     return result;
 }

@@ -2,7 +2,8 @@
  *
  * COMMAND starts torque and chooses models, so it is let through only as far as the build, the state of the machine and
  * its sender allow:
- *   - one that changes nothing, or only ends the dither, passes always: it keeps torque alive, or ends it;
+ *   - one that changes nothing, or only ends something (dither, mitigation, learning by FREEZE, all of it by RESET),
+ *     passes always: it keeps torque and correction alive, or ends them;
  *   - any other passes when the build takes commands, while nothing acts on the lever (lever_is_acting()) and, where
  *     there is such a callback, the machine says that it is safe, e.g. on the ground;
  *   - with an authentication none passes that is not authentic and new, whatever it says.
@@ -52,8 +53,11 @@ typedef struct command_guard {
     uint8_t authenticator[8];
 } command_guard_t;
 
-/* receive of port.h, with a command_guard_t as `self`. A frame that is refused is received, but not handed on: the next
- * is looked at. */
+/* No message has this identifier. */
+#define COMMAND_GUARD_NOBODY UINT32_MAX
+
+/* receive of port.h, with a command_guard_t as `self`. A COMMAND that is refused becomes a frame for COMMAND_GUARD_NOBODY,
+ * so that the loop sends its COMMAND_ACK before it receives the next frame. */
 enum port_result command_guard_receive(void *self, lever_frame_t *frame);
 
 #endif

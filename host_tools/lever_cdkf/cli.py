@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import interrupts
+from .can import identifiers
 from .errors import LeverError
 from .exit_status import INTERRUPTED, MESSAGE
 from .extras import hide_mf4, reveal_mf4
@@ -74,6 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             args = _parser().parse_args(argv)
             _check_json(args)
+            identifiers.use(args)
             with interrupts.heard():
                 status: int = args.run(args) or 0
         except SystemExit as stop:  # --help and --version

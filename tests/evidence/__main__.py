@@ -133,16 +133,15 @@ def _soak(build: Path, file: Path) -> Content:
 
 
 def _fuzz(build: Path) -> Content:
-    """Each fuzz target for a while."""
+    """Each fuzz target for a while, from a seed of now."""
+    file = build / "fuzz.json"
     command: list[str | Path] = [
-        sys.executable,
-        tools.ROOT / "tests/fuzz",
-        "--seconds",
-        str(FUZZED),
-        "--build",
-        str(build / "fuzz"),
+        *(sys.executable, tools.ROOT / "tests/fuzz", "--seconds", str(FUZZED)),
+        *("--build", build / "fuzz", "--json", file),
     ]
-    return {"targets": list(libfuzzer.SOURCES), "seconds": FUZZED, "found": _run(command)}
+    found = _run(command)
+    seeds = {name: row["first_seed"] for name, row in _read(file)["targets"].items()}
+    return {"targets": list(libfuzzer.SOURCES), "seconds": FUZZED, "seeds": seeds, "found": found}
 
 
 def _coverage(build: Path) -> Content:

@@ -144,7 +144,8 @@ def _soak(content: Mapping[str, Any]) -> str:
 
 def _fuzz(content: Mapping[str, Any]) -> str:
     found = "with a finding" if content["found"] else "without a finding"
-    return f"<p>{', '.join(content['targets'])}: {content['seconds']} s each, {found}.</p>"
+    seeds = ", ".join(f"{target} (seed {content['seeds'][target]})" for target in content["targets"])
+    return f"<p>{seeds}: {content['seconds']} s each, {found}.</p>"
 
 
 def _made(content: Mapping[str, Any]) -> str:

@@ -186,7 +186,7 @@ void torque_gate_step(torque_gate_t *gate, float asked, const torque_sample_t *s
 
 void torque_gate_idle(torque_gate_t *gate, uint32_t elapsed_us)
 {
-    const torque_sample_t sample = {elapsed_us, false, false, false};
+    const torque_sample_t sample = {elapsed_us, false, false, false, false};
     torque_gate_step(gate, 0.0f, &sample);
 }
 
@@ -199,6 +199,17 @@ void torque_gate_close(torque_gate_t *gate)
 void torque_gate_keep_alive(torque_gate_t *gate)
 {
     (void)gate;
+}
+
+void torque_gate_ask(torque_gate_t *gate)
+{
+    (void)gate;
+}
+
+bool torque_gate_has_output(const torque_gate_t *gate)
+{
+    (void)gate;
+    return any_bool();
 }
 
 bool torque_gate_is_abandoned(const torque_gate_t *gate)

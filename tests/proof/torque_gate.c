@@ -15,7 +15,7 @@ void main(void)
     torque_gate_t gate;
     torque_gate_init(&gate, &settings);
     while (any_bool()) {
-        const torque_sample_t sample = {any_word(), any_bool(), any_bool(), any_bool()};
+        const torque_sample_t sample = {any_word(), any_bool(), any_bool(), any_bool(), any_bool()};
         torque_gate_step(&gate, any_float(), &sample);
         torque_gate_idle(&gate, any_word());
         if (any_bool()) {

@@ -22,4 +22,10 @@
  * whether the estimator takes it is for lever_aircraft() to say. */
 bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, settings_error_t *error);
 
+/* Why lever_aircraft() refuses one. */
+#define AIRCRAFT_REFUSED                                                                                               \
+    "the response of the aircraft cannot be used: it needs 3 frequencies or more that rise from above 0, sigmas from " \
+    "0 "                                                                                                               \
+    "to 1, and a warning not below the alarm"
+
 #endif

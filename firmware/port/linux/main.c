@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "lever_cdkf.h"
+#include "port/linux/aircraft.h"
 #include "port/linux/options.h"
 #include "port/linux/settings.h"
 #include "port/linux/slcan_host.h"
@@ -107,26 +108,27 @@ static void print_totals(const session_t *session, const lever_t *lever)
 static bool open_medium(session_t *session, int stop)
 {
     const char *const interface = session->options->interface;
+    const uint32_t identifiers = session->options->identifiers;
     bool good = false;
 
     session->medium = slcan_peer_port(&session->slcan_peer);
     session->reason = session->slcan_peer.tty.reason;
     switch (session->options->medium) {
     case OPTIONS_MEDIUM_SLCAN:
-        good = slcan_host_open(&session->slcan_host, interface, stop);
+        good = slcan_host_open(&session->slcan_host, interface, identifiers, stop);
         session->medium = slcan_host_port(&session->slcan_host);
         session->reason = session->slcan_host.tty.reason;
         break;
     case OPTIONS_MEDIUM_PTY:
-        good = slcan_peer_open_pty(&session->slcan_peer, interface, stop);
+        good = slcan_peer_open_pty(&session->slcan_peer, interface, identifiers, stop);
         break;
     case OPTIONS_MEDIUM_SERIAL:
-        good = slcan_peer_open_device(&session->slcan_peer, interface, stop);
+        good = slcan_peer_open_device(&session->slcan_peer, interface, identifiers, stop);
         break;
     case OPTIONS_MEDIUM_CAN:
     case OPTIONS_MEDIUM_NONE:
     default:
-        good = socketcan_open(&session->socketcan, interface, stop);
+        good = socketcan_open(&session->socketcan, interface, identifiers, stop);
         session->socketcan.on_bus_state = print_bus_state;
         session->socketcan.context = session;
         session->medium = socketcan_port(&session->socketcan);
@@ -177,10 +179,7 @@ static int run(const options_t *options)
         return EXIT_BAD_INTERFACE;
     }
     if (options->has_aircraft && !lever_aircraft(lever, &options->aircraft)) {
-        (void)fputs(
-            "lever_can: the response of the aircraft cannot be used: it needs 3 frequencies or more that rise from "
-            "above 0, sigmas from 0 to 1, and a warning not below the alarm\n",
-            stderr);
+        (void)fputs("lever_can: " AIRCRAFT_REFUSED "\n", stderr);
         return EXIT_BAD_USAGE;
     }
     if (!open_medium(&session, stop)) {

@@ -3,6 +3,8 @@
 #include "port/linux/options.h"
 
 #include "lever_build.h"
+#include "lever_build_port.h"
+#include "port/identifiers.h"
 #include "port/linux/aircraft.h"
 
 #include <errno.h>
@@ -46,6 +48,9 @@ static const char help[] =
     "                       `lever aircraft` writes such a file, firmware/port/linux/aircraft.h says what is in it\n"
     "  --snapshots SECONDS  also send the whole state so often (SNAPSHOT; 0.5 is 6 % of a bus of 1 Mbit/s), so that a\n"
     "                       log may begin anywhere: `lever replay` starts from one, and proves itself by the others\n"
+    "  --id-offset N        identifiers are higher by N than those in lever.dbc, for a second lever on a bus: 0x40, "
+    "say\n"
+    "  --id-base N          identifiers have 29 bits, and are those in lever.dbc plus N: 0x18FF0000, say\n"
     "  --lock-step          time is that of the samples alone: for simulations that may pause; never beside a motor\n"
     "  --verbose            also print all settings, and every change of mode\n"
     "  --help, --version    print this, or the version, and exit\n"
@@ -83,6 +88,8 @@ static const struct option known[] = {
     {"mitigation", required_argument, NULL, '='},
     {"aircraft", required_argument, NULL, 'a'},
     {"snapshots", required_argument, NULL, 'n'},
+    {"id-offset", required_argument, NULL, 'o'},
+    {"id-base", required_argument, NULL, 'b'},
     {"lock-step", no_argument, NULL, 'k'},
     {"verbose", no_argument, NULL, 'v'},
     {"help", no_argument, NULL, 'h'},
@@ -148,6 +155,23 @@ static bool read_snapshots(options_t *options, const char *argument, settings_er
     return true;
 }
 
+/* Of the two options, the last one counts. */
+static bool read_identifiers(
+    options_t *options, const char *argument, uint32_t greatest, uint32_t flag, settings_error_t *error)
+{
+    char *end = NULL;
+
+    errno = 0;
+    const unsigned long long shift = strtoull(argument, &end, 0);
+    if ((argument[0] < '0') || (argument[0] > '9') || (*end != '\0') || (errno != 0) || (shift > greatest)) {
+        (void)snprintf(error->text, sizeof error->text, "%s takes a number from 0 to 0x%X: %.200s",
+            (flag != 0u) ? "--id-base" : "--id-offset", (unsigned)greatest, argument);
+        return false;
+    }
+    options->identifiers = (uint32_t)shift + flag;
+    return true;
+}
+
 static bool read_option(options_t *options, int option, const char *name, const char *argument, settings_error_t *error)
 {
     bool good = true;
@@ -179,6 +203,12 @@ static bool read_option(options_t *options, int option, const char *name, const 
         break;
     case 'n':
         good = read_snapshots(options, argument, error);
+        break;
+    case 'o':
+        good = read_identifiers(options, argument, IDENTIFIERS_OFFSET_MAX, 0u, error);
+        break;
+    case 'b':
+        good = read_identifiers(options, argument, IDENTIFIERS_BASE_MAX, IDENTIFIERS_EXTENDED, error);
         break;
     case 'k':
         options->lock_step = true;
@@ -219,6 +249,11 @@ bool options_read(options_t *options, int argc, char *argv[], settings_error_t *
 
     (void)memset(options, 0, sizeof *options);
     lever_build_config(&options->config);
+    options->identifiers = LEVER_IDENTIFIERS;
+    options->has_aircraft = (lever_build_aircraft() != NULL);
+    if (options->has_aircraft) {
+        options->aircraft = *lever_build_aircraft();
+    }
     opterr = 0;
     optind = 0; /* from the start, also when called again */
     int option = getopt_long(argc, argv, ":", known, &which);

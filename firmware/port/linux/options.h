@@ -25,6 +25,7 @@ typedef struct options {
     bool verbose;
     bool lock_step;        /* see loop.h */
     uint32_t snapshot_us;  /* from one SNAPSHOT to the next; 0: none */
+    uint32_t identifiers;  /* port/identifiers.h */
     lever_config_t config; /* checked */
     bool has_aircraft;
     lever_aircraft_t aircraft; /* as it stands in its file */

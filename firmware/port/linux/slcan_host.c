@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "can/messages.h"
+#include "port/identifiers.h"
 #include "port/linux/clock.h"
 
 /* Ends what the adapter may have had of a line, and goes on the bus at 1 Mbit/s. The first C is refused if the channel
@@ -10,9 +11,10 @@
 static const char opening[] = "\r\rC\rS8\rO\r";
 static const char closing[] = "C\r";
 
-bool slcan_host_open(slcan_host_t *host, const char *device, int stop)
+bool slcan_host_open(slcan_host_t *host, const char *device, uint32_t identifiers, int stop)
 {
     (void)memset(host, 0, sizeof *host);
+    host->identifiers = identifiers;
     return tty_open_device(&host->tty, device, stop) && tty_put(&host->tty, opening, (sizeof opening) - 1u);
 }
 
@@ -40,9 +42,8 @@ static enum port_result receive_frame(void *self, lever_frame_t *frame)
         if ((end == SLCAN_BEL) && host->has_sent) {
             host->refused++;
         }
-        if ((end == SLCAN_CR) && slcan_read_frame(&host->line, true, &received) && !received.extended &&
-            !received.remote) {
-            *frame = received.frame;
+        if ((end == SLCAN_CR) && slcan_read_frame(&host->line, true, &received) &&
+            slcan_is_ours(&received, host->identifiers, frame)) {
             return PORT_DONE;
         }
     }
@@ -52,7 +53,7 @@ static enum port_result receive_frame(void *self, lever_frame_t *frame)
 static enum port_result send_frame(void *self, const lever_frame_t *frame)
 {
     slcan_host_t *host = self;
-    const slcan_frame_t sent = {.frame = *frame};
+    const slcan_frame_t sent = slcan_shifted(frame, host->identifiers);
     char text[SLCAN_LINE_BYTES];
     const uint32_t length = slcan_write_frame(&sent, SLCAN_NO_TIME, text);
 

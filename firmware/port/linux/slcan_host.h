@@ -14,6 +14,7 @@
 #include "port/slcan/slcan.h"
 
 typedef struct slcan_host {
+    uint32_t identifiers; /* port/identifiers.h */
     tty_t tty;
     slcan_line_t line;
     bool has_sent;    /* a frame, at least */
@@ -22,7 +23,7 @@ typedef struct slcan_host {
 
 /* Opens `device` as tty_open_device() does, and the channel of the adapter there; host->tty.reason says what is
  * wrong. */
-bool slcan_host_open(slcan_host_t *host, const char *device, int stop);
+bool slcan_host_open(slcan_host_t *host, const char *device, uint32_t identifiers, int stop);
 
 /* Closes the channel and releases what open has taken; also right after a failed open. */
 void slcan_host_close(slcan_host_t *host);

@@ -1,6 +1,7 @@
 #include "port/linux/slcan_peer.h"
 
 #include "can/messages.h"
+#include "port/identifiers.h"
 #include "port/linux/clock.h"
 
 static bool put(void *self, const char *text, uint32_t length)
@@ -16,15 +17,17 @@ static void start(slcan_peer_t *peer)
     slcan_init(&peer->slcan, &sink, &identity);
 }
 
-bool slcan_peer_open_pty(slcan_peer_t *peer, const char *link, int stop)
+bool slcan_peer_open_pty(slcan_peer_t *peer, const char *link, uint32_t identifiers, int stop)
 {
     start(peer);
+    peer->identifiers = identifiers;
     return tty_open_pty(&peer->tty, link, stop);
 }
 
-bool slcan_peer_open_device(slcan_peer_t *peer, const char *device, int stop)
+bool slcan_peer_open_device(slcan_peer_t *peer, const char *device, uint32_t identifiers, int stop)
 {
     start(peer);
+    peer->identifiers = identifiers;
     return tty_open_device(&peer->tty, device, stop);
 }
 
@@ -48,8 +51,7 @@ static enum port_result receive_frame(void *self, lever_frame_t *frame)
             }
             return result;
         }
-        if (slcan_take(&peer->slcan, byte, &received) && !received.extended && !received.remote) {
-            *frame = received.frame;
+        if (slcan_take(&peer->slcan, byte, &received) && slcan_is_ours(&received, peer->identifiers, frame)) {
             return PORT_DONE;
         }
     }
@@ -59,7 +61,7 @@ static enum port_result receive_frame(void *self, lever_frame_t *frame)
 static enum port_result send_frame(void *self, const lever_frame_t *frame)
 {
     slcan_peer_t *peer = self;
-    const slcan_frame_t sent = {.frame = *frame};
+    const slcan_frame_t sent = slcan_shifted(frame, peer->identifiers);
 
     if (PORT_GOES_STALE(frame->id) && tty_is_slow(&peer->tty)) {
         return PORT_NOTHING;

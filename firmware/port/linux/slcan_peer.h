@@ -15,13 +15,14 @@
 #include "port/slcan/slcan.h"
 
 typedef struct slcan_peer {
+    uint32_t identifiers; /* port/identifiers.h */
     tty_t tty;
     slcan_t slcan;
 } slcan_peer_t;
 
 /* Open as tty_open_pty() and tty_open_device() do; peer->tty.reason says what is wrong. */
-bool slcan_peer_open_pty(slcan_peer_t *peer, const char *link, int stop);
-bool slcan_peer_open_device(slcan_peer_t *peer, const char *device, int stop);
+bool slcan_peer_open_pty(slcan_peer_t *peer, const char *link, uint32_t identifiers, int stop);
+bool slcan_peer_open_device(slcan_peer_t *peer, const char *device, uint32_t identifiers, int stop);
 
 /* Releases what open has taken; also right after a failed open. */
 void slcan_peer_close(slcan_peer_t *peer);

@@ -17,6 +17,7 @@
 #include <linux/if_arp.h>
 
 #include "can/messages.h"
+#include "port/identifiers.h"
 #include "port/linux/clock.h"
 
 enum {
@@ -93,8 +94,9 @@ static bool set_options(const socketcan_t *socketcan)
     const int receive_buffer = RECEIVE_BUFFER_BYTES;
 
     for (size_t i = 0u; i < ((sizeof inputs) / (sizeof inputs[0])); i++) {
-        filter[i].can_id = inputs[i];
-        filter[i].can_mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+        filter[i].can_id =
+            identifiers_to_bus(socketcan->identifiers, inputs[i]); /* IDENTIFIERS_EXTENDED is CAN_EFF_FLAG */
+        filter[i].can_mask = CAN_EFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
     }
     /* A larger receive buffer is a precaution, bounded by net.core.rmem_max for who is not root: not a failure. */
     if (setsockopt(socketcan->socket, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer, sizeof receive_buffer) != 0) {
@@ -132,11 +134,12 @@ static enum port_result open_socket(socketcan_t *socketcan)
     return result;
 }
 
-bool socketcan_open(socketcan_t *socketcan, const char *interface, int stop)
+bool socketcan_open(socketcan_t *socketcan, const char *interface, uint32_t identifiers, int stop)
 {
     (void)memset(socketcan, 0, sizeof *socketcan);
     socketcan->socket = -1;
     socketcan->stop = stop;
+    socketcan->identifiers = identifiers;
     if ((interface[0] == '\0') || (strlen(interface) >= sizeof socketcan->interface)) {
         explain(socketcan, "an interface name has 1 to %zu characters", sizeof socketcan->interface - 1u);
         return false;
@@ -249,7 +252,7 @@ static enum port_result receive_frame(void *self, lever_frame_t *frame)
         result = PORT_NOTHING;
     }
     if (result == PORT_DONE) {
-        frame->id = received.can_id & CAN_SFF_MASK;
+        frame->id = identifiers_from_bus(socketcan->identifiers, received.can_id);
         frame->length = received.can_dlc;
         (void)memcpy(frame->data, received.data, sizeof frame->data);
     }
@@ -262,7 +265,7 @@ static enum port_result send_frame(void *self, const lever_frame_t *frame)
     struct can_frame sent;
 
     (void)memset(&sent, 0, sizeof sent);
-    sent.can_id = frame->id;
+    sent.can_id = identifiers_to_bus(socketcan->identifiers, frame->id);
     sent.can_dlc = frame->length;
     (void)memcpy(sent.data, frame->data, sizeof sent.data);
     if (send(socketcan->socket, &sent, sizeof sent, 0) == (ssize_t)sizeof sent) {

@@ -1,4 +1,4 @@
-/* A port over a SocketCAN interface: classic frames with 11-bit identifiers, through a raw socket. */
+/* A port over a SocketCAN interface: classic frames, through a raw socket. */
 #ifndef LEVER_PORT_SOCKETCAN_H
 #define LEVER_PORT_SOCKETCAN_H
 
@@ -10,6 +10,7 @@
 
 typedef struct socketcan {
     char interface[IF_NAMESIZE];
+    uint32_t identifiers;        /* port/identifiers.h */
     int socket;                  /* -1: none */
     int stop;                    /* descriptor that becomes readable when the loop is to end; not owned */
     uint32_t overflow;           /* received frames that the kernel had no room for, in all */
@@ -22,7 +23,7 @@ typedef struct socketcan {
 
 /* Opens `interface` ("vcan0"), which must exist and be up. `stop` is a descriptor, see stop.h. Returns false when that
  * cannot be done; socketcan->reason then says, in one line, what is wrong and what to do. */
-bool socketcan_open(socketcan_t *socketcan, const char *interface, int stop);
+bool socketcan_open(socketcan_t *socketcan, const char *interface, uint32_t identifiers, int stop);
 
 /* Releases what open has taken; also right after a failed open. */
 void socketcan_close(socketcan_t *socketcan);

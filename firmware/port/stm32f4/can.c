@@ -1,7 +1,9 @@
 #include "port/stm32f4/can.h"
 
 #include "can/messages.h"
+#include "lever_build_port.h"
 #include "port/embedded/ring.h"
+#include "port/identifiers.h"
 #include "port/port.h"
 #include "port/stm32f4/bit_timing.h"
 #include "port/stm32f4/pins.h"
@@ -53,11 +55,13 @@ static void start_pins(void)
     pin_to_peripheral(&gpiob, PIN_TRANSMIT, FUNCTION_CAN);
 }
 
-/* RM0090 32.7.4: banks of four 16-bit identifiers; RTR and IDE in bits 4 and 3 are 0, so that only data frames
- * match. */
-static uint32_t filter_word(uint32_t id, uint32_t next_id)
+/* Identifier, IDE and RTR of a data frame, as mailboxes and filters have them (RM0090 32.9.5 and 32.7.4). */
+static uint32_t identifier_word(uint32_t id)
 {
-    return FIELD(next_id, 16u + 5u) | FIELD(id, 5u);
+    const uint32_t bus = identifiers_to_bus(LEVER_IDENTIFIERS, id);
+
+    return ((bus & IDENTIFIERS_EXTENDED) != 0u) ? (FIELD(bus & ~IDENTIFIERS_EXTENDED, CAN_IR_EXID_LOWEST) | CAN_IR_IDE)
+                                                : FIELD(bus, CAN_IR_STID_LOWEST);
 }
 
 static void start_filter(void)
@@ -66,14 +70,16 @@ static void start_filter(void)
 
     can1.FMR |= CAN_FMR_FINIT;
     can1.FA1R = 0u;
-    can1.FM1R = BIT(0) | BIT(1); /* banks 0 and 1: lists ... */
-    can1.FS1R = 0u;              /* ... of 16-bit identifiers ... */
-    can1.FFA1R = 0u;             /* ... into FIFO 0 */
-    can1.FR[0][0] = filter_word(inputs[0], inputs[1]);
-    can1.FR[0][1] = filter_word(inputs[2], inputs[3]);
-    can1.FR[1][0] = filter_word(inputs[4], inputs[4]);
-    can1.FR[1][1] = filter_word(inputs[4], inputs[4]);
-    can1.FA1R = BIT(0) | BIT(1);
+    can1.FM1R = BIT(0) | BIT(1) | BIT(2); /* banks 0 to 2: lists ... */
+    can1.FS1R = BIT(0) | BIT(1) | BIT(2); /* ... of two identifiers each ... */
+    can1.FFA1R = 0u;                      /* ... into FIFO 0 */
+    can1.FR[0][0] = identifier_word(inputs[0]);
+    can1.FR[0][1] = identifier_word(inputs[1]);
+    can1.FR[1][0] = identifier_word(inputs[2]);
+    can1.FR[1][1] = identifier_word(inputs[3]);
+    can1.FR[2][0] = identifier_word(inputs[4]);
+    can1.FR[2][1] = identifier_word(inputs[4]);
+    can1.FA1R = BIT(0) | BIT(1) | BIT(2);
     can1.FMR &= ~(uint32_t)CAN_FMR_FINIT;
 }
 
@@ -101,7 +107,12 @@ static void read_mailbox(const can_mailbox_t *mailbox, lever_frame_t *frame)
     const uint32_t words[2] = {mailbox->DLR, mailbox->DHR};
     const uint32_t length = mailbox->DTR & CAN_DTR_DLC;
 
-    frame->id = mailbox->IR >> CAN_IR_STID_LOWEST;
+    const uint32_t word = mailbox->IR;
+    const bool extended = (word & CAN_IR_IDE) != 0u;
+    const uint32_t bus =
+        extended ? ((word >> CAN_IR_EXID_LOWEST) | IDENTIFIERS_EXTENDED) : (word >> CAN_IR_STID_LOWEST);
+
+    frame->id = identifiers_from_bus(LEVER_IDENTIFIERS, bus);
     frame->length = (uint8_t)((length < 8u) ? length : 8u);
     for (uint32_t i = 0u; i < 8u; i++) {
         frame->data[i] = (uint8_t)(words[i / 4u] >> (8u * (i % 4u)));
@@ -146,7 +157,7 @@ static void write_mailbox(can_mailbox_t *mailbox, const lever_frame_t *frame)
     for (uint32_t i = 0u; i < 8u; i++) {
         words[i / 4u] |= (uint32_t)frame->data[i] << (8u * (i % 4u));
     }
-    mailbox->IR = FIELD(frame->id, CAN_IR_STID_LOWEST);
+    mailbox->IR = identifier_word(frame->id);
     mailbox->DTR = frame->length;
     mailbox->DLR = words[0];
     mailbox->DHR = words[1];

@@ -5,6 +5,7 @@
 #include "can/e2e.h"
 #include "can/messages.h"
 #include "lever_build.h"
+#include "lever_build_port.h"
 #include "lever_cdkf.h"
 #include "port/command_guard.h"
 #include "port/embedded/self_test.h"
@@ -120,7 +121,11 @@ static lever_t *configure(void)
     static lever_config_t config; /* as long as the instance */
 
     lever_build_config(&config);
-    return lever_init(&memory, &config);
+    lever_t *lever = lever_init(&memory, &config);
+    if ((lever != NULL) && !lever_aircraft(lever, lever_build_aircraft())) {
+        lever = NULL;
+    }
+    return lever;
 }
 
 static uint32_t fault_of(enum message_cause cause)
@@ -167,22 +172,28 @@ static void feed_watchdog(void)
     }
 }
 
+static void send_reset(void)
+{
+    static uint8_t counter;
+    lever_frame_t frame;
+
+    if (message_platform_reset_encode(&frame, &reset)) {
+        e2e_protect(&frame, MESSAGE_PLATFORM_RESET_DATA_ID, counter);
+        (void)transport_send(NULL, &frame); /* counted there if it finds no room */
+        counter++;
+    }
+}
+
 /* After the first sample and then each second, if there are samples: on a bus that asks nothing, nothing is said. */
 static void report_reset(uint32_t now_ms)
 {
     static uint32_t sent_ms;
     static uint64_t samples;
-    static uint8_t counter;
-    lever_frame_t frame;
 
     if ((loop.totals.samples != samples) && ((samples == 0u) || ((now_ms - sent_ms) >= (uint32_t)RESET_MS))) {
         samples = loop.totals.samples;
         sent_ms = now_ms;
-        if (message_platform_reset_encode(&frame, &reset)) {
-            e2e_protect(&frame, MESSAGE_PLATFORM_RESET_DATA_ID, counter);
-            (void)transport_send(NULL, &frame); /* counted there if it finds no room */
-            counter++;
-        }
+        send_reset();
     }
 }
 
@@ -197,6 +208,29 @@ static void each_millisecond(void)
         note_failed(periodic_test_step());
         report_reset(now_ms);
         feed_watchdog();
+    }
+}
+
+/* For ever: a configuration is refused, so that nothing can be estimated, and each second the bus is told. What is
+ * received is taken, as a host may have to open its channel, and ends here. */
+static void report_refusal(void)
+{
+    uint32_t sent_ms = tick_ms();
+    lever_frame_t frame;
+
+    note_failed((uint32_t)MESSAGE_SELF_TEST_SETTINGS);
+    while (wait_frame(NULL, true, 1)) {
+        const uint32_t now_ms = tick_ms();
+        while (transport_receive(NULL, &frame) == PORT_DONE) {
+            /* for nobody */
+        }
+        if ((now_ms - sent_ms) >= (uint32_t)RESET_MS) {
+            sent_ms = now_ms;
+            send_reset();
+        }
+        if (transport_is_served()) {
+            watchdog_kick();
+        }
     }
 }
 
@@ -216,6 +250,8 @@ int main(void)
         while (loop_turn(&loop) == PORT_DONE) {
             each_millisecond();
         }
+    } else {
+        report_refusal();
     }
-    return 1; /* a configuration that is refused: the watchdog resets, and nothing is ever sent */
+    return 1; /* never: the watchdog resets */
 }

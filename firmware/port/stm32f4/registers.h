@@ -177,6 +177,7 @@ typedef struct can {
 #define CAN_IR_TXRQ BIT(0u)
 #define CAN_IR_RTR BIT(1u)
 #define CAN_IR_IDE BIT(2u)
+#define CAN_IR_EXID_LOWEST 3u
 #define CAN_IR_STID_LOWEST 21u
 #define CAN_DTR_DLC 15u /* field */
 #define CAN_FMR_FINIT BIT(0u)

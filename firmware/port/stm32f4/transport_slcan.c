@@ -1,4 +1,5 @@
 #include "can/messages.h"
+#include "lever_build_port.h"
 #include "port/slcan/slcan.h"
 #include "port/stm32f4/registers.h"
 #include "port/stm32f4/tick.h"
@@ -57,7 +58,7 @@ void transport_status(lever_platform_t *status)
     status->dropped = (uint16_t)peer.counts.dropped;
 }
 
-/* Only data frames with 11-bit identifiers are the estimator's; the others were good SLCAN, and end here. */
+/* Only data frames with its identifiers are the estimator's; the others were good SLCAN, and end here. */
 enum port_result transport_receive(void *self, lever_frame_t *frame)
 {
     uint8_t byte = 0u;
@@ -67,8 +68,7 @@ enum port_result transport_receive(void *self, lever_frame_t *frame)
     (void)self;
     while (!found && usart_read(&byte)) {
         if (slcan_take(&peer, byte, &received)) {
-            *frame = received.frame;
-            found = !received.extended && !received.remote;
+            found = slcan_is_ours(&received, LEVER_IDENTIFIERS, frame);
         }
     }
     return found ? PORT_DONE : PORT_NOTHING;
@@ -77,7 +77,7 @@ enum port_result transport_receive(void *self, lever_frame_t *frame)
 /* What would leave too late has no room. */
 enum port_result transport_send(void *self, const lever_frame_t *frame)
 {
-    const slcan_frame_t sent = {.frame = *frame};
+    const slcan_frame_t sent = slcan_shifted(frame, LEVER_IDENTIFIERS);
 
     (void)self;
     if (PORT_GOES_STALE(frame->id) && (usart_waiting_ms() >= (uint32_t)PORT_STALE_MS)) {

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import LeverError
 from ..extras import pip_install
+from .identifiers import add_identifier_options, translate_bus
 
 if TYPE_CHECKING:
     import can
@@ -21,7 +22,7 @@ _PACKAGES = {"udp_multicast": "msgpack", "gs_usb": "gs_usb"}
 
 
 def add_bus_options(parser: argparse.ArgumentParser) -> None:
-    """--interface, --channel, --bitrate and --bus-option, for open_bus() and chosen_options()."""
+    """--interface, --channel and others, with those of identifiers.py, for open_bus() and chosen_options()."""
     parser.add_argument("--interface", help="of python-can: socketcan, slcan, pcan, kvaser …")
     parser.add_argument("--channel", help="can0, /dev/ttyACM0, … as the interface calls it")
     parser.add_argument("--bitrate", metavar="RATE", type=int, help="[bit/s] for interfaces that set it")
@@ -32,6 +33,7 @@ def add_bus_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="more for the interface, such as tty_baudrate=921600 for slcan; may be repeated",
     )
+    add_identifier_options(parser)
 
 
 def chosen_options(args: argparse.Namespace, *, fd: bool = False) -> dict[str, Any]:
@@ -57,8 +59,8 @@ def check_others_can_be_heard(interface: str) -> None:
         )
 
 
-def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) -> can.BusABC:
-    """A python-can bus. Raises LeverError."""
+def open_bus(interface: str, channel: str | None, options: Mapping[str, Any], *, translated: bool = True) -> can.BusABC:
+    """A python-can bus; `translated`: with the identifiers of lever.dbc, whatever they are on it. Raises LeverError."""
     import can
 
     from .protocol_ahead import read_ahead
@@ -76,4 +78,4 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any]) ->
         raise LeverError(f"cannot open {where}: {error}; is it there and up?") from None
     if bus.channel_info == can.BusABC.channel_info:  # slcan does not say what it is
         bus.channel_info = where
-    return bus
+    return translate_bus(bus) if translated and interface != "lever" else bus

@@ -27,6 +27,7 @@ import numpy as np
 from ..errors import LeverError
 from ..extras import require
 from ..unheard import unheard
+from . import identifiers
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 
 BLOCK = 1 << 22
@@ -45,8 +46,10 @@ class LogError(LeverError):
 class Recording:
     """One or several logs."""
 
-    def __init__(self, paths: Iterable[str | os.PathLike[str]]) -> None:
-        """Opens the logs and reads the first frames of each. Raises LogError."""
+    def __init__(self, paths: Iterable[str | os.PathLike[str]], *, translated: bool = True) -> None:
+        """Opens the logs and reads the first frames of each. `translated`: with the identifiers of lever.dbc, whatever
+        they were on the bus. Raises LogError."""
+        self._translated = translated
         self.buses = Buses()
         self.damaged = 0
         """Lines that are no frame."""
@@ -108,7 +111,7 @@ class Recording:
             if frames is None:
                 return
             if len(frames):
-                yield frames
+                yield identifiers.translate(frames) if self._translated else frames
 
     # --- candump ------------------------------------------------------------------------------------------------------
 

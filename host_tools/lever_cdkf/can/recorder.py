@@ -14,6 +14,7 @@ import can
 
 from ..errors import LeverError
 from . import codec
+from .identifiers import from_bus
 from .message_counts import Traffic
 
 PARTIAL = ".partial"
@@ -116,12 +117,13 @@ class Recorder:
 
     def _count(self, message: can.Message) -> None:
         self.frames += 1
-        counts = self.messages.get(message.arbitration_id)
+        identifier, extended = from_bus(message.arbitration_id, message.is_extended_id)
+        counts = self.messages.get(identifier)
         if message.is_error_frame:
             self.error_frames += 1
             if self._is_socketcan:
                 self._take_error(message)
-        elif counts is None or message.is_extended_id or message.is_remote_frame:
+        elif counts is None or extended or message.is_remote_frame:
             self.others += 1
         else:
             counts.take((message.data,), self.elapsed)

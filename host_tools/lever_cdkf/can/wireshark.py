@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..files import Outputs, write_text
+from . import identifiers
 from .codec import database
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def write_profile(folder: Path) -> None:
         "Signal_PDU_signal_list": (row for message in messages for row in _signals(message)),
         "Signal_PDU_signal_values": (row for message in messages for row in _values(message)),
         "Signal_PDU_Binding_CAN": (
-            (_hex(message.frame_id), _hex(_ANY_BUS), _hex(message.frame_id)) for message in messages
+            (_hex(identifiers.word(message.frame_id)), _hex(_ANY_BUS), _hex(message.frame_id)) for message in messages
         ),
     }
     with Outputs(folder) as outputs:

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..can.identifiers import add_identifier_options, chosen, shifted_dbc, word
+from ..errors import LeverError
 from ..layout import say
 from ..tables import Row, add_json_option
 
@@ -23,6 +25,7 @@ examples:
   lever dbc --path                                        where the DBC is, for other tools:
   candump -L vcan0 | cantools decode "$(lever dbc --path)"
   lever dbc --wireshark ~/.config/wireshark/profiles/lever
+  lever dbc --offset 0x40 --text > second.dbc             of a second lever: lever_can --id-offset 0x40
   candump -L vcan0 > flight.log; wireshark -C lever flight.log
 """
 
@@ -42,14 +45,21 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         type=Path,
         help="write all signals as a Wireshark profile into the folder DIR (Wireshark reads no DBC)",
     )
+    output.add_argument("--text", action="store_true", help="print the DBC itself, with the identifiers of --offset")
     add_json_option(output)
+    add_identifier_options(parser, "--offset")
 
 
 def run(args: argparse.Namespace) -> int:
     from ..files import native_file
     from ..tables import print_tables
 
+    if args.text:
+        print(shifted_dbc(native_file("lever.dbc").read_text(encoding="utf-8")), end="")
+        return 0
     if args.path:
+        if not chosen().are_those_of_the_dbc:
+            raise LeverError("the installed lever.dbc has identifiers of its own: print another with --text")
         print(native_file("lever.dbc"))
         return 0
     if args.wireshark is not None:
@@ -72,7 +82,7 @@ def _message_row(message: Message) -> Row:
 
     return {
         "message": message.name,
-        "id": f"{message.frame_id:#05x}",
+        "id": f"{word(message.frame_id) & 0x1FFFFFFF:#05x}",
         "bytes": message.length,
         "sender": ", ".join(message.senders),
         "data ID base": data_ids(message.name)[0],

@@ -63,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
         raise LeverError("record what? give a bus such as --interface socketcan --channel can0")
     check_others_can_be_heard(args.interface)
     reading, fd = _reading(args)
-    with open_bus(args.interface, args.channel, chosen_options(args, fd=fd)) as bus, _stopping() as stopped:
+    options = chosen_options(args, fd=fd)
+    with open_bus(args.interface, args.channel, options, translated=False) as bus, _stopping() as stopped:
         recorder = Recorder(bus, out, args.channel or args.interface)
         print(f"recording {bus.channel_info} into {out}; Ctrl-C ends", file=sys.stderr)
         line = _Line()

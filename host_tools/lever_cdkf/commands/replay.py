@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..can.identifiers import add_identifier_options
 from ..files import check_not_input
 from ..formats import add_format_option, chosen_formats
 from ..layout import say
@@ -63,6 +65,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "replay", help="run the firmware on recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("logs", nargs="+", metavar="LOG", help="a recorded log; several are one recording in pieces")
+    add_identifier_options(parser)
     parser.add_argument(
         "--each", action="store_true", help="every LOG is a separate recording: one table, one page, a row for each"
     )
@@ -104,6 +107,8 @@ def run(args: argparse.Namespace) -> int:
     options = _options(args, args.logs[0], chosen_formats(args))
     with Progress("replay") as progress:
         summary = replay(args.logs, options, args.out, progress.show)
+    if summary.warning and args.json is None:
+        say(f"{summary.warning}\n")
     print_tables(_tables(summary), args.json, inputs=[*args.logs, *input_files(args)])
     say(summary.verdict)
     if args.out is not None:
@@ -150,7 +155,19 @@ def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Opti
         formats=formats,
         aircraft=None if args.aircraft is None else chosen_aircraft(args.aircraft),
         inputs=input_files(args),
+        tune_command=_tune_command(args, log),
     )
+
+
+def _tune_command(args: argparse.Namespace, log: str) -> str:
+    """How `lever tune` reads the same."""
+    options = {"--dbc": args.dbc, "--clock": args.clock, "--channel": args.channel, "--settings": args.settings}
+    words = ["lever", "tune", *([log] if args.each else args.logs)]
+    words += [word for option, value in options.items() if value is not None for word in (option, value)]
+    words += ["--map", *args.map] if args.map else []
+    words += ["--start", f"{args.start:g}"] if args.start else []
+    words += ["--length", f"{args.length:g}"] if args.length is not None else []
+    return " ".join(map(shlex.quote, [*words, "-o", "my.settings"]))
 
 
 def _assignments(args: argparse.Namespace) -> Assignments:

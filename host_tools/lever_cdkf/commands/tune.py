@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..can.identifiers import add_identifier_options
 from ..errors import LeverError
 from ..extras import require
 from ..files import check_not_input
@@ -63,6 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "tune", help="settings from a log, by maximum likelihood", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("log", nargs="+", metavar="LOG", help="recorded log, of any format that `lever replay` reads")
+    add_identifier_options(parser)
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="write the settings file here")
     parser.add_argument("--page", metavar="FILE", type=Path, help="write before and after as a page for a browser")
     parser.add_argument("--settings", metavar="FILE", help="start from a settings file (default: the firmware's)")

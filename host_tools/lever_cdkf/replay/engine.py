@@ -37,7 +37,7 @@ from .outputs import FILES, SUMMARY, Folder
 from .proof import OTHER_CHOICES, Proof
 from .recorded_run import Kept, RecordedRun
 from .repeats import Repeats
-from .summary import Figures, failure, verdict
+from .summary import Figures, failure, verdict, warning
 from .timeline import Timeline
 
 Progress = Callable[[int, int], None]
@@ -70,6 +70,8 @@ class Options:
     """Whose margin to collective bounce is watched."""
     inputs: Sequence[str | Path] = ()
     """Files beside the logs that all this is from: settings, database, mapping."""
+    tune_command: str = "lever tune LOG"
+    """What tunes the settings to these logs, read in this way."""
 
 
 def replay(
@@ -238,7 +240,8 @@ class _Replay:
             comparison=None if self._comparison is None else self._comparison.summary(),
             snapshots=self._proof.summary(),
         )
-        return replace(summary, passed=not failure(summary), verdict=verdict(summary))
+        summary = replace(summary, passed=not failure(summary), warning=warning(summary, self._options.tune_command))
+        return replace(summary, verdict=verdict(summary))
 
     def _estimator(self) -> summaries.Estimator:
         choices = self._commands.choices

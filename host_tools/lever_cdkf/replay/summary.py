@@ -7,9 +7,9 @@ import numpy as np
 from ..can.traffic import why_refused
 from ..firmware.native import Config, enum_names
 from ..firmware.quantities import quantities
-from ..results import bounce, nis, whiteness
+from ..results import bounce, nis, trust, whiteness
 from ..results.bounce import Bounce
-from ..results.faults import LITTLE, OPTIONAL, WARNINGS, FaultCounts
+from ..results.faults import OPTIONAL, FaultCounts
 from ..results.nis import Innovations, Nis, freedom
 from ..results.summary import Estimate, Mapped, RecordingSummary, ReplaySummary
 from ..results.trace import CONVERGED_AFTER, MEASURED, Trace
@@ -100,9 +100,11 @@ def failure(summary: ReplaySummary) -> str:
 def verdict(summary: ReplaySummary) -> str:
     """The replay in a few sentences."""
     sentences = [
+        f"Trouble: {failure(summary)}." if failure(summary) else "",
+        summary.warning,
         *_troubles(summary),
         proof.in_words(summary.snapshots),
-        *_flags(summary),
+        *_time_estimated(summary),
         bounce.verdict(summary.stability),
         summary.comparison.in_words if summary.comparison else "",
         nis.verdict(summary.nis),
@@ -111,28 +113,29 @@ def verdict(summary: ReplaySummary) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _flags(summary: ReplaySummary) -> list[str]:
-    """What the estimator itself says against its estimates."""
+def warning(summary: ReplaySummary, tune_command: str) -> str:
+    """What the estimator says against its estimates, and what to do; `tune_command` tunes the log."""
+    said = trust.warning(summary.fault_shares, summary.flagged_share)
+    step = trust.next_step(summary.fault_shares, tune_command)
+    return f"{said} Next: {step}." if said and step else said
+
+
+def _time_estimated(summary: ReplaySummary) -> list[str]:
+    """For how much of the time there are estimates, where that is little."""
     sentences = []
     modes = summary.modes_s
     total, estimating = sum(modes.values()), modes.get("run", 0.0) + modes.get("frozen", 0.0)
     if total and estimating < 0.5 * total:
         sentences.append(
-            f"It could estimate for {100.0 * estimating / total:.0f} % of the time only; else, what is shown is "
-            "the first guess, or what was known last."
+            f"Estimates exist for {100.0 * estimating / total:.0f} % of the time; elsewhere the first guess, or the "
+            "last estimate, is shown."
         )
-    shares = {name: share for name, share in summary.fault_shares.items() if name in WARNINGS and share > LITTLE}
-    if shares:
-        listed = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares.items())
-        sentences.append(f"Do not trust the estimates while the estimator warns: {listed} of the time.")
     return sentences
 
 
 def _troubles(summary: ReplaySummary) -> list[str]:
     """What the reader has to know before believing the rest."""
     troubles, recording = [], summary.recording
-    if failure(summary):
-        troubles.append(f"Trouble: {failure(summary)}.")
     if mapping := recording.mapping:
         troubles += [f"{note}." for note in mapping.notes]
         troubles += _protection(mapping)

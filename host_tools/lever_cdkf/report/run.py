@@ -7,15 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, BoolArray
 from ..firmware import native, quantities
 from ..firmware.quantities import Quantity
 from ..models.lever import Lever
 from ..models.transfer import Transfer
 from ..results import whiteness
 from ..results.coherence import Coherence
+from ..results.faults import OPTIONAL, warning_bits
 from ..results.feedthrough import Feedthrough
 from ..results.summary import RecordingSummary, ReplaySummary, SimulationSummary, Summary
+from ..results.trace import MEASURED
 from ..results.whiteness import Whiteness
 from .bode import slow_trim
 from .series import jumps, welch
@@ -185,6 +187,16 @@ class Run:
     def has_truth(self) -> bool:
         """Of anything that is estimated."""
         return any(self.truth(quantity) is not None for quantity in self.quantities)
+
+    @cached_property
+    def flagged(self) -> BoolArray:
+        """At which rows the estimator said not to trust its estimates; inputs that were never measured do not count."""
+        faults = self.column("faults")
+        if faults is None:
+            return np.zeros(len(self.time), bool)
+        columns = {key: column for column, _, key in MEASURED}
+        without = tuple(fault for fault, key in OPTIONAL.items() if self.column(columns[key]) is None)
+        return (np.where(np.isfinite(faults), faults, 0.0).astype(np.int64) & warning_bits(without)) != 0
 
     @cached_property
     def sample_period(self) -> float:

@@ -7,12 +7,14 @@ from typing import Any
 
 from ..firmware import native
 from ..firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
+from ..results import trust
 from ..results.faults import LITTLE
 from ..results.nis import Nis
 from ..results.summary import Quality
 from .run import Run
 
 NOTHING = "–"
+_UNJUDGED = "A recorded run, whose truth is not known."
 LARGEST_ERROR = 10.0  # [% rms] of a run that is called good
 
 
@@ -54,7 +56,8 @@ def answer(run: Run) -> str:
     """The headline, the figures behind it, and what the summary says."""
     judged = [quantity for quantity in run.quantities if figures_of(run, quantity)]
     figures, note = _accuracy(run, judged) if judged else (_last_estimates(run), "")
-    text = html.escape(run.summary.verdict if run.summary else "A recorded run, whose truth is not known.")
+    said = run.summary.verdict.replace(run.summary.warning, "").strip() if run.summary else _UNJUDGED
+    text = html.escape(said)
     for quantity in run.parameters:
         text = re.sub(rf"\b{quantity.key}\b", quantity.symbol, text)
     text = text.replace(" %", "\u00a0%")
@@ -62,8 +65,10 @@ def answer(run: Run) -> str:
 
 
 def verdict(run: Run) -> str:
-    """The headline."""
-    return f'<p class="verdict {_mood(run)}"><strong>{_headline(run)}</strong></p>'
+    """The headline: a warning of the estimator before any figure."""
+    warning = html.escape(run.summary.warning).replace(" %", "\u00a0%") if run.summary else ""
+    lines = [f"<strong>{warning}</strong>", _headline(run)] if warning else [f"<strong>{_headline(run)}</strong>"]
+    return f'<p class="verdict {_mood(run)}">{"<br>".join(lines)}</p>'
 
 
 def _headline(run: Run) -> str:
@@ -83,9 +88,9 @@ def _mood(run: Run) -> str:
     if run.simulated is None:
         if run.summary is not None and not run.summary.passed:
             return "bad"
-        warned = run.replayed.flagged_share if run.replayed else None
-        return "watch" if (warned or 0.0) > LITTLE else ""
-    if not run.simulated.passed:
+        warned = (run.replayed.flagged_share if run.replayed else None) or 0.0
+        return "bad" if warned >= trust.MOST else "watch" if warned > LITTLE else ""
+    if not run.simulated.passed or (run.simulated.flagged_share or 0.0) >= trust.MOST:
         return "bad"
     figures = run.simulated.parameters.values()
     sure = all((each.coverage_2sigma or 0.0) >= LEAST_COVERAGE for each in figures)

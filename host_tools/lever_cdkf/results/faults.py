@@ -15,6 +15,28 @@ WARNINGS = ("theta", "theta_dot", "torque", "base", "innovation", "bound", "mism
 OPTIONAL = {"theta_dot": "theta_dot", "torque": "tau_m"}
 """Inputs that a recording may lack, by the fault that says so."""
 
+WORDS = {
+    "theta": "theta is missing, stuck or not plausible",
+    "theta_dot": "theta_dot is missing, stuck or not plausible",
+    "torque": "the motor torque is missing, or is not what was asked for",
+    "base": "the base acceleration is missing, or does not fit the motion",
+    "gap": "samples were missing",
+    "communication": "frames corrupt, repeated or out of order",
+    "innovation": "innovations larger than predicted",
+    "excitation": "too little motion to learn from",
+    "bound": "a parameter rests on its bound",
+    "recovered": "the filter was restarted",
+    "change": "sudden change of the pilot, learning anew",
+    "platform": "the machine reports a fault of its own",
+    "clock": "the sample clock stands or runs backwards",
+    "duplicate": "a second estimator is on this bus",
+    "settling": "levels settling, nothing is learnt",
+    "mismatch": "innovations are not white: something moves the lever that the model lacks",
+    "calibration": "torque, base and grip force do not agree on the pilot",
+    "hands_off": "nobody holds the lever",
+}
+"""Conditions of the estimator, by enum lever_fault."""
+
 LITTLE = 0.02
 """Share of the judged time, below which a fault is a passing one."""
 

@@ -75,6 +75,9 @@ class Summary:
     passed: bool
     verdict: str
     """In a few sentences."""
+    warning: str = ""
+    """What the estimator says against its estimates for a part of the time that counts, and what to do next: the first
+    thing to read. Empty where it says nothing."""
     stability: Stability | None = None
     """None without an aircraft."""
     provenance: Provenance | None = None

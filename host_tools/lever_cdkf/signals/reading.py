@@ -96,7 +96,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
     database = load_database(file)
     fields = {key: find(database, source.signal, file) for key, source in mapping.sources.items()}
     reader = BusSignals(database, fields.values(), mapping.protected)
-    recording = Recording(paths)
+    recording = Recording(paths, translated=False)
     frames, set_back = _collect(reader, recording, reading.start, reading.length, progress)
     inputs, buses = {}, set[str]()
     for key, source in mapping.sources.items():
@@ -143,7 +143,7 @@ def all_signals(
         raise LeverError(f"{log}: a log of a bus needs the database of its messages: add --dbc FILE")
     loaded = load_database(database)
     wanted = [(message, each) for message in loaded.messages for each in message.signals]
-    reader, recording = BusSignals(loaded, wanted, {}), Recording([log])
+    reader, recording = BusSignals(loaded, wanted, {}), Recording([log], translated=False)
     _collect(reader, recording, start, length, None)
     signals = [
         reader.signal(message, each.name, channel or bus, log)[0]

@@ -6,6 +6,7 @@ import math
 
 from ..can import codec
 from ..firmware.library import enum_names
+from ..results.faults import WORDS
 from .picture import Picture
 
 MODES = {
@@ -17,28 +18,6 @@ MODES = {
     "fault": "was restarted too often; only a reset leaves this",
 }
 """What the estimator does, by enum lever_mode."""
-
-FAULTS = {
-    "theta": "theta missing or invalid",
-    "theta_dot": "theta_dot missing or invalid",
-    "torque": "motor torque missing, taken as 0",
-    "base": "base acceleration invalid, last one held",
-    "gap": "samples were missing",
-    "communication": "frames corrupt, repeated or out of order",
-    "innovation": "innovations larger than predicted",
-    "excitation": "too little motion to learn from",
-    "bound": "a parameter rests on its bound",
-    "recovered": "the filter was restarted",
-    "change": "sudden change of the pilot, learning anew",
-    "platform": "the machine reports a fault of its own",
-    "clock": "the sample clock stands or runs backwards",
-    "duplicate": "a second estimator is on this bus",
-    "settling": "levels settling, nothing is learnt",
-    "mismatch": "innovations not white: not the model",
-    "calibration": "torque and base show different masses",
-    "hands_off": "nobody holds the lever",
-}
-"""Conditions of the estimator, by enum lever_fault."""
 
 PLATFORM_FAULTS = {
     "clock": "crystal did not start",
@@ -52,7 +31,7 @@ PLATFORM_FAULTS = {
 }
 """Conditions of its machine, by enum lever_platform_fault."""
 
-SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector"}
+SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector", 16: "settings or aircraft of its build"}
 """Bits of enum message_self_test (firmware/can/messages.h)."""
 
 SILENT_AFTER = 1.0
@@ -119,5 +98,5 @@ def faults(picture: Picture) -> list[str]:
     """The faults of the estimator and its machine, in words."""
     machine = picture.platform_faults()
     named = [name for name in picture.faults() if not (machine and name == "platform")]
-    texts = [FAULTS.get(name, name) for name in named]
+    texts = [WORDS.get(name, name) for name in named]
     return texts + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in machine or ()]

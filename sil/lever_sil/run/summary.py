@@ -14,7 +14,7 @@ import numpy as np
 from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.native import enum_names
 from lever_cdkf.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
-from lever_cdkf.results import bounce, nis, summary, whiteness
+from lever_cdkf.results import bounce, nis, summary, trust, whiteness
 from lever_cdkf.results.faults import FaultCounts
 from lever_cdkf.results.nis import Innovations, Nis, freedom
 from lever_cdkf.results.summary import (
@@ -72,7 +72,8 @@ def build(recording: Recording, trace: Trace) -> SimulationSummary:
         missed=missed,
         simulated_time_s=count * scenario.period,
     )
-    return replace(summary, verdict=_verdict(summary))
+    summary = replace(summary, warning=trust.warning(fault_shares, flagged_share))
+    return replace(summary, verdict=" ".join(filter(None, (summary.warning, _verdict(summary)))))
 
 
 def _scenario(scenario: Scenario) -> summary.Scenario:

@@ -113,11 +113,11 @@ def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
 
 def commands(scenario: Scenario, time: FloatArray) -> dict[int, Mapping[str, Value]]:
     """What to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the start,
-    the dither as it changes, and while it or lever damping is on, one that keeps the torque alive."""
+    the dither as it changes, and while it or a mitigation is on, one that keeps them alive."""
     changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
     sent: dict[int, Mapping[str, Value]] = {0: {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}}
     repetition = max(1, round(KEEP_ALIVE / scenario.period))
-    if "damping" in scenario.config.choices["mitigation"]:
+    if scenario.config.choices["mitigation"] != "none":
         sent = {sample: {} for sample in range(0, len(time), repetition)} | sent
     for (sample, rms), end in zip(changes.items(), [*changes, len(time)][1:], strict=True):
         sent[sample] = {**sent.get(sample, {}), "dither_rms": rms}

@@ -15,6 +15,7 @@ import pytest
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import enum_names
 from lever_cdkf.report import screenshot, summary_html, write_report
+from lever_cdkf.report.charts import tracking
 from lever_cdkf.report.charts.health import FAULT_WORDS
 from lever_cdkf.report.run import COHERENT, Run
 from lever_sil.run.runner import Result
@@ -116,7 +117,8 @@ def test_the_answer_says_what_the_summary_says(page: Reader, result: Result) -> 
         assert shown[name] == [f"{expected['rms_percent']:.1f} %", f"{100 * expected['coverage_2sigma']:.0f} %"]
     assert f"Natural frequency: {shown[ROWS['natural_frequency']][0]} rms error" in text
     assert "in % of the truth, from 4 s after the start and each sudden change on." in text
-    verdict = result.summary.verdict
+    verdict = result.summary.verdict.replace(result.summary.warning, "").strip()
+    assert result.summary.warning in text
     assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
 
 
@@ -166,13 +168,37 @@ def test_parameter_curves_are_those_of_the_trace(page: Reader, result: Result) -
         for name, kind in (("truth", "true"), ("estimate", "estimate")):
             trace = traces(page, "figure-parameters", name)[row]
             x = unpack(trace["x"])
-            np.testing.assert_allclose(unpack(trace["y"]), at(result, x, f"{key}_{kind}{suffix}"), rtol=1e-6)
+            drawn = np.isfinite(unpack(trace["y"]))  # where it is flagged, another curve goes on
+            expected = at(result, x, f"{key}_{kind}{suffix}")
+            np.testing.assert_allclose(unpack(trace["y"])[drawn], expected[drawn], rtol=1e-6)
             assert 1000 < len(x) < 2000
+            assert np.mean(drawn) > 0.5
         lower, upper = traces(page, "figure-parameters", "estimate ± 2σ")[2 * row : 2 * row + 2]
         x = unpack(upper["x"])
         width = 4.0 * at(result, x, f"{key}_sigma{suffix}")
         inside = unpack(lower["y"]) > 0.0
         np.testing.assert_allclose((unpack(upper["y"]) - unpack(lower["y"]))[inside], width[inside], rtol=1e-4)
+
+
+def test_estimates_that_are_flagged_are_grey(result: Result) -> None:
+    """Every row is in one of two curves, by the mask of the faults that say "do not trust this"."""
+    faults = np.where(result.trace["time_s"] < 6.0, 0.0, 65536.0)  # calibration
+    run = Run({**result.trace, "faults": faults}, result.summary)
+    figure = tracking.parameters(run)
+    assert figure is not None
+    curves = {trace["name"]: trace for trace in figure.traces if trace["name"].startswith("estimate")}
+    grey = curves["estimate, flagged: do not trust"]
+    assert grey["line"]["color"] == "@quiet"
+    x = unpack(grey["x"])
+    known = np.isfinite(at(result, x, "k_p_estimate_N_m"))
+    assert np.array_equal(np.isfinite(unpack(curves["estimate"]["y"])), known & (x < 6.0))
+    assert np.array_equal(np.isfinite(unpack(grey["y"]))[x >= 6.0], known[x >= 6.0])
+
+
+def test_the_headline_begins_with_the_warning(result: Result) -> None:
+    warned = replace(result.summary, warning="Do not trust the estimates: x (100 % of the time).", flagged_share=1.0)
+    shown = summary_html.verdict(Run(result.trace, warned))
+    assert shown.startswith('<p class="verdict bad"><strong>Do not trust the estimates: x (100\u00a0% of the time).')
 
 
 def test_a_jump_is_drawn_where_it_is_and_marked(page: Reader) -> None:

@@ -99,9 +99,13 @@ class Board:
     def command(self, text: str) -> str:
         """The answer to an SLCAN command, without its CR."""
         self._line.sendall(text.encode() + b"\r")
-        return self._read_line()
+        return self.read_line()
 
-    def _read_line(self) -> str:
+    def send(self, text: str) -> None:
+        self._line.sendall(text.encode())
+
+    def read_line(self) -> str:
+        """The next that the image says, without its CR."""
         while b"\r" not in self._received:
             more = self._line.recv(4096)
             assert more, "QEMU has ended"
@@ -124,7 +128,7 @@ class Board:
         self._line.settimeout(ANSWER_TIME)
         line = self.command("N")
         while not line.startswith("N"):  # answers to what was sent above
-            line = self._read_line()
+            line = self.read_line()
 
     def platform_health(self) -> dict[str, float]:
         """What PLATFORM_HEALTH and PLATFORM_RESET say after some samples of a lever that rests."""
@@ -139,7 +143,7 @@ class Board:
             if "PLATFORM_HEALTH" in said and "PLATFORM_RESET" in said:
                 closed = self.command("C")
                 while closed[:1] in ("t", "z"):  # of the last sample, still
-                    closed = self._read_line()
+                    closed = self.read_line()
                 assert closed == ""
                 return said["PLATFORM_HEALTH"] | said["PLATFORM_RESET"]
         raise AssertionError("no PLATFORM_HEALTH or no PLATFORM_RESET in 300 samples")
@@ -148,7 +152,7 @@ class Board:
         """The frames of one step, the last of which is STATE_ESTIMATE."""
         identifier = 0
         while identifier != 0x210:
-            line = self._read_line()
+            line = self.read_line()
             if line not in ("z", ""):  # an acknowledgement
                 identifier = int(line[1:4], 16)
                 yield identifier, bytes.fromhex(line[5:])

@@ -169,6 +169,32 @@ TEST(what_is_said_is_the_margin_and_another_aircraft_begins_without_one)
     TEST_ASSERT_TRUE(stability().gain_margin != 0.0f);
 }
 
+/* A clock that stands, silence and a reset make an old margin unknown, though an alarm stays; the next samples, known. */
+/* R44 */
+TEST_EACH(6, a_margin_that_is_not_of_now_is_said_to_be_unknown)
+{
+    const bool alarm = (test_round >= 3u);
+    TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
+    (void)run(4000u);
+    TEST_ASSERT_TRUE(stability().valid && (stability().state == (uint8_t)LEVER_BOUNCE_CLEAR));
+    if (alarm) {
+        lever->bounce.state = (uint8_t)LEVER_BOUNCE_ALARM;
+    }
+    const lever_sample_t standing = sample_after(0u);
+    if ((test_round % 3u) == 0u) {
+        (void)lever_update(lever, &standing);
+    } else if ((test_round % 3u) == 1u) {
+        lever_idle(lever, 20001u);
+        TEST_ASSERT_EQUAL_UINT8(LEVER_MODE_RUN, health().mode);
+    } else {
+        request(LEVER_REQUEST_RESET);
+    }
+    TEST_ASSERT_FALSE(stability().valid);
+    TEST_ASSERT_EQUAL_UINT8(alarm ? LEVER_BOUNCE_ALARM : LEVER_BOUNCE_UNKNOWN, stability().state);
+    (void)run(((test_round % 3u) == 2u) ? 4000u : 1u);
+    TEST_ASSERT_TRUE(stability().valid);
+}
+
 /* R44 */
 TEST(each_fault_of_sensors_or_model_takes_the_margin_away)
 {

@@ -82,6 +82,39 @@ TEST(a_grip_sample_serves_the_one_base_sample_with_its_counter)
     TEST_ASSERT_FALSE(sample->grip_force_valid || sample->theta_valid);
 }
 
+/* A LEVER_SAMPLE whose pair, and then fifteen more, were lost: the next BASE_SAMPLE has its counter. */
+/* R19 */
+TEST(a_lever_sample_is_not_paired_with_a_base_sample_sixteen_later)
+{
+    const message_grip_sample_t grip = {.grip_force = 12.5f, .grip_force_valid = true};
+    lever_frame_t frame;
+    for (uint32_t round = 1u; round < 4u; round++) {
+        next_pair();
+        TEST_ASSERT_TRUE(message_grip_sample_encode(&frame, &grip));
+        e2e_protect(&frame, (uint8_t)MESSAGE_GRIP_SAMPLE_DATA_ID, e2e_counter(&base_frame));
+        TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
+        TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &lever_frame));
+        for (uint32_t k = 0u; k < (16u * round); k++) {
+            next_pair();
+        }
+        TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, lever_on_frame(lever, &base_frame));
+        TEST_ASSERT_FALSE(lever->link.sample.theta_valid || lever->link.sample.theta_dot_valid);
+        TEST_ASSERT_FALSE(lever->link.sample.tau_m_valid || lever->link.sample.grip_force_valid);
+        TEST_ASSERT_EQUAL(LEVER_MODE_COAST, lever_step(lever));
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver_many(20u));
+    }
+}
+
+/* A sample comes fifteen periods after the last: within them the counters tell one from another. */
+TEST(a_pair_after_a_shorter_gap_is_one)
+{
+    for (uint32_t k = 0u; k < 12u; k++) {
+        next_pair();
+    }
+    (void)sample_after(2u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
+}
+
 /* By the validity bits of each value; and a code for "not available", or an end of the range, is no measurement,
  * whatever its flag says. */
 /* R31 */
@@ -148,8 +181,9 @@ TEST(after_an_outage_of_any_length_samples_are_taken_again_within_three)
             result = lever_on_frame(lever, &base_frame);
         }
         TEST_ASSERT_EQUAL(LEVER_FRAME_SAMPLE, result);
-        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, lever_step(lever));
+        (void)lever_step(lever);
         TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_GAP) && (health().lost >= outage));
+        TEST_ASSERT_EQUAL(LEVER_MODE_RUN, deliver());
     }
 }
 
@@ -334,7 +368,7 @@ TEST(an_on_that_is_sent_again_after_an_off_is_refused_however_often)
     TEST_ASSERT_TRUE(health().torque == 0.0f);
 }
 
-/* Up to three may be lost; and a second after the last one, a sender may start anywhere but there. */
+/* Up to three may be lost; and a second after the last one, a sender may start anywhere but there, with its second one. */
 TEST(a_command_is_accepted_by_its_place_in_the_sequence)
 {
     const struct {
@@ -343,7 +377,10 @@ TEST(a_command_is_accepted_by_its_place_in_the_sequence)
         enum message_result result;
     } rows[] = {{7u, 1u, MESSAGE_RESULT_ACCEPTED}, {7u, 1u, MESSAGE_RESULT_SEQUENCE}, {8u, 1u, MESSAGE_RESULT_ACCEPTED},
         {12u, 1u, MESSAGE_RESULT_ACCEPTED}, {1u, 1u, MESSAGE_RESULT_SEQUENCE}, {11u, 1u, MESSAGE_RESULT_SEQUENCE},
-        {0u, 1u, MESSAGE_RESULT_ACCEPTED}, {9u, 1000u, MESSAGE_RESULT_SEQUENCE}, {9u, 1u, MESSAGE_RESULT_ACCEPTED}};
+        {0u, 1u, MESSAGE_RESULT_ACCEPTED}, {9u, 1000u, MESSAGE_RESULT_SEQUENCE}, {9u, 1u, MESSAGE_RESULT_SEQUENCE},
+        {11u, 1u, MESSAGE_RESULT_SEQUENCE}, {12u, 1u, MESSAGE_RESULT_ACCEPTED}, {13u, 1000u, MESSAGE_RESULT_ACCEPTED},
+        {13u, 1001u, MESSAGE_RESULT_SEQUENCE}, {12u, 1u, MESSAGE_RESULT_SEQUENCE}, {13u, 1u, MESSAGE_RESULT_SEQUENCE},
+        {14u, 1u, MESSAGE_RESULT_ACCEPTED}};
     const lever_command_t nothing = command_none();
     for (uint32_t k = 0u; k < (sizeof rows / sizeof rows[0]); k++) {
         (void)deliver_many(rows[k].after_ms);
@@ -367,6 +404,40 @@ TEST(a_counter_that_stands_keeps_torque_for_a_second_and_never_starts_it_again)
     TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, answer_to(&anew).result);
     (void)deliver_many(900u);
     TEST_ASSERT_TRUE(health().torque != 0.0f);
+}
+
+/* Two that hang, one after the other, with whatever counters: together, too, they keep torque for two seconds at most. */
+/* R39 */
+TEST_EACH(16, two_counters_that_stand_do_not_keep_torque)
+{
+    uint32_t driven = 0u;
+    for (uint32_t k = 0u; k < 300u; k++) {
+        command_counter = (uint8_t)(3u + (((k % 2u) == 0u) ? 0u : test_round));
+        const lever_frame_t on = dither_frame(0.3f);
+        (void)answer_to(&on);
+        for (uint32_t ms = 0u; ms < 100u; ms++) {
+            (void)deliver_many(1u);
+            driven += (health().torque != 0.0f) ? 1u : 0u;
+        }
+    }
+    TEST_ASSERT_LESS_THAN_UINT32(2200u, driven);
+}
+
+/* R25 */
+TEST(no_mitigation_is_obeyed_in_any_order)
+{
+    lever_command_t command = command_none();
+    command.mitigation = (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING;
+    TEST_ASSERT_EQUAL(MESSAGE_RESULT_ACCEPTED, send(&command));
+    command_counter = (uint8_t)(command_counter + 9u);
+    command.mitigation = (uint8_t)LEVER_MITIGATION_DAMPING;
+    lever_frame_t frame = command_frame(&command);
+    TEST_ASSERT_EQUAL_UINT8(LEVER_MITIGATION_NOTCH_AND_DAMPING, answer_to(&frame).mitigation);
+    command.mitigation = (uint8_t)LEVER_MITIGATION_NONE;
+    frame = command_frame(&command);
+    const message_command_ack_t ack = answer_to(&frame);
+    TEST_ASSERT_EQUAL_UINT8(MESSAGE_RESULT_SEQUENCE, ack.result);
+    TEST_ASSERT_EQUAL_UINT8(LEVER_MITIGATION_NONE, ack.mitigation);
 }
 
 /* --- another estimator -------------------------------------------------------------------------------------------- */

@@ -45,11 +45,28 @@ static void choose(enum lever_mitigation mitigation)
     TEST_ASSERT_EQUAL(LEVER_FRAME_TAKEN, lever_on_frame(lever, &frame));
 }
 
+/* At sample k: as often as a COMMAND is repeated. */
+static void keep_alive(uint32_t k)
+{
+    if ((k % 250u) == 0u) {
+        dither((float)LEVER_KEEP);
+    }
+}
+
+/* As many samples, kept alive. */
+static void keep_delivering(uint32_t count)
+{
+    for (uint32_t k = 0u; k < count; k++) {
+        keep_alive(k);
+        (void)deliver_many(1u);
+    }
+}
+
 /* --- on the bus --------------------------------------------------------------------------------------------------- */
 
 TEST(each_sample_is_answered_by_a_correction)
 {
-    (void)deliver_many(3000u);
+    keep_delivering(3000u);
     for (uint32_t k = 0u; k < 100u; k++) {
         const message_correction_t *message = found_in(answers());
         TEST_ASSERT_NOT_NULL(message);
@@ -83,6 +100,7 @@ TEST(a_correction_changes_no_estimate)
     lever_t *other = lever_init(&other_memory, &other_config);
     for (uint32_t k = 0u; k < 3000u; k++) {
         const lever_sample_t sample = sample_after(1u);
+        keep_alive(k);
         (void)lever_update(lever, &sample);
         (void)lever_update(other, &sample);
     }
@@ -92,7 +110,7 @@ TEST(a_correction_changes_no_estimate)
 
 TEST(a_command_chooses_it)
 {
-    (void)deliver_many(3000u);
+    keep_delivering(3000u);
     choose(LEVER_MITIGATION_NONE);
     const message_correction_t *message = found_in(answers());
     TEST_ASSERT_NOT_NULL(message);
@@ -104,7 +122,7 @@ TEST(a_command_chooses_it)
     }
     TEST_ASSERT_NULL(message);
     choose(LEVER_MITIGATION_NOTCH);
-    (void)deliver_many(2000u);
+    keep_delivering(2000u);
     TEST_ASSERT_EQUAL_FLOAT(1.0f, correction().weight);
 }
 
@@ -184,7 +202,7 @@ TEST_EACH(CAUSES, whatever_fails_it_is_passive_within_100_ms_without_a_jump)
 /* The port calls it when none comes; each is fetched, down to 0, and then there is nothing to say. */
 TEST(without_samples_the_corrections_go_on_down_to_zero)
 {
-    (void)deliver_many(3000u);
+    keep_delivering(3000u);
     uint32_t count = 0u;
     float last = 1.0f;
     for (uint32_t k = 0u; k < 40u; k++) {
@@ -209,7 +227,7 @@ TEST(damping_is_asked_of_the_motor)
     config.settings.damping_limit = 0.3f;
     start_bus();
     dither(0.0f);
-    (void)deliver_many(900u);
+    keep_delivering(900u);
     dither(0.1f);
     double product = 0.0;
     double square = 0.0;
@@ -227,23 +245,31 @@ TEST(damping_is_asked_of_the_motor)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, correction().angle);
 }
 
-TEST(damping_ends_with_the_commands)
+/* R39 */
+TEST(damping_and_correction_end_with_the_commands)
 {
     config.mitigation = (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING;
     start();
     dither(0.0f);
     (void)run(900u);
     TEST_ASSERT_TRUE(health().gate_open);
+    TEST_ASSERT_TRUE(correction().weight > 0.5f);
     (void)run(200u);
     TEST_ASSERT_FALSE(health().gate_open);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, health().torque);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, correction().weight);
+    TEST_ASSERT_FALSE(lever_is_acting(lever));
+    keep_delivering(1000u);
     TEST_ASSERT_EQUAL_FLOAT(1.0f, correction().weight);
 }
 
 /* Long before the estimator finds it stuck. */
 TEST_EACH(2, a_sensor_that_says_the_same_closes_it)
 {
-    (void)run(3000u);
+    for (uint32_t k = 0u; k < 3000u; k++) {
+        keep_alive(k);
+        (void)run(1u);
+    }
     const lever_sample_t stuck = sample_after(0u);
     for (uint32_t k = 1u; k <= 23u; k++) {
         TEST_ASSERT_TRUE(lever->bounce.mitigation.open);
@@ -274,7 +300,7 @@ TEST(a_sample_serves_for_20_ms_or_longer_if_samples_are_slow)
 TEST(each_fault_of_sensors_clock_or_hands_closes_it)
 {
     static const uint32_t fault[] = {LEVER_FAULT_CLOCK, LEVER_FAULT_RECOVERED, LEVER_FAULT_HANDS_OFF, 0u};
-    (void)deliver_many(3000u);
+    keep_delivering(3000u);
     for (uint32_t i = 0u; i < 4u; i++) {
         lever->estimator.faults = fault[i];
         instance_mitigate(lever);
@@ -285,10 +311,10 @@ TEST(each_fault_of_sensors_clock_or_hands_closes_it)
 TEST(a_correction_acts_without_the_motor_until_it_has_faded)
 {
     TEST_ASSERT_FALSE(lever_is_acting(lever));
-    (void)deliver_many(3000u);
+    keep_delivering(3000u);
     TEST_ASSERT_FALSE(instance_is_driving(lever));
     TEST_ASSERT_TRUE(lever_is_acting(lever));
     choose(LEVER_MITIGATION_NONE);
-    (void)deliver_many(200u);
+    keep_delivering(200u);
     TEST_ASSERT_FALSE(lever_is_acting(lever));
 }

@@ -82,7 +82,8 @@ static const cause_t causes[] = {{.blind = true, .silence_ms = 20u, .mode = LEVE
     {.blind = true, .clock = true, .clock_us = 1, .mode = LEVER_MODE_COAST},
     {.platform = LEVER_PLATFORM_ROM, .mode = LEVER_MODE_RUN},
     {.platform = LEVER_PLATFORM_SELF_TEST, .mode = LEVER_MODE_RUN},
-    {.platform = LEVER_PLATFORM_WATCHDOG, .mode = LEVER_MODE_RUN}, {.fault = true, .mode = LEVER_MODE_FAULT},
+    {.platform = LEVER_PLATFORM_WATCHDOG, .mode = LEVER_MODE_RUN},
+    {.platform = LEVER_PLATFORM_HARD_FAULT, .mode = LEVER_MODE_RUN}, {.fault = true, .mode = LEVER_MODE_FAULT},
     {.reset = true, .mode = LEVER_MODE_RUN}};
 
 /* Torque is zero from 50 ms after the cause, or the silence that it is, on; never above its limits on the way. A
@@ -109,8 +110,8 @@ TEST_EACH(sizeof causes / sizeof causes[0], torque_ends_within_50_ms_of_every_ca
 TEST(what_the_port_reports_without_breaking_anything_ends_no_torque)
 {
     for (uint32_t fault = 1u; fault <= 128u; fault *= 2u) {
-        const uint32_t ends =
-            (uint32_t)LEVER_PLATFORM_ROM | (uint32_t)LEVER_PLATFORM_SELF_TEST | (uint32_t)LEVER_PLATFORM_WATCHDOG;
+        const uint32_t ends = (uint32_t)LEVER_PLATFORM_ROM | (uint32_t)LEVER_PLATFORM_SELF_TEST |
+                              (uint32_t)LEVER_PLATFORM_WATCHDOG | (uint32_t)LEVER_PLATFORM_HARD_FAULT;
         const lever_platform_t report = {.faults = (uint8_t)fault};
         start_dithering();
         lever_platform(lever, &report);
@@ -173,6 +174,29 @@ TEST(torque_ends_a_second_after_the_last_command_and_goes_on_with_the_next)
     TEST_ASSERT_TRUE(torque_now() != 0.0f);
 }
 
+/* So small that no float is left of a fortieth of a millionth of it: it once stayed for ever, and with it all that is
+ * refused while torque acts. */
+/* R37 */
+TEST_EACH(2, torque_that_is_hardly_any_ends_too)
+{
+    const float tiny[] = {1.0e-40f, 1.0e-44f};
+    start_dithering();
+    dither(tiny[test_round]);
+    (void)deliver_many(400u);
+    lever->gate.torque = tiny[test_round];
+    dither(0.0f);
+    (void)deliver_many(200u);
+    TEST_ASSERT_FALSE(lever_is_acting(lever));
+    dither(0.3f);
+    (void)deliver_many(400u);
+    lever->gate.torque = tiny[test_round];
+    lever_idle(lever, 1050000u);
+    for (uint32_t k = 0u; k < 10u; k++) {
+        lever_idle(lever, 5000u);
+    }
+    TEST_ASSERT_FALSE(lever_is_acting(lever));
+}
+
 /* No command but a reset leaves the mode, or makes torque; and after a reset it must be asked for again. */
 TEST(no_command_brings_torque_back_in_fault)
 {
@@ -190,6 +214,170 @@ TEST(no_command_brings_torque_back_in_fault)
     TEST_ASSERT_TRUE(lever_command(lever, &command));
     (void)deliver_many(400u);
     TEST_ASSERT_TRUE(torque_now() != 0.0f);
+}
+
+/* --- evidence that it does harm ------------------------------------------------------------------------------------ */
+
+/* Samples with a motor that does so many times what it is asked, kept alive; until the gate is as it is to be. Returns
+ * how many. */
+static uint32_t fly_motor(float gain, bool valid, bool open, uint32_t most)
+{
+    uint32_t k = 0u;
+    for (; (k < most) && (health().gate_open != open); k++) {
+        const float driven = gain * torque_now();
+        simulation.theta_dot += 1.0e-6 * (double)PERIOD_US * simulation.plant.torque * (double)driven;
+        lever_sample_t sample = sample_after(1u);
+        sample.tau_m = driven;
+        sample.tau_m_valid = valid;
+        if ((k % 250u) == 0u) {
+            dither((float)LEVER_KEEP);
+        }
+        (void)lever_update(lever, &sample);
+        watch_torque(torque_now(), 1000u, health().gate_open);
+    }
+    return k;
+}
+
+static void start_motor(float gain)
+{
+    start_bus();
+    simulation.torque_rms = 0.0;
+    watch_start(&config.settings);
+    (void)fly_motor(gain, true, true, 400u);
+    dither(0.3f);
+    TEST_ASSERT_LESS_THAN_UINT32(10u, fly_motor(gain, true, true, 10u));
+}
+
+/* Reversed, or dead: found within two seconds, off within 50 ms, and off for as long as nobody asks for torque again,
+ * though the evidence ends with the torque. */
+/* R37 */
+TEST_EACH(2, a_motor_that_does_other_than_it_is_asked_is_not_driven)
+{
+    const float gain = (test_round == 0u) ? -1.0f : 0.0f;
+    start_motor(gain);
+    TEST_ASSERT_LESS_THAN_UINT32(2000u, fly_motor(gain, true, false, 2000u));
+    for (uint32_t k = 0u; k < 20000u; k++) {
+        TEST_ASSERT_TRUE((k < 50u) || (torque_now() == 0.0f));
+        (void)fly_motor(gain, true, true, 1u);
+    }
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_TORQUE) || health().gate_open);
+    dither(0.3f);
+    TEST_ASSERT_LESS_THAN_UINT32(10u, fly_motor(gain, true, true, 10u));
+}
+
+/* Right, and missing. */
+TEST_EACH(2, a_motor_of_which_nothing_bad_is_known_is_driven)
+{
+    const bool valid = (test_round == 0u);
+    start_motor(1.0f);
+    TEST_ASSERT_EQUAL_UINT32(5000u, fly_motor(1.0f, valid, false, 5000u));
+    TEST_ASSERT_EQUAL(!valid, has_fault(LEVER_FAULT_TORQUE));
+}
+
+/* A command may ask for it meanwhile, and the pilot take the lever again: only both in this order bring torque back. */
+/* R37 */
+TEST(a_lever_that_nobody_holds_is_not_driven)
+{
+    start_motor(1.0f);
+    TEST_ASSERT_EQUAL_UINT32(3000u, fly_motor(1.0f, true, false, 3000u));
+    const plant_t held = simulation.plant;
+    simulation.plant = plant_of_lever(0.0, 0.0, 0.0);
+    TEST_ASSERT_LESS_THAN_UINT32(2000u, fly_motor(1.0f, true, false, 2000u));
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_HANDS_OFF));
+    for (uint32_t k = 0u; k < 3000u; k++) {
+        TEST_ASSERT_TRUE((k < 50u) || (torque_now() == 0.0f));
+        if (((k % 100u) == 0u) && has_fault(LEVER_FAULT_HANDS_OFF)) {
+            dither(0.3f);
+        }
+        (void)fly_motor(1.0f, true, true, 1u);
+    }
+    simulation.plant = held;
+    TEST_ASSERT_EQUAL_UINT32(4000u, fly_motor(1.0f, true, true, 4000u));
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_HANDS_OFF));
+    dither(0.3f);
+    TEST_ASSERT_LESS_THAN_UINT32(10u, fly_motor(1.0f, true, true, 10u));
+}
+
+/* Neither a reset, silence, a gap, a clock that stands, a blind sample nor a change of mode is one of them. */
+/* R37 */
+TEST_EACH(8, what_bars_torque_lasts_in_every_mode_until_it_is_asked_for)
+{
+    const enum lever_request requests[] = {
+        LEVER_REQUEST_NONE, LEVER_REQUEST_FREEZE, LEVER_REQUEST_RUN, LEVER_REQUEST_RESET};
+    monitor_t *monitor = &lever->estimator.learning.monitor;
+    start_dithering();
+    request(requests[test_round % 2u]);
+    for (uint32_t k = 0u; k < 3u; k++) { /* one of them may end a block, whose verdict is another */
+        if (test_round < 4u) {
+            monitor->torque_wrong = true;
+        } else {
+            lever->estimator.learning.hands.off = true;
+        }
+        (void)deliver_many(1u);
+    }
+    monitor->torque_wrong = false;
+    lever->estimator.learning.hands.off = false;
+    TEST_ASSERT_FALSE(health().gate_open);
+    (void)run_blind(30u);
+    lever_idle(lever, 5000u);
+    const lever_sample_t standing = sample_after(0u);
+    (void)lever_update(lever, &standing);
+    (void)sample_after(100u);
+    (void)run(50u);
+    TEST_ASSERT_TRUE(torque_now() == 0.0f);
+    (void)sample_after(1000u);
+    for (uint32_t k = 0u; k < 8u; k++) {
+        request(requests[(test_round + k) % 4u]);
+        (void)run(400u);
+        TEST_ASSERT_FALSE(health().gate_open);
+    }
+    dither(0.3f);
+    (void)run(50u);
+    TEST_ASSERT_TRUE(health().gate_open);
+}
+
+/* --- settings ------------------------------------------------------------------------------------------------------ */
+
+/* Any bit of them that flips is found within a second, whatever the others say; it is reported for good, though it is
+ * flipped back, and ends torque. */
+/* R37 R45 */
+TEST(settings_that_change_in_memory_end_torque_and_are_reported)
+{
+    uint8_t *const bytes = (uint8_t *)&config.settings;
+    for (uint32_t bit = 0u; bit < (8u * sizeof config.settings); bit += 37u) {
+        start_dithering();
+        dither((float)LEVER_KEEP);
+        const lever_settings_t right = config.settings;
+        bytes[bit / 8u] ^= (uint8_t)(1u << (bit % 8u));
+        lever->settings_us = time_us - 999999u;
+        const lever_sample_t sample = sample_after(1u);
+        (void)lever_update(lever, &sample);
+        config.settings = right;
+        TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_PLATFORM) && !health().gate_open);
+        (void)deliver_many(100u);
+        TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_PLATFORM) && (torque_now() == 0.0f));
+    }
+}
+
+/* R45 */
+TEST(settings_are_looked_at_each_second_and_said_to_be_wrong_on_the_bus)
+{
+    uint32_t said = 0u;
+    start_bus();
+    (void)deliver_many(400u);
+    config.settings.torque_slew *= 2.0f;
+    for (uint32_t k = 0u; k < 1100u; k++) {
+        const uint32_t count = answers();
+        for (uint32_t f = 0u; f < count; f++) {
+            message_platform_health_t message;
+            if (message_platform_health_decode(&message, &frames[f])) {
+                TEST_ASSERT_EQUAL_UINT8(LEVER_PLATFORM_SELF_TEST, message.faults);
+                said++;
+            }
+        }
+    }
+    TEST_ASSERT_TRUE(said > 0u);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_PLATFORM));
 }
 
 /* --- gaps --------------------------------------------------------------------------------------------------------- */

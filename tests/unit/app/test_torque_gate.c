@@ -54,7 +54,7 @@ TEST(no_request_passes_a_limit_at_any_settings)
         torque_gate_init(&gate, &settings);
         watch_start(&settings);
         for (uint32_t k = 0u; k < (3000000u / gate.period_us); k++) {
-            const torque_sample_t sample = {gate.period_us, true, true, (uniform() > 0.002f)};
+            const torque_sample_t sample = {gate.period_us, true, true, (uniform() > 0.002f), false};
             if ((k % 20u) == 0u) {
                 torque_gate_keep_alive(&gate);
             }
@@ -88,10 +88,13 @@ TEST(no_course_of_events_passes_a_limit)
                 elapsed_us = (uint32_t)(40000.0f * uniform());
             } else if (event < 0.04f) {
                 torque_gate_keep_alive(&gate);
+            } else if (event < 0.045f) {
+                torque_gate_ask(&gate);
             } else {
                 /* a good sample */
             }
-            const torque_sample_t sample = {elapsed_us, (event < 0.999f), (event < 0.9f), true};
+            const torque_sample_t sample = {
+                elapsed_us, (event < 0.999f), (event < 0.9f), true, (event > 0.899f) && (event < 0.9f)};
             const uint32_t real_us = sample.advances ? elapsed_us : 5000u; /* as long as a port waits for one */
             const uint32_t left_us = (real_us > gate.counted) ? (real_us - gate.counted) : 0u;
             torque_gate_step(&gate, random_request(run, k), &sample);
@@ -106,7 +109,7 @@ TEST(what_is_within_the_limits_passes_as_it_is)
     torque_gate_init(&gate, &config.settings);
     torque_gate_keep_alive(&gate);
     for (uint32_t k = 0u; k < 900u; k++) {
-        const torque_sample_t sample = {1000u, true, true, true};
+        const torque_sample_t sample = {1000u, true, true, true, false};
         const float asked = 0.6f * sinf(0.04f * (float)k);
         torque_gate_step(&gate, asked, &sample);
         TEST_ASSERT_TRUE((k < 101u) || (gate.torque == asked));
@@ -146,4 +149,29 @@ TEST(settings_become_times_and_slopes)
         TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, row[i].open_step, gate.open_step);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-4f * row[i].slope, row[i].slope, gate.amplitude_slope);
     }
+}
+
+/* Once is enough; a keep-alive does not end it, and asking does not either while it is there. */
+/* R37 */
+TEST(what_does_harm_bars_the_gate_until_torque_is_asked_for)
+{
+    torque_gate_t gate;
+    torque_sample_t sample = {1000u, true, true, true, true};
+    torque_gate_init(&gate, &config.settings);
+    for (uint32_t k = 0u; k < 100u; k++) {
+        torque_gate_keep_alive(&gate);
+        torque_gate_ask(&gate);
+        torque_gate_step(&gate, 1.0f, &sample);
+        TEST_ASSERT_FALSE(gate.open);
+    }
+    sample.harmful = false;
+    for (uint32_t k = 0u; k < 100u; k++) {
+        torque_gate_keep_alive(&gate);
+        torque_gate_step(&gate, 1.0f, &sample);
+        TEST_ASSERT_FALSE(gate.open);
+    }
+    torque_gate_ask(&gate);
+    TEST_ASSERT_FALSE(gate.open);
+    torque_gate_step(&gate, 1.0f, &sample);
+    TEST_ASSERT_TRUE(gate.open);
 }

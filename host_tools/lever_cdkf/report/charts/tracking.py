@@ -57,5 +57,13 @@ def _traces(run: Run, quantity: Quantity, row: int, chosen: np.ndarray) -> list[
         traces.append(line(time, truth[chosen], "truth", "truth", row, line_dash="dash", zorder=1, hovertemplate=hover))
     if (estimate := run.estimate(quantity)) is not None:
         hover = f"estimated {quantity.name} %{{y:.4g}}{unit}<extra></extra>"
-        traces.append(line(time, estimate[chosen], "estimate", "estimate", row, hovertemplate=hover))
+        flagged = run.flagged[chosen]
+        trusted = np.where(flagged, np.nan, estimate[chosen])
+        traces.append(line(time, trusted, "estimate", "estimate", row, hovertemplate=hover))
+        if flagged.any():
+            joined = flagged | np.roll(flagged, 1)  # up to where the other line goes on
+            joined[0] = flagged[0]
+            doubtful = np.where(joined, estimate[chosen], np.nan)
+            hover = hover.replace("estimated", "flagged:")
+            traces.append(line(time, doubtful, "estimate, flagged: do not trust", "quiet", row, hovertemplate=hover))
     return traces

@@ -1,0 +1,56 @@
+"""Whether the estimates of a run may be believed, why not, and what to do, in a line: what a reader sees first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .faults import LITTLE, WARNINGS, WORDS
+
+MOST = 0.5
+"""Share of the judged time with a warning, from which on the run as a whole is not to be trusted."""
+
+TUNE = "tune"
+_STEPS = {
+    "theta": "check the sensor of theta, its unit and its limits",
+    "theta_dot": "check the sensor of theta_dot, its unit and its limits",
+    "base": "check sign, unit and gravity of z_ddot",
+    "torque": "check sign and unit of tau_m",
+    "hands_off": "take the part in which somebody holds the lever (--start, --length)",
+    "calibration": TUNE,
+    "mismatch": TUNE,
+    "innovation": TUNE,
+    "bound": TUNE,
+}
+"""What to do about each of WARNINGS, causes before what follows from them; TUNE stands for a command."""
+
+
+def warning(shares: Mapping[str, float], warned: float | None) -> str:
+    """Return what the estimator says against its estimates; empty where that is little.
+
+    `shares` (0 to 1) are those of the judged time with each fault, `warned` that with any of WARNINGS.
+    """
+    causes = _causes(shares)
+    if not causes or warned is None or warned <= LITTLE:
+        return ""
+    listed = "; ".join(f"{WORDS[name]} ({_percent(shares[name])} of the time)" for name in causes)
+    part = "" if warned >= MOST else f" {_percent(warned)} of the time"
+    return f"Do not trust the estimates{part}: {listed}."
+
+
+def next_step(shares: Mapping[str, float], tune_command: str = "") -> str:
+    """Return what to do about the first cause; `tune_command` tunes the log. Empty where there is nothing to do."""
+    causes = _causes(shares)
+    greatest = max((shares[name] for name in causes), default=0.0)
+    step = next((_STEPS[name] for name in causes if shares[name] >= 0.5 * greatest), "")
+    return tune_command if step == TUNE else step
+
+
+def _causes(shares: Mapping[str, float]) -> list[str]:
+    return [name for name in _STEPS if shares.get(name, 0.0) > LITTLE]
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+assert set(_STEPS) == set(WARNINGS)
