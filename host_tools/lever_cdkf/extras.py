@@ -13,6 +13,7 @@ PACKAGES = {
     "campaign": ("dask", "distributed", "pyarrow", "plotly", "matplotlib", "scipy"),
     "files": ("asammdf", "h5py", "mcap", "pyarrow", "scipy"),
     "flash": ("pyocd",),
+    "fmu": ("fmpy",),
     "live": ("textual", "tornado"),
     "mf4": ("asammdf",),
     "report": ("plotly",),

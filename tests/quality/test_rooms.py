@@ -25,7 +25,8 @@ MAY_IMPORT = {
     "lever_cdkf/replay": {"firmware", "can", "results", "report", "signals", "exports"},
     "lever_cdkf/tune": {"firmware", "can", "results", "report", "signals"},
     "lever_cdkf/watch": {"firmware", "models", "can", "results", "report", "signals"},
-    "lever_cdkf/commands": {"firmware", "board", "can", "results", "replay", "tune", "watch", "signals"},
+    "lever_cdkf/fmu": {"firmware"},
+    "lever_cdkf/commands": {"firmware", "board", "fmu", "can", "results", "replay", "tune", "watch", "signals"},
     "lever_sil/plants": {"models"},
     "lever_sil/oracle": {"models"},
     "lever_sil/aircraft": {"firmware", "models"},
@@ -43,6 +44,7 @@ MAY_IMPORT = {
         "watch",
         "exports",
     },
+    "lever_sil/pilot_fmu": {"fast", "scenarios", "firmware", "fmu"},
     "lever_sil/judged": {"report"},
     "lever_sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
     "lever_sil/bounce": {
@@ -58,7 +60,7 @@ MAY_IMPORT = {
     "lever_sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
     "lever_sil/commands": {
         *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "faults", "soak", "aircraft"),
-        *("firmware", "can", "report", "exports"),
+        *("firmware", "can", "report", "exports", "fmu", "pilot_fmu"),
     },
 }
 """By folder. What lies beside the folders is for all of its package, and imports nothing in them; lever_sil may import

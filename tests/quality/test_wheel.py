@@ -40,13 +40,16 @@ def files_of(folder: Path) -> set[Path]:
 
 def test_the_wheel_has_every_file_of_the_tree_and_the_libraries(installed: Path) -> None:
     files = {each for each in files_of(installed) if each.parts[0] in ("lever_cdkf", "lever_sil")}
-    native = {file.name for file in files if file.parent == Path("lever_cdkf/_native")}
-    libraries = {name for name in NATIVE if any(name in file for file in native)}
+    native = {file for file in files if file.is_relative_to("lever_cdkf/_native")}
+    core = {file.relative_to("lever_cdkf/_native/sources") for file in native if "sources" in file.parts}
+    assert {Path("lever_cdkf.h"), Path("lever_settings.def"), Path("app/lever.c"), Path("can/e2e.h")} <= core
+    assert all((tools.ROOT / "firmware" / file).is_file() for file in core)
+    libraries = {name for name in NATIVE if any(name in file.name for file in native)}
     assert libraries == set(NATIVE), native
     settings = tomllib.loads((tools.ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["scikit-build"]
     folders = [tools.ROOT / folder for folder in settings["wheel"]["packages"]]
     tree = {Path(folder.name) / file for folder in folders for file in files_of(folder)}
-    assert {file for file in files if file.name not in native} == tree
+    assert {file for file in files if file not in native} == tree
 
 
 def test_the_wheel_works(installed: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,10 @@ class Struct:
         """The pointer, which lives as long as the struct."""
         self._kept.append(pointer)
         return pointer
+
+    def kept(self) -> Sequence[Any]:
+        """All arrays that its pointers point to."""
+        return self._kept
 
     def cast(self, ctype: str, values: NDArray[np.float64]) -> Any:
         """A pointer of that type to an array of doubles."""

@@ -4,73 +4,18 @@
 #include "can/layout.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
-#include "plants.h"
+#include "pilot.h"
 
-#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-#define CORRECTION_HOLDS_US 100000u
 #define IDLE_US 5000u      /* without a sample, after which the firmware is told so, as lever_idle() asks for */
 #define TIME_LOW_START 48u /* of the messages of an estimator that belong to a sample */
 #define TIME_LOW_MASK 0xFFFFu
 
-/* --- sensors ----------------------------------------------------------------------------------------------------- */
-
-/* Without faults. */
-static double reading(const loop_sensor_t *sensor, const double *signal, int64_t sample)
-{
-    double value = signal[sample];
-    if ((sensor->whole > 0u) || (sensor->part > 0.0)) {
-        const int64_t newer = sample - (int64_t)sensor->whole;
-        const double new_value = signal[(newer > 0) ? newer : 0];
-        const double old_value = signal[(newer > 1) ? (newer - 1) : 0];
-        value = new_value + (sensor->part * (old_value - new_value));
-    }
-    return (sensor->gain * value) + sensor->offset[sample];
-}
-
-/* What a sensor says; NaN: it is marked invalid. */
-static double measured(const loop_t *loop, enum loop_signal which)
-{
-    const loop_sensor_t *sensor = &loop->sensor[which];
-    const uint32_t sample = loop->sample;
-    double value;
-    if (sensor->source == NULL) {
-        value = reading(sensor, loop->signal[which], (int64_t)sample);
-    } else {
-        value = (sensor->factor[sample] * reading(sensor, loop->signal[which], sensor->source[sample])) +
-                sensor->error[sample];
-    }
-    return value;
-}
-
-static void note_signals(loop_t *loop)
-{
-    const plant_t *plant = &loop->plant;
-    loop->signal[LOOP_THETA][loop->sample] = plant->theta;
-    loop->signal[LOOP_THETA_DOT][loop->sample] = plant->theta_dot;
-    loop->signal[LOOP_TAU_M][loop->sample] = plant->tau_m;
-    if (loop->has_grip) {
-        loop->signal[LOOP_GRIP_FORCE][loop->sample] = plant->grip_force;
-    }
-}
-
-static double measured_base(const loop_t *loop)
-{
-    return loop->cabin.exists ? measured(loop, LOOP_Z_DDOT) : loop->base[loop->sample];
-}
-
 static bool has_command(const loop_t *loop)
 {
     return (loop->next_command < loop->commands) && (loop->command_sample[loop->next_command] == loop->sample);
-}
-
-/* Whether a frame can carry a value of so many steps of its field, as in the codec of host_tools; NaN does not fit. */
-static bool fits(const loop_field_t *field, double steps)
-{
-    const double most = (double)(field->mask >> 1u);
-    return (steps > (-most - 0.5)) && (steps < (most + 0.5));
 }
 
 /* --- by structs -------------------------------------------------------------------------------------------------- */
@@ -78,7 +23,7 @@ static bool fits(const loop_field_t *field, double steps)
 /* Not rounded as in a frame; but what does not fit into one is not available. */
 static float single(const loop_field_t *field, double value, bool *valid)
 {
-    *valid = fits(field, value / field->scale);
+    *valid = pilot_fits(field, value / field->scale);
     return *valid ? (float)value : 0.0f;
 }
 
@@ -94,7 +39,7 @@ static void idle(loop_t *loop, lever_t *lever)
 
 static float reading_of(const loop_t *loop, enum loop_signal which, bool *valid)
 {
-    return single(&loop->sensor[which].field, measured(loop, which), valid);
+    return single(&loop->sensor[which].field, pilot_reading(loop, which), valid);
 }
 
 static void step_by_struct(loop_t *loop, lever_t *lever)
@@ -113,7 +58,7 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
             sample.theta_dot = reading_of(loop, LOOP_THETA_DOT, &sample.theta_dot_valid);
             sample.tau_m = reading_of(loop, LOOP_TAU_M, &sample.tau_m_valid);
         }
-        sample.z_ddot = single(&loop->base_field, measured_base(loop), &sample.z_ddot_valid);
+        sample.z_ddot = single(&loop->base_field, pilot_base(loop), &sample.z_ddot_valid);
         if (loop->has_grip) {
             sample.grip_force = reading_of(loop, LOOP_GRIP_FORCE, &sample.grip_force_valid);
         }
@@ -131,30 +76,6 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
 }
 
 /* --- by frames --------------------------------------------------------------------------------------------------- */
-
-/* Bits of a value at their place, with the bit that says that it is valid. As the codec of host_tools: rounded in double
- * precision, half to even; what does not fit is not available. */
-static uint64_t bits_of(const loop_field_t *field, double value)
-{
-    const double steps = value / field->scale;
-    uint64_t bits = 0u;
-    if (fits(field, steps)) {
-        const uint32_t count = (uint32_t)(int32_t)rint(steps) & field->mask;
-        bits = ((uint64_t)count << field->start) | ((uint64_t)1u << field->valid);
-    } else if (!isnan(value)) {
-        bits = (uint64_t)(field->mask ^ (field->mask >> 1u)) << field->start;
-    } else {
-        /* all 0 */
-    }
-    return bits;
-}
-
-static double value_of(const loop_field_t *field, uint64_t payload)
-{
-    const uint32_t sign = field->mask ^ (field->mask >> 1u);
-    const uint32_t flipped = ((uint32_t)(payload >> field->start) & field->mask) ^ sign;
-    return (double)((int32_t)flipped - (int32_t)sign) * field->scale;
-}
 
 static void record(loop_t *loop, uint16_t id, const uint8_t data[8])
 {
@@ -238,9 +159,9 @@ static void take_answer(loop_t *loop)
         const bool is_own = ((uint32_t)(payload >> TIME_LOW_START) == time_low);
         const uint32_t id = loop->pending_id[count];
         if ((id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && is_own) {
-            torque = value_of(&loop->torque_field, payload);
+            torque = pilot_value(&loop->torque_field, payload);
         } else if ((id == (uint32_t)MESSAGE_CORRECTION_ID) && is_own) {
-            correction = value_of(&loop->correction_field, payload);
+            correction = pilot_value(&loop->correction_field, payload);
         } else if (id == (uint32_t)MESSAGE_STATE_ESTIMATE_ID) {
             answered = is_own;
             loop->misplaced += is_own ? 0u : 1u;
@@ -276,31 +197,22 @@ static void step_by_frames(loop_t *loop, lever_t *lever)
     if (loop->no_lever[loop->sample] == 0u) {
         uint64_t payload = 0u;
         for (uint32_t i = 0u; i < (uint32_t)LOOP_GRIP_FORCE; i++) {
-            payload |= bits_of(&loop->sensor[i].field, measured(loop, (enum loop_signal)i));
+            payload |= pilot_bits(&loop->sensor[i].field, pilot_reading(loop, (enum loop_signal)i));
         }
         send_payload(loop, lever, (uint32_t)MESSAGE_LEVER_SAMPLE_ID, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, payload);
     }
     if (loop->has_grip) {
-        const uint64_t payload = bits_of(&loop->sensor[LOOP_GRIP_FORCE].field, measured(loop, LOOP_GRIP_FORCE));
+        const uint64_t payload = pilot_bits(&loop->sensor[LOOP_GRIP_FORCE].field, pilot_reading(loop, LOOP_GRIP_FORCE));
         send_payload(loop, lever, (uint32_t)MESSAGE_GRIP_SAMPLE_ID, (uint8_t)MESSAGE_GRIP_SAMPLE_DATA_ID, payload);
     }
     if (loop->no_base[loop->sample] == 0u) {
         const uint64_t time_us = (uint64_t)(loop->sample * loop->period_us) << 32u;
-        const uint64_t payload = bits_of(&loop->base_field, measured_base(loop)) | time_us;
+        const uint64_t payload = pilot_bits(&loop->base_field, pilot_base(loop)) | time_us;
         send_payload(loop, lever, (uint32_t)MESSAGE_BASE_SAMPLE_ID, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, payload);
         take_answer(loop);
         if (loop->recorder != NULL) {
             take_snapshots(loop, lever);
         }
-    }
-}
-
-/* A correction that is too old counts as none. */
-static void age_correction(loop_t *loop)
-{
-    loop->silent_us = (loop->no_base[loop->sample] == 0u) ? 0u : (loop->silent_us + loop->period_us);
-    if (loop->silent_us > CORRECTION_HOLDS_US) {
-        loop->correction = 0.0;
     }
 }
 
@@ -312,28 +224,16 @@ static bool may_go_on(const loop_t *loop)
     return has_room && (loop->refused == 0u) && (loop->unanswered_in_a_row < loop->most_unanswered);
 }
 
-/* The cabin, to the next sample. */
-static void advance_cabin(loop_t *loop)
-{
-    loop_cabin_t *cabin = &loop->cabin;
-    double *z_ddot = loop->signal[LOOP_Z_DDOT];
-    const uint32_t now = loop->sample;
-    const double delta = loop->plant.theta - cabin->rest;
-    z_ddot[now + 1u] = aircraft_advance(&cabin->aircraft, now, delta, loop->correction);
-    cabin->speed += 0.5 * cabin->period * (z_ddot[now + 1u] + z_ddot[now]);
-    cabin->felt[now + 1u] = z_ddot[now + 1u] + (cabin->outside * cabin->speed);
-}
-
 uint32_t loop_advance(loop_t *loop, lever_t *lever, uint32_t until)
 {
     while ((loop->sample < until) && may_go_on(loop)) {
-        note_signals(loop);
+        pilot_note(loop);
         if (loop->by_frames) {
             step_by_frames(loop, lever);
         } else {
             step_by_struct(loop, lever);
         }
-        age_correction(loop);
+        pilot_age_correction(loop);
         if ((loop->sample % loop->stride) == 0u) {
             lever_estimate(lever, &loop->estimate[loop->sample / loop->stride]);
             lever_health(lever, &loop->health[loop->sample / loop->stride]);
@@ -342,10 +242,7 @@ uint32_t loop_advance(loop_t *loop, lever_t *lever, uint32_t until)
             }
         }
         if ((loop->sample + 1u) < loop->count) {
-            if (loop->cabin.exists) {
-                advance_cabin(loop);
-            }
-            plant_advance(&loop->plant, loop->sample, loop->asked + loop->torque[loop->sample]);
+            pilot_advance(loop);
         }
         loop->sample++;
     }

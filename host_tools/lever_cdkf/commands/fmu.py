@@ -1,0 +1,89 @@
+"""`lever fmu`: the estimator, and what else the entry points bring, as FMUs (FMI 3.0)."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+from typing import Any
+
+from ..fmu.options import add_out_option, print_written
+
+FMUS = "lever_cdkf.fmus"
+"""Entry point group of modules with further kinds of FMU: add_parser(subparsers), run(args) as of a command."""
+
+_DESCRIPTION = """\
+Makes an FMU (FMI 3.0 Co-Simulation) for Simulink, dSPACE VEOS, Silver, OpenModelica, FMPy and the like. It holds a
+binary for this machine, the C sources for others, and its documentation.
+"""
+_EPILOG = """\
+examples:
+  lever fmu controller -o lever.fmu
+  lever fmu pilot -o pilot.fmu --scenario sudden_grip
+      a pilot to test it, or another controller, against
+
+`lever fmu KIND --help` explains each. host_tools/lever_cdkf/fmu/README.md says how to connect them, and what to click
+in Simulink.
+"""
+_CONTROLLER = """\
+Makes an FMU of the estimator: the C core of the firmware, to the bit. A step is the setting sample_period, or a whole
+multiple.
+
+  inputs      theta, theta_dot, z_ddot, tau_m and grip_force, each with a flag; what COMMAND asks for on the bus
+  outputs     estimates with standard deviations, mode, faults by name, margin, correction and torque
+  parameters  the settings, with unit, range and meaning; --settings and --set change their start values
+
+It is of one model; --set model=linear_physical chooses another. Needs a C compiler, and FMPy for the headers of FMI.
+"""
+_CONTROLLER_EPILOG = """\
+examples:
+  lever fmu controller -o lever.fmu
+  lever fmu controller -o lever.fmu --settings my.settings
+  lever fmu controller -o uh60.fmu --set mitigation=cancellation \\
+      --aircraft uh60_like,gearing=0.5
+
+What is wrong while it runs is a message to the importer: a value out of its range (logStatusError), a step that is no
+multiple (logStatusDiscard), an input that was never set (logStatusWarning). Faults and modes are logEvents.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    parser = subparsers.add_parser(
+        "fmu", help="FMUs of the estimator and of a simulated pilot", description=_DESCRIPTION, epilog=_EPILOG
+    )
+    kinds = parser.add_subparsers(title="kinds", metavar="KIND", required=True)
+    controller = kinds.add_parser(
+        "controller", help="the estimator", description=_CONTROLLER, epilog=_CONTROLLER_EPILOG
+    )
+    add_out_option(controller, "lever.fmu")
+    controller.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
+    controller.add_argument(
+        "--set", metavar="NAME=VALUE", action="append", default=[], help="set one value; may be repeated"
+    )
+    controller.add_argument("--model", help="short for --set model=MODEL")
+    controller.add_argument(
+        "--aircraft",
+        metavar="AIRCRAFT",
+        help="watch the margin to collective bounce with this helicopter, as `lever replay --aircraft` does",
+    )
+    for entry in sorted(importlib.metadata.entry_points(group=FMUS)):
+        module = entry.load()
+        before = set(kinds.choices)
+        module.add_parser(kinds)
+        for name in kinds.choices.keys() - before:
+            kinds.choices[name].set_defaults(run=module.run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..firmware.settings_file import make_config, parse_assignment, read_assignments
+    from ..fmu import archive
+    from ..fmu.controller import controller
+    from .signal_options import chosen_aircraft
+
+    archive.check(args.out)
+    assignments = read_assignments(args.settings) if args.settings is not None else {}
+    model = [] if args.model is None else [f"model={args.model}"]
+    assignments |= dict(parse_assignment(text) for text in (*model, *args.set))
+    aircraft = None if args.aircraft is None else chosen_aircraft(args.aircraft)
+    archive.write(args.out, controller(make_config(assignments), aircraft))
+    print_written(args.out)
+    return 0

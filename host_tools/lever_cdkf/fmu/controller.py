@@ -1,0 +1,68 @@
+"""The FMU of the estimator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.resources import files
+
+from ..firmware.aircraft import AircraftResponse
+from ..firmware.config import CHOICES, Config, choice_value, model_parameters, settings_table
+from .archive import Contents, core_c, float_list, own_c
+from .description import Model
+from .page import page
+from .variables import Variable, read_table
+
+_DURATION = 60.0
+
+
+def controller(config: Config, aircraft: AircraftResponse | None) -> Contents:
+    """What is in the FMU of an estimator that starts with `config`, and watches the margin with `aircraft`."""
+    watched = "" if aircraft is None else f"; it watches the margin to collective bounce with {aircraft.name}"
+    model = Model(
+        identifier="lever_controller",
+        title="Lever CDKF controller",
+        description="Estimates the mass, damping and stiffness of a pilot's arm on the collective lever, model "
+        f"{config.choices['model']}{watched}",
+        period=round(config.settings["sample_period"] * 1e6) / 1e6,
+        stop_time=_DURATION,
+        variables=variables(config),
+    )
+    own = own_c(__package__, ("controller.c", "controller.def"))
+    return Contents(model, own | core_c(), _config(config, aircraft), page(__package__, "controller.html", model), {})
+
+
+def variables(config: Config) -> list[Variable]:
+    """All variables in the order of their value references."""
+    table = (files(__package__) / "c/controller.def").read_text(encoding="utf-8")
+    named = {f"parameter_{number}": each for number, each in enumerate(model_parameters(config.choices["model"]), 1)}
+    rows = []
+    for row in read_table(table):
+        parameter = named.get(row.name.removesuffix("_sigma"))
+        if parameter is not None:
+            name, meaning = f"{parameter.name}_estimate", f"estimate of {parameter.name}"
+            is_sigma = row.name.endswith("_sigma")
+            row = replace(
+                row,
+                name=f"{name}_sigma" if is_sigma else name,
+                unit=parameter.unit,
+                meaning=f"standard deviation of {name}" if is_sigma else meaning,
+            )
+        elif row.name in CHOICES:
+            row = replace(row, start=float(choice_value(row.enumeration, row.name, config.choices[row.name])))
+        rows.append(row)
+    for setting in settings_table():
+        limits = (setting.least, setting.greatest)
+        start = config.settings[setting.name]
+        rows.append(Variable(setting.name, "FLOAT64", "PARAMETER", setting.unit, start, setting.meaning, *limits))
+    return rows
+
+
+def _config(config: Config, aircraft: AircraftResponse | None) -> str:
+    lines = [f"#define CONTROLLER_MODEL {config.pointer.model}u"]
+    if aircraft is not None:
+        at = aircraft.pointer
+        columns = [list(getattr(at, name))[: at.count] for name in ("frequency", "real", "imaginary")]
+        numbers = [at.gain_sigma, at.phase_sigma, at.warning, at.alarm]
+        values = [*map(float_list, columns), *(f"{float(number)!r}f" for number in numbers)]
+        lines.append(f"#define CONTROLLER_AIRCRAFT {{{at.count}u, {', '.join(values)}}}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,1 @@
+"""The simulated pilot as an FMU (FMI 3.0 Co-Simulation)."""

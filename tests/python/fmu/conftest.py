@@ -1,0 +1,30 @@
+"""FMUs that several tests look at, made once by the command `lever`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from lever_cdkf import cli
+from python.fmu.importer import unpacked
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with lever.fmu and pilot.fmu, with two seeds of the scenario demo."""
+    folder = tmp_path_factory.mktemp("fmus")
+    assert cli.main(["fmu", "controller", "-o", str(folder / "lever.fmu")]) == 0
+    assert cli.main(["fmu", "pilot", "-o", str(folder / "pilot.fmu"), "--seeds", "2"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
+def controller(fmus: Path) -> Path:
+    """lever.fmu, unpacked."""
+    return unpacked(fmus / "lever.fmu", fmus / "lever")
+
+
+@pytest.fixture(scope="session")
+def pilot(fmus: Path) -> Path:
+    """pilot.fmu, unpacked."""
+    return unpacked(fmus / "pilot.fmu", fmus / "pilot")

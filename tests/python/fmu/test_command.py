@@ -1,0 +1,89 @@
+"""`lever fmu`: what it says, and what it writes."""
+
+from __future__ import annotations
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+from lever_cdkf.fmu.binary import headers
+from python.conftest import Refused, Run
+
+
+def test_an_fmu_has_all_its_parts(fmus: Path) -> None:
+    for name in ("lever", "pilot"):
+        with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
+            names = archive.namelist()
+            page = archive.read("documentation/index.html").decode()
+        assert {"modelDescription.xml", "sources/buildDescription.xml", "sources/fmi3.c"} <= set(names)
+        assert any(each.startswith("binaries/") for each in names)
+        assert "What it cannot do" in page
+        assert "ℓ² k_p" in page
+        assert "$" not in page
+        assert not [each for each in names if each.endswith(("fmi3Functions.h", "fmi3FunctionTypes.h"))]
+
+
+def test_the_same_twice_is_the_same(fmus: Path, lever: Run, tmp_path: Path) -> None:
+    """But for the time in it: the token stays."""
+    assert lever("fmu", "controller", "-o", tmp_path / "again.fmu")[0] == 0
+    contents = []
+    for path in (fmus / "lever.fmu", tmp_path / "again.fmu"):
+        with zipfile.ZipFile(path) as archive:
+            contents.append({name: archive.read(name) for name in archive.namelist() if name.startswith("sources/")})
+    assert contents[0] == contents[1]
+
+
+def test_sources_compile_without_a_warning(controller: Path, pilot: Path) -> None:
+    """Under the project's warnings, as errors."""
+    warnings = (
+        "all",
+        "extra",
+        "pedantic",
+        "conversion",
+        "double-promotion",
+        "shadow",
+        "missing-prototypes",
+        "cast-qual",
+    )
+    options = ["-std=c99", "-fsyntax-only", "-Werror", *(f"-W{each}" for each in warnings), "-isystem", str(headers())]
+    for folder in (controller / "sources", pilot / "sources"):
+        sources = sorted(str(each) for each in folder.rglob("*.c"))
+        result = subprocess.run(
+            ["gcc", *options, "-I", str(folder), *sources], capture_output=True, text=True, check=False
+        )
+        assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_what_is_wrong_is_one_line(refused: Refused, tmp_path: Path) -> None:
+    out = tmp_path / "x.fmu"
+    cases = {
+        ("controller", "--settings", "none.settings"): "none.settings: cannot be read: No such file or directory",
+        ("controller", "--set", "k_p=1"): "k_p = 1.0 is out of range",
+        ("controller", "--model", "arm"): "model = 'arm' is not known; allowed: lever, ",
+        ("controller", "--aircraft", "uh60"): "uh60",
+        ("pilot", "--scenario", "stedy"): "stedy",
+        ("pilot", "--seeds", "0"): "--seeds 0: must be 1 to 1000",
+        ("pilot", "--set", "x=1"): "x",
+        ("pilot", "--aircraft", "uh60"): "uh60",
+    }
+    for arguments, text in cases.items():
+        assert text in refused("fmu", *arguments, "-o", out)
+    assert "cannot write" in refused("fmu", "controller", "-o", tmp_path / "none/x.fmu")
+    assert "it is a folder" in refused("fmu", "pilot", "-o", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_compiler(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert "an FMU needs a C compiler, and there is none: apt install gcc, or set CC" in refused("fmu", "controller")
+    monkeypatch.setenv("CC", "tcc9")
+    assert "CC = tcc9: there is no such compiler" in refused("fmu", "controller", "-o", tmp_path / "x.fmu")
+
+
+def test_help_teaches(lever: Run) -> None:
+    for arguments in (("fmu",), ("fmu", "controller"), ("fmu", "pilot")):
+        status, out, _ = lever(*arguments, "--help")
+        assert status == 0
+        assert "examples:" in out
