@@ -103,17 +103,16 @@ static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
     return (z_ddot + ahead) * estimator->setup.base_scale;
 }
 
-/* An input that is plausible, but for some samples far from where it was. Only successive samples are compared: not
- * after a gap, nor when it was missing before, as `fault` of the last sample says. */
+/* An input that is plausible, but for some samples far from where it was. Not after it was missing, as `fault` of the
+ * last sample says: then there is no change from sample to sample. */
 static bool has_jumped(
     estimator_t *estimator, enum monitor_input input, enum lever_fault fault, float change, float elapsed)
 {
     monitor_t *monitor = &estimator->learning.monitor;
-    const bool known = ((estimator->faults & (uint32_t)fault) == 0u) || (monitor->jump[input].refused > 0.0f);
-    const bool successive = (elapsed > 0.0f) && (elapsed < (1.5f * estimator->setup.settings->sample_period));
-    const bool jumped = successive && known && monitor_is_jump(monitor, input, change, elapsed);
-    if (jumped) {
-        estimator->corrupt++;
+    bool jumped = false;
+    if (((estimator->faults & (uint32_t)fault) == 0u) || (monitor->jump[input].refused > 0.0f)) {
+        jumped = monitor_is_jump(monitor, input, change, elapsed);
+        estimator->corrupt += jumped ? 1u : 0u;
     }
     return jumped;
 }
@@ -125,10 +124,13 @@ static void check(
     monitor_t *monitor = &estimator->learning.monitor;
     const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MOST);
+    const bool successive = (elapsed > 0.0f) && (elapsed < (1.5f * estimator->setup.settings->sample_period));
     const bool measured = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MOST);
     const float tau_m = sample->tau_m * estimator->setup.torque_scale;
-    const bool torque =
-        measured && !has_jumped(estimator, MONITOR_TORQUE, LEVER_FAULT_TORQUE, tau_m - estimator->last_tau_m, elapsed);
+    const bool torque_jumped =
+        measured && successive &&
+        has_jumped(estimator, MONITOR_TORQUE, LEVER_FAULT_TORQUE, tau_m - estimator->last_tau_m, elapsed);
+    const bool torque = measured && !torque_jumped;
     const bool base = is_usable(estimator, sample->z_ddot, sample->z_ddot_valid, OTHER_MOST);
     checked->y[0] = sample->theta;
     checked->y[1] = sample->theta_dot;
@@ -137,8 +139,9 @@ static void check(
     checked->base = base && monitor_is_alive(monitor, MONITOR_Z_DDOT, sample->z_ddot);
     checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MOST);
     checked->grip_force = sample->grip_force;
-    const bool jumped = checked->base && has_jumped(estimator, MONITOR_BASE, LEVER_FAULT_BASE,
-                                             sample->z_ddot - estimator->raw_z_ddot, elapsed);
+    const bool jumped =
+        checked->base && successive &&
+        has_jumped(estimator, MONITOR_BASE, LEVER_FAULT_BASE, sample->z_ddot - estimator->raw_z_ddot, elapsed);
     checked->tau_m = measured ? (torque ? tau_m : estimator->last_tau_m) : own_torque;
     if (torque && monitor_takes_torque(estimator->samples)) {
         monitor_add_torque(monitor, own_torque, checked->tau_m);
@@ -188,22 +191,25 @@ static bool is_excited(const estimator_t *estimator)
 
 /* The mean square of the rate, as the product of successive samples: unlike motion, the noise of a sensor differs from
  * sample to sample. The prediction is no evidence of motion: the base drives it on a lever that is locked. Where only
- * theta is measured, a motion well above the trim's corner is presumed. */
-static void average_motion(estimator_t *estimator, const checked_t *sample, float elapsed)
+ * theta is measured, a motion well above the trim's corner is presumed. `share` is that of a sample in the mean. */
+static void average_motion(estimator_t *estimator, const checked_t *sample, float elapsed, float share)
 {
     averages_t *averages = &estimator->averages;
     const uint32_t i = sample->valid[1] ? 1u : 0u;
-    const float angle = sample->y[0] - (estimator->setup.constants.trim ? 0.0f : trim_angle(&estimator->trim));
-    const float now = sample->valid[1] ? sample->y[1] : ((RATE_OF_ANGLE * estimator->trim.corner) * angle);
-    const float square = now * averages->last[i];
     if (sample->valid[i]) {
+        float now = sample->y[i];
+        if (i == 0u) {
+            const float angle = now - (estimator->setup.constants.trim ? 0.0f : trim_angle(&estimator->trim));
+            now = (RATE_OF_ANGLE * estimator->trim.corner) * angle;
+        }
+        const float square = now * averages->last[i];
         averages->last[i] = now;
-    }
-    if (sample->valid[i] && (elapsed < TRIM_OUTAGE)) {
-        const float share = share_of(elapsed, estimator->setup.settings->excitation_time);
-        averages->excitation_square += share * (square - averages->excitation_square);
-        averages->excitation_square = greater(averages->excitation_square, 0.0f);
-        averages->motion_square += share_of(elapsed, MOTION_TIME) * (square - averages->motion_square);
+        if (elapsed < TRIM_OUTAGE) {
+            const float excitation = averages->excitation_square;
+            averages->excitation_square = greater(excitation + (share * (square - excitation)), 0.0f);
+            averages->motion_square +=
+                lesser(elapsed * (1.0f / MOTION_TIME), 1.0f) * (square - averages->motion_square);
+        }
     }
 }
 
@@ -219,11 +225,12 @@ bool estimator_may_learn(const estimator_t *estimator)
     return !estimator->frozen && is_settled(estimator) && is_excited(estimator);
 }
 
-static void average(estimator_t *estimator, float elapsed)
+static void average(estimator_t *estimator, const checked_t *sample, float elapsed)
 {
     const float time = estimator->setup.settings->excitation_time;
     averages_t *averages = &estimator->averages;
     const float share = share_of(elapsed, time);
+    average_motion(estimator, sample, elapsed, share);
     if (averages->restarts > 0.0f) {
         averages->restarts -= averages->restarts * (elapsed * RESTARTS_FORGOTTEN);
     }
@@ -278,8 +285,7 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     }
     note(estimator, (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
     const bool restarted = restart_if_invalid(estimator, sample, learnt);
-    average_motion(estimator, sample, elapsed);
-    average(estimator, elapsed);
+    average(estimator, sample, elapsed);
     note(estimator, !lesson.excited, LEVER_FAULT_EXCITATION);
     note(estimator, learning->bounded, LEVER_FAULT_BOUND);
     note(estimator, learning->changed > 0.0f, LEVER_FAULT_CHANGE);

@@ -274,6 +274,7 @@ static void end_block(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, 
     }
     cdkf->disturbance -= cdkf->disturbance * share_of(period, DISTURBANCE_TIME);
     follow_grip(learning, setup, cdkf, period);
+    monitor_end_jumps(&learning->monitor, period, setup->settings->sample_period);
     const bool taught = judge(learning, setup, cdkf, lesson, period, &step);
     if (lesson->walks) {
         adapt(learning, setup, cdkf, &step, period, taught, lesson->excited);

@@ -13,7 +13,6 @@
 #define SPIKE 8.0f           /* standard deviations */
 #define SPIKE_TIME 0.02f     /* longer than this it is no spike [s] */
 #define JUMP_MEMORY 1.0f     /* of the mean square of changes [s] */
-#define JUMP_COUNTED 4.0f    /* in mean squares: a larger change counts as this, so that jumps hardly raise the mean */
 #define BASE_MEMORY 0.5f     /* [s] */
 #define BASE_MEMORY_AGAIN 0.2f
 #define BASE_WRONG 0.4f    /* gain of the base's response below which it is wrong, */
@@ -26,9 +25,14 @@
 #define TORQUE_AGAIN 0.25f /* and while it is wrong; */
 #define TORQUE_SURE 1.6f   /* besides, times torque of other origin over what is asked, both rms */
 
+/* Square of a jump that does no harm, by input [m^2/s^4], [N^2 m^2]. */
+static const float jump_least[MONITOR_INPUTS] = {4.0f, 0.09f};
+
 void monitor_start(monitor_t *monitor)
 {
     (void)memset(monitor, 0, sizeof *monitor);
+    monitor->jump[MONITOR_BASE].limit = jump_least[MONITOR_BASE];
+    monitor->jump[MONITOR_TORQUE].limit = jump_least[MONITOR_TORQUE];
     monitor->surprise = 1.0f;
 }
 
@@ -72,17 +76,21 @@ bool monitor_is_spike(monitor_t *monitor, const cdkf_t *cdkf, uint32_t i, float 
     return far && (monitor->refused[i] < SPIKE_TIME);
 }
 
-bool monitor_is_jump(monitor_t *monitor, enum monitor_input input, float change, float elapsed)
+bool monitor_hold_input(jump_t *of, bool far, float elapsed)
 {
-    static const float least[MONITOR_INPUTS] = {2.0f, 0.3f}; /* a smaller jump does no harm [m/s^2], [N m] */
-    jump_t *of = &monitor->jump[input];
-    const float floor = (least[input] * least[input]) * (1.0f / (SPIKE * SPIKE));
-    const float expected = greater(of->square, floor);
-    const float square = change * change;
-    const bool far = square > ((SPIKE * SPIKE) * expected);
-    of->square += share_of(elapsed, JUMP_MEMORY) * (lesser(square, JUMP_COUNTED * expected) - of->square);
     of->refused = far ? (of->refused + elapsed) : 0.0f;
     return far && (of->refused < SPIKE_TIME);
+}
+
+void monitor_end_jumps(monitor_t *monitor, float period, float sample_period)
+{
+    const float share = share_of(period, JUMP_MEMORY);
+    const float each = (SPIKE * SPIKE) * (sample_period / period);
+    for (uint32_t i = 0u; i < (uint32_t)MONITOR_INPUTS; i++) {
+        jump_t *of = &monitor->jump[i];
+        of->limit += share * (((each * of->sum) + jump_least[i]) - of->limit);
+        of->sum = 0.0f;
+    }
 }
 
 void monitor_add(monitor_t *monitor, float ratio, float elapsed)

@@ -35,11 +35,14 @@ typedef struct agreement {
     float product;
 } agreement_t;
 
+#define MONITOR_JUMP_COUNTED 0.0625f /* part of its limit that a jump counts as: it hardly raises the mean */
+
 enum monitor_input { MONITOR_BASE, MONITOR_TORQUE, MONITOR_INPUTS };
 
 /* How an input changes from sample to sample. */
 typedef struct jump {
-    float square;  /* mean square of the changes */
+    float limit;   /* square of the change that is a jump */
+    float sum;     /* squares of the changes in this block; that of a jump counts as less */
     float refused; /* time for which samples have been jumps [s] */
 } jump_t;
 
@@ -98,9 +101,22 @@ bool monitor_has_just_stuck(monitor_t *monitor);
  * now `level` times as large as expected, in squares. */
 bool monitor_is_spike(monitor_t *monitor, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed);
 
+/* A jump, or the first sample after some: true when what was believed before is better. */
+bool monitor_hold_input(jump_t *of, bool far, float elapsed);
+
 /* An input that has changed by `change` since it was believed last, `elapsed` seconds after the last sample; true when
  * it is a jump, and what was believed last is better. */
-bool monitor_is_jump(monitor_t *monitor, enum monitor_input input, float change, float elapsed);
+static inline bool monitor_is_jump(monitor_t *monitor, enum monitor_input input, float change, float elapsed)
+{
+    jump_t *of = &monitor->jump[input];
+    const float square = change * change;
+    const bool far = square > of->limit;
+    of->sum += far ? (MONITOR_JUMP_COUNTED * of->limit) : square;
+    return (far || (of->refused > 0.0f)) && monitor_hold_input(of, far, elapsed);
+}
+
+/* After a block of `period` seconds of samples `sample_period` apart: how inputs usually change. */
+void monitor_end_jumps(monitor_t *monitor, float period, float sample_period);
 
 /* Any signal is stuck. */
 bool monitor_has_stuck(const monitor_t *monitor);
