@@ -142,7 +142,8 @@ static void check(
     const bool jumped =
         checked->base && successive &&
         has_jumped(estimator, MONITOR_BASE, LEVER_FAULT_BASE, sample->z_ddot - estimator->raw_z_ddot, elapsed);
-    checked->tau_m = measured ? (torque ? tau_m : estimator->last_tau_m) : own_torque;
+    checked->tau_m = torque_jumped ? estimator->last_tau_m : own_torque;
+    checked->tau_m = torque ? tau_m : checked->tau_m;
     if (torque && monitor_takes_torque(estimator->samples)) {
         monitor_add_torque(monitor, own_torque, checked->tau_m);
     }

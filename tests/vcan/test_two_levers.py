@@ -16,7 +16,7 @@ from vcan import rig
 SAMPLES = 1200
 PERIOD_US = 2000
 STATE_ESTIMATE = 0x210
-OPTIONS = ([], ["--id-offset", "0x40"], ["--id-base", "0x18FF0000"])
+OPTIONS: tuple[list[str], ...] = ([], ["--id-offset", "0x40"], ["--id-base", "0x18FF0000"])
 PLACES: tuple[tuple[int, bool], ...] = ((0, False), (0x40, False), (0x18FF0000, True))
 
 

@@ -196,7 +196,8 @@ class Run:
             return np.zeros(len(self.time), bool)
         columns = {key: column for column, _, key in MEASURED}
         without = tuple(fault for fault, key in OPTIONAL.items() if self.column(columns[key]) is None)
-        return (np.where(np.isfinite(faults), faults, 0.0).astype(np.int64) & warning_bits(without)) != 0
+        flagged: BoolArray = (np.where(np.isfinite(faults), faults, 0.0).astype(np.int64) & warning_bits(without)) != 0
+        return flagged
 
     @cached_property
     def sample_period(self) -> float:

@@ -38,9 +38,9 @@ class RunningClock:
         steps = np.diff(recorded, prepend=self._last).astype(recorded.dtype)
         forward = steps[steps > 0]
         if len(forward):
-            self._step = np.median(forward).astype(recorded.dtype)
+            self._step = float(np.median(forward))
         back = steps < -self._least
-        times = recorded + self._ahead + np.cumsum(np.where(back, self._step - steps, 0), dtype=recorded.dtype)
+        times = recorded + self._ahead + np.cumsum(np.where(back, self._step - steps, 0.0)).astype(recorded.dtype)
         self.set_back += [(float(at), float(-by)) for at, by in zip(times[back], steps[back], strict=True)]
         self._last, self._ahead = recorded[-1], times[-1] - recorded[-1]
         return times.astype(recorded.dtype)

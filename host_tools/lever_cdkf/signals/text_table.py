@@ -9,7 +9,6 @@ import io
 import re
 import zlib
 from itertools import islice
-from typing import IO
 
 import numpy as np
 
@@ -58,7 +57,7 @@ def is_text_table(path: str) -> bool:
     return not _start(path)[0].startswith("(")
 
 
-def _open(path: str) -> IO[bytes]:
+def _open(path: str) -> gzip.GzipFile | io.BufferedReader:
     """The bytes of a text that may be compressed."""
     with open(path, "rb") as file:
         packed = file.read(2) == b"\x1f\x8b"
