@@ -173,8 +173,7 @@ enum lever_mode {
     LEVER_MODE_ALIGN = 1,  /* averaging the first samples; estimates are the first guess */
     LEVER_MODE_RUN = 2,    /* estimating */
     LEVER_MODE_COAST = 3,  /* no usable theta or theta_dot: predicting, uncertainty grows */
-    LEVER_MODE_FROZEN = 4, /* by command: states are estimated and sensors judged, parameters held; only what a sensor
-                              that then proves wrong has taught in the last two seconds is taken back */
+    LEVER_MODE_FROZEN = 4, /* states are estimated, parameters held, by command */
     LEVER_MODE_FAULT = 5   /* the filter had to be restarted too often; only a reset leaves this mode */
 };
 
@@ -320,24 +319,38 @@ const char *lever_parameter_unit(uint8_t model, uint32_t index);
 
 /* Conditions present at the last sample; none of them stops the estimator. HEALTH has those since the last HEALTH. */
 enum lever_fault {
-    LEVER_FAULT_THETA = 1,     /* theta missing or invalid */
-    LEVER_FAULT_THETA_DOT = 2, /* theta_dot missing or invalid */
-    LEVER_FAULT_TORQUE = 4,    /* motor torque missing (taken as what was asked for), far off (last one held), wrong */
-    LEVER_FAULT_BASE = 8,      /* base acceleration missing or far off (last one held), or wrong */
-    LEVER_FAULT_GAP = 16,      /* samples were missing before this one */
-    LEVER_FAULT_COMMUNICATION = 32, /* a frame since the last sample was corrupt, repeated or out of sequence */
+    LEVER_FAULT_THETA = 1,     /* theta missing, stuck or not plausible */
+    LEVER_FAULT_THETA_DOT = 2, /* theta_dot missing, stuck or not plausible */
+    LEVER_FAULT_TORQUE = 4,    /* motor torque missing (taken as what was asked for), or not what was asked for */
+    LEVER_FAULT_BASE = 8,      /* base acceleration missing or stuck (the last is held), or not fitting the motion */
+    LEVER_FAULT_GAP = 16,      /* samples were missing */
+    LEVER_FAULT_COMMUNICATION = 32, /* a frame was corrupt, repeated, out of sequence or not understood */
     LEVER_FAULT_INNOVATION = 64,    /* innovations persistently larger than their predicted covariance */
     LEVER_FAULT_EXCITATION = 128,   /* too little motion to learn from; the parameters stand, and grow uncertain */
-    LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model, in any mode */
-    LEVER_FAULT_RECOVERED = 512,    /* an invalid factor or estimate was refused and restarted at this sample */
-    LEVER_FAULT_CHANGE = 1024,      /* the pilot has changed suddenly within the last second; learning anew */
-    LEVER_FAULT_PLATFORM = 2048,    /* the machine reports a fault of its own: lever_platform() */
+    LEVER_FAULT_BOUND = 256,        /* a parameter rests on a bound of its model */
+    LEVER_FAULT_RECOVERED = 512,    /* an invalid factor or estimate was refused, and the filter restarted */
+    LEVER_FAULT_CHANGE = 1024,      /* the pilot has changed suddenly within the last 3 s; learning anew */
+    LEVER_FAULT_PLATFORM = 2048,    /* the machine reports a fault of its own: PLATFORM_HEALTH */
     LEVER_FAULT_CLOCK = 4096,       /* the sample clock stands, runs backwards or crawls (a quarter of sample_period) */
-    LEVER_FAULT_DUPLICATE = 8192,   /* another estimator has spoken on this bus within the last two seconds */
+    LEVER_FAULT_DUPLICATE = 8192,   /* another estimator has spoken on this bus within the last 2 s */
     LEVER_FAULT_SETTLING = 16384,   /* nothing is learnt: the levels of the signals have not settled yet */
     LEVER_FAULT_MISMATCH = 32768,   /* innovations are not white: something moves the lever that the model lacks */
     LEVER_FAULT_CALIBRATION = 65536, /* torque, base and grip force do not agree on the pilot */
     LEVER_FAULT_HANDS_OFF = 131072   /* nobody holds the lever; nothing is learnt */
+};
+
+/* Faults that say: do not trust the parameters, and what follows from them, while any of these is present. Tools and
+ * tables count an estimate as flagged by this mask; in HEALTH a fault of one sample stands for a publish_period.
+ * In it: THETA, THETA_DOT, TORQUE, BASE: an input is missing, and the estimate not of now; or it is wrong, and may have
+ * been learnt from. CLOCK: samples are ignored, or not of the time they state. INNOVATION, MISMATCH: the standard
+ * deviations do not hold. CALIBRATION: an input is scaled wrongly, and the parameters with it. BOUND, RECOVERED: a value
+ * is that of its bound, or the first guess. HANDS_OFF: there is no pilot whose parameters these could be.
+ * Not in it: EXCITATION, SETTLING (the parameters stand, and their standard deviations hold), CHANGE (followed, with
+ * standard deviations that grow), GAP, COMMUNICATION, PLATFORM, DUPLICATE (of the link and the machine). */
+enum lever_faults {
+    LEVER_FAULTS_DO_NOT_TRUST = LEVER_FAULT_THETA | LEVER_FAULT_THETA_DOT | LEVER_FAULT_TORQUE | LEVER_FAULT_BASE |
+    LEVER_FAULT_CLOCK | LEVER_FAULT_INNOVATION | LEVER_FAULT_MISMATCH | LEVER_FAULT_CALIBRATION | LEVER_FAULT_BOUND |
+    LEVER_FAULT_RECOVERED | LEVER_FAULT_HANDS_OFF
 };
 
 typedef struct lever_health {

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 FRAME_SAMPLE: int = lib.LEVER_FRAME_SAMPLE
 """What on_frame() returns when a sample is complete: call step() now."""
 
+DO_NOT_TRUST: int = lib.LEVER_FAULTS_DO_NOT_TRUST
+"""Mask of the faults with any of which the estimates are not to be trusted: enum lever_faults says why."""
+
 FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
 """What FEEDTHROUGH is sent for on the bus, one after the other [Hz]."""
 

@@ -5,6 +5,7 @@ Importing takes about 50 ms (cffi reads the header); a library that is not there
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,16 @@ def enum_names(enum: str) -> dict[int, str]:
     prefix = enum if all(name.startswith(f"{enum}_") for name in elements.values()) else enum.rpartition("_")[0]
     names = {value: name.removeprefix(f"{prefix}_") for value, name in sorted(elements.items())}
     return {value: name for value, name in names.items() if name != "count"}
+
+
+@cache
+def enum_words(enum: str) -> dict[str, str]:
+    """What the façade header says of each member of an enum, by its name of enum_names()."""
+    header = native_file("lever_cdkf_cdef.h").read_text(encoding="utf-8")
+    body = header.partition(f"enum {enum} {{")[2].partition("}")[0]
+    comments = re.findall(r"= (\d+),?\s*/\*(.*?)\*/", body, re.DOTALL)
+    names = enum_names(enum)
+    return {names[int(value)]: " ".join(comment.split()) for value, comment in comments}
 
 
 def struct_dtype(ctype: str) -> np.dtype[Any]:

@@ -5,10 +5,11 @@ instance, `run_samples` a whole recording at once, `model_parameters` what a mod
 """
 
 from .config import Config, Parameter, Setting, model_parameters, settings_table
-from .estimator import FRAME_SAMPLE, Estimate, Estimator, Feedthrough, Health, fault_names, run_samples
-from .library import enum_names, ffi, lib
+from .estimator import DO_NOT_TRUST, FRAME_SAMPLE, Estimate, Estimator, Feedthrough, Health, fault_names, run_samples
+from .library import enum_names, enum_words, ffi, lib
 
 __all__ = [
+    "DO_NOT_TRUST",
     "FRAME_SAMPLE",
     "Config",
     "Estimate",
@@ -18,6 +19,7 @@ __all__ = [
     "Parameter",
     "Setting",
     "enum_names",
+    "enum_words",
     "fault_names",
     "ffi",
     "lib",

@@ -181,6 +181,8 @@ def _recorded_estimates(recording: RecordingSummary) -> list[str]:
             "The estimates in the log are of another version of lever.dbc, or of an unknown one (IDENTITY): they are "
             "not compared."
         )
+    if corrupt := recording.corrupt_recorded_answers:
+        troubles.append(f"{corrupt:,} recorded estimates are corrupt (CRC or length): they are not compared.")
     if recording.misplaced_answers:
         troubles.append(f"{recording.misplaced_answers} recorded estimates do not belong to the sample before them.")
     return troubles

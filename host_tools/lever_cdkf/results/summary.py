@@ -326,7 +326,7 @@ class ReplaySummary(Summary):
     fault_shares: dict[str, float]
     """Shares (0 to 1) of the judged time with each fault that there was; without those of inputs that the log lacks."""
     flagged_share: float | None
-    """Of the judged time with any of faults.WARNINGS of those; None where nothing is judged."""
+    """Of the judged time with any of DO_NOT_TRUST of those; None where nothing is judged."""
     estimates: dict[str, Estimate]
     comparison: Comparison | None
     snapshots: Snapshots | None = None

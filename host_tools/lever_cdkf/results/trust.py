@@ -4,35 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .faults import LITTLE, WARNINGS, WORDS
+from ..firmware.estimator import DO_NOT_TRUST, fault_names
+from ..firmware.library import enum_words
+from .faults import LITTLE
 
 MOST = 0.5
 """Share of the judged time with a warning, from which on the run as a whole is not to be trusted."""
 
 TUNE = "tune"
 _STEPS = {
+    "clock": "check the time of the samples, and sample_period",
     "theta": "check the sensor of theta, its unit and its limits",
     "theta_dot": "check the sensor of theta_dot, its unit and its limits",
     "base": "check sign, unit and gravity of z_ddot",
     "torque": "check sign and unit of tau_m",
+    "recovered": "check settings and first guess: the filter was restarted",
     "hands_off": "take the part in which somebody holds the lever (--start, --length)",
     "calibration": TUNE,
     "mismatch": TUNE,
     "innovation": TUNE,
     "bound": TUNE,
 }
-"""What to do about each of WARNINGS, causes before what follows from them; TUNE stands for a command."""
+"""What to do about each of DO_NOT_TRUST, causes before what follows from them; TUNE stands for a command."""
 
 
 def warning(shares: Mapping[str, float], warned: float | None) -> str:
     """Return what the estimator says against its estimates; empty where that is little.
 
-    `shares` (0 to 1) are those of the judged time with each fault, `warned` that with any of WARNINGS.
+    `shares` (0 to 1) are those of the judged time with each fault, `warned` that with any of DO_NOT_TRUST.
     """
     causes = _causes(shares)
     if not causes or warned is None or warned <= LITTLE:
         return ""
-    listed = "; ".join(f"{WORDS[name]} ({_percent(shares[name])} of the time)" for name in causes)
+    listed = "; ".join(f"{enum_words('lever_fault')[name]} ({_percent(shares[name])} of the time)" for name in causes)
     part = "" if warned >= MOST else f" {_percent(warned)} of the time"
     return f"Do not trust the estimates{part}: {listed}."
 
@@ -53,4 +57,4 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"
 
 
-assert set(_STEPS) == set(WARNINGS)
+assert set(_STEPS) == set(fault_names(DO_NOT_TRUST))

@@ -5,31 +5,8 @@ from __future__ import annotations
 import math
 
 from ..can import codec
-from ..firmware.library import enum_names
-from ..results.faults import WORDS
+from ..firmware.library import enum_names, enum_words
 from .picture import Picture
-
-MODES = {
-    "init": "waits for the first sample",
-    "align": "averages the first samples; estimates are the first guess",
-    "run": "is estimating",
-    "coast": "has no usable theta or theta_dot: predicts, and grows uncertain",
-    "frozen": "holds the parameters, by command",
-    "fault": "was restarted too often; only a reset leaves this",
-}
-"""What the estimator does, by enum lever_mode."""
-
-PLATFORM_FAULTS = {
-    "clock": "crystal did not start",
-    "rom": "program memory is damaged",
-    "self_test": "self test failed",
-    "watchdog": "reset by the watchdog",
-    "hard_fault": "reset by a hard fault",
-    "bus_off": "off the bus",
-    "overrun": "received frames lost",
-    "dropped": "frames to send dropped",
-}
-"""Conditions of its machine, by enum lever_platform_fault."""
 
 SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector", 16: "settings or aircraft of its build"}
 """Bits of enum message_self_test (firmware/can/messages.h)."""
@@ -60,7 +37,7 @@ def condition(picture: Picture) -> tuple[str, str]:
     level = {"run": "good", "fault": "bad"}.get(mode, "watch")
     if level == "good" and (present := faults(picture)):
         return "watch", f"{mode}, but: {'; '.join(present)}"
-    return level, f"{mode}: the estimator {MODES.get(mode, 'is in a mode that this program does not know')}"
+    return level, f"{mode}: {enum_words('lever_mode').get(mode, 'a mode that this program does not know')}"
 
 
 def bounce(picture: Picture) -> tuple[str, str] | None:
@@ -98,5 +75,5 @@ def faults(picture: Picture) -> list[str]:
     """The faults of the estimator and its machine, in words."""
     machine = picture.platform_faults()
     named = [name for name in picture.faults() if not (machine and name == "platform")]
-    texts = [WORDS.get(name, name) for name in named]
-    return texts + [f"machine: {PLATFORM_FAULTS.get(name, name)}" for name in machine or ()]
+    texts = [enum_words("lever_fault")[name] for name in named]
+    return texts + [f"machine: {enum_words('lever_platform_fault')[name]}" for name in machine or ()]

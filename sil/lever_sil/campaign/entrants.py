@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.arrays import Array
-from lever_cdkf.firmware.native import Config, run_samples
-from lever_cdkf.results.faults import warning_bits
+from lever_cdkf.firmware.native import DO_NOT_TRUST, Config, run_samples
 
 from ..scenarios.scenario import Scenario
 from ..study.baselines import BASELINES
@@ -89,7 +88,7 @@ class Firmware(Entrant):
 
     def _run(self, flight: Flight) -> Columns:
         columns = flight.firmware if self.flies_in(flight.scenario) else self._replayed(flight)
-        return columns | {"flagged": (columns["faults"] & warning_bits() != 0).astype(np.float64)}
+        return columns | {"flagged": (columns["faults"] & DO_NOT_TRUST != 0).astype(np.float64)}
 
     def flies_in(self, scenario: Scenario) -> bool:
         return scenario.config.choices["estimator"] == self.name

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.arrays import BoolArray, FloatArray
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import lib
 from numpy.typing import NDArray
 
@@ -18,8 +19,6 @@ from ..judged.result import Values, largest, mean
 from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from .motions import Recording
 
-FLAGS = ("THETA", "THETA_DOT", "BASE", "INNOVATION", "BOUND", "MISMATCH", "CALIBRATION", "HANDS_OFF")
-"""Faults that say "do not trust this". CHANGE alone does not."""
 QUANTITIES = ("f_n", "zeta", *PARAMETERS)
 WITHIN = 0.05
 """Settled is a natural frequency that stays within so much of the truth."""
@@ -68,9 +67,9 @@ class Outcome:
         """Size of the error in standard deviations that the firmware states."""
         return np.abs(self.error(quantity)) / self.track.sigma[quantity]
 
-    def flagged(self, *names: str) -> BoolArray:
+    def flagged(self, mask: int = DO_NOT_TRUST) -> BoolArray:
         """Where the firmware shows any of these faults."""
-        shown: BoolArray = (self.track.faults & fault_mask(*names)) != 0
+        shown: BoolArray = (self.track.faults & mask) != 0
         return shown
 
 
@@ -98,8 +97,8 @@ def _largest(quantity: str, outcome: Outcome) -> Values:
     return largest
 
 
-def _share(names: tuple[str, ...], outcome: Outcome) -> Values:
-    return _percent(outcome.flagged(*names)[outcome.judged])
+def _share(mask: int, outcome: Outcome) -> Values:
+    return _percent(outcome.flagged(mask)[outcome.judged])
 
 
 def _running(outcome: Outcome) -> Values:
@@ -126,12 +125,12 @@ def _lag(outcome: Outcome) -> Values:
     return lag
 
 
-def _until_flagged(names: tuple[str, ...], outcome: Outcome) -> Values:
+def _until_flagged(mask: int, outcome: Outcome) -> Values:
     """From the begin of each event until one of the faults shows; the slowest."""
     delays = []
     for start, end in outcome.events:
         inside = outcome.during(start, end)
-        shown = outcome.flagged(*names)[inside]
+        shown = outcome.flagged(mask)[inside]
         delay = outcome.track.time[inside][shown.argmax(axis=0)] - start
         delays.append(np.where(shown.any(axis=0), delay, math.inf))
     slowest: Values = np.max(delays, axis=0)
@@ -143,7 +142,7 @@ def _back(outcome: Outcome) -> Values:
     delays = []
     for _, end in outcome.events:
         after = outcome.during(end, end + FOLLOWED)
-        shown = outcome.flagged(*FLAGS, "SETTLING")[after]
+        shown = outcome.flagged(DO_NOT_TRUST | fault_mask("SETTLING"))[after]
         time = outcome.track.time[after] - end
         calm = round(_CALM / (time[1] - time[0]))
         run = np.lib.stride_tricks.sliding_window_view(shown, calm, axis=0).any(axis=-1)
@@ -231,7 +230,7 @@ def _figure(
 
 
 def _figures() -> dict[str, Figure]:
-    figures = {}
+    figures, hands_off = {}, fault_mask("HANDS_OFF")
     for name in QUANTITIES:
         rms, ratio = partial(_rms, name), partial(_against, partial(_rms, name))
         figures[f"{name} rms"] = _figure("%", f"rms error of {name}", rms, _pooled_rms)
@@ -244,13 +243,13 @@ def _figures() -> dict[str, Figure]:
         )
         figures[f"{name} ratio"] = _figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
     return figures | {
-        "flagged": _figure("%", "share of time with a fault that forbids trust", partial(_share, FLAGS), mean),
-        "mismatch": _figure("%", "share of time with MISMATCH", partial(_share, ("MISMATCH",)), mean, False),
+        "flagged": _figure("%", "share of time with a fault that forbids trust", partial(_share, DO_NOT_TRUST), mean),
+        "mismatch": _figure("%", "share of time with MISMATCH", partial(_share, fault_mask("MISMATCH")), mean, False),
         "running": _figure("%", "share of time in mode RUN", _running, mean, False),
         "settled": _figure("s", f"until f_n stays within {100 * WITHIN:g} %", _settled, largest),
         "lag": _figure("s", "delay with which c_p is followed", _lag, mean),
-        "to flag": _figure("s", "until a fault shows", partial(_until_flagged, FLAGS), largest),
-        "to HANDS_OFF": _figure("s", "until HANDS_OFF shows", partial(_until_flagged, ("HANDS_OFF",)), largest),
+        "to flag": _figure("s", "until a fault shows", partial(_until_flagged, DO_NOT_TRUST), largest),
+        "to HANDS_OFF": _figure("s", "until HANDS_OFF shows", partial(_until_flagged, hands_off), largest),
         "back": _figure("s", "until flags are off and learning goes on", _back, largest),
         "learnt at once": _figure("σ", "greatest change of a parameter in the event", partial(_learnt, 0.0), largest),
         "learnt": _figure("σ", "the same from 0.5 s after its begin on", partial(_learnt, 0.5), largest),
@@ -286,7 +285,7 @@ def excerpt(outcome: Outcome, points: int = 600) -> Excerpt:
         truth=np.empty(0) if truth is None else truth[at, run],
         value=track.value["f_n"][at, run],
         sigma=track.sigma["f_n"][at, run],
-        flagged=outcome.flagged(*FLAGS)[at, run],
+        flagged=outcome.flagged()[at, run],
     )
 
 

@@ -6,11 +6,12 @@ import html
 from collections.abc import Sequence
 
 import numpy as np
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST, fault_names
 from lever_cdkf.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
 
-from .judge import BACK, ERROR, RIGHT, SIGMAS, SILENT, WARNED, Excerpt
+from .judge import BACK, ERROR, RIGHT, SIGMAS, SILENT, Excerpt
 from .matrix import Result
 from .rows import KNOWN
 from .table import HOLDS, demands, lines, missed, state
@@ -109,6 +110,6 @@ def _legend() -> str:
         f"<p>Of every fault, besides: estimates are finite; none is off by more than {SIGMAS:g}σ for {SILENT:g} s",
         f"without a flag, and {RIGHT:g} % of the samples without a flag are within {SIGMAS:g}σ; each sample is",
         f"answered; torque keeps its limits; the firmware learns again {BACK:g} s after the fault and knows the",
-        f"natural frequency to {ERROR:g} % in the last 5 s. Flagged is any of {', '.join(WARNED)}, a mode without",
-        "estimates, and silence.</p>",
+        f"natural frequency to {ERROR:g} % in the last 5 s. Flagged is any of {', '.join(fault_names(DO_NOT_TRUST))},",
+        "a mode without estimates, and silence.</p>",
     ))  # fmt: skip

@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from lever_cdkf.arrays import BoolArray, FloatArray
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import enum_names, lib
 from lever_cdkf.report.series import runs
 
-from ..envelope.measure import FLAGS, QUANTITIES, fault_mask
+from ..envelope.measure import QUANTITIES, fault_mask
 from ..envelope.motions import PERIOD, STRIDE
 from .bus import Interval
 from .flight import Record
 
-WARNED = (*FLAGS, "TORQUE", "GAP", "COMMUNICATION", "RECOVERED", "CLOCK", "SETTLING", "PLATFORM", "DUPLICATE")
-"""Faults with any of which an estimate is flagged; CHANGE and EXCITATION are none."""
 GONE = (
     *("THETA", "THETA_DOT", "TORQUE", "BASE", "GAP", "COMMUNICATION", "CLOCK", "SETTLING", "RECOVERED", "HANDS_OFF"),
 )
@@ -123,11 +122,11 @@ def is_estimating(record: Record) -> BoolArray:
 
 
 def is_flagged(record: Record) -> BoolArray:
-    """At every sample: a fault of WARNED, a mode without estimates, or nothing at all."""
+    """At every sample: a fault of DO_NOT_TRUST, a mode without estimates, or nothing at all."""
     health = record.health
     taken = np.diff(health["samples"].astype(np.int64), prepend=0) != 0
     since = np.arange(len(taken)) - np.maximum.accumulate(np.where(taken, np.arange(len(taken)), 0))
-    flagged: BoolArray = ((health["faults"] & fault_mask(*WARNED)) != 0) | ~is_estimating(record) | (since >= UNHEARD)
+    flagged: BoolArray = ((health["faults"] & DO_NOT_TRUST) != 0) | ~is_estimating(record) | (since >= UNHEARD)
     return flagged
 
 

@@ -358,6 +358,7 @@ KNOWN: dict[str, str] = {
     "z_ddot_gain_drift": _BASE,
     "grip_force_saturated": "a constant force passes no high-pass: it counts as none",
     "grip_force_gain_half": "CALIBRATION shows a gain that is too large sooner than one that is too small",
+    "babble_1": "one random frame in 256 has a right CRC and is taken; COMMUNICATION shows, but flags no estimate",
     "clock_half": _CLOCK,
     "clock_1.1": _CLOCK,
     "clock_2": _CLOCK,

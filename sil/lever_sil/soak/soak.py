@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.config import Config
-from lever_cdkf.firmware.estimator import Estimator
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
-from ..envelope.measure import fault_mask
 from ..fast.closed_loop import STRIDE, Loop
-from ..faults.judge import SIGMAS, WARNED
+from ..faults.judge import SIGMAS
 from ..run.summary import judged_samples
 from ..scenarios import inputs as scenario_inputs
 from ..scenarios.scenario import Scenario
@@ -182,7 +181,7 @@ def judge(scenario: Scenario, time: FloatArray, truth: Any, estimates: NDArray[A
     values = {**truth.parameters, **vars(truth.dynamics)}
     judged = judged_samples(scenario, time) & np.isfinite(values["natural_frequency"])
     running = (healths["mode"] == lib.LEVER_MODE_RUN) | (healths["mode"] == lib.LEVER_MODE_FROZEN)
-    unflagged = judged & running & ((healths["faults"] & fault_mask(*WARNED)) == 0)
+    unflagged = judged & running & ((healths["faults"] & DO_NOT_TRUST) == 0)
     sums = Sums(looks=len(time), judged=int(judged.sum()), unflagged=int(unflagged.sum()))
     sums.in_fault = int(np.sum(healths["mode"] == lib.LEVER_MODE_FAULT))
     sums.not_finite = int(sum(np.sum(~np.isfinite(estimates[name])) for name in ("parameter", "parameter_sigma")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from lever_cdkf.firmware.config import CHOICES
+from lever_cdkf.firmware.library import enum_words
 from python.can.codec import DBC, MULTIPLEXED, Codec, data_id_base, is_quantity, limits, not_available, scaled
 
 
@@ -105,3 +106,11 @@ def test_every_fault_has_its_named_bit(codec: Codec) -> None:
     bits = {signal.name: 1 << signal.start - 16 for signal in health.signals if signal.name.startswith("fault_")}
     expected = {name.removeprefix("LEVER_").lower(): bit for name, bit in codec.enum("lever_fault").items()}
     assert bits == expected
+
+
+@pytest.mark.requirement("R57")
+def test_every_fault_is_described_as_in_the_header() -> None:
+    health = DBC.get_message_by_name("HEALTH")
+    for name, words in enum_words("lever_fault").items():
+        comment = health.get_signal_by_name(f"fault_{name}").comment
+        assert comment in (f"{words}.", f"{words[0].upper()}{words[1:]}."), name

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_sil.envelope import measure, motions, pilots, plant
 from lever_sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
@@ -264,7 +265,8 @@ STUCK = fault_mask("BASE")
         ("settled", {"f_n": np.where(TIME < 13.5, 0.06, 0.04)}, None, 1.5),
         ("settled", {"f_n": np.full_like(TIME, -0.06)}, None, math.inf),
         ("flagged", None, STUCK * (TIME >= 14.0), 10.0),
-        ("flagged", None, fault_mask("CHANGE", "SETTLING", "GAP") * (TIME > 0.0), 0.0),
+        ("flagged", None, DO_NOT_TRUST * (TIME >= 14.0), 10.0),
+        ("flagged", None, ~DO_NOT_TRUST * (TIME > 0.0), 0.0),
         ("mismatch", None, fault_mask("MISMATCH") * (TIME < 14.0), 90.0),
         ("to flag", None, STUCK * (TIME >= 10.4), 0.4),
         ("to flag", None, STUCK * (TIME >= 12.4), math.inf),

@@ -103,6 +103,7 @@ def test_one_flipped_bit_is_found(lines: list[str], tmp_path: Path) -> None:
             assert 0.0 <= at - seconds(lines[place]) <= 0.501
         else:
             assert corrupt + left_out == 1, (lines[place], spoilt[place])
+            assert (f"{corrupt} recorded estimates are corrupt" in summary.verdict) == (corrupt > 0)
         assert found.equal >= before.equal - 2
 
 

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.errors import LeverError
-from lever_cdkf.firmware.native import enum_names
+from lever_cdkf.firmware.native import enum_words
 from lever_cdkf.report import screenshot, summary_html, write_report
 from lever_cdkf.report.charts import tracking
-from lever_cdkf.report.charts.health import FAULT_WORDS
 from lever_cdkf.report.run import COHERENT, Run
 from lever_sil.run.runner import Result
 
@@ -341,16 +340,13 @@ def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, re
 
 def test_health_names_what_happened_when_it_happened(page: Reader) -> None:
     bars = {trace["name"]: trace for trace in figures(page)["figure-health"]["data"]}
-    assert {"mode: align", "mode: run", "angle missing", "rate missing", "lost"} <= set(bars)
-    assert "filter restarted" not in bars
-    x = unpack(bars["angle missing"]["x"]).reshape(-1, 3)
+    assert {"mode: align", "mode: run", "fault: theta", "fault: theta_dot", "lost"} <= set(bars)
+    assert "fault: recovered" not in bars
+    x = unpack(bars["fault: theta"]["x"]).reshape(-1, 3)
     longest = x[np.argmax(x[:, 1] - x[:, 0])]
     assert longest[0] == pytest.approx(12.0, abs=0.05)
     assert longest[1] == pytest.approx(13.0, abs=0.05)
-
-
-def test_every_fault_has_a_word() -> None:
-    assert set(FAULT_WORDS) == set(enum_names("lever_fault").values())
+    assert enum_words("lever_fault")["theta"] in bars["fault: theta"]["hovertemplate"]
 
 
 # --- less than everything --------------------------------------------------------------------------------------------

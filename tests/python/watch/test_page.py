@@ -88,7 +88,7 @@ def test_a_session(desktop: Browser, start_lever: Start) -> None:
     assert desktop.run("document.querySelector('[data-request=run]').ariaPressed") == "true"
     desktop.click("[data-request=freeze]")
     desktop.wait("document.querySelector('[data-request=freeze]').ariaPressed == 'true'")
-    assert desktop.run(CONDITION) == "frozen: the estimator holds the parameters, by command"
+    assert desktop.run(CONDITION) == "frozen: states are estimated, parameters held, by command"
     frozen = estimates(desktop)["kp stiffness"][0]
     desktop.run("new Promise(done => setTimeout(done, 500))")
     assert estimates(desktop)["kp stiffness"][0] == frozen

@@ -13,28 +13,6 @@ LANE_POINTS = 1500  # how finely the bars are drawn
 LEAST_SHARE = 0.002  # of the whole time: no bar is drawn shorter, or it could not be seen
 COUNT_COLOURS = {"lost": "estimate", "corrupt": "torque", "late": "base"}
 
-# In words for the page; the bits and their exact meaning are enum lever_fault of firmware/lever_cdkf.h.
-FAULT_WORDS = {
-    "theta": "angle missing",
-    "theta_dot": "rate missing",
-    "torque": "torque missing",
-    "base": "base acceleration missing",
-    "gap": "samples missing",
-    "communication": "frame corrupt or out of order",
-    "innovation": "innovations larger than predicted",
-    "excitation": "too little motion",
-    "bound": "parameter at its bound",
-    "recovered": "filter restarted",
-    "change": "sudden change detected",
-    "platform": "machine reports a fault",
-    "clock": "sample clock stands or runs back",
-    "duplicate": "second estimator on the bus",
-    "settling": "levels settling",
-    "mismatch": "innovations not white",
-    "calibration": "torque and base disagree",
-    "hands_off": "hands off",
-}
-
 
 def timeline(run: Run) -> Figure | None:
     """A row for each mode and each fault that occurred, with a bar whenever it was present; below it the counts."""
@@ -64,20 +42,21 @@ def timeline(run: Run) -> Figure | None:
 def _modes(run: Run, mode: Array) -> list[Spec]:
     names = native.enum_names("lever_mode")
     present = [int(value) for value in np.unique(mode[np.isfinite(mode)])]
-    return [_bar(run, mode == value, f"mode: {names.get(value, value)}", "estimate") for value in present]
+    named = [(value, f"mode: {names.get(value, value)}") for value in present]
+    return [_bar(run, mode == value, name, name, "estimate") for value, name in named]
 
 
 def _faults(run: Run, faults: Array) -> list[Spec]:
-    bits = np.nan_to_num(faults).astype(np.int64)
+    bits, words = np.nan_to_num(faults).astype(np.int64), native.enum_words("lever_fault")
     return [
-        _bar(run, (bits & value) != 0, FAULT_WORDS.get(name, name), "fault")
+        _bar(run, (bits & value) != 0, f"fault: {name}", words[name], "fault")
         for value, name in native.enum_names("lever_fault").items()
         if np.any(bits & value)
     ]
 
 
-def _bar(run: Run, active: np.ndarray, name: str, colour: str) -> Spec:
-    """One thick line over each stretch in which something was so; stretches too close to be told apart become one."""
+def _bar(run: Run, active: np.ndarray, name: str, words: str, colour: str) -> Spec:
+    """Draw each stretch in which something was so as a thick line that shows `words`; close stretches become one."""
     starts = spread_indices(len(active), LANE_POINTS)
     anywhere = np.logical_or.reduceat(active, starts)
     ends = np.append(run.time[starts[1:]], run.end)
@@ -87,5 +66,5 @@ def _bar(run: Run, active: np.ndarray, name: str, colour: str) -> Spec:
         x += [round(start, 4), round(max(float(ends[last]), start + LEAST_SHARE * run.end), 4), None]
     y = [name if moment is not None else None for moment in x]
     style = {"color": f"@{colour}", "width": 12}
-    hover = {"hovertemplate": f"{name} %{{x:.2f}} s<extra></extra>", "showlegend": False}
+    hover = {"hovertemplate": f"{words} %{{x:.2f}} s<extra></extra>", "showlegend": False}
     return {"type": "scatter", "mode": "lines", "x": x, "y": y, "name": name, "yaxis": "y", "line": style} | hover

@@ -34,7 +34,7 @@ class _Case:
     sigma: Array
     """(B, T, 4)"""
     noticed: NDArray[np.bool_]
-    """(B, T) whether the firmware says that the pilot has changed within the last second."""
+    """(B, T) whether the firmware says CHANGE."""
 
 
 def grip(seed: int, extent: Extent) -> Figure:
