@@ -451,8 +451,9 @@ uint16_t lever_state_layout(void);
 void lever_state_save(const lever_t *lever, uint8_t state[LEVER_STATE_BYTES]);
 
 /* From then on the instance is as that was which was saved: for a replay, on a desktop; a controller must not take its
- * state from a bus. Returns false, changing nothing, if a value is out of its range, the settings are others, or one of
- * the two has an aircraft and the other has none. Bytes that are accepted may make any estimate, but no harm. */
+ * state from a bus. Returns false, changing nothing, if a value is out of its range or not finite, the filter would break
+ * its invariant, the settings are others, or one of the two has an aircraft and the other has none. Bytes that are
+ * accepted may make any estimate, but a finite one. Needs another instance on the stack. */
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES]);
 
 /* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and
