@@ -277,6 +277,11 @@ static void adopt(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
     scaling_init(&lever->estimator.cdkf.scaling, setup->model_in_use, &prior);
 }
 
+static bool is_near(float value, float expected)
+{
+    return fabsf(value - expected) <= (1.0e-3f * fabsf(expected));
+}
+
 static float largest(const float value[], uint32_t count)
 {
     float most = 0.0f;
@@ -284,6 +289,24 @@ static float largest(const float value[], uint32_t count)
         most = (fabsf(value[i]) <= most) ? most : fabsf(value[i]); /* NaN stays */
     }
     return most;
+}
+
+/* The parameters and the coefficients at the sigma points are those of the belief. */
+static bool is_drawn(const estimator_t *estimator)
+{
+    const cdkf_t *cdkf = &estimator->cdkf;
+    cdkf_t drawn = *cdkf;
+    cdkf_draw(&drawn, estimator->setup.model_in_use, &estimator->setup.constants);
+    bool same = true;
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        same = same && is_near(cdkf->p[i], drawn.p[i]);
+    }
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_POINTS; i++) {
+        for (uint32_t j = 0u; j < (uint32_t)MODEL_COEFFICIENTS; j++) {
+            same = same && is_near(cdkf->points[i].c[j], drawn.points[i].c[j]);
+        }
+    }
+    return same;
 }
 
 /* Values that are possible one by one may contradict each other: the filter keeps its invariant, and all of the
@@ -300,7 +323,7 @@ static bool is_consistent(const lever_t *lever)
         largest(estimate.parameter_sigma, (uint32_t)LEVER_PARAMETERS),
         largest(estimate.parameter_correlation, (uint32_t)LEVER_PARAMETERS)};
     const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.averages.excitation_square >= 0.0f);
-    return squares && cdkf_is_valid(&lever->estimator.cdkf) &&
+    return squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
            is_finite(largest(all, (uint32_t)(sizeof(all) / sizeof(all[0]))));
 }
 

@@ -178,7 +178,7 @@ TEST(limits_are_those_of_what_they_index)
     }
 }
 
-/* Every value that is limited: at its limit it is taken, beyond not. */
+/* Every value that is limited: at its limit it is taken, beyond not. But a belief of one model is none of another. */
 TEST(a_value_beyond_its_range_is_refused)
 {
     uint32_t at = FIRST_ROW;
@@ -194,7 +194,7 @@ TEST(a_value_beyond_its_range_is_refused)
                 const uint32_t value = row->most + beyond;
                 put(at, width, value);
                 lever_t *other = lever_init(&other_memory, &config);
-                if (beyond == 0u) {
+                if ((beyond == 0u) && (row->offset != offsetof(struct lever, estimator.setup.model))) {
                     TEST_ASSERT_TRUE(lever_state_restore(other, state));
                 } else {
                     assert_refused(other);
