@@ -404,8 +404,8 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
  *   - the platform reports none of ROM, SELF_TEST, WATCHDOG, HARD_FAULT, and the settings are as lever_init() found them:
  *     they are looked at each second, and a change raises LEVER_FAULT_PLATFORM for good;
  *   - since LEVER_FAULT_HANDS_OFF, or a motor found to do other than it is asked (LEVER_FAULT_TORQUE, but not for a
- *     torque that is only missing), a command has asked for torque anew, by a dither or a mitigation that it names, with
- *     that fault gone.
+ *     torque that is only missing), a command has asked for torque anew, with that fault gone: by a dither or a
+ *     mitigation that it names, where the command before it named none.
  * Opening takes dither_fade. */
 
 /* Torque leaves, or will with the next sample; or mitigation adds to the angle. */
@@ -455,7 +455,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1623 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1624 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);
@@ -464,8 +464,9 @@ uint16_t lever_state_layout(void);
 void lever_state_save(const lever_t *lever, uint8_t state[LEVER_STATE_BYTES]);
 
 /* From then on the instance is as that was which was saved: for a replay, on a desktop; a controller must not take its
- * state from a bus. Returns false, changing nothing, if a value is out of its range, the settings are others, or one of
- * the two has an aircraft and the other has none. Bytes that are accepted may make any estimate, but no harm. */
+ * state from a bus. Returns false, changing nothing, if a value is out of its range or not finite, the filter would break
+ * its invariant, the settings are others, or one of the two has an aircraft and the other has none. Bytes that are
+ * accepted may make any estimate, but a finite one. Needs another instance on the stack. */
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES]);
 
 /* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and

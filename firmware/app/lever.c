@@ -239,9 +239,7 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
     const bool known = plausible ? estimator_command(&lever->estimator, command) : false;
     if (known) {
         torque_gate_keep_alive(&lever->gate);
-        if (asks_for_torque(command)) {
-            torque_gate_ask(&lever->gate);
-        }
+        torque_gate_ask(&lever->gate, asks_for_torque(command));
         choose_mitigation(&lever->bounce, command->mitigation);
         if (resets) {
             dither_reset(&lever->dither);
@@ -338,8 +336,8 @@ void lever_stability(const lever_t *lever, lever_stability_t *stability)
     const bool is_now = instance_is_estimating(lever) && torque_gate_has_output(&lever->gate);
     const bool stands = is_now || (state == (uint8_t)LEVER_BOUNCE_ALARM);
     stability->state = stands ? state : (uint8_t)LEVER_BOUNCE_UNKNOWN;
-    stability->valid = is_now && (state != (uint8_t)LEVER_BOUNCE_UNKNOWN) && is_finite(margin->gain_sigma) &&
-                       is_finite(margin->modulus_sigma);
+    stability->valid = is_now && carries_margin(lever) && (state != (uint8_t)LEVER_BOUNCE_UNKNOWN) &&
+                       is_finite(margin->gain_sigma) && is_finite(margin->modulus_sigma);
     stability->gain_margin = margin->gain;
     stability->gain_margin_sigma = margin->gain_sigma;
     stability->modulus = margin->modulus;

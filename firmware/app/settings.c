@@ -68,9 +68,9 @@ static const char *settings_check(const lever_settings_t *settings)
 }
 
 /* The name of the first setting that does not go with another, or NULL. Through a gap the high-pass behind trim_corner
- * is stepped in sixteenths of it, for which an equal product of both is the angle 2 pi product / 16: unstable from a
- * product of 2.6 on (all parameters went to their bounds at 3), biased by 2 sigma from 2 on, and good at 1.5. A
- * gap_limit of less than two sample periods takes a late sample for a gap, and aligns for ever. */
+ * is stepped in SUBSTEPS_MOST parts of it (prediction.c), 12, each of an angle of 2 pi product / 12, with the product of
+ * both. The sections lose accuracy as that angle grows; at a product of 1.5, +-2 sigma still cover 97 %. A gap_limit of
+ * less than two sample periods takes a late sample for a gap, and aligns for ever. */
 static const char *combination_check(const lever_settings_t *settings)
 {
     const bool fits = ((settings->gap_limit * settings->trim_corner) <= 1.5f) &&

@@ -1,8 +1,10 @@
 #include "app/state.h"
 
 #include "app/instance.h"
+#include "math/bounds.h"
 #include "math/crc32.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -11,22 +13,27 @@
 #define COUNTER 15u /* of E2E */
 #define FLAG 1u
 #define BYTE_BITS 8u
+#define FLOAT_LIMIT 1.0e9f
 
 /* From one member to another of the same size, side by side. */
 #define MEMBERS(first, last, size, most)                                                                               \
     {(uint16_t)offsetof(struct lever, first),                                                                          \
-        (uint16_t)(((offsetof(struct lever, last) - offsetof(struct lever, first)) / (size)) + 1u), (size), (most)}
+        (uint16_t)(((offsetof(struct lever, last) - offsetof(struct lever, first)) / (size)) + 1u), (size), false,     \
+        (most)}
 
 #define WORDS(first, last) MEMBERS(first, last, 4u, UINT32_MAX)
+#define FLOATS(first, last)                                                                                            \
+    {(uint16_t)offsetof(struct lever, first),                                                                          \
+        (uint16_t)(((offsetof(struct lever, last) - offsetof(struct lever, first)) / 4u) + 1u), 4u, true, UINT32_MAX}
 #define BYTES(first, last, most) MEMBERS(first, last, 1u, most)
 #define FLAGS(first, last) MEMBERS(first, last, 1u, FLAG)
 
 /* What a value may be at most is what the code may meet: of an enum, an index, or what counts bits, so that bytes from
- * anywhere do no harm. Any float may come, as from any sample. */
+ * anywhere do no harm. A float is finite and below FLOAT_LIMIT in size, but in a sample that waits: there, any may come. */
 /* cppcheck-suppress misra-c2012-20.7 ; D1 */
 #define RECEIVER(name) BYTES(link.name.max_delta, link.name.lost, COUNTER), FLAGS(link.name.waiting, link.name.waiting)
 #define STILLNESS(i)                                                                                                   \
-    WORDS(estimator.learning.monitor.stillness[i].now, estimator.learning.monitor.stillness[i].before),                \
+    FLOATS(estimator.learning.monitor.stillness[i].now, estimator.learning.monitor.stillness[i].before),               \
         BYTES(                                                                                                         \
             estimator.learning.monitor.stillness[i].same, estimator.learning.monitor.stillness[i].changes, ANY_BYTE),  \
         FLAGS(estimator.learning.monitor.stillness[i].seen, estimator.learning.monitor.stillness[i].stuck)
@@ -38,39 +45,42 @@ static const state_row_t rows[] = {
     BYTES(estimator.setup.estimator, estimator.setup.estimator, (uint32_t)LEVER_ESTIMATOR_COUNT - 1u),
     BYTES(estimator.setup.adaptation, estimator.setup.adaptation, (uint32_t)LEVER_ADAPTATION_COUNT - 1u),
 
-    WORDS(estimator.cdkf.w[0], estimator.cdkf.considered_sigma[CDKF_STEP]),
+    FLOATS(estimator.cdkf.w[0], estimator.cdkf.considered_sigma[CDKF_STEP]),
     MEMBERS(estimator.cdkf.acting, estimator.cdkf.acting, 4u, (uint32_t)CDKF_CONSIDERED),
-    WORDS(estimator.cdkf.trust, estimator.cdkf.points[MODEL_POINTS - 1].c[MODEL_COEFFICIENTS - 1]),
+    FLOATS(estimator.cdkf.trust, estimator.cdkf.points[MODEL_POINTS - 1].c[MODEL_COEFFICIENTS - 1]),
 
-    WORDS(estimator.learning.change.sum[0], estimator.learning.whiteness.time),
+    FLOATS(estimator.learning.change.sum[0], estimator.learning.whiteness.time),
     FLAGS(estimator.learning.whiteness.coloured, estimator.learning.whiteness.coloured),
-    WORDS(estimator.learning.calibration.score[0].vector,
+    FLOATS(estimator.learning.calibration.score[0].vector,
         estimator.learning.calibration.score[CDKF_FRICTION].information),
     FLAGS(estimator.learning.calibration.wrong, estimator.learning.calibration.wrong),
     STILLNESS(MONITOR_THETA),
     STILLNESS(MONITOR_THETA_DOT),
     STILLNESS(MONITOR_Z_DDOT),
-    WORDS(estimator.learning.monitor.refused[0], estimator.learning.monitor.torque.product),
+    FLOATS(estimator.learning.monitor.refused[0], estimator.learning.monitor.torque.product),
     FLAGS(estimator.learning.monitor.base_wrong, estimator.learning.monitor.torque_wrong),
-    WORDS(estimator.learning.hands.begin, estimator.learning.hands.driven),
+    FLOATS(estimator.learning.hands.begin, estimator.learning.hands.driven),
     FLAGS(estimator.learning.hands.counted, estimator.learning.hands.off),
-    WORDS(estimator.learning.force.raw, estimator.learning.force.means.time),
+    FLOATS(estimator.learning.force.raw, estimator.learning.force.means.time),
     FLAGS(estimator.learning.force.seen, estimator.learning.force.wrong),
-    WORDS(estimator.learning.kept[0].w[0], estimator.learning.gripping),
+    FLOATS(estimator.learning.kept[0].w[0], estimator.learning.gripping),
     FLAGS(estimator.learning.calm, estimator.learning.bounded),
 
-    WORDS(estimator.trim.output[0].section[0].level, estimator.trim.settling_time),
+    FLOATS(estimator.trim.output[0].section[0].level, estimator.trim.settling_time),
     FLAGS(estimator.trim.deviations, estimator.trim.deviations),
-    WORDS(estimator.trim_sine_cosine.sine, estimator.alignment.time),
+    FLOATS(estimator.trim_sine_cosine.sine, estimator.alignment.time),
     MEMBERS(estimator.mode, estimator.mode, (uint8_t)sizeof(enum lever_mode), (uint32_t)LEVER_MODE_FAULT),
-    WORDS(estimator.time_us, estimator.nis),
+    WORDS(estimator.time_us, estimator.late_series_us),
+    FLOATS(estimator.raw_z_ddot, estimator.nis),
     BYTES(estimator.nis_size, estimator.nis_size, (uint32_t)CDKF_OUTPUTS),
     FLAGS(estimator.frozen, estimator.communication_fault),
     WORDS(estimator.faults, estimator.recoveries),
 
-    WORDS(dither.high_pass.level, dither.noise),
-    WORDS(gate.torque, gate.counted),
-    FLAGS(gate.open, gate.barred),
+    FLOATS(dither.high_pass.level, dither.slope),
+    WORDS(dither.noise, dither.noise),
+    FLOATS(gate.torque, gate.mean_square),
+    WORDS(gate.output_left, gate.counted),
+    FLAGS(gate.open, gate.asked),
     WORDS(to_gate.elapsed_us, to_gate.elapsed_us),
     FLAGS(to_gate.advances, to_gate.harmful),
 
@@ -92,7 +102,8 @@ static const state_row_t rows[] = {
     BYTES(link.command_result, link.command_result, (uint32_t)MESSAGE_RESULT_COUNT - 1u),
     BYTES(link.counter[0], link.counter[OUTPUT_STATE_ESTIMATE], COUNTER),
 
-    WORDS(bounce.mitigation.involuntary.base.level, bounce.mitigation.counted),
+    FLOATS(bounce.mitigation.involuntary.base.level, bounce.mitigation.expected_damping),
+    WORDS(bounce.mitigation.sensed_left, bounce.mitigation.counted),
     BYTES(bounce.mitigation.theta.same, bounce.mitigation.samples, ANY_BYTE),
     FLAGS(bounce.mitigation.rated, bounce.mitigation.started),
     BYTES(bounce.chosen, bounce.chosen, (uint32_t)LEVER_MITIGATION_COUNT - 1u),
@@ -222,6 +233,15 @@ void lever_state_save(const lever_t *lever, uint8_t state[LEVER_STATE_BYTES])
     }
 }
 
+static bool is_possible_value(const state_row_t *row, uint32_t value)
+{
+    float number = 0.0f;
+    if (row->is_float) {
+        (void)memcpy(&number, &value, sizeof number); /* cppcheck-suppress misra-c2012-21.15 ; D2 */
+    }
+    return (value <= row->most) && (fabsf(number) < FLOAT_LIMIT); /* NaN is not */
+}
+
 /* Every value is one that the row may have. */
 static bool is_possible(const uint8_t state[LEVER_STATE_BYTES])
 {
@@ -230,34 +250,95 @@ static bool is_possible(const uint8_t state[LEVER_STATE_BYTES])
     for (uint32_t i = 0u; i < state_row_count(); i++) {
         const uint32_t width = width_of(&rows[i]);
         for (uint32_t k = 0u; k < rows[i].count; k++) {
-            possible = possible && (value_at(&state[at], width) <= rows[i].most);
+            possible = possible && is_possible_value(&rows[i], value_at(&state[at], width));
             at += width;
         }
     }
     return possible;
 }
 
+/* Copies possible values into the instance, and renews what follows from them. */
+static void adopt(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
+{
+    uint8_t *memory = (uint8_t *)lever;
+    setup_t *setup = &lever->estimator.setup;
+    uint32_t at = 1u;
+    for (uint32_t i = 0u; i < state_row_count(); i++) {
+        const state_row_t *row = &rows[i];
+        const uint32_t width = width_of(row);
+        for (uint32_t k = 0u; k < row->count; k++) {
+            store(&memory[row->offset + (k * row->size)], row, value_at(&state[at], width));
+            at += width;
+        }
+    }
+    lever->link.has_sample = false;
+    setup_choose(setup);
+    const prior_t prior = setup_prior(setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    scaling_init(&lever->estimator.cdkf.scaling, setup->model_in_use, &prior);
+}
+
+static bool is_near(float value, float expected)
+{
+    return fabsf(value - expected) <= (1.0e-3f * fabsf(expected));
+}
+
+static float largest(const float value[], uint32_t count)
+{
+    float most = 0.0f;
+    for (uint32_t i = 0u; i < count; i++) {
+        most = (fabsf(value[i]) <= most) ? most : fabsf(value[i]); /* NaN stays */
+    }
+    return most;
+}
+
+/* The parameters and the coefficients at the sigma points are those of the belief. */
+static bool is_drawn(const estimator_t *estimator)
+{
+    const cdkf_t *cdkf = &estimator->cdkf;
+    cdkf_t drawn = *cdkf;
+    cdkf_draw(&drawn, estimator->setup.model_in_use, &estimator->setup.constants);
+    bool same = true;
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        same = same && is_near(cdkf->p[i], drawn.p[i]);
+    }
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_POINTS; i++) {
+        for (uint32_t j = 0u; j < (uint32_t)MODEL_COEFFICIENTS; j++) {
+            same = same && is_near(cdkf->points[i].c[j], drawn.points[i].c[j]);
+        }
+    }
+    return same;
+}
+
+/* Values that are possible one by one may contradict each other: the filter keeps its invariant, and all of the
+ * estimate is finite. */
+static bool is_consistent(const lever_t *lever)
+{
+    lever_estimate_t estimate;
+    lever_estimate(lever, &estimate);
+    const float single[] = {estimate.theta, estimate.theta_dot, estimate.theta_sigma, estimate.theta_dot_sigma,
+        estimate.trim, estimate.natural_frequency, estimate.natural_frequency_sigma, estimate.damping_ratio,
+        estimate.damping_ratio_sigma};
+    const float all[] = {largest(single, (uint32_t)(sizeof(single) / sizeof(single[0]))),
+        largest(estimate.parameter, (uint32_t)LEVER_PARAMETERS),
+        largest(estimate.parameter_sigma, (uint32_t)LEVER_PARAMETERS),
+        largest(estimate.parameter_correlation, (uint32_t)LEVER_PARAMETERS)};
+    const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.averages.excitation_square >= 0.0f);
+    return squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
+           is_finite(largest(all, (uint32_t)(sizeof(all) / sizeof(all[0]))));
+}
+
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
 {
     const uint8_t watches = (lever->bounce.aircraft != NULL) ? 1u : 0u;
     const bool ours = (state[0] == watches) && (value_at(&state[1], 4u) == lever->link.settings_crc);
-    const bool accepted = ours && is_possible(state);
+    bool accepted = ours && is_possible(state);
     if (accepted) {
-        uint8_t *memory = (uint8_t *)lever;
-        setup_t *setup = &lever->estimator.setup;
-        uint32_t at = 1u;
-        for (uint32_t i = 0u; i < state_row_count(); i++) {
-            const state_row_t *row = &rows[i];
-            const uint32_t width = width_of(row);
-            for (uint32_t k = 0u; k < row->count; k++) {
-                store(&memory[row->offset + (k * row->size)], row, value_at(&state[at], width));
-                at += width;
-            }
+        const lever_t before = *lever;
+        adopt(lever, state);
+        accepted = is_consistent(lever);
+        if (!accepted) {
+            *lever = before;
         }
-        lever->link.has_sample = false;
-        setup_choose(setup);
-        const prior_t prior = setup_prior(setup); /* cppcheck-suppress misra-c2012-9.3 ; D3 */
-        scaling_init(&lever->estimator.cdkf.scaling, setup->model_in_use, &prior);
     }
     return accepted;
 }

@@ -5,6 +5,7 @@
 #ifndef APP_STATE_H
 #define APP_STATE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* Members of one kind that lie side by side in an instance. */
@@ -12,6 +13,7 @@ typedef struct state_row {
     uint16_t offset;
     uint16_t count;
     uint8_t size;  /* of each, in memory: 1, 2 or 4 bytes */
+    bool is_float; /* which must be finite */
     uint32_t most; /* greatest value; as many bytes of the state as that needs */
 } state_row_t;
 

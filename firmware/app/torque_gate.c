@@ -139,9 +139,12 @@ bool torque_gate_has_output(const torque_gate_t *gate)
     return gate->output_left != 0u;
 }
 
-void torque_gate_ask(torque_gate_t *gate)
+void torque_gate_ask(torque_gate_t *gate, bool asks)
 {
-    gate->barred = false; /* the next sample, before which nothing opens, bars it again if it is still harmful */
+    if (asks && !gate->asked) {
+        gate->barred = false; /* the next sample, before which nothing opens, bars it again if it is still harmful */
+    }
+    gate->asked = asks;
 }
 
 bool torque_gate_is_abandoned(const torque_gate_t *gate)

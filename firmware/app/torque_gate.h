@@ -43,6 +43,7 @@ typedef struct torque_gate {
     uint32_t counted;      /* time since the last sample of any kind that torque_gate_idle() has counted [us] */
     bool open;
     bool barred; /* until torque is asked for anew */
+    bool asked;  /* by the last command */
 } torque_gate_t;
 
 /* A sample, to the gate. */
@@ -72,8 +73,9 @@ void torque_gate_keep_alive(torque_gate_t *gate);
 /* A sample with a valid output came within 20 ms or three sample periods. */
 bool torque_gate_has_output(const torque_gate_t *gate);
 
-/* A command asks for torque. */
-void torque_gate_ask(torque_gate_t *gate);
+/* A command was accepted that `asks` for torque or does not. It asks anew where the one before did not: a sender that
+ * repeats a command lifts no bar. */
+void torque_gate_ask(torque_gate_t *gate, bool asks);
 
 /* No command was accepted within the last second. */
 bool torque_gate_is_abandoned(const torque_gate_t *gate);

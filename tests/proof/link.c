@@ -201,9 +201,10 @@ void torque_gate_keep_alive(torque_gate_t *gate)
     (void)gate;
 }
 
-void torque_gate_ask(torque_gate_t *gate)
+void torque_gate_ask(torque_gate_t *gate, bool asks)
 {
     (void)gate;
+    (void)asks;
 }
 
 bool torque_gate_has_output(const torque_gate_t *gate)

@@ -218,6 +218,37 @@ def _rubbing(friction: float) -> Condition:
     return Condition(f"friction_{friction:g}", title, Motion(friction=friction), _ALL_COVERED, _FLAGGED)
 
 
+_RIGHT_OR_FLAGGED = _most("unflagged", 3.0)
+
+
+def _slipping(friction: float) -> Condition:
+    """The pilot moves a lever that friction holds in between: it is nothing that a model of the firmware does."""
+    title = f"friction of {friction:g} N m, through which the pilot moves the lever, 3° rms"
+    also = ("unflagged", "silent")
+    return Condition(f"friction_{friction:g}", title, Motion(friction=friction, wander=3.0), also=also, start=2.0)
+
+
+_STANDING = (
+    Condition(
+        "locked",
+        "lever held by 5 N m of friction or more from power-on",
+        Motion(friction=5.0),
+        (_RIGHT_OR_FLAGGED, _QUIET),
+        start=2.0,
+    ),
+    Condition(
+        "freed",
+        "lever held by friction from power-on, freed after 30 s",
+        Motion(friction=30.0, freed=EVENT),
+        (_RIGHT_OR_FLAGGED, _most("settled", 2.0, "median")),
+        start=2.0,
+        events=((0.0, EVENT),),
+        also=("back",),
+    ),
+    *(_slipping(torque) for torque in (5.0, 15.0, 30.0)),
+)
+
+
 def _drawn(name: str, title: str, dither: float) -> Condition:
     """Errors drawn from what the settings state."""
     gain, delay, friction = 0.02, 0.5e-3, 0.05
@@ -335,6 +366,6 @@ _PILOTS = (
 
 CONDITIONS = {
     row.name: row
-    for row in (*_STEADY, *_MOVEMENT, *_TORQUES, *_OUTAGES, *_FAULTS, *_CALIBRATION, *_GRIP_FORCE, *_PILOTS)
+    for row in (*_STEADY, *_MOVEMENT, *_TORQUES, *_OUTAGES, *_FAULTS, *_CALIBRATION, *_STANDING, *_GRIP_FORCE, *_PILOTS)
 }
 """All by name, in the order of the table."""

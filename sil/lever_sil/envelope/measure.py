@@ -12,6 +12,7 @@ import numpy as np
 from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import lib
+from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
 from ..judged import result as judged
@@ -20,6 +21,8 @@ from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from .motions import Recording
 
 QUANTITIES = ("f_n", "zeta", *PARAMETERS)
+WRONG = 3.0
+"""An error of more standard deviations is wrong, unless it is flagged."""
 WITHIN = 0.05
 """Settled is a natural frequency that stays within so much of the truth."""
 FOLLOWED = 8.0
@@ -95,6 +98,24 @@ def _covered(quantity: str, outcome: Outcome) -> Values:
 def _largest(quantity: str, outcome: Outcome) -> Values:
     largest: Values = outcome.deviation(quantity)[outcome.judged].max(axis=0)
     return largest
+
+
+def _unflagged_deviation(outcome: Outcome) -> FloatArray:
+    """Largest error of the parameters in standard deviations, 0 with a fault of DO_NOT_TRUST (times, runs)."""
+    worst = np.max([outcome.deviation(name)[outcome.judged] for name in PARAMETERS], axis=0)
+    return np.where(outcome.flagged(DO_NOT_TRUST)[outcome.judged], 0.0, worst)
+
+
+def _unflagged(outcome: Outcome) -> Values:
+    greatest: Values = _unflagged_deviation(outcome).max(axis=0)
+    return greatest
+
+
+def _silent(outcome: Outcome) -> Values:
+    """Seconds in a row."""
+    wrong = _unflagged_deviation(outcome) > WRONG
+    step = outcome.track.time[1] - outcome.track.time[0]
+    return np.array([step * max((last - first + 1 for first, last in runs(each)), default=0) for each in wrong.T])
 
 
 def _share(mask: int, outcome: Outcome) -> Values:
@@ -244,6 +265,8 @@ def _figures() -> dict[str, Figure]:
         figures[f"{name} ratio"] = _figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
     return figures | {
         "flagged": _figure("%", "share of time with a fault that forbids trust", partial(_share, DO_NOT_TRUST), mean),
+        "unflagged": _figure("σ", "largest error of a parameter without such a fault", _unflagged, largest),
+        "silent": _figure("s", f"longest time with it above {WRONG:g} σ", _silent, largest),
         "mismatch": _figure("%", "share of time with MISMATCH", partial(_share, fault_mask("MISMATCH")), mean, False),
         "running": _figure("%", "share of time in mode RUN", _running, mean, False),
         "settled": _figure("s", f"until f_n stays within {100 * WITHIN:g} %", _settled, largest),

@@ -65,6 +65,8 @@ class Motion:
     """Who holds it then: c_p and k_p are so many times as large, or as small in every second run."""
     friction: float = 0.0
     """Coulomb friction [N m]."""
+    freed: float | None = None
+    """From then on there is no friction [s]."""
     friction_sigma: float = 0.0
     """Friction is the size of a normal number of this standard deviation [N m]."""
 
@@ -190,6 +192,8 @@ def lanes(motion: Motion, seeds: Sequence[int]) -> Lanes:
         pilot = np.where((time >= motion.released[1])[:, None], _up_or_down(motion.next_pilot, seeds), 1.0)
         m_p, c_p, k_p = m_p * held, c_p * held * pilot, k_p * held * pilot
     friction = np.full((1, len(seeds)), motion.friction)
+    if motion.freed is not None:
+        friction = friction * (time < motion.freed)[:, None]
     if motion.friction_sigma:
         friction = motion.friction_sigma * np.abs(columns("friction", seeds, 1))
     return Lanes(

@@ -1,13 +1,13 @@
 """Levers and pilots of many runs at once, independent of the filter and of the other truths: RK4, one lane a run.
 
     M theta_ddot = -l cos(theta) [mu (g + z_ddot) + k_p (l sin theta - r) + c_p l cos(theta) theta_dot]
-                   - c_l theta_dot - k_l (theta - theta_l) - T_f theta_dot / sqrt(theta_dot^2 + v_f^2)
-                   + tau_m + disturbance
+                   - c_l theta_dot - k_l (theta - theta_l) + tau_m + disturbance - T_f sign(theta_dot)
 
 with M = l^2 (eta^2 m_l + m_p) + J_l, mu = eta m_l + m_p. The arm's spring rests at the height r, which the pilot moves
 to move the lever: where the lever rests at the trim, so that the weight mu g drops out. A lever that nobody holds
 (m_p, c_p, k_p = 0) is balanced. theta_l stays. Inputs are given at the samples and are linear between them; the pilot's
-m_p, c_p, k_p and the friction are held.
+m_p, c_p, k_p and the friction are held. Friction acts after each step, as an impulse of at most T_f times the period: a
+lever that it stops is held by it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 
 from ..fast.library import Struct, lib
 
-STOP_RATE = 2e-3
-"""v_f: theta_dot at which friction reaches 71 % of its limit [rad/s]."""
 TICK = 10_000
 """Samples between two signs of life."""
 
@@ -114,7 +112,7 @@ class Plant:
         )
         given = self.struct.pointer
         given.count, given.width, given.period = self.count, self.width, lanes.period
-        given.length, given.damping, given.stiffness, given.stop_rate = h.length, h.damping, h.stiffness, STOP_RATE
+        given.length, given.damping, given.stiffness = h.length, h.damping, h.stiffness
         for name, values in {
             "drive": h.forcing_mass(lanes.m_p) * lanes.z_ddot,
             "torque": lanes.tau_m + lanes.disturbance + h.stiffness * trim[0],

@@ -25,6 +25,8 @@ TIME = (15.0, 25.0)
 MESSAGES = (*bus.SAMPLES, "COMMAND")
 FROZEN = "_frozen"
 """End of the name of a row that is flown with frozen parameters."""
+FROM_POWER_ON = "_from_power_on"
+"""End of the name of a row whose fault begins with the first sample."""
 _SHORT = {"LEVER_SAMPLE": "lever", "BASE_SAMPLE": "base", "GRIP_SAMPLE": "grip", "COMMAND": "command"}
 _SIGNAL = {"theta": "θ", "theta_dot": "θ̇", "tau_m": "τ_m", "z_ddot": "z̈", "grip_force": "grip force"}
 _FLAG = {
@@ -39,6 +41,8 @@ _LOST: dict[str, tuple[str, ...]] = {"LEVER_SAMPLE": ("THETA",), "BASE_SAMPLE": 
 """What says that a message is missing; a sensor of the grip force is optional."""
 _STUCK, _WRONG = 500, 2000
 """A signal that is stuck, or a base acceleration that does not fit, is flagged within so many samples: R32, R33."""
+_ALIGNED, _JUDGED = 300, 1200
+"""Samples until ALIGN ends after power-on, and until the levels have settled."""
 _GRIP_WRONG = 10_000
 """A grip force that is far off changes no estimate, so that it is enough to say so in time for maintenance."""
 _COAST_ENDS = 0.08
@@ -328,11 +332,45 @@ def _frozen(row: Row) -> Row:
     )
 
 
+def _from_power_on(row: Row) -> Row:
+    """The same fault from the first sample on, in ALIGN already. What is stuck shows half a second after ALIGN at the
+    latest; what only the innovations show, any way, two seconds after the first that may be judged."""
+    must, wrong = row.must, row.must.within == _WRONG
+    later = _JUDGED if wrong else _ALIGNED if row.must.within == _STUCK else 0
+    flags = (*must.flags, "BASE", "MISMATCH", "INNOVATION", "CALIBRATION") if wrong else must.flags
+    return replace(
+        row,
+        name=f"{row.name}{FROM_POWER_ON}",
+        title=f"{row.title}, from power-on",
+        must=replace(must, flags=flags, within=must.within + later),
+        time=(0.0, TIME[1] - TIME[0]),
+    )
+
+
+def _failing() -> Iterator[Row]:
+    """Signals that fail for good."""
+    kinds = ("invalid", "saturated", "stuck", "zero", "sign")
+    names = {f"{signal}_{kind}" for signal in _SIGNAL if signal != "grip_force" for kind in kinds}
+    yield from (row for row in _readings() if row.name in names)
+
+
+def _coasting() -> Iterator[Row]:
+    """Faults of the base acceleration while no lever signal comes, for its own stillness is all that shows them. Torque
+    has ended, and cannot be compared."""
+    must = replace(_BLIND, flags=("BASE",), within=_STUCK)
+    faults = {"stuck": ("stuck", readings.stuck("z_ddot")), "zero": ("zero", readings.reads("z_ddot", 0.0))}
+    for name, (words, spoil) in faults.items():
+        title = f"z̈ {words} while no LEVER_SAMPLE comes"
+        yield Row(f"z_ddot_{name}_coasting", title, must, bus.lost("LEVER_SAMPLE", 1.1), spoil)
+
+
 def _table() -> Iterator[Row]:
     for part in (_damaged, _counters, _missing, _late, _other_senders, _commands, _readings, _clocks):
         yield from part()
     for part in (_missing, _readings, _clocks):
         yield from map(_frozen, part())
+    yield from map(_from_power_on, _failing())
+    yield from _coasting()
 
 
 ROWS = {row.name: row for row in _table()}

@@ -93,6 +93,12 @@ REQUIRED: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "calibration_drawn": (DRAWN, COVERED),
     "calibration_drawn_base_only": (DRAWN | {"dither": 0.0}, COVERED),
+    "locked": ({"friction": 5.0, "start": 2.0}, "unflagged ≤ 3, flagged ≤ 2"),
+    "freed": (
+        {"friction": 30.0, "freed": 30.0, "start": 2.0, "events": ((0.0, 30.0),)},
+        "unflagged ≤ 3, settled median ≤ 2",
+    ),
+    **{f"friction_{torque:g}": ({"friction": torque, "wander": 3.0, "start": 2.0}, "") for torque in (5.0, 15.0, 30.0)},
     "grip_none": (FORCE, ""),
     "grip_force": (FORCED | {"grip_gain": 1.0}, "σ(k_p) ratio ≤ 0.5, k_p covered ≥ 90"),
     "grip_gain_wrong": (FORCED | {"grip_gain": 1.5}, "k_p ratio ≤ 1"),

@@ -47,6 +47,15 @@ def test_plant_is_the_one_of_sil_by_another_integration() -> None:
         assert zeta == pytest.approx(truth.dynamics.damping_ratio[0], rel=1e-12)
 
 
+def test_friction_holds_a_lever_that_is_driven_by_less_until_it_is_freed() -> None:
+    given = motions.lanes(Motion(duration=2.0, friction=30.0, freed=1.0), SEEDS)
+    theta, theta_dot = plant.run(given)
+    held = np.arange(len(theta)) <= 1000
+    assert np.all(theta[held] == theta[0])
+    assert np.all(theta_dot[held] == 0.0)
+    assert np.all(np.std(theta[~held], axis=0) > math.radians(0.1))
+
+
 def test_friction_takes_its_share_of_each_half_swing() -> None:
     """Coulomb friction T on a spring K: each half swing is smaller by 2 T / K (Den Hartog)."""
     hardware = plant.Hardware(damping=0.0)

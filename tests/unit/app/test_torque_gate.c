@@ -89,7 +89,7 @@ TEST(no_course_of_events_passes_a_limit)
             } else if (event < 0.04f) {
                 torque_gate_keep_alive(&gate);
             } else if (event < 0.045f) {
-                torque_gate_ask(&gate);
+                torque_gate_ask(&gate, event < 0.043f);
             } else {
                 /* a good sample */
             }
@@ -160,17 +160,20 @@ TEST(what_does_harm_bars_the_gate_until_torque_is_asked_for)
     torque_gate_init(&gate, &config.settings);
     for (uint32_t k = 0u; k < 100u; k++) {
         torque_gate_keep_alive(&gate);
-        torque_gate_ask(&gate);
+        torque_gate_ask(&gate, false);
+        torque_gate_ask(&gate, true);
         torque_gate_step(&gate, 1.0f, &sample);
         TEST_ASSERT_FALSE(gate.open);
     }
     sample.harmful = false;
     for (uint32_t k = 0u; k < 100u; k++) {
         torque_gate_keep_alive(&gate);
+        torque_gate_ask(&gate, true); /* what has been asked for all the time is not asked for anew */
         torque_gate_step(&gate, 1.0f, &sample);
         TEST_ASSERT_FALSE(gate.open);
     }
-    torque_gate_ask(&gate);
+    torque_gate_ask(&gate, false);
+    torque_gate_ask(&gate, true);
     TEST_ASSERT_FALSE(gate.open);
     torque_gate_step(&gate, 1.0f, &sample);
     TEST_ASSERT_TRUE(gate.open);

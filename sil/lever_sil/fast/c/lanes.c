@@ -16,25 +16,33 @@ typedef struct arm {
     double spring;
     double damper;
     double inverse;
-    double friction;
 } arm_t;
 
 static double acceleration(const lanes_t *lanes, const arm_t *arm, double drive, double torque, double x, double v)
 {
     const double cosine = cos(x);
     const double of_arm = drive - arm->rest + (arm->spring * sin(x)) + (arm->damper * cosine * v);
-    double other = torque - (lanes->damping * v) - (lanes->stiffness * x);
-    if (arm->friction > 0.0) {
-        other -= arm->friction * v / sqrt((v * v) + (lanes->stop_rate * lanes->stop_rate));
-    }
+    const double other = torque - (lanes->damping * v) - (lanes->stiffness * x);
     return (other - (lanes->length * cosine * of_arm)) * arm->inverse;
+}
+
+/* Coulomb friction takes up to `most` [rad/s] from the rate after a step, spread over the step; a lever that it holds
+ * stays where it is. */
+static void rub(const lanes_t *lanes, size_t here, double most)
+{
+    const size_t next = here + lanes->width;
+    const double rate = lanes->theta_dot[next];
+    const double left = (fabs(rate) > most) ? (rate - copysign(most, rate)) : 0.0;
+    const bool held = (lanes->theta_dot[here] == 0.0) && (left == 0.0);
+    lanes->theta[next] = held ? lanes->theta[here] : (lanes->theta[next] + (0.5 * lanes->period * (left - rate)));
+    lanes->theta_dot[next] = left;
 }
 
 /* A lane from sample i to sample i + 1 (Runge-Kutta), with further torque [N m] at its begin and end. */
 static void advance(const lanes_t *lanes, uint32_t i, uint32_t lane, double begin, double end)
 {
     const arm_t arm = {at(&lanes->rest, i, lane), at(&lanes->spring, i, lane), at(&lanes->damper, i, lane),
-        at(&lanes->inverse, i, lane), at(&lanes->friction, i, lane)};
+        at(&lanes->inverse, i, lane)};
     const double drive0 = at(&lanes->drive, i, lane);
     const double drive1 = at(&lanes->drive, i + 1u, lane);
     const double torque0 = at(&lanes->torque, i, lane) + begin;
@@ -56,6 +64,9 @@ static void advance(const lanes_t *lanes, uint32_t i, uint32_t lane, double begi
     const size_t next = here + lanes->width;
     lanes->theta[next] = x + (period / 6.0 * (v + (2.0 * (v2 + v3)) + v4));
     lanes->theta_dot[next] = v + (period / 6.0 * (a1 + (2.0 * (a2 + a3)) + a4)) + at(&lanes->kick, i, lane);
+    if (at(&lanes->friction, i, lane) > 0.0) {
+        rub(lanes, here, period * at(&lanes->friction, i, lane) * arm.inverse);
+    }
 }
 
 void lanes_move(const lanes_t *lanes, uint32_t first, uint32_t last)

@@ -26,7 +26,6 @@ typedef struct lanes {
     double length;
     double damping;
     double stiffness;
-    double stop_rate;
     lane_column_t drive;
     lane_column_t torque;
     lane_column_t rest;
