@@ -15,6 +15,8 @@
 #define BYTE_BITS 8u
 #define FLOAT_LIMIT 1.0e9f
 
+enum { SINGLE = 9 }; /* floats of an estimate that are no array */
+
 /* From one member to another of the same size, side by side. */
 #define MEMBERS(first, last, size, most)                                                                               \
     {(uint16_t)offsetof(struct lever, first),                                                                          \
@@ -282,20 +284,20 @@ static bool is_near(float value, float expected)
     return fabsf(value - expected) <= (1.0e-3f * fabsf(expected));
 }
 
-static float largest(const float value[], uint32_t count)
+static bool are_finite(const float value[], uint32_t count)
 {
-    float most = 0.0f;
+    bool finite = true;
     for (uint32_t i = 0u; i < count; i++) {
-        most = (fabsf(value[i]) <= most) ? most : fabsf(value[i]); /* NaN stays */
+        finite = finite && is_finite(value[i]);
     }
-    return most;
+    return finite;
 }
 
 /* The parameters and the coefficients at the sigma points are those of the belief. */
 static bool is_drawn(const estimator_t *estimator)
 {
     const cdkf_t *cdkf = &estimator->cdkf;
-    cdkf_t drawn = *cdkf;
+    cdkf_t drawn = *cdkf; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
     cdkf_draw(&drawn, estimator->setup.model_in_use, &estimator->setup.constants);
     bool same = true;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
@@ -315,16 +317,15 @@ static bool is_consistent(const lever_t *lever)
 {
     lever_estimate_t estimate;
     lever_estimate(lever, &estimate);
-    const float single[] = {estimate.theta, estimate.theta_dot, estimate.theta_sigma, estimate.theta_dot_sigma,
+    const float single[SINGLE] = {estimate.theta, estimate.theta_dot, estimate.theta_sigma, estimate.theta_dot_sigma,
         estimate.trim, estimate.natural_frequency, estimate.natural_frequency_sigma, estimate.damping_ratio,
         estimate.damping_ratio_sigma};
-    const float all[] = {largest(single, (uint32_t)(sizeof(single) / sizeof(single[0]))),
-        largest(estimate.parameter, (uint32_t)LEVER_PARAMETERS),
-        largest(estimate.parameter_sigma, (uint32_t)LEVER_PARAMETERS),
-        largest(estimate.parameter_correlation, (uint32_t)LEVER_PARAMETERS)};
+    const bool finite = are_finite(single, (uint32_t)SINGLE) &&
+                        are_finite(estimate.parameter, (uint32_t)LEVER_PARAMETERS) &&
+                        are_finite(estimate.parameter_sigma, (uint32_t)LEVER_PARAMETERS) &&
+                        are_finite(estimate.parameter_correlation, (uint32_t)LEVER_PARAMETERS);
     const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.averages.excitation_square >= 0.0f);
-    return squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
-           is_finite(largest(all, (uint32_t)(sizeof(all) / sizeof(all[0]))));
+    return finite && squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator);
 }
 
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
