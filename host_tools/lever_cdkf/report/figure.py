@@ -27,6 +27,11 @@ def line(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) 
     return _trace(x, y, name, row) | {"mode": "lines", "line": style} | more
 
 
+def hover(quantity: str, unit: str = "") -> Spec:
+    """The text under the pointer, for a trace: what it is, its value, and the unit, "" for none."""
+    return {"hovertemplate": f"{quantity} %{{y:.4g}}{unit and ' '}{unit}<extra></extra>"}
+
+
 def dots(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) -> Spec:
     """Separate points."""
     marker = {"color": f"@{colour}", "size": 4}

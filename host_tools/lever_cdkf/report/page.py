@@ -257,5 +257,6 @@ def _numbers(page: Page, run: Run) -> None:
     estimator = {**vars(run.summary.estimator), "settings": None} if run.summary else {}
     rows += [(f"estimator.{html.escape(key)}", html.escape(value)) for key, value in summary_html.flat(estimator)]
     details = f"<details><summary>Scenario</summary>{summary_html.table(('', ''), rows)}</details>" if rows else ""
-    settings = f"<details><summary>Settings of the estimator</summary>{summary_html.settings_table(run)}</details>"
+    name = "Settings of the estimator (bold: not the default)"
+    settings = f"<details><summary>{name}</summary>{summary_html.settings_table(run)}</details>"
     page.section("made", "Settings", "How this run was made", details, settings)

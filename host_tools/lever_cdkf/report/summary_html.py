@@ -40,11 +40,10 @@ def percent(fraction: float | None) -> str:
 
 
 def seconds(values: Sequence[float | None] | None) -> str:
-    """Times after the start and each change [s]; "never" where it was not reached."""
-    if not values:
+    """Times after the start and each change [s]; a dash where it was not reached."""
+    if not values or all(value is None for value in values):
         return NOTHING
-    shown = " / ".join("never" if value is None else f"{value:.1f}" for value in values)
-    return shown if values[-1] is None else f"{shown} s"
+    return f"{' / '.join(fixed(value, 1) for value in values)} s"
 
 
 def figures_of(run: Run, quantity: Quantity) -> Quality | None:
@@ -118,9 +117,10 @@ def _accuracy(run: Run, judged: list[Quantity]) -> tuple[str, str]:
     note = (
         f"rms error: in % of the truth{since}. In ±2σ: part of that time with the truth within ±2σ; 95 % of Gaussian "
         "errors are, but errors last for seconds, so a single run is partly luck (<code>lever sim --seeds</code> shows "
-        "many). To 10 %: from the start / from each sudden change, until the error stays below 10 %."
+        "many). Stays below 10 % after: from the start / from each sudden change, until the error was below for good. "
+        f"{NOTHING}: it was above once more just before the next change, or before the end."
     )
-    return table(("", "rms error", "in ±2σ", "to 10 %"), rows), note
+    return table(("", "rms error", "in ±2σ", "stays below<br>10 % after"), rows), note
 
 
 def _last_estimates(run: Run) -> str:
@@ -150,7 +150,13 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def errors_table(run: Run) -> str:
     """Every figure that the summary has of every quantity."""
-    titles = (("rms error", "%"), ("bias", "%"), ("within ±2σ", "%"), ("to within 10 %", "s"), ("to within 5 %", "s"))
+    titles = (
+        ("rms error", "%"),
+        ("bias", "%"),
+        ("within ±2σ", "%"),
+        ("stays below 10 % after", "s"),
+        ("below 5 %", "s"),
+    )
     header = ("", *(f"{name}<br>[{unit}]" for name, unit in titles))
     rows = []
     for quantity in run.quantities:
@@ -170,7 +176,7 @@ def errors_table(run: Run) -> str:
 
 
 def _times(values: Sequence[float | None] | None) -> str:
-    return ", ".join("never" if value is None else f"{value:.2f}" for value in values) if values else NOTHING
+    return ", ".join(fixed(value, 2) for value in values) if values else NOTHING
 
 
 def comparison_table(run: Run) -> str:
@@ -260,11 +266,11 @@ def run_table(run: Run) -> str:
 
 
 def settings_table(run: Run) -> str:
-    """The estimator's settings, what differs from the default in bold."""
+    """The estimator's settings, what differs from the default in bold; the others are not printed on paper."""
     rows = []
     for setting in native.settings_table():
         value = run.settings[setting.name]
-        shown = f"{value:g}" if value == setting.default else f"<strong>{value:g}</strong>"
+        shown = f'<span class="default">{value:g}</span>' if value == setting.default else f"<strong>{value:g}</strong>"
         rows.append((setting.name, shown, setting.unit, f'<span class="words">{html.escape(setting.meaning)}</span>'))
     return table(("setting", "value", "unit", "meaning"), rows)
 

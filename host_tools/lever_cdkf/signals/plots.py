@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from ..exports import pictures
 from ..extras import require
 from ..files import whole, write_text
@@ -53,13 +53,31 @@ def _parts(signal: Signal, count: int) -> tuple[FloatArray, FloatArray]:
     """Times and means of equal parts."""
     if not len(signal.time):
         return np.zeros(0), np.zeros(0)
+    time, place = _places(signal, count)
     valid = np.isfinite(signal.values)
-    time, values = signal.time[valid], signal.values[valid]
+    counts = np.bincount(place[valid], minlength=count)
+    return time, np.bincount(place[valid], signal.values[valid], count) / np.where(counts, counts, np.nan)
+
+
+def _places(signal: Signal, count: int) -> tuple[FloatArray, IntArray]:
+    """Times of the middles of equal parts, from the first value on, and the part that each value is in."""
     first, last = float(signal.time[0]), float(signal.time[-1])
-    place = np.minimum(((time - first) / max(last - first, 1e-9) * count).astype(np.int64), count - 1)
-    counts = np.bincount(place, minlength=count)
-    means = np.bincount(place, values, count) / np.where(counts, counts, np.nan)
-    return (np.arange(count) + 0.5) * (last - first) / count, means
+    place = ((signal.time - first) / max(last - first, 1e-9) * count).astype(np.int64)
+    return (np.arange(count) + 0.5) * (last - first) / count, np.minimum(place, count - 1)
+
+
+def _ranges(signal: Signal, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times of equal parts, with the least and the greatest value of each; NaN where there is none."""
+    if not len(signal.time):
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    time, place = _places(signal, count)
+    valid = np.isfinite(signal.values)
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, place[valid], signal.values[valid])
+    np.maximum.at(high, place[valid], signal.values[valid])
+    empty = low > high
+    low[empty] = high[empty] = np.nan
+    return time, low, high
 
 
 def _points(signal: Signal, most: int) -> int:
@@ -100,18 +118,20 @@ def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
 
 
 def _svg(signal: Signal, begin: float, end: float) -> str:
-    """Over the time of all, from `begin` to `end` [s], which is counted from `begin`."""
-    time, values = _parts(signal, _points(signal, _POINTS))
-    present = values[np.isfinite(values)]
-    low, span = (float(present.min()), float(np.ptp(present)) or 1.0) if len(present) else (0.0, 1.0)
+    """Over the time of all, from `begin` to `end` [s], which is counted from `begin`: in each part of it the range
+    that the values cover."""
+    time, lows, highs = _ranges(signal, _points(signal, _POINTS))
+    present = np.isfinite(lows)
+    low = float(lows[present].min()) if present.any() else 0.0
+    span = (float(highs[present].max()) - low or 1.0) if present.any() else 1.0
     first = float(signal.time[0]) - begin if len(signal.time) else 0.0
     bottom, scale = _HEIGHT - _BELOW, (_WIDTH - _MARGIN - 20) / max(end - begin, 1e-9)
     path, pen = [], "M"
-    for at, value in zip(time.tolist(), values.tolist(), strict=True):
-        if math.isfinite(value):
-            height = bottom * (0.93 - 0.8 * (value - low) / span)
-            path.append(f"{pen}{_MARGIN + scale * (first + at):.1f} {height:.1f}")
-        pen = "L" if math.isfinite(value) else "M"
+    for at, least, most in zip(time.tolist(), lows.tolist(), highs.tolist(), strict=True):
+        if math.isfinite(least):
+            ends = (bottom * (0.93 - 0.8 * (value - low) / span) for value in (least, most))
+            path.append(f"{pen}{_MARGIN + scale * (first + at):.1f} {'V'.join(f'{end:.1f}' for end in ends)}")
+        pen = "L" if math.isfinite(least) else "M"
     axis, texts = [f"M{_MARGIN} 0V{bottom}H{_WIDTH}"], []
     for tick in ticks(end - begin):
         x = _MARGIN + scale * tick
@@ -149,8 +169,8 @@ def _drawn(figure: Any, signals: Sequence[tuple[str, Signal]], title: str) -> An
     figure.suptitle(title)
     axes = figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (heading, signal) in zip(axes, signals, strict=True):
-        time, values = _parts(signal, _points(signal, 4 * _POINTS))
-        axis.plot(time, values, linewidth=0.7)
+        time, low, high = _ranges(signal, _points(signal, 4 * _POINTS))
+        axis.plot(np.repeat(time, 2), np.column_stack((low, high)).ravel(), linewidth=0.7)
         axis.set_ylabel(signal.unit or "no unit")
         axis.set_title(f"{heading}: {signal.name}", fontsize="small", loc="left")
     axes[-1].set_xlabel("time [s]")

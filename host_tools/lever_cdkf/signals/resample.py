@@ -1,7 +1,8 @@
 """Signals with rates and clocks of their own as the firmware's samples: one clock, and NaN where a value is missing.
 
-One signal is the clock: each of its values makes a sample. It is the slowest of the model's inputs z_ddot and tau_m,
-unless all come at one rate: the firmware learns only where these are known, and can do without the lever's in between.
+One signal is the clock: each of its values makes a sample. It is the slowest of the model's inputs z_ddot and tau_m:
+the firmware learns only where these are known, and can do without the lever's in between. Where angle or rate come
+about as often (a third more or less), it is one of them: what is measured is then not interpolated.
 Any other signal is, against it,
 - paired, where its values come at a constant offset from the clock's: one sender measured both, and sent one frame
   after the other;

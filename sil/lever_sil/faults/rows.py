@@ -381,9 +381,7 @@ _OFFSET = "a step passes the high-passes; for some pilots it is taken for a chan
 _TORQUE = "takes a second: a shorter memory takes other torque of a frequency near the dither's for a wrong gain"
 _BASE = "without torque a gain of z̈ is a scale of the arm, which no innovation tells from it; dither tells in seconds"
 _LEVELS = "its levels are off by the whole angle when it is right again: BASE and INNOVATION go after up to 2.4 s"
-_RATE_ALONE = (
-    "learnt from the rate alone, some pilots' arm is off by over 3 sigma for 2 s after the angle is back"
-)
+_RATE_ALONE = "learnt from the rate alone, some pilots' arm is off by over 3 sigma for 2 s after the angle is back"
 _CLOCK = "it is samples at another rate, which is no fault: the firmware has no clock of its own"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",

@@ -7,7 +7,7 @@ import numpy as np
 from ...arrays import Array
 from ...firmware.library import enum_names
 from ...results.trace import CORRECTION, TRUE_MARGIN
-from ..figure import Figure, Spec, axis, axis_range, band, line, time_axis
+from ..figure import Figure, Spec, axis, axis_range, band, hover, line, time_axis
 from ..run import Run
 from ..series import spread_indices
 
@@ -32,14 +32,13 @@ def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
     for name, colour in _COLOURS.items():
         figure.add(*_stretches(time, state[chosen], name, colour, shown))
     figure.add(*band(time, low, high, "margin ± 2σ", "estimate-band"))
-    figure.add(line(time, gain[chosen], "gain margin", "estimate", hovertemplate="%{y:.3g} dB<extra></extra>"))
-    figure.add(
-        line(time, frequency[chosen], "critical frequency", "violet", 1, hovertemplate="%{y:.3g} Hz<extra></extra>")
-    )
+    figure.add(line(time, gain[chosen], "gain margin", "estimate", **hover("gain margin", "dB")))
+    figure.add(line(time, frequency[chosen], "critical frequency", "violet", 1, **hover("critical frequency", "Hz")))
     if true is not None:
-        figure.add(line(time, true[chosen], "truth", "truth", line_dash="dash", zorder=1))
+        look: Spec = {"line_dash": "dash", "zorder": 1}
+        figure.add(line(time, true[chosen], "truth", "truth", **look, **hover("true gain margin", "dB")))
     if correction is not None:
-        figure.add(line(time, np.degrees(correction[chosen]), "correction", "good", 2))
+        figure.add(line(time, np.degrees(correction[chosen]), "correction", "good", 2, **hover("correction", "°")))
     figure.level(0.0, *limits)
     figure.mark(run.changes)
     return figure
@@ -51,5 +50,5 @@ def _stretches(time: Array, state: Array, name: str, colour: str, shown: list[fl
     if shown is None or not (state == number).any():
         return []
     foot = np.where(state == number, shown[0], np.nan)
-    hover: Spec = {"hovertemplate": f"{name}<extra></extra>", "connectgaps": False}
-    return [line(time, foot, name, colour, line_width=10, **hover)]
+    more: Spec = {"hovertemplate": f"{name}<extra></extra>", "connectgaps": False}
+    return [line(time, foot, name, colour, line_width=10, **more)]
