@@ -112,7 +112,11 @@ static inline bool monitor_is_jump(monitor_t *monitor, enum monitor_input input,
     const float square = change * change;
     const bool far = square > of->limit;
     of->sum += far ? (MONITOR_JUMP_COUNTED * of->limit) : square;
-    return (far || (of->refused > 0.0f)) && monitor_hold_input(of, far, elapsed);
+    bool held = false;
+    if (far || (of->refused > 0.0f)) {
+        held = monitor_hold_input(of, far, elapsed);
+    }
+    return held;
 }
 
 /* After a block of `period` seconds of samples `sample_period` apart: how inputs usually change. */

@@ -15,7 +15,7 @@
 #define BYTE_BITS 8u
 #define FLOAT_LIMIT 1.0e9f
 
-enum { SINGLE = 9 }; /* floats of an estimate that are no array */
+enum { SINGLE = 9, GROUPS = 4 }; /* floats of an estimate that are no array; these and its arrays */
 
 /* From one member to another of the same size, side by side. */
 #define MEMBERS(first, last, size, most)                                                                               \
@@ -320,10 +320,13 @@ static bool is_consistent(const lever_t *lever)
     const float single[SINGLE] = {estimate.theta, estimate.theta_dot, estimate.theta_sigma, estimate.theta_dot_sigma,
         estimate.trim, estimate.natural_frequency, estimate.natural_frequency_sigma, estimate.damping_ratio,
         estimate.damping_ratio_sigma};
-    const bool finite = are_finite(single, (uint32_t)SINGLE) &&
-                        are_finite(estimate.parameter, (uint32_t)LEVER_PARAMETERS) &&
-                        are_finite(estimate.parameter_sigma, (uint32_t)LEVER_PARAMETERS) &&
-                        are_finite(estimate.parameter_correlation, (uint32_t)LEVER_PARAMETERS);
+    const float *const group[GROUPS] = {
+        estimate.parameter_correlation, estimate.parameter, estimate.parameter_sigma, single};
+    static const uint8_t count[GROUPS] = {LEVER_PARAMETERS, LEVER_PARAMETERS, LEVER_PARAMETERS, SINGLE};
+    bool finite = true;
+    for (uint32_t i = 0u; i < (uint32_t)GROUPS; i++) {
+        finite = finite && are_finite(group[i], count[i]);
+    }
     const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.averages.excitation_square >= 0.0f);
     return finite && squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator);
 }

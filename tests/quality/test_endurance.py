@@ -25,8 +25,8 @@ SECONDS = 3600
 LINES_A_SECOND = 10
 
 FOLDER = Path(__file__).with_name("endurance")
-FACADE = [tools.FIRMWARE / "app" / name for name in ("lever.c", "link.c", "link_out.c")]
-"""Not built in double precision: the instance of the façade has room for floats only."""
+FACADE = [tools.FIRMWARE / "app" / name for name in ("lever.c", "link.c", "link_out.c", "recorder.c", "state.c")]
+"""Not built in double precision: the instance of the façade, and its state in bytes, have room for floats only."""
 
 
 @pytest.fixture(scope="module")

@@ -70,10 +70,10 @@ static bool fly(const lever_config_t *config, bool drifts, uint32_t samples)
     static estimator_t estimator;
     simulation_t simulation = simulation_of((uint8_t)LEVER_MODEL_LEVER);
     bool valid = true;
-    if (!drifts) { /* an eighth of the usual motion, just enough to be learnt from, and no torque */
-        simulation.base_rms *= 0.125;
+    if (!drifts) { /* three sixteenths of the usual motion, which is enough to be learnt from at any time, and no torque */
+        simulation.base_rms *= 0.1875;
         simulation.torque_rms = 0.0;
-        simulation.process_noise *= 0.125;
+        simulation.process_noise *= 0.1875;
     }
     estimator_init(&estimator, config);
     for (uint32_t index = 0u; (index < samples) && valid; index++) {

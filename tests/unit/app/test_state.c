@@ -205,7 +205,8 @@ TEST(a_value_beyond_its_range_is_refused)
     }
 }
 
-/* R53: an infinity or NaN in any float of the filter and the trim, not only in those that the estimate is made of. */
+/* An infinity or NaN in any float of the filter and the trim, not only in those that the estimate is made of. */
+/* R53 */
 TEST(a_float_that_is_not_finite_is_refused)
 {
     static const uint32_t not_finite[] = {0x7F800000u, 0xFF800000u, 0x7FC00000u, 0xFFC00001u};
@@ -228,14 +229,15 @@ TEST(a_float_that_is_not_finite_is_refused)
 }
 
 /* R53 */
-TEST(a_covariance_that_is_none_is_refused)
+TEST(a_covariance_that_is_none_and_a_negative_square_are_refused)
 {
     start_bus();
     fly(50u);
     lever_t *other = lever_init(&other_memory, &config);
     cdkf_t *cdkf = &lever->estimator.cdkf;
-    float *const member[] = {&cdkf->s[0], &cdkf->s_xx[0], &cdkf->s_xx[3], &cdkf->w[1], &cdkf->walk[2]};
-    static const float value[] = {-1.0f, -1.0f, 0.0f, 1.0e6f, -1.0f};
+    float *const member[] = {&cdkf->s[0], &cdkf->s_xx[0], &cdkf->s_xx[3], &cdkf->w[1], &cdkf->walk[2],
+        &lever->estimator.nis, &lever->estimator.averages.excitation_square};
+    static const float value[] = {-1.0f, -1.0f, 0.0f, 1.0e6f, -1.0f, -1.0f, -1.0f};
     for (uint32_t i = 0u; i < (uint32_t)(sizeof value / sizeof value[0]); i++) {
         const float kept = *member[i];
         *member[i] = value[i];
@@ -269,7 +271,8 @@ static void use(lever_t *hurt)
     lever = mine;
 }
 
-/* R53: some values anywhere in their ranges, floats of any bits; under the sanitizers. What is accepted estimates. */
+/* Some values anywhere in their ranges, floats of any bits; under the sanitizers. What is accepted estimates. */
+/* R53 */
 TEST(any_bytes_that_are_accepted_break_nothing)
 {
     uint32_t accepted = 0u;

@@ -378,6 +378,9 @@ TEST(settings_are_looked_at_each_second_and_said_to_be_wrong_on_the_bus)
     }
     TEST_ASSERT_TRUE(said > 0u);
     TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_PLATFORM));
+    config.settings.torque_slew *= 0.5f; /* right again, and looked at again */
+    (void)deliver_many(2100u);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_PLATFORM));
 }
 
 /* --- gaps --------------------------------------------------------------------------------------------------------- */
