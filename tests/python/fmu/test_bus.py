@@ -13,7 +13,6 @@ import pytest
 from fmpy.build import build_platform_binary
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
-from lever_cdkf import cli
 from lever_cdkf.can import codec
 from lever_cdkf.firmware.native import Estimator
 from lever_sil.run import in_process
@@ -27,19 +26,6 @@ TO_ESTIMATOR = ("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", "COMMAND")
 ACTIVE, PASSIVE, OFF = 1, 2, 3
 CONFIGURATIONS = [(ls_bus.CONFIGURATION, struct.pack("<BI", 1, 1_000_000)), (ls_bus.CONFIGURATION, bytes((4, 1)))]
 """The bit rate [bit/s], and that the bus buffers and retransmits what loses arbitration."""
-
-
-@pytest.fixture(scope="session")
-def bus_fmu(fmus: Path) -> Path:
-    """The FMU as a file."""
-    assert cli.main(["fmu", "controller", "--bus", "-o", str(fmus / "bus.fmu")]) == 0
-    return fmus / "bus.fmu"
-
-
-@pytest.fixture(scope="session")
-def bus(bus_fmu: Path) -> Path:
-    """Unpacked."""
-    return unpacked(bus_fmu, bus_fmu.parent / "bus")
 
 
 @pytest.fixture(scope="session")
@@ -100,7 +86,7 @@ def test_the_bus_is_configured_first(bus: Path) -> None:
 
 
 def test_without_samples_the_firmware_is_told(bus: Path, flight: list[tuple[list[Frame], list[Frame]]]) -> None:
-    """Each 5 ms, as the loop of lever_can does; the torque fades."""
+    """Each 5 ms, which is LOOP_IDLE_MS of the loop that lever_can runs; the torque fades."""
     instance, estimator = BusInstance(bus), Estimator()
     for received, _ in flight[:3000]:
         instance.exchange(received)
