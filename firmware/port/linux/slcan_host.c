@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "can/messages.h"
-#include "port/identifiers.h"
 #include "port/linux/clock.h"
 
 /* Ends what the adapter may have had of a line, and goes on the bus at 1 Mbit/s. The first C is refused if the channel

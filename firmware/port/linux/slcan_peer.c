@@ -1,7 +1,6 @@
 #include "port/linux/slcan_peer.h"
 
 #include "can/messages.h"
-#include "port/identifiers.h"
 #include "port/linux/clock.h"
 
 static bool put(void *self, const char *text, uint32_t length)

@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "port/identifiers.h"
+
 #define CR '\r'
 #define LF '\n'
 #define BEL '\a'
@@ -394,4 +396,22 @@ void slcan_hang_up(slcan_t *slcan)
 {
     (void)memset(&slcan->line, 0, sizeof slcan->line);
     slcan->channel = (uint8_t)SLCAN_CHANNEL_CLOSED;
+}
+
+slcan_frame_t slcan_shifted(const lever_frame_t *frame, uint32_t identifiers)
+{
+    const uint32_t id = identifiers_to_bus(identifiers, frame->id);
+    slcan_frame_t shifted = {.frame = *frame, .extended = ((id & IDENTIFIERS_EXTENDED) != 0u)};
+
+    shifted.frame.id = id & ~IDENTIFIERS_EXTENDED;
+    return shifted;
+}
+
+bool slcan_is_ours(const slcan_frame_t *received, uint32_t identifiers, lever_frame_t *frame)
+{
+    const uint32_t flag = received->extended ? IDENTIFIERS_EXTENDED : 0u;
+
+    *frame = received->frame;
+    frame->id = identifiers_from_bus(identifiers, received->frame.id | flag);
+    return !received->remote && identifiers_are_ours(frame->id);
 }

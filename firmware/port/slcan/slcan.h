@@ -29,7 +29,6 @@
 #include <stdint.h>
 
 #include "lever_cdkf.h"
-#include "port/identifiers.h"
 
 /* What our adapters answer to V, two digits each: hardware 10, and the first two numbers of the version. */
 #define SLCAN_TEXT(number) #number
@@ -146,23 +145,9 @@ bool slcan_send(slcan_t *slcan, const slcan_frame_t *frame, uint32_t time_ms);
 void slcan_hang_up(slcan_t *slcan);
 
 /* A data frame of the estimator, as it is on the bus; `identifiers`: port/identifiers.h. */
-static inline slcan_frame_t slcan_shifted(const lever_frame_t *frame, uint32_t identifiers)
-{
-    const uint32_t id = identifiers_to_bus(identifiers, frame->id);
-    slcan_frame_t shifted = {.frame = *frame, .extended = ((id & IDENTIFIERS_EXTENDED) != 0u)};
-
-    shifted.frame.id = id & ~IDENTIFIERS_EXTENDED;
-    return shifted;
-}
+slcan_frame_t slcan_shifted(const lever_frame_t *frame, uint32_t identifiers);
 
 /* The other way; false for a frame that is not for the estimator. */
-static inline bool slcan_is_ours(const slcan_frame_t *received, uint32_t identifiers, lever_frame_t *frame)
-{
-    const uint32_t flag = received->extended ? IDENTIFIERS_EXTENDED : 0u;
-
-    *frame = received->frame;
-    frame->id = identifiers_from_bus(identifiers, received->frame.id | flag);
-    return !received->remote && identifiers_are_ours(frame->id);
-}
+bool slcan_is_ours(const slcan_frame_t *received, uint32_t identifiers, lever_frame_t *frame);
 
 #endif

@@ -40,6 +40,8 @@ examples:
   lever fmu controller -o lever.fmu --settings my.settings
   lever fmu controller -o uh60.fmu --set mitigation=cancellation \\
       --aircraft uh60_like,gearing=0.5
+  lever fmu controller -o ecu.fmu --bus
+      a virtual ECU on the terminal Can; needs an importer with event mode
 
 What is wrong while it runs is a message to the importer: a value out of its range (logStatusError), a step that is no
 multiple (logStatusDiscard), an input that was never set (logStatusWarning). Faults and modes are logEvents.
@@ -65,6 +67,11 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         metavar="AIRCRAFT",
         help="watch the margin to collective bounce with this helicopter, as `lever replay --aircraft` does",
     )
+    controller.add_argument(
+        "--bus",
+        action="store_true",
+        help="samples and commands are frames of a CAN bus (FMI-LS-BUS 1.0), as lever.dbc has them, and so are answers",
+    )
     for entry in sorted(importlib.metadata.entry_points(group=FMUS)):
         module = entry.load()
         before = set(kinds.choices)
@@ -84,6 +91,6 @@ def run(args: argparse.Namespace) -> int:
     model = [] if args.model is None else [f"model={args.model}"]
     assignments |= dict(parse_assignment(text) for text in (*model, *args.set))
     aircraft = None if args.aircraft is None else chosen_aircraft(args.aircraft)
-    archive.write(args.out, controller(make_config(assignments), aircraft))
+    archive.write(args.out, controller(make_config(assignments), aircraft, args.bus))
     print_written(args.out)
     return 0

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from .binary import compile_library, compiler, headers, library_suffix, platform
 from .description import Model, build_description, model_description
 
 _LICENCE = "MIT; the text is in the file LICENSE of Lever CDKF.\n"
-_FMI = ("fmi3.c", "fmi3_unused.c", "fmi3_values.c", "fmu.h")
+_FMI = ("fmi3.c", "fmi3_state.c", "fmi3_unused.c", "fmi3_values.c", "fmu.h")
 """What every FMU has, in c/ beside this file."""
 
 
@@ -33,6 +33,8 @@ class Contents:
     """Content of documentation/index.html."""
     resources: Mapping[str, bytes]
     """By file name."""
+    more: Mapping[str, bytes] = field(default_factory=dict)
+    """Further files by their path in the FMU."""
 
 
 def own_c(package: str, names: Iterable[str]) -> dict[str, Path]:
@@ -89,6 +91,7 @@ def _fill(folder: Path, contents: Contents) -> None:
     )
     _write_all(folder / "extra/lever_cdkf", {"provenance.json": provenance().text().encode()})
     _write_all(folder / "resources", contents.resources)
+    _write_all(folder, contents.more)
 
 
 def _write_all(folder: Path, content: Mapping[str, bytes]) -> None:

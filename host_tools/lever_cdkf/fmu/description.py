@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -14,7 +14,15 @@ from ..provenance import SOFTWARE, created, version
 from .dimension import base_units
 from .variables import Variable
 
-_TYPES = {"FLOAT64": "Float64", "INT64": "Int64", "BOOLEAN": "Boolean", "ENUMERATION": "Enumeration"}
+_TYPES = {
+    "FLOAT64": "Float64",
+    "INT64": "Int64",
+    "BOOLEAN": "Boolean",
+    "ENUMERATION": "Enumeration",
+    "BINARY": "Binary",
+    "CLOCK": "Clock",
+}
+_ROLES = {"STRUCTURALPARAMETER": "structuralParameter"}
 _CATEGORIES = {
     "logEvents": "modes and faults, as they come and go",
     "logStatusWarning": "an input that is missing or not a number, a request that is refused",
@@ -37,6 +45,8 @@ class Model:
     """[s]"""
     variables: Sequence[Variable]
     token: str = ""
+    has_events: bool = False
+    """Its clocks tick in event mode, and a step may have any length."""
 
     def with_token(self, *content: bytes) -> Model:
         """With an instantiation token that depends on the description and on `content`: of this FMU alone."""
@@ -56,17 +66,12 @@ def model_description(model: Model, made: str | None = None) -> bytes:
         license="MIT",
         generationTool=SOFTWARE,
         generationDateAndTime=created().strftime("%Y-%m-%dT%H:%M:%SZ") if made is None else made,
-        variableNamingConvention="flat",
+        variableNamingConvention="structured" if model.has_events else "flat",
     )
-    SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=model.identifier,
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize="true",
-        fixedInternalStepSize=_number(model.period),
-    )
+    steps = {"hasEventMode": "true"} if model.has_events else {"fixedInternalStepSize": _number(model.period)}
+    abilities = ("canGetAndSetFMUState", "canSerializeFMUState", "canHandleVariableCommunicationStepSize")
+    capabilities = {"modelIdentifier": model.identifier} | dict.fromkeys(abilities, "true") | steps
+    SubElement(root, "CoSimulation", capabilities)
     _add_units(root, model.variables)
     _add_types(root, model.variables)
     categories = SubElement(root, "LogCategories")
@@ -75,15 +80,17 @@ def model_description(model: Model, made: str | None = None) -> bytes:
     experiment = {"startTime": "0", "stopTime": _number(model.stop_time), "stepSize": _number(model.period)}
     SubElement(root, "DefaultExperiment", experiment)
     variables = SubElement(root, "ModelVariables")
-    for reference, variable in enumerate(model.variables):
-        _add_variable(variables, reference, variable)
+    references = {variable.name: str(reference) for reference, variable in enumerate(model.variables)}
+    for variable in model.variables:
+        _add_variable(variables, references, variable)
     structure = SubElement(root, "ModelStructure")
     outputs = [str(at) for at, variable in enumerate(model.variables) if variable.role == "OUTPUT"]
     for output in outputs:
         SubElement(structure, "Output", valueReference=output, dependencies="")
     for output in outputs:
-        SubElement(structure, "InitialUnknown", valueReference=output)
-    return _text(root)
+        if not model.variables[int(output)].clock:
+            SubElement(structure, "InitialUnknown", valueReference=output)
+    return xml_text(root)
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> bytes:
@@ -96,10 +103,11 @@ def build_description(identifier: str, sources: Sequence[str]) -> bytes:
     for source in sources:
         SubElement(files, "SourceFile", name=source)
     SubElement(configuration, "Library", name="m")
-    return _text(root)
+    return xml_text(root)
 
 
-def _text(root: Element) -> bytes:
+def xml_text(root: Element) -> bytes:
+    """A document."""
     ElementTree.indent(root)
     content: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return content + b"\n"
@@ -134,15 +142,15 @@ def _add_types(root: Element, variables: Sequence[Variable]) -> None:
                 SubElement(element, "Item", name=item, value=str(value))
 
 
-def _add_variable(variables: Element, reference: int, variable: Variable) -> None:
+def _add_variable(variables: Element, references: Mapping[str, str], variable: Variable) -> None:
     attributes = {
         "name": variable.name,
-        "valueReference": str(reference),
+        "valueReference": references[variable.name],
         "description": variable.meaning,
-        "causality": variable.role.lower(),
+        "causality": _ROLES.get(variable.role, variable.role.lower()),
     }
     is_real = variable.type == "FLOAT64"
-    if variable.role == "PARAMETER":
+    if variable.role in ("PARAMETER", "STRUCTURALPARAMETER"):
         attributes["variability"] = "fixed"
     elif variable.role != "INDEPENDENT":
         attributes["variability"] = "continuous" if is_real else "discrete"
@@ -152,7 +160,13 @@ def _add_variable(variables: Element, reference: int, variable: Variable) -> Non
         attributes["unit"] = variable.unit
     if variable.least is not None and variable.greatest is not None:
         attributes |= {"min": _number(variable.least), "max": _number(variable.greatest)}
-    if variable.role in ("PARAMETER", "INPUT"):
+    if variable.type == "BINARY":
+        attributes |= {"mimeType": variable.mime_type, "clocks": references[variable.clock]}
+    elif variable.type == "CLOCK":
+        attributes["intervalVariability"] = "triggered"
+    elif variable.role in ("PARAMETER", "STRUCTURALPARAMETER", "INPUT"):
         flag = "true" if variable.start else "false"
         attributes["start"] = flag if variable.type == "BOOLEAN" else _number(variable.start)
-    SubElement(variables, _TYPES[variable.type], attributes)
+    element = SubElement(variables, _TYPES[variable.type], attributes)
+    if variable.type == "BINARY" and variable.role == "INPUT":
+        SubElement(element, "Start", value="")

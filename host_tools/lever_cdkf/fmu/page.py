@@ -32,7 +32,7 @@ def page(package: str, template: str, model: Model, **more: str) -> str:
 
 
 def _table(model: Model, role: str) -> str:
-    rows = "".join(_row(variable) for variable in model.variables if variable.role == role)
+    rows = "".join(_row(variable) for variable in model.variables if variable.role.endswith(role))
     head = "<tr><th>name</th><th>unit</th><th>start</th><th>range</th><th>meaning</th></tr>"
     return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
 

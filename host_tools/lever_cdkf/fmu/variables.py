@@ -19,9 +19,9 @@ class Variable:
 
     name: str
     type: str
-    """FLOAT64, INT64, BOOLEAN or ENUMERATION, as in enum fmu_type."""
+    """FLOAT64, INT64, BOOLEAN, ENUMERATION, BINARY or CLOCK, as in enum fmu_type."""
     role: str
-    """INDEPENDENT, PARAMETER, INPUT or OUTPUT, as in enum fmu_role."""
+    """INDEPENDENT, STRUCTURALPARAMETER, PARAMETER, INPUT or OUTPUT, as in enum fmu_role."""
     unit: str
     """"1" without one."""
     start: float
@@ -31,6 +31,10 @@ class Variable:
     greatest: float | None = None
     enumeration: str = ""
     """Of type ENUMERATION: the enum of lever_cdkf.h."""
+    mime_type: str = ""
+    """Of type BINARY."""
+    clock: str = ""
+    """Of type BINARY: the variable at whose ticks it is got or set."""
 
 
 def read_table(text: str) -> Iterator[Variable]:

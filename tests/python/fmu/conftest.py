@@ -28,3 +28,16 @@ def controller(fmus: Path) -> Path:
 def pilot(fmus: Path) -> Path:
     """pilot.fmu, unpacked."""
     return unpacked(fmus / "pilot.fmu", fmus / "pilot")
+
+
+@pytest.fixture(scope="session")
+def bus_fmu(fmus: Path) -> Path:
+    """lever.fmu --bus."""
+    assert cli.main(["fmu", "controller", "--bus", "-o", str(fmus / "bus.fmu")]) == 0
+    return fmus / "bus.fmu"
+
+
+@pytest.fixture(scope="session")
+def bus(bus_fmu: Path) -> Path:
+    """Unpacked."""
+    return unpacked(bus_fmu, bus_fmu.parent / "bus")

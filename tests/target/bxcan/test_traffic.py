@@ -61,27 +61,32 @@ def dither(talk: Talk) -> None:
 
 
 @pytest.mark.requirement("S1", "R24")
-def test_the_image_as_it_is_shipped_changes_nothing_by_command(make_board: Callable[..., Board]) -> None:
-    """It says so in each COMMAND_ACK; what changes nothing is accepted. `dither` above is obeyed by the same image as
-    it is built with -D LEVER_COMMANDS=ON."""
+def test_the_image_as_it_is_shipped_only_ends_something_by_command(make_board: Callable[..., Board]) -> None:
+    """It says so in each COMMAND_ACK; what changes nothing, or ends learning, is accepted, and what begins it again is
+    not. `dither` above is obeyed by the same image as it is built with -D LEVER_COMMANDS=ON."""
     board = make_board()
     board.start()
-    asked = [command(0, dither_rms=0.3), command(1, request="freeze"), command(2, model="hand"), command(3)]
+    asked = [
+        (command(0, dither_rms=0.3), "disabled", lib.LEVER_MODE_RUN),
+        (command(1, model="hand"), "disabled", lib.LEVER_MODE_RUN),
+        (command(2, request="freeze", dither_rms=0.3), "disabled", lib.LEVER_MODE_RUN),
+        (command(3), "accepted", lib.LEVER_MODE_RUN),
+        (command(4, request="freeze"), "accepted", lib.LEVER_MODE_FROZEN),
+        (command(5, request="run"), "disabled", lib.LEVER_MODE_FROZEN),
+    ]
     with Talk(board) as talk:
         for _ in range(350):
             talk.ask()
-        for frame in asked:
+        for frame, _, mode in asked:
             board.peer.send(frame)
             board.run(MS)
-            talk.ask()
-        for _ in range(50):
-            talk.ask()
-        assert talk.report("HEALTH")["mode"] == lib.LEVER_MODE_RUN
+            for _ in range(50):
+                talk.ask()
+            assert talk.report("HEALTH")["mode"] == mode
     heard = board.peer.frames()
     acks = [codec.decode(ACK, frame.data)[1] for frame in heard if frame.identifier == ACK]
-    assert [(ack["command_counter"], result_of(ack)) for ack in acks] == [
-        (0, "disabled"), (1, "disabled"), (2, "disabled"), (3, "accepted")
-    ]  # fmt: skip
+    results = [result for _, result, _ in asked]
+    assert [(ack["command_counter"], result_of(ack)) for ack in acks] == list(enumerate(results))
     assert {ack["dither_rms"] for ack in acks} == {0.0}
     assert not [frame for frame in heard if frame.identifier == MOTOR_COMMAND]
     assert board.machine.resets == []

@@ -1,31 +1,14 @@
 /* The estimator of lever_cdkf.h behind an FMU. fmu_config.h, written by `lever fmu`, has the model, the aircraft, the start
  * values and the token. */
-#include "fmu.h"
-#include "fmu_config.h"
-#include "lever_cdkf.h"
+#include "controller.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define KEEP_ALIVE 0.25 /* [s], between two commands that keep the torque alive */
-#define IDLE_US 5000u   /* without a sample, after which lever_idle() is called */
-
-enum {
-#define FMU_VARIABLE(name, type, role, unit, start, meaning) AT_##name,
-#include "controller.def"
-    FIRST_SETTING
-};
-
-enum {
-#define LEVER_SETTING(name, unit, value, least, greatest, meaning) SETTING_##name,
-#include "lever_settings.def"
-    SETTINGS
-};
-
 enum { FAULTS = 18 };
 
-const uint32_t model_variables = (uint32_t)FIRST_SETTING + (uint32_t)SETTINGS;
+const uint32_t model_variables = MODEL_VARIABLES;
 const char *const model_token = FMU_TOKEN;
 const double model_start_value[] = {FMU_START_VALUES};
 const fmu_variable_t model_variable[] = {
@@ -33,22 +16,11 @@ const fmu_variable_t model_variable[] = {
 #include "controller.def"
 #define LEVER_SETTING(name, unit, value, least, greatest, meaning) {#name, FMU_FLOAT64, FMU_PARAMETER},
 #include "lever_settings.def"
+#ifdef FMU_EVENTS
+#define FMU_VARIABLE(name, type, role, unit, start, meaning) {#name, FMU_##type, FMU_##role},
+#include "controller_bus.def"
+#endif
 };
-
-typedef struct controller {
-    lever_memory_t memory;
-    lever_config_t config;
-    lever_t *lever;
-    /* state besides the estimator's */
-    uint64_t commanded; /* sample of the last command */
-    double dither_rms;  /* of it; NaN: there was none yet */
-    uint32_t idle_us;   /* without a sample, since lever_idle() */
-    uint32_t missing;   /* inputs that have been reported as missing, a bit each */
-    uint32_t faults;    /* that have been reported */
-    uint8_t mode;
-    bool freezes;
-    bool resets;
-} controller_t;
 
 #ifdef CONTROLLER_AIRCRAFT
 static const lever_aircraft_t aircraft = CONTROLLER_AIRCRAFT;
@@ -64,18 +36,22 @@ void model_free(void *model)
     free(model);
 }
 
-/* --- parameters ------------------------------------------------------------------------------------------------------ */
+/* --- parameters --------------------------------------------------------------------------------------------------- */
 
 bool model_accepts(fmu_t *fmu, uint32_t variable, double value)
 {
     bool accepts = true;
-    if (variable >= (uint32_t)FIRST_SETTING) {
+    if (variable >= (uint32_t)FIRST_BUS) {
+        accepts = input_accepts(fmu, variable, value);
+    } else if (variable >= (uint32_t)FIRST_SETTING) {
         const lever_setting_t *setting = lever_setting(variable - (uint32_t)FIRST_SETTING);
         accepts = ((float)value >= setting->least) && ((float)value <= setting->greatest);
         if (!accepts) {
             fmu_log(fmu, fmi3Error, "%s = %g is out of range: it must be a number from %g to %g %s (%s)", setting->name,
                 value, (double)setting->least, (double)setting->greatest, setting->unit, setting->meaning);
         }
+    } else {
+        /* a choice: lever_config_check() looks at it */
     }
     return accepts;
 }
@@ -130,88 +106,15 @@ bool model_start(fmu_t *fmu)
         return false;
     }
 #endif
-    controller->dither_rms = (double)NAN;
-    fmu->period = floor(((double)controller->config.settings.sample_period * 1.0e6) + 0.5) * 1.0e-6;
+    input_start(fmu);
     model_put_outputs(fmu);
     return true;
 }
 
-/* --- steps ----------------------------------------------------------------------------------------------------------- */
-
-static uint32_t period_us(const fmu_t *fmu)
-{
-    return (uint32_t)floor((fmu->period * 1.0e6) + 0.5);
-}
-
-/* The inputs of a sample that are measured, with the variable that says whether they may be used. */
-static const struct {
-    uint32_t value;
-    uint32_t valid;
-} measured[] = {{AT_theta, AT_theta_valid}, {AT_theta_dot, AT_theta_dot_valid}, {AT_z_ddot, AT_z_ddot_valid},
-    {AT_tau_m, AT_tau_m_valid}, {AT_grip_force, AT_grip_force_valid}};
-
-enum { MEASURED = (int)(sizeof measured / sizeof measured[0]) };
-
-/* An input that is used must have been set, and be a number; reported once for as long as it is missing. */
-static float reading(fmu_t *fmu, uint32_t which, bool *valid)
-{
-    controller_t *controller = fmu->model;
-    const uint32_t at = measured[which].value;
-    const bool is_wanted = (fmu->value[measured[which].valid] != 0.0);
-    const bool is_there = (fmu->given[at] != 0u) && (fabs(fmu->value[at]) < 3.0e38);
-    const uint32_t bit = (uint32_t)1u << which;
-    if (is_wanted && !is_there && ((controller->missing & bit) == 0u)) {
-        fmu_log(fmu, fmi3Warning,
-            (fmu->given[at] != 0u)
-                ? "input %s is not a number: it counts as invalid"
-                : "input %s has never been set: it counts as invalid; connect it, or set %s to false",
-            model_variable[at].name, model_variable[measured[which].valid].name);
-        controller->missing |= bit;
-    } else if (is_there) {
-        controller->missing &= ~bit;
-    } else {
-        /* reported already, or not wanted */
-    }
-    *valid = is_wanted && is_there;
-    return *valid ? (float)fmu->value[at] : 0.0f;
-}
-
-/* What the inputs ask for; repeated while torque is to be kept alive. */
-static void command(fmu_t *fmu)
-{
-    controller_t *controller = fmu->model;
-    const bool freezes = (fmu->value[AT_freeze] != 0.0);
-    const bool resets = (fmu->value[AT_reset] != 0.0);
-    const double rms = fmu->value[AT_dither_rms];
-    const bool damps = (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_DAMPING) ||
-                       (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING) ||
-                       (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING);
-    const uint64_t repetition = (uint64_t)fmax(1.0, floor((KEEP_ALIVE / fmu->period) + 0.5));
-    const bool is_due = ((fmu->samples - controller->commanded) >= repetition) && (damps || (rms > 0.0));
-    lever_command_t to = {LEVER_REQUEST_NONE, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, (float)rms};
-    if (resets && !controller->resets) {
-        to.request = LEVER_REQUEST_RESET;
-    } else if (freezes != controller->freezes) {
-        to.request = freezes ? LEVER_REQUEST_FREEZE : LEVER_REQUEST_RUN;
-    } else {
-        /* nothing but the dither */
-    }
-    /* the comparison with NaN is true */
-    const bool has_changed = !((rms <= controller->dither_rms) && (rms >= controller->dither_rms));
-    if ((to.request != (uint8_t)LEVER_REQUEST_NONE) || has_changed || is_due) {
-        if (!lever_command(controller->lever, &to) && (has_changed || !is_due)) {
-            fmu_log(fmu, fmi3Warning, "the estimator refuses dither_rms = %g N m, freeze = %d, reset = %d in this mode",
-                rms, freezes ? 1 : 0, resets ? 1 : 0);
-        }
-        controller->commanded = fmu->samples;
-        controller->dither_rms = rms;
-    }
-    controller->freezes = freezes;
-    controller->resets = resets;
-}
+/* --- steps -------------------------------------------------------------------------------------------------------- */
 
 /* What is new since the last sample, as events. */
-static void report(fmu_t *fmu)
+void controller_report(fmu_t *fmu)
 {
     controller_t *controller = fmu->model;
     lever_health_t health;
@@ -224,46 +127,22 @@ static void report(fmu_t *fmu)
                 ((health.faults & bit) != 0u) ? "raised" : "gone", time);
         }
     }
-    if ((uint8_t)health.mode != controller->mode) {
+    if ((uint32_t)health.mode != controller->mode) {
         static const char *const name[] = {"init", "align", "run", "coast", "frozen", "fault"};
         fmu_log(fmu, (health.mode == LEVER_MODE_FAULT) ? fmi3Warning : fmi3OK, "mode %s at %.6g s", name[health.mode],
             time);
     }
     controller->faults = health.faults;
-    controller->mode = (uint8_t)health.mode;
-}
-
-static void take_sample(fmu_t *fmu)
-{
-    controller_t *controller = fmu->model;
-    lever_sample_t sample = {.time_us = (uint32_t)(fmu->samples * period_us(fmu))};
-    sample.theta = reading(fmu, 0u, &sample.theta_valid);
-    sample.theta_dot = reading(fmu, 1u, &sample.theta_dot_valid);
-    sample.z_ddot = reading(fmu, 2u, &sample.z_ddot_valid);
-    sample.tau_m = reading(fmu, 3u, &sample.tau_m_valid);
-    sample.grip_force = reading(fmu, 4u, &sample.grip_force_valid);
-    (void)lever_update(controller->lever, &sample);
-    controller->idle_us = 0u;
+    controller->mode = (uint32_t)health.mode;
 }
 
 fmi3Status model_step(fmu_t *fmu)
 {
-    controller_t *controller = fmu->model;
-    command(fmu);
-    if (fmu->value[AT_sampled] != 0.0) {
-        take_sample(fmu);
-    } else {
-        controller->idle_us += period_us(fmu);
-        if (controller->idle_us >= IDLE_US) {
-            lever_idle(controller->lever, controller->idle_us);
-            controller->idle_us = 0u;
-        }
-    }
-    report(fmu);
+    input_step(fmu);
     return fmi3OK;
 }
 
-/* --- outputs --------------------------------------------------------------------------------------------------------- */
+/* --- outputs ------------------------------------------------------------------------------------------------------ */
 
 static void put_estimate(const lever_t *lever, double *value)
 {
@@ -317,19 +196,13 @@ void model_put_outputs(fmu_t *fmu)
     fmu->value[AT_bounce_frequency] = (double)stability.frequency;
 }
 
-/* --- state ----------------------------------------------------------------------------------------------------------- */
+/* --- state -------------------------------------------------------------------------------------------------------- */
 
 /* What a controller_t has besides memory, configuration and pointer. */
 typedef struct rest {
-    uint64_t commanded;
-    double dither_rms;
-    uint32_t idle_us;
-    uint32_t missing;
+    controller_input_t input;
     uint32_t faults;
-    uint8_t mode;
-    uint8_t freezes;
-    uint8_t resets;
-    uint8_t unused;
+    uint32_t mode;
 } rest_t;
 
 size_t model_state_size(const fmu_t *fmu)
@@ -341,27 +214,22 @@ size_t model_state_size(const fmu_t *fmu)
 void model_state_save(const fmu_t *fmu, uint8_t *state)
 {
     const controller_t *controller = fmu->model;
-    const rest_t rest = {controller->commanded, controller->dither_rms, controller->idle_us, controller->missing,
-        controller->faults, controller->mode, controller->freezes ? 1u : 0u, controller->resets ? 1u : 0u, 0u};
-    (void)memcpy(state, &rest, sizeof rest);
-    lever_state_save(controller->lever, &state[sizeof rest]);
+    (void)memcpy(&state[offsetof(rest_t, input)], &controller->input, sizeof controller->input);
+    (void)memcpy(&state[offsetof(rest_t, faults)], &controller->faults, sizeof controller->faults);
+    (void)memcpy(&state[offsetof(rest_t, mode)], &controller->mode, sizeof controller->mode);
+    lever_state_save(controller->lever, &state[sizeof(rest_t)]);
 }
 
 bool model_state_restore(fmu_t *fmu, const uint8_t *state, size_t size)
 {
     controller_t *controller = fmu->model;
-    rest_t rest;
-    if ((size != model_state_size(fmu)) || !lever_state_restore(controller->lever, &state[sizeof rest])) {
+    controller_input_t *input = &controller->input;
+    if ((size != model_state_size(fmu)) || !input_is_usable(&state[offsetof(rest_t, input)]) ||
+        !lever_state_restore(controller->lever, &state[sizeof(rest_t)])) {
         return false;
     }
-    (void)memcpy(&rest, state, sizeof rest);
-    controller->commanded = rest.commanded;
-    controller->dither_rms = rest.dither_rms;
-    controller->idle_us = rest.idle_us;
-    controller->missing = rest.missing;
-    controller->faults = rest.faults;
-    controller->mode = rest.mode;
-    controller->freezes = (rest.freezes != 0u);
-    controller->resets = (rest.resets != 0u);
+    (void)memcpy(input, &state[offsetof(rest_t, input)], sizeof *input);
+    (void)memcpy(&controller->faults, &state[offsetof(rest_t, faults)], sizeof controller->faults);
+    (void)memcpy(&controller->mode, &state[offsetof(rest_t, mode)], sizeof controller->mode);
     return true;
 }

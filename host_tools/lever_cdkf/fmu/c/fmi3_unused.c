@@ -1,6 +1,7 @@
 /* FMI 3.0: functions that every FMU exports, for what these have not. Each says so and returns fmi3Error. */
 #include "fmi3Functions.h"
 #include "fmu.h"
+#include "fmu_config.h"
 
 #ifdef __GNUC__
 #pragma GCC diagnostic ignored "-Wunused-parameter"
@@ -10,8 +11,7 @@ static fmi3Status refused(fmi3Instance instance, const char *function)
 {
     if (instance != NULL) {
         fmu_log(instance, fmi3Error,
-            "%s: this FMU has no such thing; it is for co-simulation, with variables of type "
-            "Float64, Int64, Boolean and enumerations",
+            "%s: this FMU has no such thing; it is for co-simulation, with variables of the types in its description",
             function);
     }
     return fmi3Error;
@@ -38,6 +38,7 @@ REFUSE_TYPE(Int32)
 REFUSE_TYPE(UInt32)
 REFUSE_TYPE(UInt64)
 REFUSE_TYPE(String)
+#ifndef FMU_EVENTS /* otherwise they are in fmi3_events.c */
 REFUSE(fmi3GetBinary, (fmi3Instance instance, const fmi3ValueReference references[], size_t count, size_t sizes[],
                           fmi3Binary values[], size_t value_count))
 REFUSE(fmi3SetBinary, (fmi3Instance instance, const fmi3ValueReference references[], size_t count, const size_t sizes[],
@@ -54,6 +55,7 @@ REFUSE(fmi3EvaluateDiscreteStates, (fmi3Instance instance))
 REFUSE(
     fmi3UpdateDiscreteStates, (fmi3Instance instance, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals,
                                   fmi3Boolean *values, fmi3Boolean *has_next, fmi3Float64 *next))
+#endif
 REFUSE(fmi3ActivateModelPartition, (fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time))
 
 REFUSE(fmi3GetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference references[], size_t count,

@@ -4,8 +4,7 @@
 
 #include <math.h>
 
-/* The variable of a value reference, if it is of the type. */
-static const fmu_variable_t *variable_of(fmu_t *fmu, fmi3ValueReference reference, bool is_type, const char *function)
+const fmu_variable_t *fmu_variable(fmu_t *fmu, fmi3ValueReference reference, bool is_type, const char *function)
 {
     const fmu_variable_t *variable = NULL;
     if (reference >= model_variables) {
@@ -50,6 +49,8 @@ static bool may_set(fmu_t *fmu, const fmu_variable_t *variable)
         if (!may) {
             fmu_log(fmu, fmi3Error, "parameter %s is fixed: set it before the simulation starts", variable->name);
         }
+    } else if (variable->role == (uint8_t)FMU_STRUCTURALPARAMETER) {
+        may = fmu_is_in(fmu, FMU_CONFIGURING, variable->name);
     } else {
         fmu_log(fmu, fmi3Error, "%s is no input and no parameter: it cannot be set", variable->name);
     }
@@ -60,7 +61,7 @@ static fmi3Status set(fmu_t *fmu, fmi3ValueReference reference, const fmu_variab
 {
     fmi3Status status = fmi3Error;
     if (may_set(fmu, variable)) {
-        const bool is_parameter = (variable->role == (uint8_t)FMU_PARAMETER);
+        const bool is_parameter = (variable->role != (uint8_t)FMU_INPUT);
         if (!is_parameter || model_accepts(fmu, reference, value)) {
             fmu->value[reference] = value;
             fmu->given[reference] = 1u;
@@ -88,7 +89,7 @@ static bool counts(fmu_t *fmu, size_t references, size_t values, const char *fun
         fmu_t *fmu = instance;                                                                                         \
         fmi3Status status = counts(fmu, count, value_count, "fmi3Get" #suffix) ? fresh(fmu) : fmi3Error;               \
         for (size_t i = 0u; (i < count) && (status == fmi3OK); i++) {                                                  \
-            if (variable_of(fmu, references[i], has_type(references[i], type), "fmi3Get" #suffix) != NULL) {           \
+            if (fmu_variable(fmu, references[i], has_type(references[i], type), "fmi3Get" #suffix) != NULL) {          \
                 values[i] = from_number(fmu->value[references[i]]);                                                    \
             } else {                                                                                                   \
                 status = fmi3Error;                                                                                    \
@@ -103,7 +104,7 @@ static bool counts(fmu_t *fmu, size_t references, size_t values, const char *fun
         fmi3Status status = counts(fmu, count, value_count, "fmi3Set" #suffix) ? fmi3OK : fmi3Error;                   \
         for (size_t i = 0u; (i < count) && (status == fmi3OK); i++) {                                                  \
             const fmu_variable_t *variable =                                                                           \
-                variable_of(fmu, references[i], has_type(references[i], type), "fmi3Set" #suffix);                     \
+                fmu_variable(fmu, references[i], has_type(references[i], type), "fmi3Set" #suffix);                    \
             status = (variable != NULL) ? set(fmu, references[i], variable, (double)values[i]) : fmi3Error;            \
         }                                                                                                              \
         return status;                                                                                                 \

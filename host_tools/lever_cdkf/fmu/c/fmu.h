@@ -2,7 +2,7 @@
  * sil/fmu/c. Exactly one of them is in an FMU, and has the functions model_…().
  *
  * All variables of an instance are numbers of type double, whatever their FMI type, at the index of their value
- * reference; a Boolean is 0 or 1. This is host code: it allocates with calloc() and prints with vsnprintf().
+ * reference; a Boolean is 0 or 1, and what is binary or a clock is with the model. This is host code: it allocates with calloc() and prints with vsnprintf().
  */
 #ifndef FMU_H
 #define FMU_H
@@ -13,9 +13,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum fmu_type { FMU_FLOAT64, FMU_INT64, FMU_ENUMERATION, FMU_BOOLEAN };
-enum fmu_role { FMU_INDEPENDENT, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT };
-enum fmu_phase { FMU_INSTANTIATED, FMU_INITIALIZING, FMU_STEPPING, FMU_TERMINATED };
+enum fmu_type { FMU_FLOAT64, FMU_INT64, FMU_ENUMERATION, FMU_BOOLEAN, FMU_BINARY, FMU_CLOCK };
+enum fmu_role { FMU_INDEPENDENT, FMU_STRUCTURALPARAMETER, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT };
+enum fmu_phase { FMU_INSTANTIATED, FMU_CONFIGURING, FMU_INITIALIZING, FMU_EVENT, FMU_STEPPING, FMU_TERMINATED };
 
 typedef struct fmu_variable {
     const char *name;
@@ -43,7 +43,16 @@ typedef struct fmu {
 /* Sends a message of a status to the importer; a fmi3OK is an event, which goes out with debug logging only. */
 void fmu_log(fmu_t *fmu, fmi3Status status, const char *format, ...);
 
-/* --- what a model has ---------------------------------------------------------------------------------------------- */
+/* Whether an instance is in a phase; says so otherwise. */
+bool fmu_is_in(fmu_t *fmu, enum fmu_phase phase, const char *function);
+
+/* Starts the model, where parameters have changed since it was. */
+fmi3Status fmu_started(fmu_t *fmu);
+
+/* The variable of a value reference, if it is of the type; NULL otherwise, and said so. */
+const fmu_variable_t *fmu_variable(fmu_t *fmu, fmi3ValueReference reference, bool is_type, const char *function);
+
+/* --- what a model has --------------------------------------------------------------------------------------------- */
 
 extern const uint32_t model_variables;
 extern const fmu_variable_t model_variable[]; /* by value reference */
@@ -71,5 +80,20 @@ void model_put_outputs(fmu_t *fmu);
 size_t model_state_size(const fmu_t *fmu);
 void model_state_save(const fmu_t *fmu, uint8_t *state);
 bool model_state_restore(fmu_t *fmu, const uint8_t *state, size_t size);
+
+/* --- what a model with event mode has: FMU_EVENTS is defined in fmu_config.h -------------------------------------- */
+
+/* Binary variables and clocks, at their value reference and of their type. Setting: false where the bytes are too many,
+ * and said so. The bytes that are got stand until the next call for the instance. */
+bool model_set_binary(fmu_t *fmu, uint32_t variable, const uint8_t *bytes, size_t size);
+void model_get_binary(fmu_t *fmu, uint32_t variable, const uint8_t **bytes, size_t *size);
+void model_set_clock(fmu_t *fmu, uint32_t variable, bool is_active);
+bool model_get_clock(fmu_t *fmu, uint32_t variable);
+
+/* At the end of a step: whether an output clock ticks, so that event mode is needed. */
+bool model_ticks(fmu_t *fmu);
+
+/* At the end of an iteration in event mode; sets the outputs. */
+void model_update(fmu_t *fmu);
 
 #endif
