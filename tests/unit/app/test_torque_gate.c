@@ -151,6 +151,19 @@ TEST(settings_become_times_and_slopes)
     }
 }
 
+/* A second after the last COMMAND, and not a microsecond sooner. */
+TEST(without_commands_torque_is_abandoned_after_a_second)
+{
+    torque_gate_t gate;
+    torque_gate_init(&gate, &config.settings);
+    TEST_ASSERT_TRUE(torque_gate_is_abandoned(&gate)); /* there was none yet */
+    torque_gate_keep_alive(&gate);
+    torque_gate_idle(&gate, 1000000u);
+    TEST_ASSERT_FALSE(torque_gate_is_abandoned(&gate));
+    torque_gate_idle(&gate, 1u);
+    TEST_ASSERT_TRUE(torque_gate_is_abandoned(&gate));
+}
+
 /* Once is enough; a keep-alive does not end it, and asking does not either while it is there. */
 /* R37 */
 TEST(what_does_harm_bars_the_gate_until_torque_is_asked_for)
