@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define KEEP_ALIVE 0.25 /* [s], between two commands that keep the torque alive */
+#define KEEP_ALIVE 0.25 /* [s], between two commands that keep torque and correction alive */
 #define IDLE_US 5000u   /* without a sample, after which lever_idle() is called */
 
 enum {
@@ -176,18 +176,16 @@ static float reading(fmu_t *fmu, uint32_t which, bool *valid)
     return *valid ? (float)fmu->value[at] : 0.0f;
 }
 
-/* What the inputs ask for; repeated while torque is to be kept alive. */
+/* What the inputs ask for; repeated while torque or a correction is to be kept alive. */
 static void command(fmu_t *fmu)
 {
     controller_t *controller = fmu->model;
     const bool freezes = (fmu->value[AT_freeze] != 0.0);
     const bool resets = (fmu->value[AT_reset] != 0.0);
     const double rms = fmu->value[AT_dither_rms];
-    const bool damps = (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_DAMPING) ||
-                       (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING) ||
-                       (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING);
+    const bool mitigates = (controller->config.mitigation != (uint8_t)LEVER_MITIGATION_NONE);
     const uint64_t repetition = (uint64_t)fmax(1.0, floor((KEEP_ALIVE / fmu->period) + 0.5));
-    const bool is_due = ((fmu->samples - controller->commanded) >= repetition) && (damps || (rms > 0.0));
+    const bool is_due = ((fmu->samples - controller->commanded) >= repetition) && (mitigates || (rms > 0.0));
     lever_command_t to = {LEVER_REQUEST_NONE, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, (float)rms};
     if (resets && !controller->resets) {
         to.request = LEVER_REQUEST_RESET;
