@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 PERIOD = 1e-3
 Q_RATE = 0.05  # random walk of the rate [rad/s/sqrt(s)]
 INPUT_CHANGE = np.array([0.3, 0.05])
-"""From sample to sample, of z_ddot [m/s^2] and tau_m [N m]: a sixth of what the firmware takes for a jump at its start."""
+"""From sample to sample, of z_ddot [m/s^2] and tau_m [N m]: a sixth of what the firmware takes for a jump at first."""
 R = np.array([1e-3, 1e-2])  # standard deviations of theta [rad], theta_dot [rad/s]
 Q = Q_RATE**2 * np.array([[PERIOD**3 / 3.0, PERIOD**2 / 2.0], [PERIOD**2 / 2.0, PERIOD]])  # van Loan (1978)
 
