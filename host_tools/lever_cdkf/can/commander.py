@@ -19,7 +19,7 @@ KEEP: dict[str, codec.Value] = {
 """A COMMAND that changes nothing; infinity saturates at the value that keeps the dither."""
 
 KEEP_ALIVE = 0.25
-"""[s] after which to repeat a COMMAND, so that torque goes on: the estimator waits for a second."""
+"""[s] after which to repeat a COMMAND, so that torque and correction go on: the estimator waits for a second."""
 
 ACCEPTED, SEQUENCE = "accepted", "sequence"
 UNANSWERED = "no COMMAND_ACK: is an estimator, of this version, on the bus?"

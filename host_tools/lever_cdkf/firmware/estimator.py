@@ -169,8 +169,8 @@ class Estimator:
     ) -> None:
         """Carries out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
 
-        dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque fades out a second
-        of sample time after the last command: repeat one. Raises LeverError.
+        dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque and
+        correction fade out a second of sample time after the last command: repeat one. Raises LeverError.
         """
         choices = zip(CHOICES, (model, preload, estimator, adaptation, mitigation), strict=True)
         command = make_command(request, dither_rms, **dict(choices))

@@ -1,7 +1,7 @@
 """A run in lock-step over any python-can bus: one sample out, one estimate back, whatever time that takes.
 
 An estimate says which sample it belongs to, by the low bits of its time: what answers another one is not taken for this
-one's. Dither needs a COMMAND a second, and gets one every KEEP_ALIVE of simulated time.
+one's. Dither and mitigation need a COMMAND a second, and get one every KEEP_ALIVE of simulated time.
 
 Everything that does not depend on the estimator (excitation, noise, dropouts, truth) is made beforehand, everything
 that is not needed to go on (decoding, statistics, files) is done afterwards, both in whole columns; the loop in between

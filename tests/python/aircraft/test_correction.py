@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lever_cdkf.can.commander import KEEP_ALIVE
 from lever_cdkf.firmware.aircraft import Correction
 from lever_cdkf.firmware.native import Config, Estimator
 from lever_sil.plants import lever_plant
@@ -24,11 +25,13 @@ def feedthrough(frequency: float) -> complex:
 
 
 def corrections(mitigation: str, frequency: float, seconds: float = 8.0) -> list[Correction]:
-    """Those of an estimator that knows the arm, on a base that moves by a sine of BASE."""
+    """Return those of an estimator that knows the arm and is sent COMMANDs, on a base that moves by a sine of BASE."""
     settings = ARM | {f"{name}_sigma": 1e-3 for name in ARM}
     estimator = Estimator(Config(settings=settings, mitigation=mitigation))
     response, turn, found = BASE * feedthrough(frequency), 2.0 * np.pi * frequency, []
     for sample in range(round(1e3 * seconds)):
+        if sample % round(1e3 * KEEP_ALIVE) == 0:
+            estimator.command()
         phase = np.exp(1j * turn * 1e-3 * sample)
         moved = response * phase
         estimator.update(1000 * sample, TRIM + moved.imag, (1j * turn * moved).imag, 0.0, BASE * phase.imag)

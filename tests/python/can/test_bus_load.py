@@ -15,7 +15,8 @@ from lever_cdkf.can.commander import KEEP_ALIVE, Commander
 from lever_cdkf.firmware.aircraft import AircraftResponse
 
 README = Path(__file__).parents[3] / "firmware/can/README.md"
-SECONDS, BIT_RATE = 4.0, 1_000_000
+START, SECONDS, BIT_RATE = 1.0, 4.0, 1_000_000
+"""Time left to the alignment, in which nothing is driven [s]; what is counted after it [s]; bits each second."""
 BEHIND_CRC = 1 + 2 + 7 + 3
 """Delimiter of the CRC, acknowledgement, end of frame, interframe space: not stuffed."""
 FREQUENCIES = [1.5 + 0.5 * i for i in range(14)]
@@ -53,11 +54,11 @@ def test_bits_are_those_of_known_frames() -> None:
 
 
 def load(period: float, only_estimate: bool, snapshots: float | None) -> float:
-    """Part of the bus that a lever that is shaken and dithered takes, in percent."""
+    """Return the part of the bus [%] that a lever takes that is shaken, and dithered by a motor that obeys."""
     settings: dict[str, str | float] = {"sample_period": period}
     if not only_estimate:
         settings["mitigation"] = "cancellation_and_damping"
-    bits, commander = 0, Commander()
+    bits, torque, commander = 0, 0.0, Commander()
     with LeverBus(
         settings=settings,
         aircraft=None if only_estimate else HELICOPTER,
@@ -68,20 +69,23 @@ def load(period: float, only_estimate: bool, snapshots: float | None) -> float:
         def send(identifier: int, data: bytes) -> None:
             bus.send(Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
-        for k in range(round(SECONDS / period)):
+        for k in range(round((START + SECONDS) / period)):
             time = k * period
             phase = 2.0 * math.pi * 3.0 * time
             if not only_estimate:
                 if k % round(KEEP_ALIVE / period) == 0:
                     commander.send({"dither_rms": 0.3}, send)
                 send(0x112, codec.encode("GRIP_SAMPLE", k, {"grip_force": 5.0 * math.sin(phase)}))
-            swing = {"theta": 0.35 + 0.02 * math.sin(phase), "theta_dot": 0.377 * math.cos(phase), "tau_m": 0.1}
+            swing = {"theta": 0.35 + 0.02 * math.sin(phase), "theta_dot": 0.377 * math.cos(phase), "tau_m": torque}
             send(0x110, codec.encode("LEVER_SAMPLE", k, swing))
             base = {"z_ddot": 1.5 * math.sin(phase + 0.4), "time_us": round(time * 1e6)}
             send(0x111, codec.encode("BASE_SAMPLE", k, base))
             for message in bus:
-                names = ("LEVER_SAMPLE", "BASE_SAMPLE", "STATE_ESTIMATE")
-                if not only_estimate or codec.message(message.arbitration_id).name in names:
+                name = codec.message(message.arbitration_id).name
+                if name == "MOTOR_COMMAND":
+                    torque = codec.decode(message.arbitration_id, message.data)[1]["torque"]
+                counted = ("LEVER_SAMPLE", "BASE_SAMPLE", "STATE_ESTIMATE")
+                if time >= START and (not only_estimate or name in counted):
                     bits += bits_of(message.arbitration_id, bytes(message.data))
     return 100.0 * bits / (SECONDS * BIT_RATE)
 

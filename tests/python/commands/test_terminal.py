@@ -25,7 +25,7 @@ from processes import LEVER
 Shown = Callable[..., str]
 COMMANDS = (
     *("aircraft", "bounce", "campaign", "compare", "dbc", "demo", "envelope", "faults", "figures", "flash"),
-    *("live", "map", "monitor", "qemu", "record", "replay", "settings", "sim", "soak", "tune"),
+    *("fmu", "live", "map", "monitor", "qemu", "record", "replay", "settings", "sim", "soak", "tune"),
 )
 ROWS: list[Row] = [
     {

@@ -72,9 +72,14 @@ def test_other_pilots_too(name: str, controller: Path, tmp_path: Path) -> None:
     assert compared(scenario, Loop(Instance(unpacked(fmu, tmp_path / "pilot")), own)) == []
 
 
-def test_a_helicopter_with_mitigation_too(tmp_path: Path) -> None:
-    """The scenario's aircraft moves the cabin; the controller watches the margin, corrects and damps."""
-    changes = ["--set", "duration=6 s", "--set", "mitigation=cancellation_and_damping"]
+@pytest.mark.parametrize(
+    "changed",
+    [["mitigation=cancellation_and_damping"], ["mitigation=cancellation", 'torque=[{kind="firmware", rms="0 N m"}]']],
+)
+def test_a_helicopter_with_mitigation_too(changed: list[str], tmp_path: Path) -> None:
+    """The scenario's aircraft moves the cabin; the controller watches the margin, corrects and, with dither, damps. A
+    correction by itself needs commands as well, or it ends after a second."""
+    changes = [text for each in ("duration=6 s", *changed) for text in ("--set", each)]
     scenario = load("bounce", changes[1::2])
     assert cli.main(["fmu", "pilot", "-o", str(tmp_path / "p.fmu"), "--scenario", "bounce", *changes]) == 0
     own = [f"{name}={value}" for name, value in {**scenario.config.choices, **scenario.config.settings}.items()]

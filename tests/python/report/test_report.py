@@ -167,11 +167,8 @@ def test_parameter_curves_are_those_of_the_trace(page: Reader, result: Result) -
         for name, kind in (("truth", "true"), ("estimate", "estimate")):
             trace = traces(page, "figure-parameters", name)[row]
             x = unpack(trace["x"])
-            drawn = np.isfinite(unpack(trace["y"]))  # where it is flagged, another curve goes on
-            expected = at(result, x, f"{key}_{kind}{suffix}")
-            np.testing.assert_allclose(unpack(trace["y"])[drawn], expected[drawn], rtol=1e-6)
+            np.testing.assert_allclose(unpack(trace["y"]), at(result, x, f"{key}_{kind}{suffix}"), rtol=1e-6)
             assert 1000 < len(x) < 2000
-            assert np.mean(drawn) > 0.5
         lower, upper = traces(page, "figure-parameters", "estimate ± 2σ")[2 * row : 2 * row + 2]
         x = unpack(upper["x"])
         width = 4.0 * at(result, x, f"{key}_sigma{suffix}")
@@ -180,7 +177,8 @@ def test_parameter_curves_are_those_of_the_trace(page: Reader, result: Result) -
 
 
 def test_estimates_that_are_flagged_are_grey(result: Result) -> None:
-    """Every row is in one of two curves, by the mask of the faults that say "do not trust this"."""
+    """By a curve over that of all estimates, by the mask of the faults that say "do not trust this"; one of both says
+    the value at the cursor."""
     faults = np.where(result.trace["time_s"] < 6.0, 0.0, 65536.0)  # calibration
     run = Run({**result.trace, "faults": faults}, result.summary)
     figure = tracking.parameters(run)
@@ -190,8 +188,11 @@ def test_estimates_that_are_flagged_are_grey(result: Result) -> None:
     assert grey["line"]["color"] == "@quiet"
     x = unpack(grey["x"])
     known = np.isfinite(at(result, x, "k_p_estimate_N_m"))
-    assert np.array_equal(np.isfinite(unpack(curves["estimate"]["y"])), known & (x < 6.0))
-    assert np.array_equal(np.isfinite(unpack(grey["y"]))[x >= 6.0], known[x >= 6.0])
+    assert np.array_equal(np.isfinite(unpack(curves["estimate"]["y"])), known)
+    assert np.array_equal(np.isfinite(unpack(grey["y"])), known & (x >= 6.0))
+    assert grey["line"]["width"] > curves["estimate"]["line"]["width"]
+    assert grey["hoverinfo"] == "skip"
+    assert "hovertemplate" not in grey
 
 
 def test_the_headline_begins_with_the_warning(result: Result) -> None:

@@ -10,7 +10,7 @@ import can
 import numpy as np
 import pytest
 from lever_cdkf import cli
-from lever_cdkf.firmware.native import Config, enum_names, run_samples
+from lever_cdkf.firmware.native import Config, enum_names, enum_words, run_samples
 from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
 
@@ -105,9 +105,7 @@ def test_what_the_estimator_warns_of_is_said(flight: Flight, tmp_path: Path) -> 
     verdict, shares, flagged = said("stuck", flight.theta, np.where(moving, flight.z_ddot, flight.z_ddot[499]))
     assert shares["base"] > 0.9
     assert flagged > 0.9
-    assert verdict.startswith(
-        "Do not trust the estimates: the base acceleration is missing, or does not fit the motion"
-    )
+    assert verdict.startswith(f"Do not trust the estimates: {enum_words('lever_fault')['base']} (")
     assert "Next: check sign, unit and gravity of z_ddot." in verdict
     verdict, shares, flagged = said("frozen", np.where(moving, flight.theta, flight.theta[0]), flight.z_ddot)
     assert shares["theta"] > 0.9

@@ -56,11 +56,14 @@ def sheet(name: str, width: str = "single") -> Any:
 
 @pytest.fixture(scope="module", autouse=True)
 def commands() -> Iterator[None]:
-    """The sub-commands of pyproject.toml, installed or not, and figures of short runs."""
-    entries = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][cli.COMMANDS]
-    found = [importlib.metadata.EntryPoint(name, value, cli.COMMANDS) for name, value in entries.items()]
+    """Provides the entry points of pyproject.toml, installed or not, and figures of short runs."""
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+
+    def entry_points(group: str) -> list[importlib.metadata.EntryPoint]:
+        return [importlib.metadata.EntryPoint(name, value, group) for name, value in groups.get(group, {}).items()]
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(importlib.metadata, "entry_points", lambda group: found)
+        patch.setattr(importlib.metadata, "entry_points", entry_points)
         patch.setattr(runs, "Extent", lambda: SHORT)
         patch.setattr(catalogue, "FIGURES", ONCE)
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")

@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 
 PERIOD = 1e-3
 Q_RATE = 0.05  # random walk of the rate [rad/s/sqrt(s)]
+INPUT_CHANGE = np.array([0.3, 0.05])
+"""From sample to sample, of z_ddot [m/s^2] and tau_m [N m]: a sixth of what the firmware takes for a jump at first."""
 R = np.array([1e-3, 1e-2])  # standard deviations of theta [rad], theta_dot [rad/s]
 Q = Q_RATE**2 * np.array([[PERIOD**3 / 3.0, PERIOD**2 / 2.0], [PERIOD**2 / 2.0, PERIOD]])  # van Loan (1978)
 
@@ -28,7 +30,7 @@ def simulate(p: Array, count: int, seed: int) -> NDArray[np.void]:
     """Samples (SAMPLE) of a system with parameters p, shaken and pushed at random."""
     rng = np.random.default_rng(seed)
     a, b = system(p)
-    inputs = np.cumsum(rng.standard_normal((count, 2)), axis=0) * np.array([0.1, 0.3])
+    inputs = np.cumsum(rng.standard_normal((count, 2)), axis=0) * INPUT_CHANGE
     inputs -= 0.5 * (inputs[0] + inputs[-1])
     noise = rng.standard_normal((count, 2)) @ np.linalg.cholesky(Q).T
     x = np.zeros((count, 2))
@@ -43,9 +45,11 @@ def simulate(p: Array, count: int, seed: int) -> NDArray[np.void]:
     return samples
 
 
-def log_likelihood(samples: NDArray[np.void], sets: Array) -> Array:
-    """Of all samples but the first, at which the state starts with the uncertainty of its measurement; for each row of
-    `sets` (S, 3)."""
+def log_likelihood(samples: NDArray[np.void], sets: Array, begin: int = 1) -> Array:
+    """Return that of the samples from `begin` on, given those before, for each row of `sets` (S, 3).
+
+    At the first sample, which is none of them, the state starts with the uncertainty of its measurement.
+    """
     pairs = [system(p) for p in sets]
     a, b = np.stack([pair[0] for pair in pairs]), np.stack([pair[1] for pair in pairs])
     u = np.stack([samples["z_ddot"], samples["tau_m"]], axis=1).astype(np.float64)
@@ -60,7 +64,9 @@ def log_likelihood(samples: NDArray[np.void], sets: Array) -> Array:
         innovation = y[i] - x
         gain = covariance @ np.linalg.inv(predicted)
         weighted = np.linalg.solve(predicted, innovation[..., None])[..., 0]
-        total -= 0.5 * (np.einsum("si,si->s", innovation, weighted) + np.log(np.linalg.det(2.0 * np.pi * predicted)))
+        if i >= begin:
+            size = np.log(np.linalg.det(2.0 * np.pi * predicted))
+            total -= 0.5 * (np.einsum("si,si->s", innovation, weighted) + size)
         x = x + np.einsum("sij,sj->si", gain, innovation)
         covariance = covariance - gain @ covariance
     return total

@@ -16,16 +16,18 @@
 #include <stddef.h>
 #include <string.h>
 
-/* cdkf_measurement_update() of filter/cdkf.c, which is built with this name here (CMakeLists.txt), so that its caller
- * in app/ comes to the one below instead. */
+/* cdkf_measurement_update() and cdkf_learn() of filter/, which are built with these names here (CMakeLists.txt), so
+ * that their callers in app/ come to the ones below instead. */
 void firmware_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS]);
+void firmware_learn(cdkf_t *cdkf, float period, float caution, correction_t *correction);
 
 #define PARAMETERS ((uint32_t)MODEL_PARAMETERS)
 #define BOTH ((uint32_t)INNOVATION_OUTPUTS)
 #define LN_TURN 1.8378770664093453 /* ln 2 pi */
 
 static sample_innovation_t *current; /* of the sample that the estimator is taking; NULL: nobody asks */
+static sample_innovation_t *block;   /* of the first sample from which the parameters have not learnt yet */
 
 static double squared(double x)
 {
@@ -75,9 +77,18 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
 {
     if (current != NULL) {
         note_prediction(cdkf, y, valid, current);
-        current->learns = learn;
     }
     firmware_update(cdkf, y, valid, learn, innovation);
+}
+
+/* The end of a block: what it says of the parameters is pending, unless app/ has dropped it. */
+void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correction)
+{
+    const bool learns = (cdkf->pending.matrix[0] > 0.0f);
+    for (; (current != NULL) && (block <= current); block++) {
+        block->learns = learns && (block->size != 0u);
+    }
+    firmware_learn(cdkf, period, caution, correction);
 }
 
 bool innovation_run(
@@ -86,6 +97,7 @@ bool innovation_run(
     static lever_memory_t memory;
     lever_t *lever = lever_init(&memory, config);
     (void)memset(innovations, 0, (size_t)count * sizeof innovations[0]);
+    block = innovations;
     for (uint32_t k = 0u; (lever != NULL) && (k < count); k++) {
         current = &innovations[k];
         (void)lever_update(lever, &samples[k]);

@@ -23,7 +23,7 @@ typedef struct sample_innovation {
     float sigma[INNOVATION_OUTPUTS]; /* its predicted standard deviation; 0 likewise */
     float nis;                       /* normalised innovation squared, chi-square with `size` degrees of freedom */
     uint8_t size;                    /* outputs used; 0 while aligning */
-    bool learns;                     /* the parameters learn from it: settled, excited, not frozen */
+    bool learns;                     /* the parameters learn from the block that it is in */
 } sample_innovation_t;
 
 /* Feeds `count` samples to a fresh estimator, one innovation for each. False if the configuration is refused. */

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#define KEEP_ALIVE 0.25 /* [s], between two commands that keep the torque alive */
+#define KEEP_ALIVE 0.25 /* [s], between two commands that keep torque and correction alive */
 
 void input_start(fmu_t *fmu)
 {
@@ -62,18 +62,16 @@ static float reading(fmu_t *fmu, uint32_t which, bool *valid)
     return *valid ? (float)fmu->value[at] : 0.0f;
 }
 
-/* What the inputs ask for; repeated while torque is to be kept alive. */
+/* What the inputs ask for; repeated while torque or a correction is to be kept alive. */
 static void command(fmu_t *fmu)
 {
     controller_t *controller = fmu->model;
     const bool freezes = (fmu->value[AT_freeze] != 0.0);
     const bool resets = (fmu->value[AT_reset] != 0.0);
     const double rms = fmu->value[AT_dither_rms];
-    const bool damps = (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_DAMPING) ||
-                       (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_CANCELLATION_AND_DAMPING) ||
-                       (controller->config.mitigation == (uint8_t)LEVER_MITIGATION_NOTCH_AND_DAMPING);
+    const bool mitigates = (controller->config.mitigation != (uint8_t)LEVER_MITIGATION_NONE);
     const uint64_t repetition = (uint64_t)fmax(1.0, floor((KEEP_ALIVE / fmu->period) + 0.5));
-    const bool is_due = ((fmu->samples - controller->input.commanded) >= repetition) && (damps || (rms > 0.0));
+    const bool is_due = ((fmu->samples - controller->input.commanded) >= repetition) && (mitigates || (rms > 0.0));
     lever_command_t to = {LEVER_REQUEST_NONE, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, LEVER_KEEP, (float)rms};
     if (resets && (controller->input.resets == 0u)) {
         to.request = LEVER_REQUEST_RESET;

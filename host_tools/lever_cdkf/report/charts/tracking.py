@@ -57,13 +57,10 @@ def _traces(run: Run, quantity: Quantity, row: int, chosen: np.ndarray) -> list[
         traces.append(line(time, truth[chosen], "truth", "truth", row, line_dash="dash", zorder=1, hovertemplate=hover))
     if (estimate := run.estimate(quantity)) is not None:
         hover = f"estimated {quantity.name} %{{y:.4g}}{unit}<extra></extra>"
+        traces.append(line(time, estimate[chosen], "estimate", "estimate", row, hovertemplate=hover))
         flagged = run.flagged[chosen]
-        trusted = np.where(flagged, np.nan, estimate[chosen])
-        traces.append(line(time, trusted, "estimate", "estimate", row, hovertemplate=hover))
-        if flagged.any():
-            joined = flagged | np.roll(flagged, 1)  # up to where the other line goes on
-            joined[0] = flagged[0]
-            doubtful = np.where(joined, estimate[chosen], np.nan)
-            hover = hover.replace("estimated", "flagged:")
-            traces.append(line(time, doubtful, "estimate, flagged: do not trust", "quiet", row, hovertemplate=hover))
+        if flagged.any():  # drawn over the other; its label is that of the other
+            flagged[1:] |= flagged[:-1]  # a single sample is a line to the next
+            doubtful, style = np.where(flagged, estimate[chosen], np.nan), {"line_width": 2.4, "hoverinfo": "skip"}
+            traces.append(line(time, doubtful, "estimate, flagged: do not trust", "quiet", row, **style))
     return traces
