@@ -154,7 +154,9 @@ def test_what_is_no_operation_is_a_format_error(
     assert frames(sent) == flight[0][1]
     assert list(operations(sent))[-1] == (ls_bus.FORMAT_ERROR, struct.pack("<H", len(wrong)) + wrong)
     assert [status for status, _ in instance.messages] == [1]
-    assert "no operation of FMI-LS-BUS for CAN" in instance.messages[0][1]
+    text = instance.messages[0][1]
+    assert "no operation of FMI-LS-BUS for CAN: " in text
+    assert ("code is unknown" in text) == (wrong[0] == 0x99)
 
 
 def bus_error(sender: int, first: int = 1) -> bytes:

@@ -69,6 +69,7 @@ static bool read_bus_error(const uint8_t *bytes, can_operation_t *operation)
 static bool read_arguments(const uint8_t *bytes, can_operation_t *operation)
 {
     bool is_right = true; /* what no node answers is not looked into */
+    operation->fault = "its arguments or its length are not those of its code";
     switch (operation->code) {
     case CAN_TRANSMIT:
         is_right = read_transmit(bytes, operation);
@@ -88,6 +89,7 @@ static bool read_arguments(const uint8_t *bytes, can_operation_t *operation)
     case CAN_WAKEUP:
         break;
     default:
+        operation->fault = "its code is unknown";
         is_right = false;
         break;
     }
@@ -99,6 +101,7 @@ bool can_operation_read(const uint8_t *bytes, size_t size, can_operation_t *oper
     bool is_right = false;
     (void)memset(operation, 0, sizeof *operation);
     operation->length = size;
+    operation->fault = "its length is not that of the bytes there";
     if (size >= (size_t)HEAD) {
         const uint32_t length = number(&bytes[4], 4u);
         operation->code = number(bytes, 4u);

@@ -28,6 +28,7 @@ enum can_status { CAN_ERROR_ACTIVE = 1, CAN_ERROR_PASSIVE = 2, CAN_BUS_OFF = 3 }
 typedef struct can_operation {
     uint32_t code;       /* enum can_code */
     size_t length;       /* bytes, all of it */
+    const char *fault;   /* why these bytes are no operation, where they are none */
     bool is_data;        /* of CAN_TRANSMIT: a data frame with an 11-bit identifier */
     lever_frame_t frame; /* then */
     bool is_first;       /* of CAN_BUS_ERROR: this node has found the error */

@@ -163,8 +163,9 @@ static void take_all(fmu_t *fmu)
             take(fmu, &operation);
         } else {
             const can_buffer_t buffer = to_send(input);
-            fmu_log(fmu, fmi3Warning, "Rx_Data, byte %zu: no operation of FMI-LS-BUS for CAN (code 0x%X)", at,
-                (unsigned)operation.code);
+            fmu_log(fmu, fmi3Warning,
+                "Rx_Data, byte %zu: no operation of FMI-LS-BUS for CAN: %s (code 0x%X, %zu bytes)", at, operation.fault,
+                (unsigned)operation.code, operation.length);
             (void)can_put_format_error(&buffer, bytes, operation.length);
         }
         at += operation.length;

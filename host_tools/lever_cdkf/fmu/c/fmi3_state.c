@@ -1,7 +1,9 @@
 /* FMI 3.0: the state of an instance. */
 #include "fmi3Functions.h"
 #include "fmu.h"
+#include "math/crc32.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,11 +12,14 @@
 
 typedef struct head {
     uint32_t magic;
-    uint32_t phase;
+    uint32_t crc; /* CRC-32 of what follows it, in a serialised state; 0 in others */
     uint64_t samples;
     double start_time;
-    char token[64];
+    uint32_t phase;
+    char token[68];
 } head_t;
+
+enum { CRC_ENDS = 8 };
 
 typedef struct saved {
     size_t size;
@@ -26,6 +31,15 @@ static bool has_model_state(const fmu_t *fmu)
     return (fmu->phase >= (uint32_t)FMU_INITIALIZING) && !fmu->changed;
 }
 
+static uint32_t checksum(const uint8_t *bytes, size_t size)
+{
+    uint32_t crc = CRC32_START;
+    for (size_t i = CRC_ENDS; i < size; i++) {
+        crc = crc32_shift(crc ^ bytes[i], 8u);
+    }
+    return ~crc;
+}
+
 static size_t values_size(void)
 {
     return sizeof(head_t) + (model_variables * (sizeof(double) + 1u));
@@ -34,7 +48,7 @@ static size_t values_size(void)
 static void save(const fmu_t *fmu, uint8_t *bytes)
 {
     const size_t values = model_variables * sizeof fmu->value[0];
-    head_t head = {STATE_MAGIC, fmu->phase, fmu->samples, fmu->start_time, {0}};
+    head_t head = {STATE_MAGIC, 0u, fmu->samples, fmu->start_time, fmu->phase, {0}};
     (void)snprintf(head.token, sizeof head.token, "%s", model_token);
     (void)memcpy(bytes, &head, sizeof head);
     (void)memcpy(&bytes[sizeof head], fmu->value, values);
@@ -60,20 +74,34 @@ fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state)
     return fmi3OK;
 }
 
+/* Why bytes are no state of this FMU; NULL: they are one. */
+static const char *fault(const uint8_t *bytes, size_t size)
+{
+    head_t head = {0};
+    const bool has_head = size >= sizeof head;
+    if (has_head) {
+        (void)memcpy(&head, bytes, sizeof head);
+        head.token[sizeof head.token - 1u] = '\0';
+    }
+    const char *found = NULL;
+    if (!has_head || (head.magic != STATE_MAGIC)) {
+        found = "they do not begin as one";
+    } else if (strncmp(head.token, model_token, sizeof head.token - 1u) != 0) {
+        found = "they are a state of another FMU, or of another version of this one";
+    } else if ((size < values_size()) || (head.crc != checksum(bytes, size))) {
+        found = "they are damaged or incomplete, as their CRC-32 is wrong";
+    } else {
+        /* none */
+    }
+    return found;
+}
+
 /* Values first, as the model starts from them; again after that, as it has set the outputs. */
 static bool restore(fmu_t *fmu, const uint8_t *bytes, size_t size)
 {
     head_t head;
     const size_t values = model_variables * sizeof fmu->value[0];
-    if (size < values_size()) {
-        return false;
-    }
     (void)memcpy(&head, bytes, sizeof head);
-    head.token[sizeof head.token - 1u] = '\0';
-    if ((head.magic != STATE_MAGIC) || (head.phase > (uint32_t)FMU_TERMINATED) ||
-        (strncmp(head.token, model_token, sizeof head.token - 1u) != 0)) {
-        return false;
-    }
     (void)memcpy(fmu->value, &bytes[sizeof head], values);
     bool is_whole = true;
     if (size > values_size()) {
@@ -129,13 +157,19 @@ fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState state, fmi3
         return fmi3Error;
     }
     (void)memcpy(bytes, saved->bytes, saved->size);
+    const uint32_t crc = checksum(bytes, saved->size);
+    (void)memcpy(&bytes[offsetof(head_t, crc)], &crc, sizeof crc);
     return fmi3OK;
 }
 
-/* It is judged where it is set. */
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
 {
     fmi3FreeFMUState(instance, state);
+    const char *wrong = fault(bytes, size);
+    if (wrong != NULL) {
+        fmu_log(instance, fmi3Error, "%zu bytes are no state of this FMU: %s", size, wrong);
+        return fmi3Error;
+    }
     saved_t *saved = calloc(1u, sizeof *saved + size);
     if (saved == NULL) {
         fmu_log(instance, fmi3Error, "no memory left for a state");
