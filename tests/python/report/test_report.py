@@ -92,7 +92,7 @@ def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
         assert float(row[1]) == pytest.approx(expected["bias_percent"], abs=0.005)
         assert float(row[2]) == pytest.approx(100.0 * expected["coverage_2sigma"], abs=0.05)
         for cell, times in ((row[3], "time_to_10_percent_s"), (row[4], "time_to_5_percent_s")):
-            shown = [None if text == "never" else float(text) for text in cell.split(", ")]
+            shown = [None if text == "–" else float(text) for text in cell.split(", ")]
             assert shown == [None if time is None else pytest.approx(time, abs=0.0051) for time in expected[times]]
     values = {row[0]: row[1] for row in run[1:]}
     summary = result.summary
