@@ -112,6 +112,16 @@ TEST(fades_in_linearly_over_its_time)
     TEST_ASSERT_TRUE(dither.level == 0.4f);
 }
 
+/* R41 */
+TEST(a_change_of_hardly_any_torque_fades_as_one_of_a_millionth)
+{
+    ask(4.0e-7f);
+    step(300u);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-9f, 3.0e-7f, dither.level);
+    step(101u);
+    TEST_ASSERT_TRUE(dither.level == 4.0e-7f);
+}
+
 TEST(without_a_fade_time_or_need_it_is_there_at_once)
 {
     start(1.0, 10.0, (double)PERIOD, 1.5, 0.0);

@@ -12,6 +12,7 @@
 
 static learning_t *learning;
 static grip_force_t *grip;
+static bool theta_is_missing;
 
 void setUp(void)
 {
@@ -19,6 +20,7 @@ void setUp(void)
     start();
     learning = &lever->estimator.learning;
     grip = &learning->force;
+    theta_is_missing = false;
 }
 
 /* `count` samples, with the force that makes the difference between held and alone, and `more`. */
@@ -34,6 +36,7 @@ static void run_gripped(uint32_t count, float more)
                                simulation_acceleration(&other, simulation.theta, simulation.theta_dot, input);
         sample.grip_force = ((ALONE / 0.45f) * (float)of_hand) + more;
         sample.grip_force_valid = true;
+        sample.theta_valid = !theta_is_missing;
         (void)lever_update(lever, &sample);
     }
 }
@@ -126,6 +129,16 @@ TEST(a_force_is_compensated_for_gain_and_bias)
     TEST_ASSERT_EQUAL_FLOAT((5.0f - 3.0f) / 1.25f, grip->raw);
 }
 
+/* With levels that are followed, the force's has to settle first. */
+TEST_EACH(LEVER_PRELOAD_COUNT, a_force_is_compared_from_its_first_sample_where_no_level_is_followed)
+{
+    config.preload = (uint8_t)test_round;
+    start();
+    (void)run(1000u);
+    run_gripped(1u, 0.0f);
+    TEST_ASSERT_EQUAL(test_round == (uint32_t)LEVER_PRELOAD_TRIM, grip->settling > 0.0f);
+}
+
 /* --- in flight ---------------------------------------------------------------------------------------------------- */
 
 /* What was learnt with it is taken back. */
@@ -141,6 +154,22 @@ TEST(a_force_that_is_found_wrong_is_said_and_what_it_taught_taken_back)
     TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_CALIBRATION));
     TEST_ASSERT_TRUE(learning->noise.elapsed < 0.021f); /* this block */
     TEST_ASSERT_EQUAL_MEMORY(&kept, &learning->kept[0], sizeof kept);
+}
+
+/* R5 R29 */
+TEST(while_levels_settle_after_an_outage_of_theta_the_force_teaches_nothing)
+{
+    run_gripped(SETTLED, 0.0f);
+    theta_is_missing = true;
+    run_gripped(100u, 0.0f);
+    theta_is_missing = false;
+    run_gripped(100u, 0.0f);
+    const lever_estimate_t before = estimate();
+    run_gripped(100u, 0.0f);
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_SETTLING) && !has_fault(LEVER_FAULT_EXCITATION));
+    TEST_ASSERT_TRUE(grip->right);
+    const lever_estimate_t after = estimate();
+    assert_same_parameters(&before, &after);
 }
 
 /* R5 */

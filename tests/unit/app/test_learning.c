@@ -455,6 +455,19 @@ TEST(a_lever_that_stands_still_teaches_nothing_until_it_moves)
     TEST_ASSERT_TRUE(!has_fault(LEVER_FAULT_EXCITATION) && (estimate().parameter[2] != before.parameter[2]));
 }
 
+/* R56 */
+TEST(after_a_long_gap_the_lever_has_to_be_seen_to_move_anew)
+{
+    config = config_of(0u);
+    start();
+    (void)run(3000u);
+    const averages_t *averages = &lever->estimator.averages;
+    TEST_ASSERT_TRUE((averages->excitation_square > 0.0f) && (averages->motion_square > 0.0f));
+    const lever_sample_t sample = sample_after(1000u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, lever_update(lever, &sample));
+    TEST_ASSERT_TRUE((averages->excitation_square == 0.0f) && (averages->motion_square == 0.0f));
+}
+
 /* R9 */
 TEST(a_parameter_that_rests_on_a_bound_is_reported_while_nothing_is_learnt)
 {
