@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import shlex
 import sys
 import textwrap
@@ -14,7 +15,7 @@ from ..can.identifiers import add_identifier_options
 from ..errors import LeverError
 from ..extras import require
 from ..files import check_not_input
-from ..layout import say
+from ..layout import command_lines, say, terminal_width
 from ..tables import Row, Tables, add_json_option
 from .signal_options import MAP_HELP, add_signal_options, chosen_reading, input_files
 
@@ -220,7 +221,7 @@ def _conclude(
     if written:
         say(f"Written: {', '.join(written)}")
     if args.output is not None:
-        say(f"Next: {_replay(args, mapping[0] if mapping else None)}")
+        _say_next(_replay(args, mapping[0] if mapping else None))
     return 0
 
 
@@ -228,18 +229,22 @@ def _refuse(args: argparse.Namespace, likelihood: Likelihood, calibration: Calib
     """Says what was found, why it is not believed, and what to try; the exit status."""
     from ..tables import print_tables
     from ..tune.likelihood import SHORTEST
+    from ..tune.search import NOISE
 
     tables: Tables = {"calibration": [_calibration_row(entry) for entry in calibration.entries]}
     print_tables(tables, args.json, inputs=[*args.log, *input_files(args)])
     say(f"{_subtitle(args, likelihood)} {calibration.text}")
-    kept = " ".join(f"--keep {entry.name}" for entry in calibration.entries)
     begin, length = likelihood.longest_calm()
-    part = (
-        f"try the longest part without a change of the arm (--start {args.start + begin:.0f} --length {length:.0f})"
-        if likelihood.changes and length >= SHORTEST
-        else "try a part in which the pilot holds still and smooth air shakes the lever (--start, --length)"
-    )
-    _note(f"no settings are written: {part}, or tune noise and walks alone ({kept})")
+    kept = [name for name in args.keep if name in NOISE]
+    if kept:
+        part = f"try without --keep {', '.join(kept)}, since noise that is set wrong looks like a wrong model"
+    elif likelihood.changes and length >= SHORTEST:
+        start, length = math.ceil(args.start + begin), math.floor(length - 1.0)
+        part = f"try the {length} s from {start} s on, the longest part in which the arm does not change"
+        _say_next(_tune(args, start, length))
+    else:
+        part = "try a part in which the pilot holds still and smooth air shakes the lever (--start, --length)"
+    _note(f"no settings are written, since the calibration is not believed: {part}")
     return 1
 
 
@@ -263,14 +268,38 @@ def _delay_to_mapping(
     return {**after, "z_ddot_delay": 0.0}, (args.output.with_suffix(".mapping.toml"), as_toml(changed))
 
 
+def _say_next(command: str) -> None:
+    """Prints a command, to be copied."""
+    print("Next:", *command_lines(command, terminal_width()), sep="\n")
+
+
 def _replay(args: argparse.Namespace, mapping: Path | None) -> str:
     """The command that flies the log with what was found."""
-    words = ["lever", "replay", *args.log]
-    words += ["--dbc", args.dbc] if args.dbc else []
-    words += ["--map", str(mapping)] if mapping is not None else ["--map", *args.map] if args.map else []
-    words += ["--channel", args.channel] if args.channel else []
-    words += ["--clock", args.clock] if args.clock else []
+    words = ["lever", "replay", *_log_words(args, args.map if mapping is None else [str(mapping)])]
     return shlex.join([*words, "--settings", str(args.output)])
+
+
+def _tune(args: argparse.Namespace, start: int, length: int) -> str:
+    """The same command, of another part of the log."""
+    given = {"--settings": args.settings, "-o": args.output, "--page": args.page}
+    words = ["lever", "tune", *_log_words(args, args.map), "--start", str(start), "--length", str(length)]
+    words += [word for option, value in given.items() if value is not None for word in (option, str(value))]
+    words += [word for text in args.set for word in ("--set", text)]
+    words += [word for name in args.keep for word in ("--keep", name)]
+    return shlex.join(words)
+
+
+def _log_words(args: argparse.Namespace, mapping: Sequence[str]) -> list[str]:
+    """The log and how it is read, as arguments."""
+    given = {
+        "--dbc": args.dbc,
+        "--channel": args.channel,
+        "--clock": args.clock,
+        "--id-offset": args.id_offset,
+        "--id-base": args.id_base,
+    }
+    words = [word for option, value in given.items() if value is not None for word in (option, str(value))]
+    return [*args.log, *words, *(["--map", *mapping] if mapping else [])]
 
 
 def _subtitle(args: argparse.Namespace, likelihood: Likelihood) -> str:
