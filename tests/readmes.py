@@ -6,7 +6,7 @@ import re
 import shlex
 from pathlib import Path
 
-KEPT = "m_p_walk c_p_walk k_p_walk walk_ceiling robbins_monro_time theta_dot_noise theta_dot_process_noise"
+KEPT = "m_p_walk c_p_walk k_p_walk walk_ceiling robbins_monro_time z_ddot_gain z_ddot_delay lever_friction"
 SHORTER = {
     r"lever tune \S+": r"\g<0>" + "".join(f" --keep {name}" for name in KEPT.split()),
     r"(?m)^lever replay (?!.*(?:--format|out/replay))(.*(?:-o|--out) \S+)": r"lever replay \1 --format csv",

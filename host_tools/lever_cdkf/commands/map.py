@@ -82,7 +82,9 @@ def run(args: argparse.Namespace) -> int:
         layout.say(f"{note}.")
     if len(changing) < len(others):
         layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
-    print(*layout.command_lines(_command(args, mapping, proposed), layout.terminal_width()), sep="\n")
+    signals_of = _signal_options(args, mapping, proposed)
+    for command in (f"lever tune {signals_of} -o my.settings", f"lever replay {signals_of}"):
+        print(*layout.command_lines(command, layout.terminal_width()), sep="\n")
     origin = provenance(read)
     if args.toml is not None:
         write_text(args.toml, origin.comment() + as_toml(mapping))
@@ -122,10 +124,10 @@ def _row(key: str, signal: Signal) -> Row:
     }
 
 
-def _command(args: argparse.Namespace, mapping: Mapping, proposed: list[Candidate]) -> str:
-    """How to use the proposal."""
+def _signal_options(args: argparse.Namespace, mapping: Mapping, proposed: list[Candidate]) -> str:
+    """The log and the proposal, as arguments of commands that read signals."""
     database = f" --dbc {shlex.quote(args.dbc)}" if args.dbc else ""
     turned = {key: ",sign=-1" if source.sign == -1 else "" for key, source in mapping.sources.items()}
     entries = [shlex.quote(f"{each.key}={each.signal.name}{turned[each.key]}") for each in proposed]
     time = [shlex.quote(f"time={args.time}")] if args.time else []
-    return f"lever replay {shlex.quote(args.log)}{database} --map {' '.join([*entries, *time])}"
+    return f"{shlex.quote(args.log)}{database} --map {' '.join([*entries, *time])}"

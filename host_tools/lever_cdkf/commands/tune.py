@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import math
+import shlex
 import sys
 import textwrap
 from collections.abc import Sequence
@@ -13,7 +15,7 @@ from ..can.identifiers import add_identifier_options
 from ..errors import LeverError
 from ..extras import require
 from ..files import check_not_input
-from ..layout import say
+from ..layout import command_lines, say, terminal_width
 from ..tables import Row, Tables, add_json_option
 from .signal_options import MAP_HELP, add_signal_options, chosen_reading, input_files
 
@@ -30,10 +32,11 @@ Finds settings of the estimator from a recorded log: measurement noise (theta_no
 (theta_dot_process_noise), the walk of the parameters and how it adapts. They are those under which the log is most
 likely: the firmware's own filter runs through it some hundred times, and the density of its innovations is maximised.
 
-With dither in the log (a motor torque of 0.05 N m rms or more) it first finds the calibration: gain and delay of the
-accelerometer (z_ddot_gain, z_ddot_delay) and Coulomb friction of the lever (lever_friction), each with its standard
-deviation (_sigma). Two minutes with 0.3 N m of dither and 0.1 g of vibration give them within 1 %, 0.3 ms and 0.03 N m.
-Without dither they cannot be known. tau_m_gain cannot be found in a log at all: measure it.
+Seconds in which the firmware finds a change of the arm are not tuned on. With dither in the log (a motor torque of
+0.05 N m rms or more) it first finds the calibration: gain and delay of the accelerometer (z_ddot_gain, z_ddot_delay)
+and Coulomb friction of the lever (lever_friction), each with its standard deviation (_sigma). Two minutes with 0.3 N
+m of dither and 0.1 g of vibration give them within 1 %, 0.3 ms and 0.03 N m. Without dither they cannot be known.
+tau_m_gain cannot be found in a log at all: measure it.
 
 Noise, walks and adaptation are changed only where the log contradicts them (95 % likelihood interval). The last part of
 the log is held out: the search never sees it, and before and after are compared on it. Noise that the firmware
@@ -55,7 +58,8 @@ examples:
   lever tune flight.log --set model=linear_physical --keep theta_noise
   lever tune flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o my.settings
 
-Exit status: 0, or 1 when the new settings do clearly worse on the part held out; then no settings are written.
+Exit status: 0, or 1 when no settings are written: the new ones do worse on the part held out, or there is dither but
+the log does not go with the model, so that neither calibration nor walks can be trusted.
 """
 
 
@@ -109,13 +113,17 @@ def run(args: argparse.Namespace) -> int:
         before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
         calibration = calibrate(likelihood, before, args.keep, progress.show)
-        calibrated = {**before, **calibration.assignments}
-        search = Search(likelihood, calibrated, progress.show)
-        if not search.can_learn:
-            _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
-        tuned = search.run(groups(calibrated, args.keep))
-        after = {**calibrated, **{entry.name: entry.after for entry in tuned if entry.after != entry.before}}
-        fits = validation.fits(likelihood, before, after)
+        tuned: list[Tuned] = []
+        if not calibration.is_refused:
+            calibrated = {**before, **calibration.assignments}
+            search = Search(likelihood, calibrated, progress.show)
+            if not search.can_learn:
+                _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
+            tuned = search.run(groups(calibrated, args.keep))
+            after = {**calibrated, **{entry.name: entry.after for entry in tuned if entry.after != entry.before}}
+            fits = validation.fits(likelihood, before, after)
+    if calibration.is_refused:
+        return _refuse(args, likelihood, calibration)
     return _conclude(args, likelihood, before, after, calibration, tuned, fits)
 
 
@@ -203,12 +211,95 @@ def _conclude(
     if validation.is_worse(fits):
         _note("the new settings do worse on the part held out, so the log changes on the way: no settings are written")
         return 1
+    mapping = None
     if args.output is not None:
+        after, mapping = _delay_to_mapping(args, before, after)
         write_text(args.output, origin.comment() + _file(f"{verdict} {calibration.text}", before, after))
-    written = [str(path) for path in (args.output, args.page) if path is not None]
+        if mapping is not None:
+            write_text(mapping[0], origin.comment() + mapping[1])
+    written = [str(path) for path in (args.output, mapping and mapping[0], args.page) if path is not None]
     if written:
         say(f"Written: {', '.join(written)}")
+    if args.output is not None:
+        _say_next(_replay(args, mapping[0] if mapping else None))
     return 0
+
+
+def _refuse(args: argparse.Namespace, likelihood: Likelihood, calibration: Calibration) -> int:
+    """Says what was found, why it is not believed, and what to try; the exit status."""
+    from ..tables import print_tables
+    from ..tune.likelihood import SHORTEST
+    from ..tune.search import NOISE
+
+    tables: Tables = {"calibration": [_calibration_row(entry) for entry in calibration.entries]}
+    print_tables(tables, args.json, inputs=[*args.log, *input_files(args)])
+    say(f"{_subtitle(args, likelihood)} {calibration.text}")
+    begin, length = likelihood.longest_calm()
+    kept = [name for name in args.keep if name in NOISE]
+    if kept:
+        part = f"try without --keep {', '.join(kept)}, since noise that is set wrong looks like a wrong model"
+    elif likelihood.changes and length >= SHORTEST:
+        start, length = math.ceil(args.start + begin), math.floor(length - 1.0)
+        part = f"try the {length} s from {start} s on, the longest part in which the arm does not change"
+        _say_next(_tune(args, start, length))
+    else:
+        part = "try a part in which the pilot holds still and smooth air shakes the lever (--start, --length)"
+    _note(f"no settings are written, since the calibration is not believed: {part}")
+    return 1
+
+
+def _delay_to_mapping(
+    args: argparse.Namespace, before: Assignments, after: Assignments
+) -> tuple[Assignments, tuple[Path, str] | None]:
+    """With signals that are mapped the delay goes into the mapping, which undoes it exactly; the settings, and the path
+    and text of the mapping."""
+    from dataclasses import replace
+
+    from ..firmware.settings_file import make_config
+    from ..signals.mapping import as_toml, read_mapping
+
+    was, found = (make_config(each).settings["z_ddot_delay"] for each in (before, after))
+    if not args.map or found == was:
+        return after, None
+    mapping = read_mapping(args.map)
+    source = mapping.sources["z_ddot"]
+    later = replace(source, delay=float(f"{source.delay + found:.4g}"))
+    changed = replace(mapping, sources={**mapping.sources, "z_ddot": later})
+    return {**after, "z_ddot_delay": 0.0}, (args.output.with_suffix(".mapping.toml"), as_toml(changed))
+
+
+def _say_next(command: str) -> None:
+    """Prints a command, to be copied."""
+    print("Next:", *command_lines(command, terminal_width()), sep="\n")
+
+
+def _replay(args: argparse.Namespace, mapping: Path | None) -> str:
+    """The command that flies the log with what was found."""
+    words = ["lever", "replay", *_log_words(args, args.map if mapping is None else [str(mapping)])]
+    return shlex.join([*words, "--settings", str(args.output)])
+
+
+def _tune(args: argparse.Namespace, start: int, length: int) -> str:
+    """The same command, of another part of the log."""
+    given = {"--settings": args.settings, "-o": args.output, "--page": args.page}
+    words = ["lever", "tune", *_log_words(args, args.map), "--start", str(start), "--length", str(length)]
+    words += [word for option, value in given.items() if value is not None for word in (option, str(value))]
+    words += [word for text in args.set for word in ("--set", text)]
+    words += [word for name in args.keep for word in ("--keep", name)]
+    return shlex.join(words)
+
+
+def _log_words(args: argparse.Namespace, mapping: Sequence[str]) -> list[str]:
+    """The log and how it is read, as arguments."""
+    given = {
+        "--dbc": args.dbc,
+        "--channel": args.channel,
+        "--clock": args.clock,
+        "--id-offset": args.id_offset,
+        "--id-base": args.id_base,
+    }
+    words = [word for option, value in given.items() if value is not None for word in (option, str(value))]
+    return [*args.log, *words, *(["--map", *mapping] if mapping else [])]
 
 
 def _subtitle(args: argparse.Namespace, likelihood: Likelihood) -> str:

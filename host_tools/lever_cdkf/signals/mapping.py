@@ -119,6 +119,13 @@ def as_toml(mapping: Mapping) -> str:
             if value != each.default:
                 lines.append(f"{each.name} = {_quoted(value) if isinstance(value, str) else value}")
         lines.append("")
+    for message, protection in mapping.protected.items():
+        lines.append(f"[{PROTECTED}.{_quoted(message)}]")
+        lines += [] if protection.profile is None else [f"profile = {protection.profile}"]
+        identifier = protection.data_id
+        lines.append(f"data_id = {identifier if isinstance(identifier, int) else list(identifier)}")
+        lines += [] if protection.counter is None else [f"counter = {_quoted(protection.counter)}"]
+        lines.append("")
     return "\n".join(lines)
 
 

@@ -15,7 +15,7 @@ sensor cannot be found beside that of the accelerometer. Its standard deviation 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,7 @@ _NOISE_STEP = 0.02  # of the logarithm
 _FARTHEST = 1.0  # that the logarithm of a noise goes in one step
 _RANGE = 1000.0  # greatest factor by which a noise is changed
 _ROUNDS = 12
+_AGAIN = 2  # times that it is looked for in other parts of the log
 _CONVERGED = 0.05  # standard deviations
 _CONTRADICTED = 3.0  # likewise
 _NOTHING = 1e-6  # likewise: a value at the end of its range, where the fit leaves 1e-17
@@ -100,6 +101,11 @@ class Calibration:
     """That, and why."""
 
     @property
+    def is_refused(self) -> bool:
+        """Whether the log has all that is needed, but not as the model has it."""
+        return any(not entry.white for entry in self.entries)
+
+    @property
     def assignments(self) -> dict[str, float]:
         """What to set."""
         return {name: value for entry in self.entries for name, value in entry.assignments.items()}
@@ -108,7 +114,21 @@ class Calibration:
 def calibrate(
     likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = (), progress: ShowProgress | None = None
 ) -> Calibration:
-    """Looks for all of NAMES that are not `kept`."""
+    """Looks for all of NAMES that are not `kept`, in the parts of the log in which the arm does not change. With a
+    wrong calibration other changes are found than with the right one: it is looked for until they stay the same."""
+    likelihood.leave_out_changes(assignments)
+    found = _calibrate(likelihood, assignments, kept, progress)
+    for _ in range(_AGAIN):
+        best = {entry.name: entry.best for entry in found.entries}
+        if not best or not likelihood.leave_out_changes({**assignments, **best}):
+            break
+        found = _calibrate(likelihood, assignments, kept, progress)
+    return found
+
+
+def _calibrate(
+    likelihood: Likelihood, assignments: Assignments, kept: Sequence[str], progress: ShowProgress | None
+) -> Calibration:
     config = make_config(assignments)
     names = tuple(name for name in NAMES if name not in kept)
     if not names:
@@ -229,27 +249,28 @@ class _Fit:
 
     def _each(self, at: Array, **others: float) -> Array:
         """Log-likelihood of each sample that is tuned on [nat]."""
-        per_sample: Array = self._innovations(at, **others)["log_likelihood"]
+        per_sample: Array = self._innovations(at, others)["log_likelihood"]
         return per_sample
 
     def _is_white(self, at: Array) -> bool:
         """Whether the innovations are, of theta_dot or, if that is not measured, of theta."""
-        innovations = self._innovations(at)
+        innovations = self._innovations(at, {}, everywhere=True)
         output = 1 if innovations["sigma"][:, 1].any() else 0
-        values = np.where(innovations["sigma"][:, output] > 0.0, innovations["value"][:, output], np.nan)
+        used = (innovations["sigma"][:, output] > 0.0) & self._likelihood.tuned_on
+        values = np.where(used, innovations["value"][:, output], np.nan)  # what is left out is missing
         measured = whiteness.measure(values.astype(np.float64), self._likelihood.recording.period)
         return measured is None or measured.white
 
-    def _innovations(self, at: Array, **others: float) -> Array:
-        """Of the part that is tuned on."""
+    def _innovations(self, at: Array, others: Mapping[str, float], everywhere: bool = False) -> Array:
+        """Of the part that is tuned on, or of all."""
         values = {each.name: each.value(float(x)) for each, x in zip(self._unknowns, at, strict=True)}
         delay = values.pop("z_ddot_delay", self._settings["z_ddot_delay"])
         everything = {**self._base, **values, **others, "z_ddot_delay": 0.0}
-        innovations: Array = self._likelihood.run(everything, delay)[self._likelihood.tuned_on]
+        innovations: Array = self._likelihood.run(everything, delay)
         if self._progress is not None:
             done = self._likelihood.runs
             self._progress(min(done, self._expected - 1), self._expected, "looking for the calibration")
-        return innovations
+        return innovations if everywhere else innovations[self._likelihood.tuned_on]
 
     def _scores(self, at: Array, now: Array) -> tuple[Array, Array]:
         """Derivatives of `now`, a column for each unknown, and their sum, by differences to both sides.

@@ -1,7 +1,8 @@
 """How likely a recording is to the estimator with given settings; one part of it to tune on, another to judge by.
 
 The estimator runs through all of the recording, as in flight. What it says counts from the end of its start on
-(aligning, levels, the worst of a wrong first guess), and is added up over each part by itself.
+(aligning, levels, the worst of a wrong first guess), and is added up over each part by itself. The seconds in which the
+arm changes are not tuned on: no noise, walk or calibration explains them.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ START = 10.0
 START_SHARE = 0.2
 SHORTEST = 20.0
 """Least duration of a recording [s]."""
+BEFORE_CHANGE, AFTER_CHANGE = 1.0, 3.0
+"""What is left out beside the time for which the estimator reports a change [s]: until it sees it, and what follows."""
 LEARNT_LEAST = 5.0
 """Of the part that is tuned on, the parameters must have learnt for so long [s], for their walk to be looked for."""
 
@@ -34,6 +37,8 @@ class Likelihood:
     held_out: float = 0.3
     runs: int = field(default=0, init=False)
     """How often the estimator has run through the recording."""
+    changes: list[tuple[float, float]] = field(default_factory=list, init=False)
+    """From when to when the estimator has reported a change of the arm [s of the recording]."""
 
     def __post_init__(self) -> None:
         """Raises LeverError for a recording that is too short."""
@@ -44,8 +49,32 @@ class Likelihood:
         split = begin + (1.0 - self.held_out) * (duration - begin)
         self.tuned_on: Array = (time >= begin) & (time < split)
         """True at the samples that are tuned on."""
+        self._wanted: Array = self.tuned_on
         self.judged_by: Array = time >= split
         """True at those that are held out."""
+
+    def leave_out_changes(self, assignments: Assignments) -> bool:
+        """Tunes on those parts only in which the estimator, with these settings, finds no change of the arm. Where that
+        would leave less than half of what is tuned on, all stays: then it is not the arm that changes. Returns whether
+        other parts are tuned on than before."""
+        recording, before = self.recording, self.tuned_on
+        changed = self.run(noise_as_set(assignments))["changed"]
+        steps = np.diff(changed.astype(np.int8), prepend=0, append=0)
+        time = np.append(recording.time, recording.duration)
+        ends = zip(time[steps > 0].tolist(), time[steps < 0].tolist(), strict=True)
+        self.changes = list(ends)
+        kept = self._wanted.copy()
+        for begin, end in self.changes:
+            kept &= (recording.time < begin - BEFORE_CHANGE) | (recording.time > end + AFTER_CHANGE)
+        self.tuned_on = kept if 2 * kept.sum() >= self._wanted.sum() else self._wanted
+        return not np.array_equal(before, self.tuned_on)
+
+    def longest_calm(self) -> tuple[float, float]:
+        """Begin and length [s] of the longest part of the recording without a change."""
+        begins = [0.0, *(end + AFTER_CHANGE for _, end in self.changes)]
+        ends = [*(begin - BEFORE_CHANGE for begin, _ in self.changes), self.recording.duration]
+        begin, end = max(zip(begins, ends, strict=True), key=lambda part: part[1] - part[0])
+        return begin, end - begin
 
     def run(self, assignments: Assignments, delay: float = 0.0) -> Array:
         """What the estimator with these settings and choices makes of the samples: innovations.INNOVATION for each.

@@ -15,7 +15,8 @@ from .likelihood import Likelihood, noise_as_set
 
 _BLOCK = 0.5
 """Gains are averaged over so long [s] before their error is told from their scatter: they are not quite white."""
-_CLEAR = 3.0  # standard errors; they are of few blocks
+_CLEAR = 3.0  # standard errors from which on it is better; they are of few blocks
+_WORSE = 2.0  # and worse: settings that may do harm are not written
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,12 @@ class Gain:
     """Its standard error."""
 
     @property
-    def is_clear(self) -> bool:
-        return abs(self.mean) > _CLEAR * self.error
+    def is_better(self) -> bool:
+        return self.mean > _CLEAR * self.error
+
+    @property
+    def is_worse(self) -> bool:
+        return self.mean < -_WORSE * self.error
 
     def __str__(self) -> str:
         return f"{self.mean:+.4f} ± {self.error:.4f} nat a sample"
@@ -109,9 +114,9 @@ def _held_out(results: Sequence[Fit]) -> dict[str, Gain]:
 
 
 def is_worse(results: Sequence[Fit]) -> bool:
-    """Whether the part held out clearly goes worse with the new settings, with noise as in flight."""
+    """Whether the part held out goes worse with the new settings, with noise as in flight."""
     flown = list(_held_out(results).values())[-1:]
-    return any(each.is_clear and each.mean < 0.0 for each in flown)
+    return any(each.is_worse for each in flown)
 
 
 def verdict(results: Sequence[Fit], changed: int) -> str:
@@ -127,6 +132,6 @@ def verdict(results: Sequence[Fit], changed: int) -> str:
 
 
 def _outcome(gain: Gain) -> str:
-    if not gain.is_clear:
-        return "no clear difference"
-    return "better" if gain.mean > 0.0 else "worse"
+    if gain.is_better:
+        return "better"
+    return "worse" if gain.is_worse else "no clear difference"

@@ -25,6 +25,11 @@ CHANGING = {
     f'least = "{least}", greatest = "{greatest}" }}'
     for name, least, greatest in (("c_p", "15 N s/m", "140 N s/m"), ("k_p", "500 N/m", "3900 N/m"))
 }
+REGRIP = {
+    name: f'{{ kind = "steps", first = "{first}", at = ["40 s"], to = ["{then}"] }}'
+    for name, first, then in (("c_p", "48 N s/m", "75 N s/m"), ("k_p", "1700 N/m", "2600 N/m"))
+}
+"""A pilot who tightens his grip."""
 
 _SCENARIO = """
 title = "Known noise"
@@ -60,14 +65,17 @@ rms = "{torque} N m"
 
 @pytest.fixture(scope="session")
 def simulate(tmp_path_factory: pytest.TempPathFactory) -> Simulate:
-    """simulate(duration, changing=False, rest=False, **others): the bus.log of a run of so many seconds.
+    """simulate(duration, changing=False, rest=False, regrip=False, **others): the bus.log of a run of so many seconds.
 
     `others` are of NOISE, CALIBRATION and LOADS.
     """
 
-    def run(duration: float, *, changing: bool = False, rest: bool = False, **others: float) -> Path:
+    def run(
+        duration: float, *, changing: bool = False, rest: bool = False, regrip: bool = False, **others: float
+    ) -> Path:
         folder = tmp_path_factory.mktemp("log")
         pilot = CHANGING if changing else {name: f'"{value}"' for name, value in PILOT.items()}
+        pilot = REGRIP if regrip else pilot
         shaken = {"base": 0.0001, "torque": 0.0001} if rest else {}
         values = {**LOADS, **NOISE, **CALIBRATION, **pilot, **shaken, **others}
         (folder / "known.toml").write_text(_SCENARIO.format(duration=duration, **values))

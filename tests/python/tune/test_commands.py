@@ -14,6 +14,7 @@ from lever_cdkf import cli
 from lever_cdkf.can import codec
 from lever_cdkf.firmware.settings_file import make_config, read_assignments
 from lever_cdkf.tune import calibration
+from lever_cdkf.tune.calibration import NAMES
 from python.conftest import Refused, Run
 from python.report.reading import figures, read, unpack
 from python.tune.conftest import NOISE, Simulate
@@ -204,7 +205,8 @@ def test_worse_on_the_part_held_out_writes_nothing(simulate: Simulate, tmp_path:
     quiet, loud = (simulate(20.0, theta_noise=noise).read_text().splitlines() for noise in (0.5e-3, 3e-3))
     log, output = tmp_path / "two.log", tmp_path / "two.settings"
     log.write_text("\n".join(quiet) + "\n" + "\n".join(_shifted(line, 20.0) for line in loud) + "\n")
-    quickly = (*QUICK, "--keep", "theta_dot_noise", "--keep", "theta_dot_process_noise")
+    kept = ("theta_dot_noise", "theta_dot_process_noise", *NAMES)
+    quickly = (*QUICK, *(word for name in kept for word in ("--keep", name)))
     status, _, err = lever("tune", log, "-o", output, *quickly, "--set", "noise_window=0", "--held-out", "0.62")
     assert (status, output.exists()) == (1, False)
     assert "do worse on the part held out" in err

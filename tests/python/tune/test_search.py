@@ -58,7 +58,7 @@ def test_part_that_is_not_tuned_on_shows_the_improvement(steady_log: Path) -> No
     parts = {(before.noise, before.part): (before, after) for before, after in validation.pairs(fits)}
     before, after = parts["as set", "held out"]
     gained = validation.gain(before, after)
-    assert gained.is_clear
+    assert gained.is_better
     assert gained.mean > 0.5
     assert not validation.is_worse(fits)
     assert after.nis == pytest.approx(1.02, abs=0.03)  # 0.02: the trim filter's; of 8000 samples 0.011 is chance
@@ -102,11 +102,13 @@ def test_what_is_off_or_kept_is_not_looked_for() -> None:
     assert wanted == {"noise": ("theta_noise", "theta_dot_noise"), "walk": ("a21_walk", "b21_walk")}
 
 
-@pytest.mark.parametrize(("mean", "clear"), [(2.9, False), (3.1, True), (-2.9, False), (-3.1, True)])
-def test_a_gain_is_clear_beyond_three_standard_errors(mean: float, clear: bool) -> None:
-    gain = validation.Gain(mean, 1.0)
-    assert gain.is_clear is clear
-    assert validation._outcome(gain) == ("no clear difference" if not clear else "better" if mean > 0.0 else "worse")
+@pytest.mark.parametrize(
+    ("mean", "outcome"),
+    [(2.9, "no clear difference"), (3.1, "better"), (-1.9, "no clear difference"), (-2.1, "worse"), (-0.0115, "worse")],
+)
+def test_a_gain_is_clear_beyond_three_standard_errors_and_a_loss_beyond_two(mean: float, outcome: str) -> None:
+    gain = validation.Gain(mean, 0.0047 if abs(mean) < 1.0 else 1.0)
+    assert validation._outcome(gain) == outcome
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,7 @@ bool innovation_run(
     for (uint32_t k = 0u; (lever != NULL) && (k < count); k++) {
         current = &innovations[k];
         (void)lever_update(lever, &samples[k]);
+        current->changed = ((lever->estimator.faults & (uint32_t)LEVER_FAULT_CHANGE) != 0u);
     }
     current = NULL;
     return lever != NULL;

@@ -24,6 +24,7 @@ typedef struct sample_innovation {
     float nis;                       /* normalised innovation squared, chi-square with `size` degrees of freedom */
     uint8_t size;                    /* outputs used; 0 while aligning */
     bool learns;                     /* the parameters learn from the block that it is in */
+    bool changed;                    /* a change of the arm was found lately: LEVER_FAULT_CHANGE */
 } sample_innovation_t;
 
 /* Feeds `count` samples to a fresh estimator, one innovation for each. False if the configuration is refused. */
