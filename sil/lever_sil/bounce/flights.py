@@ -15,8 +15,7 @@ from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.units import GRAVITY
 from numpy.typing import NDArray
 
-from ..aircraft import aircraft
-from ..aircraft.aircraft import Coupled
+from ..aircraft.aircraft import Aircraft, Coupled
 from ..aircraft.response_table import UNSURE, response_table
 from ..aircraft.stability import critical_gearing
 from ..envelope.motions import stream
@@ -27,6 +26,7 @@ from ..scenarios.scenario import Scenario
 from ..toml_tables import Place, read
 
 AIRCRAFT = ("uh60_like", "puma_like", "bo105_like")
+FIVE = (*AIRCRAFT, "ec135_like", "ch53_like")
 STRIDE = 20
 """Samples between two notes of what the firmware says."""
 RAISED = (20.0, 25.0)
@@ -59,6 +59,8 @@ class Plan:
     """What the firmware is told of that, with the sample period [s]."""
     low_pass: float = 0.0
     """Corner of a low-pass of the lever's angle, to compare with mitigation [Hz]; 0: none."""
+    airframe: Mapping[str, Any] = field(default_factory=dict)
+    """Further keys of [aircraft]."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further tables of the scenario."""
     clock_stops: float | None = None
@@ -77,6 +79,7 @@ class Plan:
                 "gearing": f"{self.gearing} 1",
                 "correction_delay": f"{self.correction_delay} s",
                 "lever_low_pass": f"{self.low_pass} Hz",
+                **self.airframe,
             },
             "base": [{"kind": "noise", "rms": f"{self.gust * GRAVITY} m/s^2", "low": "1 Hz", "high": "10 Hz"}],
         }
@@ -88,6 +91,13 @@ class Plan:
         }
         scenario: Scenario = read(Scenario, {**values, **self.more, **merged}, Place("flight"))
         return scenario
+
+    @property
+    def aircraft(self) -> Aircraft:
+        """That flies."""
+        coupled = self.scenario.aircraft
+        assert coupled is not None
+        return coupled.aircraft
 
     def gearings(self, time: FloatArray) -> FloatArray:
         """At these times [s]."""
@@ -109,7 +119,7 @@ class Flown:
     tau_m: FloatArray
     """[N m]"""
     z_ddot: FloatArray
-    """[m/s^2]"""
+    """At the pilot's seat [m/s^2]."""
     correction: FloatArray
     """As put out [rad]."""
     notes: FloatArray
@@ -133,7 +143,7 @@ class Flown:
     def margins(self, every: int) -> FloatArray:
         """The true gain margin at every so many-th note [dB]."""
         at = np.arange(0, len(self.time), STRIDE * every)
-        limit = critical_gearing(aircraft.load(self.plan.craft), self.truth.transfer(at))
+        limit = critical_gearing(self.plan.aircraft, self.truth.transfer(at))
         margin: FloatArray = 20.0 * np.log10(limit / np.maximum(self.plan.gearings(self.time[at]), 1e-9))
         return margin
 
@@ -157,7 +167,7 @@ def fly(plan: Plan) -> Flown:
         time=inputs.time,
         theta=loop.signals["theta"],
         tau_m=loop.signals["tau_m"],
-        z_ddot=loop.signals["z_ddot"],
+        z_ddot=inputs.z_ddot,
         correction=loop.correction,
         notes=inputs.time[::STRIDE],
         stability=stability,
