@@ -80,6 +80,8 @@ class Aircraft(ABC):
     title: str = text("")
     accelerometer: str = choice("mounted", "seat", default="mounted")
     """Where it sits: where the airframe has it, or at the pilot's seat."""
+    seat_transfer_known: str = choice("yes", "no", default="yes")
+    """Whether the firmware is told what lies between accelerometer and seat."""
     delay: float = quantity("s", 0.020, least=0.0, greatest=0.2)
     correction_delay: float = quantity("s", 0.0, least=0.0, greatest=0.2)
     lever_low_pass: float = quantity("Hz", 0.0, least=0.0, greatest=1e3)

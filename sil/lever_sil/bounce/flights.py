@@ -15,8 +15,8 @@ from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.units import GRAVITY
 from numpy.typing import NDArray
 
-from ..aircraft.aircraft import Aircraft, Coupled
-from ..aircraft.response_table import UNSURE, response_table
+from ..aircraft.aircraft import Aircraft
+from ..aircraft.response_table import UNSURE, known_response
 from ..aircraft.stability import critical_gearing
 from ..envelope.motions import stream
 from ..fast.closed_loop import Loop
@@ -29,6 +29,8 @@ AIRCRAFT = ("uh60_like", "puma_like", "bo105_like")
 FIVE = (*AIRCRAFT, "ec135_like", "ch53_like")
 STRIDE = 20
 """Samples between two notes of what the firmware says."""
+SEAT_ERROR = 0.1
+"""Largest error of what is told of the way from the accelerometer to the seat: of the gain [1], of the phase [rad]."""
 RAISED = (20.0, 25.0)
 """When a gearing goes up that does so [s]: the firmware knows the pilot by then."""
 
@@ -61,6 +63,10 @@ class Plan:
     """Corner of a low-pass of the lever's angle, to compare with mitigation [Hz]; 0: none."""
     airframe: Mapping[str, Any] = field(default_factory=dict)
     """Further keys of [aircraft]."""
+    table_gain: float = 1.0
+    """Of the firmware's table over that of the aircraft, besides an error of UNSURE."""
+    table_sigma: float = UNSURE
+    """gain_sigma that the firmware is told."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further tables of the scenario."""
     clock_stops: float | None = None
@@ -152,10 +158,9 @@ def fly(plan: Plan) -> Flown:
     """One flight. Raises LeverError."""
     scenario = plan.scenario
     inputs = scenario_inputs.prepare(scenario)
-    assert scenario.aircraft is not None
     loop = Loop(scenario, inputs, by_frames=False, every=STRIDE)
     loop.gear(plan.gearings(inputs.time))
-    stability = loop.watch(uncertain_response(scenario.aircraft, plan.seed))
+    stability = loop.watch(uncertain_response(plan))
     if plan.clock_stops is not None:
         time = np.minimum(inputs.time, plan.clock_stops)
         loop.give_time(np.round(1e6 * time).astype(np.uint32))
@@ -175,11 +180,18 @@ def fly(plan: Plan) -> Flown:
     )
 
 
-def uncertain_response(coupled: Coupled, seed: int) -> AircraftResponse:
-    """What the firmware is given of an aircraft: its response, off by what is stated."""
-    gain, phase = UNSURE * stream(f"known {coupled.aircraft.title}", seed).standard_normal(2)
-    off = (1.0 + gain) * np.exp(1j * phase)
-    return response_table(lambda s: coupled.response(s) * off)
+def uncertain_response(plan: Plan) -> AircraftResponse:
+    """What the firmware is given of an aircraft: its response, off by what is stated; the way from the accelerometer to
+    the seat is off by up to SEAT_ERROR."""
+    coupled = plan.scenario.aircraft
+    assert coupled is not None
+    random = stream(f"known {coupled.aircraft.title}", plan.seed)
+    gain, phase = UNSURE * random.standard_normal(2)
+    off, seat_off = plan.table_gain * (1.0 + gain) * np.exp(1j * phase), random.uniform(-SEAT_ERROR, SEAT_ERROR, 2)
+    seat = (1.0 + seat_off[0]) * np.exp(1j * seat_off[1])
+    return known_response(
+        coupled, lambda s: np.full_like(s, off), seat_off=lambda s: np.full_like(s, seat), gain_sigma=plan.table_sigma
+    )
 
 
 def _low_passed(angle: FloatArray, plan: Plan) -> FloatArray:
