@@ -167,14 +167,24 @@ static float take_rest(mitigation_rest_t *rest, float left, float usual, float p
     return left - (weight * pass_notch(&rest->notch, left, turn * period, damping));
 }
 
+/* Nothing of an angle [rad] at which the lever stands. */
+static void start_rest(mitigation_t *mitigation, float theta)
+{
+    const mitigation_rest_t none = {.band = {theta, theta}, .notch = {.low_pass = theta}};
+    for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
+        mitigation->rest[i] = none;
+    }
+}
+
 /* --- a sample ----------------------------------------------------------------------------------------------------- */
 
 /* Begins with the base as it is now, and nothing known of how the lever moves. */
-static void start(mitigation_t *mitigation, float z_ddot)
+static void start(mitigation_t *mitigation, const mitigation_sample_t *sample)
 {
     const mitigation_t none = {.rated = mitigation->rated, .sensed_left = mitigation->sensed_left};
     *mitigation = none;
-    involuntary_start(&mitigation->involuntary, z_ddot);
+    involuntary_start(&mitigation->involuntary, sample->step.z_ddot);
+    start_rest(mitigation, sample->theta);
 }
 
 /* The angle to take away. */
@@ -204,6 +214,9 @@ static float angle_of(
 static void choose(mitigation_t *mitigation, const mitigation_sample_t *sample)
 {
     if (mitigation->weight <= 0.0f) {
+        if (mitigation->notches) {
+            start_rest(mitigation, sample->theta);
+        }
         mitigation->notches = has_notch(sample->mitigation);
         mitigation->notch.low_pass = sample->theta;
         mitigation->notch.band_pass = 0.0f;
@@ -237,7 +250,7 @@ bool mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings,
 {
     pass_gate(mitigation, sample);
     if (!mitigation->started || (sample->step.period > LONGEST)) { /* then all has faded */
-        start(mitigation, sample->step.z_ddot);
+        start(mitigation, sample);
     } else if (sample->advances) {
         advance(mitigation, settings, sample);
     } else { /* no time has passed, and the torque gate is closed */
