@@ -68,9 +68,7 @@ class StateSpace:
             scale = scale * change
             if np.all(change == 1.0):
                 break
-        return StateSpace(
-            self.a * scale / scale[:, None], self.b / scale[:, None], self.c * scale, self.d
-        )
+        return StateSpace(self.a * scale / scale[:, None], self.b / scale[:, None], self.c * scale, self.d)
 
     def minimal(self) -> StateSpace:
         """Without the states that no input moves or no output shows; itself where there are none."""
