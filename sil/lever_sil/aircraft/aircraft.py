@@ -242,6 +242,8 @@ GREATEST_GEARING = 100.0
 """Pitch over the lever's angle [1]: 200 times what is in service. `lever bounce` goes beyond 10."""
 SHELF = Shelf("aircraft", __package__)
 names = SHELF.names
+WORST_FIT = 0.2
+"""Relative error of a fit to a frequency response that may fly [1]."""
 FILES = (".mat", ".npz", ".csv")
 """Of airframes that were computed or measured elsewhere."""
 
@@ -257,7 +259,12 @@ def load(name_or_path: str, **changes: Any) -> Aircraft:
     if is_response(path):
         fitted: Fitted = read(Fitted, changes, place)
         response = Tabulated.load(path)
-        system = response.fitted(fitted.response_gearing, fitted.delay).system
+        system, error = response.fitted(fitted.response_gearing, fitted.delay)
+        if error > WORST_FIT:
+            raise place.error(
+                f"a state space fits the response to {100.0 * error:.0f} % only, and {100.0 * WORST_FIT:.0f} % is what may "
+                "fly: it needs more frequencies, or less noise"
+            )
         return replace(fitted, title=fitted.title or path.name, system=flyable(system, name_or_path))
     imported: Imported = read(Imported, changes, place)
     system = flyable(imported.picked(state_space.read(path), name_or_path), name_or_path)

@@ -13,6 +13,7 @@ from lever_cdkf.firmware.aircraft import ALARM, WARNING, AircraftResponse, SeatT
 from .aircraft import Coupled
 from .stability import Response
 from .state_space import SEAT, SENSOR
+from .tabulated import Tabulated
 from .vector_fitting import Fit, fit
 
 UNSURE = 0.05
@@ -42,6 +43,13 @@ def known_response(coupled: Coupled, off: Response | None = None, **said: Any) -
     place = SENSOR if apart and not told else SEAT
     seat = seat_modes(s, between * seat_off(s)) if told else None
     return response_table(lambda s: coupled.response(s, place) * factor(s), name=coupled.name, seat=seat, **said)
+
+
+def measured_response(measured: Tabulated, **said: Any) -> AircraftResponse:
+    """The same of a frequency response, as it was measured."""
+    s = 2j * np.pi * measured.frequency.astype(np.complex128)
+    seat = None if measured.seat is None else seat_modes(s, measured.seat)
+    return response_table(measured.response, measured.band, seat=seat, **said)
 
 
 def seat_modes(s: ComplexArray, between: ComplexArray) -> SeatTransfer:

@@ -338,7 +338,7 @@ _TOGETHER = (_airframe(**AT_4_5, **UNTOLD, **SLOW_ACTUATOR), _late(10.0), _base_
 FLOOR = (_least("gearing ÷ critical", 2.0, "median"), _least("gearing ÷ critical", 1.0, "worst"))
 TOLD = (_least("gearing ÷ critical", 4.0, "median"), _least("gearing ÷ critical", 2.5, "worst"))
 BETWEEN: tuple[tuple[str, str, Callable[[Plan], Plan], tuple[str, ...], tuple[Limit, ...]], ...] = (
-    ("rigid", "rigid cabin", _all_of(), ("none", NOTCH, CANCELLATION), FLOOR),
+    ("rigid", "rigid cabin", _all_of(), ("none", CANCELLATION), FLOOR),
     ("late_10", "correction 10 ms late, not told", _late(10.0), (CANCELLATION,), FLOOR),
     ("late_20", "correction 20 ms late, not told", _late(20.0), (CANCELLATION,), FLOOR),
     ("late_20_told", "correction 19 ms late, told", _late(19.0, told=True), (CANCELLATION,), FLOOR),
@@ -380,14 +380,14 @@ BETWEEN: tuple[tuple[str, str, Callable[[Plan], Plan], tuple[str, ...], tuple[Li
         "together_trunk",
         "trunk, mode at 4.5 Hz, both delays of 10 ms, actuator of 30°/s",
         _all_of(_held_by(_TRUNK), *_TOGETHER),
-        ("none", NOTCH, CANCELLATION),
+        ("none", CANCELLATION),
         FLOOR,
     ),
     (
         "together_reflex",
         "stretch reflex, mode at 4.5 Hz, both delays of 10 ms, actuator of 30°/s",
         _all_of(_held_by(_REFLEX), *_TOGETHER),
-        ("none", NOTCH, CANCELLATION),
+        ("none", CANCELLATION),
         FLOOR,
     ),
 )
