@@ -112,8 +112,12 @@ class AircraftResponse:
         lines += [f"{at.frequency[i]:.6g}  {at.real[i]:.6g}  {at.imaginary[i]:.6g}" for i in range(at.count)]
         lines += [f"{name} = {getattr(at, name):.6g}  # {unit}" for name, unit in _NUMBERS.items()]
         if at.seat_modes:
-            lines += [f"{_DIRECT} = {at.seat_direct:.9g}  # [1]; z_ddot at the seat over that at the accelerometer: this,"]
-            lines += ["# and by_rate [1/s], by_place [1/s²], damping [1/s] and stiffness [1/s²] of each mode between them"]
+            lines += [
+                f"{_DIRECT} = {at.seat_direct:.9g}  # [1]; z_ddot at the seat over that at the accelerometer: this,"
+            ]
+            lines += [
+                "# and by_rate [1/s], by_place [1/s²], damping [1/s] and stiffness [1/s²] of each mode between them"
+            ]
             modes = (at.seat[i] for i in range(at.seat_modes))
             lines += [f"{_SEAT}  " + "  ".join(f"{getattr(mode, each):.9g}" for each in _MODE) for mode in modes]
         return "\n".join(lines) + "\n"
@@ -132,9 +136,9 @@ def read_response(path: str) -> AircraftResponse:
         is_entry = len(cells) == 1 and name in (*_NUMBERS, _DIRECT) and name not in numbers
         if not (is_entry if equals else len(cells) == (len(_MODE) if is_mode else 3)) or any(map(math.isnan, cells)):
             raise LeverError(
-                f"{place}: neither {', '.join(_NUMBERS)}, {_DIRECT} = number, each once, nor frequency, real and imaginary "
-                f"part, nor {_SEAT} and four numbers; `lever aircraft FILE.csv -o FILE.response` makes such a file of a "
-                "CSV one"
+                f"{place}: neither {', '.join(_NUMBERS)}, {_DIRECT} = number, each once, nor frequency, real and "
+                f"imaginary part, nor {_SEAT} and four numbers; `lever aircraft FILE.csv -o FILE.response` makes such "
+                "a file of a CSV one"
             )
         if equals:
             numbers[name] = cells[0]

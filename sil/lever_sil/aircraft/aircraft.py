@@ -173,7 +173,7 @@ class Helicopter(Aircraft):
 
 @dataclass(frozen=True, kw_only=True)
 class Imported(Aircraft):
-    """An airframe from a file: [state_space.py]. Numbers of inputs and outputs count from 1; 0: the first and the second
+    """An airframe from a file: state_space.py. Numbers of inputs and outputs count from 1; 0: the first and the second
     of a file that has no more."""
 
     input: str = choice("blade", "actuator", default="blade")
@@ -262,8 +262,8 @@ def load(name_or_path: str, **changes: Any) -> Aircraft:
         system, error = response.fitted(fitted.response_gearing, fitted.delay)
         if error > WORST_FIT:
             raise place.error(
-                f"a state space fits the response to {100.0 * error:.0f} % only, and {100.0 * WORST_FIT:.0f} % is what may "
-                "fly: it needs more frequencies, or less noise"
+                f"a state space fits the response to {100.0 * error:.0f} % only, which does not fly; it must to "
+                f"{100.0 * WORST_FIT:.0f} %: give more frequencies, or less noise"
             )
         return replace(fitted, title=fitted.title or path.name, system=flyable(system, name_or_path))
     imported: Imported = read(Imported, changes, place)
