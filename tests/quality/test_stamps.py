@@ -34,7 +34,7 @@ def prove(tree: Path) -> Prove:
 
     def run(status: int = 0, **variables: str) -> int:
         proof = f"open('runs', 'a').write('.'); raise SystemExit({status})"
-        command = [sys.executable, tree / "tests/setup/stamped.py", "p", "build", "a", "--"]
+        command: list[str | Path] = [sys.executable, tree / "tests/setup/stamped.py", "p", "build", "a", "--"]
         environment = {name: value for name, value in os.environ.items() if not name.startswith("LEVER_")} | variables
         done = subprocess.run([*command, sys.executable, "-c", proof], cwd=tree, env=environment, check=False)
         assert done.returncode in (0, status)
