@@ -5,10 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from lever_cdkf.arrays import ComplexArray
 from lever_cdkf.errors import LeverError
-from lever_cdkf.firmware.aircraft import AircraftResponse
+from lever_cdkf.firmware.aircraft import AircraftResponse, SeatTransfer
 
+from .aircraft import Coupled
 from .stability import Response
+from .state_space import SEAT, SENSOR
+from .vector_fitting import Fit, fit
 
 UNSURE = 0.05
 """How well it is known, where nothing else is said: standard deviation of gain [1] and phase [rad]."""
@@ -17,6 +21,45 @@ BAND = (1.5, 8.0)
 _NEEDED = (2.0, 7.0)
 """Of it at least, so that it has the crossing of the loop [Hz]."""
 _POINTS = 24
+_SEAT_MODES = 3
+_AT_SEAT = 1e-6
+"""By which seat and accelerometer may differ and be one place."""
+
+
+def known_response(coupled: Coupled, off: Response | None = None, **said: Any) -> AircraftResponse:
+    """What a firmware is told of an aircraft: the response at the seat and the way from the accelerometer to there, or
+    where that is not known, the response at the accelerometer. `off`: both are wrong by a factor; the one of the way is
+    `seat_off` in `said`."""
+    craft, factor = coupled.aircraft, off or (lambda s: np.ones_like(s))
+    seat_off: Response = said.pop("seat_off", factor)
+    s = 2j * np.pi * np.geomspace(1.0, 10.0, 60).astype(np.complex128)
+    between = craft.seat_transfer(s)
+    apart = bool(np.any(np.abs(between - 1.0) > _AT_SEAT))
+    told = apart and craft.seat_transfer_known == "yes"
+    place = SENSOR if apart and not told else SEAT
+    seat = seat_modes(s, between * seat_off(s)) if told else None
+    return response_table(lambda s: coupled.response(s, place) * factor(s), name=coupled.name, seat=seat, **said)
+
+
+def seat_modes(s: ComplexArray, between: ComplexArray) -> SeatTransfer:
+    """The acceleration at the seat over that at the accelerometer as the firmware takes it, fitted at s [rad/s] on the
+    imaginary axis."""
+    return _modes(fit(s, between, _SEAT_MODES))
+
+
+def _modes(fitted: Fit) -> SeatTransfer:
+    """Its poles two by two: r / (s - p) + q / (s - o). A real one that is left over counts twice, with a zero there."""
+    poles, vectors = np.linalg.eig(fitted.a)
+    residues = (fitted.c @ vectors) * np.linalg.solve(vectors, fitted.b.astype(np.complex128))
+    known = list(zip(poles.astype(np.complex128).tolist(), residues.tolist(), strict=True))
+    pairs = [((p, r), (p.conjugate(), r.conjugate())) for p, r in known if p.imag > 0.0]
+    real = [each for each in known if each[0].imag == 0.0]
+    real += [(real[-1][0], 0.0)] if len(real) % 2 else []
+    pairs += list(zip(real[::2], real[1::2], strict=True))
+    modes = [
+        ((r + q).real, -(r * o + q * p).real, -(p + o).real, (p * o).real) for (p, r), (o, q) in pairs
+    ]
+    return SeatTransfer(fitted.d, modes)
 
 
 def response_table(response: Response, band: tuple[float, float] = BAND, **said: Any) -> AircraftResponse:

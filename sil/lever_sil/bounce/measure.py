@@ -11,7 +11,6 @@ import numpy as np
 from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.library import lib
 
-from ..aircraft import aircraft
 from ..aircraft.stability import critical_gearing
 from ..fast import plants
 from ..judged.result import Figure, largest, least, mean
@@ -80,7 +79,7 @@ def _least_critical(plan: Plan) -> float:
     """The least gearing that is critical at any time of a flight [1]."""
     truth = truth_of(plan)
     at = np.arange(0, len(truth.rest), 1000 // STRIDE)
-    return float(critical_gearing(aircraft.load(plan.craft), truth.transfer(at)).min())
+    return float(critical_gearing(plan.aircraft, truth.transfer(at)).min())
 
 
 def geared(plan: Plan, ratio: float) -> Plan:
