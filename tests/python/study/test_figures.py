@@ -117,12 +117,13 @@ def test_numbers_have_the_digits_that_count_and_no_exponent(value: float, digits
 
 
 def test_names_are_put_in_order_and_unknown_ones_refused() -> None:
-    assert catalogue.chosen(["grip", "bode"]) == ["bode", "grip"]
-    assert catalogue.chosen([]) == list(catalogue.FIGURES)
+    known = list(catalogue.FIGURES)
+    assert catalogue.chosen(["grip", "bode"], known) == ["bode", "grip"]
+    assert catalogue.chosen([], known) == known
     with pytest.raises(LeverError, match=r"unknown figure 'body'; did you mean bode\?"):
-        catalogue.chosen(["grip", "body"])
+        catalogue.chosen(["grip", "body"], known)
     with pytest.raises(LeverError, match=r"unknown figure 'xyz'; there are bode, excitation"):
-        catalogue.chosen(["xyz"])
+        catalogue.chosen(["xyz"], known)
 
 
 # --- Bode ------------------------------------------------------------------------------------------------------------
