@@ -84,7 +84,8 @@ def _most_lanes(duration: float) -> int:
 def _joined(parts: Sequence[Result]) -> Result:
     """One result of some for different seeds; the excerpt is of the first."""
     first = parts[0]
-    return replace(first, values={name: np.concatenate([part.values[name] for part in parts]) for name in first.values})
+    values = {name: np.concatenate([part.values[name] for part in parts]) for name in first.values}
+    return replace(first, values=values, runs=[name for part in parts for name in part.runs])
 
 
 def _result(
@@ -103,7 +104,8 @@ def _result(
     outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""), row.followed)
     outcomes[row.name] = outcome
     with np.errstate(all="ignore"):  # an estimate that is not finite is no warning but a figure that keeps no limit
-        return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt=excerpt(outcome))
+        values = {name: FIGURES[name].compute(outcome) for name in row.figures}
+        return Result(row, values, runs=[f"seed {seed}" for seed in seeds], excerpt=excerpt(outcome))
 
 
 def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recording | None]]:

@@ -76,9 +76,24 @@ def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.Mo
     apart = campaign.run(rows, {}, 3, lambda *_: None)
     for left, right in zip(together, apart, strict=True):
         assert left.condition is right.condition
+        assert left.runs == right.runs == ["seed 0", "seed 1", "seed 2"]
         assert len(left.values["f_n rms"]) == 3
         for name, values in left.values.items():
             np.testing.assert_allclose(values, right.values[name], rtol=1e-9)
+
+
+def test_every_row_of_the_rules_is_measured() -> None:
+    """All figures are numbers; times may be infinite."""
+    results = campaign.run(list(rules.RULES.values()), {}, 1, lambda *_: None)
+    for result in results:
+        assert result.problem == ""
+        assert not any(np.isnan(values).any() for values in result.values.values())
+        assert len(result.values["f_n rms"]) == result.condition.runs
+    jumps = {
+        result.condition.name: result.values["settled"] for result in results if result.condition.motion.jump[1] != 1
+    }
+    assert jumps.keys() == {"jump_k_1.4", "jump_ck_1.3_base_only", "jump_k_0.6"}
+    assert all(0.0 < settled < 30.0 for settled in jumps.values())
 
 
 @pytest.mark.parametrize("whole", [False, True])

@@ -138,8 +138,8 @@ RULES_REQUIRED: dict[str, tuple[dict[str, Any], str]] = {
         "changes ≤ 10, f_n rms ≤ 4, silent share ≤ 1, CALIBRATION share ≤ 5",
     ),
     "rough_throughout": (LONG | {"process_noise": 0.5}, "CALIBRATION share ≤ 5"),
-    "retrims": (LONG | {"retrims": (3.0, 8.0, 1.0)}, "changes ≤ 67, f_n rms ≤ 2.06"),
-    "steady_long": (LONG, "changes ≤ 2.2, f_n rms ≤ 0.94"),
+    "retrims": (LONG | {"retrims": (3.0, 8.0, 1.0)}, "changes ≤ 90, f_n rms ≤ 1.45"),
+    "steady_long": (LONG, "changes ≤ 5.5, f_n rms ≤ 0.86"),
     **{
         f"stick_slip_{torque:g}": ({"friction": torque, "start": 2.0, "events": ((2.0, 60.0),)}, SLIPS)
         for torque in (1.0, 1.5, 2.0)
