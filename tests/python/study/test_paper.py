@@ -1,4 +1,4 @@
-"""Two claims of the paper about its parameter filter, as identities.
+"""The paper: two claims about its parameter filter as identities, and its experiment.
 
 "Equivalent to recursive least squares in linear cases, in general to a modified Gauss-Newton method" (Aresi, Zanoni,
 Masarati). Least squares and the Gauss-Newton step are written here from their textbooks, not from the filter.
@@ -11,7 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from lever_cdkf.arrays import Array
+from lever_cdkf.firmware.config import setting
 from lever_sil.study.baselines.algorithm1 import ParameterFilter
+from lever_sil.study.compare import campaign, paper
+from lever_sil.study.compare.cases import Plan, cases
 from lever_sil.study.data import Batch, Knowledge, Truth
 
 SAMPLES, PERIOD = 1001, 1e-3
@@ -123,3 +126,49 @@ def test_one_update_is_a_step_of_a_modified_gauss_newton_method() -> None:
     normal = np.eye(3) + np.outer(derivative, derivative) / 0.1**2
     gauss_newton = np.linalg.solve(normal, derivative * error / 0.1**2)
     assert np.abs(recursion.w[0] - gauss_newton).max() > 1e-3
+
+
+# --- the experiment --------------------------------------------------------------------------------------------------
+
+SHORT = Plan(seeds=3, duration=8.0)
+
+
+def experiment(truth: str) -> str:
+    return f"paper_lever_{truth}_coarse_rough"
+
+
+def test_parameters_stay_drift_or_jump_and_estimators_are_told_the_same() -> None:
+    batches = {truth: cases()[experiment(truth)].batch(SHORT) for truth in ("constant", "drift", "jump")}
+    p = {truth: data.truth.p for truth, data in batches.items() if data.truth.p is not None}
+    assert np.ptp(p["constant"], axis=1).max() == 0.0
+    assert np.ptp(p["drift"], axis=1).min() > 0.0
+    ratio = p["jump"] / p["constant"]
+    assert np.allclose(ratio[:, :4000], 1.0)
+    assert np.allclose(ratio[:, 4000:], (1.0, 1.3, 1.3))
+    walk = [setting(f"{name}_walk").default for name in ("m_p", "c_p", "k_p")]
+    assert all(np.allclose(data.knowledge.walk, walk) for data in batches.values())
+    noise = batches["constant"].raw_y - batches["constant"].truth.x
+    assert np.std(noise, axis=(0, 1)) == pytest.approx(5.0 * np.array([1e-3, 1e-2]), rel=0.02)
+
+
+def test_the_table_is_that_of_the_runs() -> None:
+    """Computed anew from the errors of each run; both kinds of parameter noise are in it."""
+    name = experiment("jump")
+    results = campaign.run(campaign.tasks([name], None, SHORT), jobs=1)
+    (rows,) = paper.tables(results).values()
+    by_name = {str(row["estimator"]): row for row in rows}
+    assert {"dual_fixed", "dual_annealing", "dual_robbins_monro", "joint_annealing", "rls"} <= by_name.keys()
+    outcome = results.outcomes[name, "dual_annealing"]
+    judged = (outcome.time >= 2.0) & ((outcome.time < 4.0) | (outcome.time >= 5.0))
+    error = outcome.relative[:, judged, :3]
+    rms = 100.0 * np.sqrt(np.mean(error**2, axis=(1, 2)))
+    assert outcome.stated is not None
+    inside = np.abs(outcome.errors[:, judged, :3]) <= 2.0 * np.sqrt(outcome.stated[:, judged, :3])
+    least = 100.0 * inside.mean(axis=1).min(axis=1)
+    row = by_name["dual_annealing"]
+    assert row["rms [%]"] == " / ".join(
+        f"{each:.0f}" if each >= 10 else f"{each:.1f}" for each in (np.median(rms), rms.max())
+    )
+    assert str(row["±2σ covers [%]"]).split(" / ")[1] in (f"{least.min():.0f}", f"{least.min():.1f}")
+    assert by_name["lms"]["±2σ covers [%]"] is None, "it states no standard deviation"
+    assert {row["parameters"] for row in rows} == {"jump"}
