@@ -112,8 +112,12 @@ class AircraftResponse:
         lines += [f"{at.frequency[i]:.6g}  {at.real[i]:.6g}  {at.imaginary[i]:.6g}" for i in range(at.count)]
         lines += [f"{name} = {getattr(at, name):.6g}  # {unit}" for name, unit in _NUMBERS.items()]
         if at.seat_modes:
-            lines += [f"{_DIRECT} = {at.seat_direct:.9g}  # [1]; z_ddot at the seat over that at the accelerometer: this,"]
-            lines += ["# and by_rate [1/s], by_place [1/s²], damping [1/s] and stiffness [1/s²] of each mode between them"]
+            lines += [
+                f"{_DIRECT} = {at.seat_direct:.9g}  # [1]; z_ddot at the seat over that at the accelerometer: this,"
+            ]
+            lines += [
+                "# and by_rate [1/s], by_place [1/s²], damping [1/s] and stiffness [1/s²] of each mode between them"
+            ]
             modes = (at.seat[i] for i in range(at.seat_modes))
             lines += [f"{_SEAT}  " + "  ".join(f"{getattr(mode, each):.9g}" for each in _MODE) for mode in modes]
         return "\n".join(lines) + "\n"
