@@ -85,20 +85,8 @@ def test_the_function_of_the_readme_estimates(built: Built, tmp_path: Path) -> N
     (example,) = readmes.blocks(tools.FIRMWARE / "README.md", "c").values()
     (tmp_path / "main.c").write_text(example + FLIGHT, encoding="utf-8")
     library = next(prefix.rglob("liblever_cdkf.a"))
-    tools.assert_silent(
-        [
-            "cc",
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            f"-I{prefix / 'include'}",
-            tmp_path / "main.c",
-            library,
-            "-lm",
-        ]
-        + ["-o", tmp_path / "flight"]
-    )
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", f"-I{prefix / 'include'}"]
+    tools.assert_silent(["cc", *flags, tmp_path / "main.c", library, "-lm", "-o", tmp_path / "flight"])
     good, frequency = map(float, tools.run([tmp_path / "flight"]).stdout.split())
     assert 3000 < good < 5000
     assert frequency == pytest.approx(3.0, rel=0.1)

@@ -43,7 +43,8 @@ class QemuError(LeverError):
 def running(image: Path, *, machine: str = MACHINE, count_instructions: bool = False) -> Iterator[str]:
     """Runs an SLCAN image on the emulated board until the end of the context; gives the channel for python-can's slcan.
 
-    `machine` is QEMU's name of the board, whose first serial line is used. The image has answered when the context begins. One at a time can open the channel. Raises QemuError.
+    `machine` is QEMU's name of the board, whose first serial line is used. The image has answered when the context
+    begins. One at a time can open the channel. Raises QemuError.
     """
     check(image)
     options = ["-display", "none", "-monitor", "none", "-serial", "chardev:usart1", "-echr", _NO_ESCAPE]

@@ -16,9 +16,9 @@ from ..errors import LeverError
 _CHANNEL = "{channel}"
 _DESCRIPTION = """\
 Runs the image for the STM32F405 in QEMU (machine netduinoplus2), or with --machine that of another port, with its first
-serial line on a TCP port of this machine, where it is an SLCAN adapter with the estimator behind it. Waits until it answers and prints the channel, for `lever sim
---interface slcan` and everything else that uses python-can's slcan. Runs until Ctrl-C; or, with a COMMAND, until that
-ends. In COMMAND, {channel} stands for the channel.
+serial line on a TCP port of this machine, where it is an SLCAN adapter with the estimator behind it. Waits until it
+answers and prints the channel, for `lever sim --interface slcan` and everything else that uses python-can's slcan. Runs
+until Ctrl-C; or, with a COMMAND, until that ends. In COMMAND, {channel} stands for the channel.
 
 The image has the default settings. From a scenario it takes what a COMMAND message can set (model, preload, estimator,
 adaptation, dither); one with other [settings] is refused, unless --set "settings={}" leaves them out.
