@@ -281,6 +281,7 @@ margin_t margin_of(const lever_aircraft_t *aircraft, const cdkf_t *cdkf, const m
     const float by_phase = critical_frequency(&loop, &places, &later) - frequency;
     const margin_t result = {.gain = (at.height > LEAST_HEIGHT) ? -(DECIBELS * logarithm(at.height)) : MARGIN_MOST,
         .gain_sigma = hidden + hypotenuse(sigma.first, louder_by(&louder, &at), louder_by(&later, &at)),
+        .arm_sigma = hidden + sigma.first,
         .modulus = at.modulus,
         .modulus_sigma = hypotenuse(modulus_sigma.first, louder.modulus - at.modulus, later.modulus - at.modulus),
         .frequency = frequency,

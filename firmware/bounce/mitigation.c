@@ -20,7 +20,9 @@
 #define LIVELY 2.5e-5f       /* mean square of the rate from which on that can be told: (5 mrad/s)^2 */
 #define LEFT_LEAST 2.25e-4f   /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
 #define LEFT_PART 0.05f       /* and this part of the expected one */
+#define WEIGHED_EVERY 8u      /* samples */
 #define SLOW 100.0f           /* squares of the frequencies below which it is the pilot's own, */
+#define SLOW_TURN 10.0f       /* the root of that [rad/s] */
 #define FAST 230.0f           /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
 #define FASTEST 2500.0f       /* 8 Hz */
 #define NOTCH_TURN_MOST 0.8f /* corner of the notch times a sample period, up to which it is stable */
@@ -150,27 +152,31 @@ static void compare(mitigation_t *mitigation, float moved, float expected, float
     }
 }
 
-/* Takes from what is left of the lever's motion, where that is loud, what is about the frequency at which most of it is,
- * by the mean squares of rate and angle. */
-static float take_rest(mitigation_rest_t *rest, float left, float usual, float period, float damping)
+/* About which frequency most of what is left is, by the mean squares of rate and angle, and how much of it a notch there
+ * is to take: none where it is quiet, or as slow as the pilot's own. */
+static void weigh(mitigation_rest_t *rest, float usual)
 {
-    const float share = share_of(period, MEMORY);
+    const float turn_square = rest->rate_square / greater(rest->square, LEFT_LEAST / FASTEST);
+    rest->turn = sqrtf(lesser(greater(turn_square, SLOW), FASTEST));
+    rest->weight = between_0_and_1((rest->rate_square / usual) - 1.0f) *
+                   between_0_and_1((turn_square - SLOW) / (FAST - SLOW));
+}
+
+/* Takes that away. */
+static float take_rest(mitigation_rest_t *rest, float left, float period, float share, float damping)
+{
     const float rise = (HIGH_PASS_TURN * BAND_HIGH) * (left - rest->band.low_pass);
     const float angle = pass_band(&rest->band, left, period);
     const float rate = rise - ((HIGH_PASS_TURN * BAND_LOW) * angle);
     rest->square += share * ((angle * angle) - rest->square);
     rest->rate_square += share * ((rate * rate) - rest->rate_square);
-    const float turn_square = rest->rate_square / greater(rest->square, LEFT_LEAST / FASTEST);
-    const float turn = sqrtf(lesser(greater(turn_square, SLOW), FASTEST));
-    const float weight = between_0_and_1((rest->rate_square / usual) - 1.0f) *
-                         between_0_and_1((turn_square - SLOW) / (FAST - SLOW));
-    return left - (weight * pass_notch(&rest->notch, left, turn * period, damping));
+    return left - (rest->weight * pass_notch(&rest->notch, left, rest->turn * period, damping));
 }
 
 /* Nothing of an angle [rad] at which the lever stands. */
 static void start_rest(mitigation_t *mitigation, float theta)
 {
-    const mitigation_rest_t none = {.band = {theta, theta}, .notch = {.low_pass = theta}};
+    const mitigation_rest_t none = {.band = {theta, theta}, .notch = {.low_pass = theta}, .turn = SLOW_TURN};
     for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
         mitigation->rest[i] = none;
     }
@@ -197,12 +203,17 @@ static float angle_of(
         angle = pass_notch(&mitigation->notch, sample->theta, turn, 2.0f * settings->notch_damping_ratio);
     } else {
         const float involuntary = mitigation->trust * mitigation->involuntary.theta;
-        const float usual = LEFT_LEAST + (LEFT_PART * mitigation->expected_square);
         const float damping = 2.0f * settings->notch_damping_ratio;
+        const float share = share_of(period, MEMORY);
         const float all = sample->theta - involuntary;
         float left = all;
         for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
-            left = take_rest(&mitigation->rest[i], left, usual, period, damping);
+            left = take_rest(&mitigation->rest[i], left, period, share, damping);
+        }
+        if ((mitigation->samples % WEIGHED_EVERY) == 0u) {
+            const float usual = LEFT_LEAST + (LEFT_PART * mitigation->expected_square);
+            weigh(&mitigation->rest[0], usual);
+            weigh(&mitigation->rest[1], usual);
         }
         angle = (mitigation->trust * involuntary_angle(&mitigation->involuntary, settings->correction_delay)) +
                 (all - left);

@@ -41,6 +41,8 @@ typedef struct mitigation_rest {
     mitigation_band_t band;
     float square;      /* means of its square in the band [rad^2], */
     float rate_square; /* and of that of its rate [rad^2/s^2] */
+    float turn;        /* frequency [rad/s] */
+    float weight;      /* 0 to 1 */
     mitigation_notch_t notch;
 } mitigation_rest_t;
 

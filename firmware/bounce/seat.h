@@ -9,6 +9,9 @@
 
 #include "lever_cdkf.h"
 
+#include <stdbool.h>
+#include <stddef.h>
+
 typedef struct seat {
     const lever_aircraft_t *aircraft; /* NULL, or none of its modes: the accelerometer is at the seat */
     float z_ddot;                     /* at the accelerometer, of the last sample [m/s^2] */
@@ -16,8 +19,15 @@ typedef struct seat {
     float rate[LEVER_SEAT_MODES];
 } seat_t;
 
-/* z_ddot at the seat [m/s^2] of that at the accelerometer, `elapsed` [s] after the last one; 0, or after a gap: at
- * rest. */
-float seat_step(seat_t *seat, float z_ddot, float elapsed);
+/* z_ddot at the seat [m/s^2] of that at the accelerometer, on a cabin that bends, `elapsed` [s] after the last one; 0, or
+ * after a gap: at rest. */
+float seat_bent(seat_t *seat, float z_ddot, float elapsed);
+
+/* The same on any cabin. */
+static inline float seat_step(seat_t *seat, float z_ddot, float elapsed)
+{
+    const bool bends = (seat->aircraft != NULL) && (seat->aircraft->seat_modes > 0u);
+    return bends ? seat_bent(seat, z_ddot, elapsed) : z_ddot;
+}
 
 #endif

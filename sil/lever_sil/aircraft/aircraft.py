@@ -164,7 +164,9 @@ class Helicopter(Aircraft):
         rows[0], rows[2], rows[4::2] = accelerations[1], accelerations[0], accelerations[2:]
         rows[1, BETA_DOT] = 1.0
         rows[range(3, size, 2), range(4, size, 2)] = 1.0
-        places = [[1.0, *amplitudes] for amplitudes in zip(*((m.seat, m.accelerometer) for m in self.mode), strict=True)]
+        places = [
+            [1.0, *amplitudes] for amplitudes in zip(*((m.seat, m.accelerometer) for m in self.mode), strict=True)
+        ]
         outputs = np.array(places or [[1.0], [1.0]]) @ accelerations[1:]
         return StateSpace(rows[:, :size], rows[:, size:], outputs[:, :size], outputs[:, size:])
 
@@ -194,7 +196,9 @@ class Imported(Aircraft):
     def picked(self, whole_system: StateSpace, where: str) -> StateSpace:
         """Two inputs and two outputs of all that a file has. Without a gust there, it accelerates both places alike.
         Raises LeverError."""
-        inputs = _chosen((self.collective_input, self.gust_input), whole_system.d.shape[1], ("collective", "gust"), where)
+        inputs = _chosen(
+            (self.collective_input, self.gust_input), whole_system.d.shape[1], ("collective", "gust"), where
+        )
         outputs = _chosen(
             (self.seat_output, self.accelerometer_output), len(whole_system.d), ("seat", "accelerometer"), where
         )
@@ -238,6 +242,8 @@ GREATEST_GEARING = 100.0
 """Pitch over the lever's angle [1]: 200 times what is in service. `lever bounce` goes beyond 10."""
 SHELF = Shelf("aircraft", __package__)
 names = SHELF.names
+WORST_FIT = 0.2
+"""Relative error of a fit to a frequency response that may fly [1]."""
 FILES = (".mat", ".npz", ".csv")
 """Of airframes that were computed or measured elsewhere."""
 
@@ -253,7 +259,12 @@ def load(name_or_path: str, **changes: Any) -> Aircraft:
     if is_response(path):
         fitted: Fitted = read(Fitted, changes, place)
         response = Tabulated.load(path)
-        system = response.fitted(fitted.response_gearing, fitted.delay).system
+        system, error = response.fitted(fitted.response_gearing, fitted.delay)
+        if error > WORST_FIT:
+            raise place.error(
+                f"a state space fits the response to {100.0 * error:.0f} % only, and {100.0 * WORST_FIT:.0f} % is what may "
+                "fly: it needs more frequencies, or less noise"
+            )
         return replace(fitted, title=fitted.title or path.name, system=flyable(system, name_or_path))
     imported: Imported = read(Imported, changes, place)
     system = flyable(imported.picked(state_space.read(path), name_or_path), name_or_path)
@@ -280,7 +291,9 @@ def read_aircraft(values: Any, place: Place) -> Coupled:
         raise place.error(f"{values!r} is not a table")
     changes = {name: value for name, value in values.items() if name not in _OF_SCENARIO}
     if not isinstance(values.get("model"), str):
-        raise place.at("model").error(f"must be one of {', '.join(names())}, or the path of a .toml, .mat, .npz or .csv")
+        raise place.at("model").error(
+            f"must be one of {', '.join(names())}, or the path of a .toml, .mat, .npz or .csv"
+        )
     known = keys(values["model"])
     if unknown := next((name for name in changes if name not in known), None):
         raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")

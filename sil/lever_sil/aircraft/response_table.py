@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from lever_cdkf.arrays import ComplexArray
 from lever_cdkf.errors import LeverError
-from lever_cdkf.firmware.aircraft import AircraftResponse, SeatTransfer
+from lever_cdkf.firmware.aircraft import ALARM, WARNING, AircraftResponse, SeatTransfer
 
 from .aircraft import Coupled
 from .stability import Response
 from .state_space import SEAT, SENSOR
+from .tabulated import Tabulated
 from .vector_fitting import Fit, fit
 
 UNSURE = 0.05
@@ -21,6 +23,8 @@ BAND = (1.5, 8.0)
 _NEEDED = (2.0, 7.0)
 """Of it at least, so that it has the crossing of the loop [Hz]."""
 _POINTS = 24
+LEFT = 1.5
+"""[dB]"""
 _SEAT_MODES = 3
 _AT_SEAT = 1e-6
 """By which seat and accelerometer may differ and be one place."""
@@ -41,6 +45,13 @@ def known_response(coupled: Coupled, off: Response | None = None, **said: Any) -
     return response_table(lambda s: coupled.response(s, place) * factor(s), name=coupled.name, seat=seat, **said)
 
 
+def measured_response(measured: Tabulated, **said: Any) -> AircraftResponse:
+    """The same of a frequency response, as it was measured."""
+    s = 2j * np.pi * measured.frequency.astype(np.complex128)
+    seat = None if measured.seat is None else seat_modes(s, measured.seat)
+    return response_table(measured.response, measured.band, seat=seat, **said)
+
+
 def seat_modes(s: ComplexArray, between: ComplexArray) -> SeatTransfer:
     """The acceleration at the seat over that at the accelerometer as the firmware takes it, fitted at s [rad/s] on the
     imaginary axis."""
@@ -56,9 +67,7 @@ def _modes(fitted: Fit) -> SeatTransfer:
     real = [each for each in known if each[0].imag == 0.0]
     real += [(real[-1][0], 0.0)] if len(real) % 2 else []
     pairs += list(zip(real[::2], real[1::2], strict=True))
-    modes = [
-        ((r + q).real, -(r * o + q * p).real, -(p + o).real, (p * o).real) for (p, r), (o, q) in pairs
-    ]
+    modes = [((r + q).real, -(r * o + q * p).real, -(p + o).real, (p * o).real) for (p, r), (o, q) in pairs]
     return SeatTransfer(fitted.d, modes)
 
 
@@ -73,5 +82,13 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
         )
     table = np.geomspace(low, high, _POINTS)
     values = response(2j * np.pi * table.astype(np.complex128))
-    sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE}
-    return AircraftResponse(table.tolist(), values.tolist(), **{**sigmas, **said})
+    sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE, **said}
+    alarm = alarm_limit(sigmas["gain_sigma"])
+    limits = {"alarm": alarm, "warning": max(alarm, said.get("alarm", alarm)) + WARNING - ALARM}
+    return AircraftResponse(table.tolist(), values.tolist(), **{**limits, **sigmas})
+
+
+def alarm_limit(gain_sigma: float) -> float:
+    """The gain margin below which there is an alarm where nothing else is said [dB]: with a gain that is too small by
+    gain_sigma [1], LEFT of it are left then."""
+    return max(ALARM, LEFT - 20.0 * math.log10(1.0 - min(gain_sigma, 0.9)))

@@ -68,9 +68,7 @@ class StateSpace:
             scale = scale * change
             if np.all(change == 1.0):
                 break
-        return StateSpace(
-            self.a * scale / scale[:, None], self.b / scale[:, None], self.c * scale, self.d
-        )
+        return StateSpace(self.a * scale / scale[:, None], self.b / scale[:, None], self.c * scale, self.d)
 
     def minimal(self) -> StateSpace:
         """Without the states that no input moves or no output shows; itself where there are none."""
@@ -132,12 +130,14 @@ def _krylov(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def read(path: Path) -> StateSpace:
     """What a file holds, as it stands: real and finite. Raises LeverError."""
+    if not path.is_file():
+        raise LeverError(f"{path}: no such file")
     try:
         arrays = _READERS[path.suffix.lower()](path)
     except KeyError:
         raise LeverError(f"{path}: a state space is a .mat, .npz or .csv file") from None
-    except (OSError, UnicodeError, ValueError, zipfile.BadZipFile) as error:
-        reason = getattr(error, "strerror", None) or "it is damaged, or no such file"
+    except (OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
+        reason = getattr(error, "strerror", None) or "it is damaged"
         raise LeverError(f"{path}: {reason}") from None
     found: dict[str, FloatArray] = {}
     for name in "ABCD":
@@ -180,7 +180,7 @@ def _mat(path: Path) -> Mapping[str, Any]:
     except NotImplementedError:
         raise LeverError(f"{path}: is of MATLAB 7.3; save it with -v7") from None
     except MatReadError:
-        raise LeverError(f"{path}: it is damaged, or no such file") from None
+        raise LeverError(f"{path}: it is damaged") from None
     return {name.upper(): each for name, each in content.items() if len(name) == 1}
 
 

@@ -19,17 +19,7 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.units import number_of
 
 from .state_space import StateSpace, is_state_space
-from .vector_fitting import Fit, fit
-
-
-@dataclass(frozen=True)
-class FittedResponse:
-    """A state space that was fitted to a frequency response."""
-
-    system: StateSpace
-    """Of pitch and gust to seat and accelerometer; a gust accelerates both."""
-    fits: tuple[Fit, ...]
-    """Of the response at the seat, and where it is another, at the accelerometer."""
+from .vector_fitting import fit
 
 
 @dataclass(frozen=True)
@@ -71,8 +61,9 @@ class Tabulated:
             raise LeverError(f"{path}: is zero at a frequency")
         return cls(columns[0], columns[1] + 1j * columns[2], seat)
 
-    def fitted(self, gearing: float, delay: float) -> FittedResponse:
-        """For a gearing of 1, without a delay [s]: both are in the table."""
+    def fitted(self, gearing: float, delay: float) -> tuple[StateSpace, float]:
+        """A state space of pitch and gust to seat and accelerometer, both of which a gust accelerates, without gearing [1]
+        and delay [s], which are in the table; and its largest relative error [1]."""
         s = 2j * np.pi * self.frequency.astype(np.complex128)
         values = self.values * np.exp(s * delay) / gearing
         fits = tuple(fit(s, each) for each in ((values,) if self.seat is None else (values, values / self.seat)))
@@ -84,7 +75,7 @@ class Tabulated:
             a[block, block], b[block, 0], d[place:, 0] = each.a, each.b, each.d
             c[place:, :at], c[place:, block] = 0.0, each.c
             at += len(each.b)
-        return FittedResponse(StateSpace(a, b, c, d), fits)
+        return StateSpace(a, b, c, d), max(float(each.error.max()) for each in fits)
 
     @property
     def band(self) -> tuple[float, float]:
