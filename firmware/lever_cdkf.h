@@ -169,7 +169,7 @@ typedef struct lever_sample {
 } lever_sample_t;
 
 enum lever_mode {
-    LEVER_MODE_INIT = 0,   /* no sample yet */
+    LEVER_MODE_INIT = 0,   /* no usable sample yet: none with a valid theta or theta_dot, since the start or a reset */
     LEVER_MODE_ALIGN = 1,  /* averaging the first samples; estimates are the first guess */
     LEVER_MODE_RUN = 2,    /* estimating */
     LEVER_MODE_COAST = 3,  /* no usable theta or theta_dot: predicting, uncertainty grows */

@@ -19,8 +19,11 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
     const lever_settings_t *settings = estimator->setup.settings;
     alignment_t *alignment = &estimator->alignment;
     alignment->time += elapsed;
-    estimator->mode = LEVER_MODE_ALIGN;
-    if (sample->valid[0] || sample->valid[1]) {
+    const bool usable = sample->valid[0] || sample->valid[1];
+    if (usable || (estimator->mode != LEVER_MODE_INIT)) {
+        estimator->mode = LEVER_MODE_ALIGN;
+    }
+    if (usable) {
         alignment->theta_sum += sample->valid[0] ? sample->y[0] : 0.0f;
         alignment->count += sample->valid[0] ? 1.0f : 0.0f;
         const bool seen = (alignment->count > 0.0f);

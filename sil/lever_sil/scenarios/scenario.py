@@ -126,7 +126,7 @@ def _read_setting(row: Setting) -> Reader:
 
 def _read_lever() -> Reader:
     """Reader of a table of what is constant in a lever; only angles may be below 0."""
-    units = {row.name: row.unit for row in settings_table()} | {"lever_friction": "N m"}
+    units = {row.name: row.unit for row in settings_table()}
     readers = {}
     for name in lever_plant.Lever.__dataclass_fields__:
         readers[name] = read_quantity(units[name], least=-math.inf if units[name] == "rad" else 0.0)
