@@ -85,7 +85,7 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
     values = response(2j * np.pi * table.astype(np.complex128))
     sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE, **said}
     alarm = alarm_limit(sigmas["gain_sigma"])
-    limits = {"alarm": alarm, "warning": max(alarm, said.get("alarm", alarm)) + WARNING - ALARM}
+    limits = {"alarm": alarm, "warning": alarm + WARNING - ALARM}
     return AircraftResponse(table.tolist(), values.tolist(), **{**limits, **sigmas})
 
 
