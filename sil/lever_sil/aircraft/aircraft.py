@@ -290,20 +290,21 @@ def read_aircraft(values: Any, place: Place) -> Coupled:
     if not isinstance(values, dict):
         raise place.error(f"{values!r} is not a table")
     changes = {name: value for name, value in values.items() if name not in _OF_SCENARIO}
-    if not isinstance(values.get("model"), str):
+    model = values.get("model")
+    known = keys(model if isinstance(model, str) else "")
+    if unknown := next((name for name in changes if name not in known), None):
+        raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")
+    if not isinstance(model, str):
         raise place.at("model").error(
             f"must be one of {', '.join(names())}, or the path of a .toml, .mat, .npz or .csv"
         )
-    known = keys(values["model"])
-    if unknown := next((name for name in changes if name not in known), None):
-        raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")
     try:
-        aircraft = load(values["model"], **changes)
+        aircraft = load(model, **changes)
     except LeverError as error:
         raise place.error(str(error)) from None
     gearing = read_quantity("1", above=0.0, greatest=GREATEST_GEARING)(values.get("gearing"), place.at("gearing"))
     changed = "".join(f", {key} {value}" for key, value in changes.items())
-    return Coupled(aircraft, gearing, f"{values['model']}{changed}, gearing {gearing:g}")
+    return Coupled(aircraft, gearing, f"{model}{changed}, gearing {gearing:g}")
 
 
 @dataclass(frozen=True)
