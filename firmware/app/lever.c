@@ -110,8 +110,7 @@ void instance_watch(lever_t *lever)
         bounce->time_us = time_us;
         bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
         const bool doubtful = ((lever->estimator.faults & (uint32_t)LEVER_FAULT_MISMATCH) != 0u);
-        const alarm_basis_t basis = {.carried = carries_margin(lever), .doubtful = doubtful};
-        bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, basis);
+        bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever), doubtful);
     }
 }
 

@@ -14,7 +14,7 @@
 #define SAME_US 22000u       /* a sensor that says the same for longer is stuck, */
 #define SAME_LEAST 8u        /* if for so many samples more than */
 #define SAME_USUAL 3u        /* times the most for which it did lately */
-#define LETTING_GO 0.02f      /* time constant of a correction that no model stands behind any more [s] */
+#define LETTING_GO 0.95f      /* of a correction that no model stands behind any more, what a sample leaves */
 #define MEMORY 0.5f          /* of how the lever moves [s] */
 #define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
 #define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
@@ -255,7 +255,7 @@ static void advance(mitigation_t *mitigation, const lever_settings_t *settings, 
         mitigation->correction = -clamped(angle_of(mitigation, settings, sample, period), settings->correction_limit);
     } else {
         mitigation->explained = false;
-        mitigation->correction -= share_of(period, LETTING_GO) * mitigation->correction;
+        mitigation->correction *= LETTING_GO;
     }
 }
 

@@ -14,15 +14,13 @@ static const lever_aircraft_t aircraft = {.warning = WARNING, .alarm = ALARM};
 static uint8_t next(enum lever_bounce state, float gain, float sigma, bool carried)
 {
     const margin_t margin = {.gain = gain, .arm_sigma = sigma};
-    const alarm_basis_t basis = {.carried = carried};
-    return alarm_next((uint8_t)state, &margin, &aircraft, basis);
+    return alarm_next((uint8_t)state, &margin, &aircraft, carried, false);
 }
 
 static uint8_t next_doubtful(enum lever_bounce state, float gain)
 {
     const margin_t margin = {.gain = gain, .arm_sigma = 1.0f};
-    const alarm_basis_t basis = {.carried = true, .doubtful = true};
-    return alarm_next((uint8_t)state, &margin, &aircraft, basis);
+    return alarm_next((uint8_t)state, &margin, &aircraft, true, true);
 }
 
 /* R44 */
