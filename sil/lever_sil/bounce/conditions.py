@@ -282,7 +282,8 @@ _WRONG_SIGN = Condition(
         mitigation=CANCELLATION,
         spoil=_sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="-100 %"),
     ),
-    (_most("adds for", 1.0, "worst"), _most("jump", 0.2, "worst")),
+    (_most("adds for", 0.5, "worst"),),
+    ("jump",),
 )
 
 # --- between accelerometer and pilot ---------------------------------------------------------------------------------
