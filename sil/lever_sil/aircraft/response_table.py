@@ -92,8 +92,8 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
 
 
 def _frequencies(response: Response, low: float, high: float) -> FloatArray:
-    """Those of the table [Hz]: equal ratios, or where a mode of the fuselage lies between two of them, each where straight
-    lines between the ones before are furthest off."""
+    """Those of the table [Hz]: equal ratios, or where a mode of the fuselage lies between two of them, each where
+    straight lines between the ones before are furthest off."""
     fine = np.geomspace(low, high, 1000)
     exact = response(2j * np.pi * fine.astype(np.complex128))
 
