@@ -463,7 +463,9 @@ _AT_1_HZ: dict[str, Any] = {"title": "cancellation, its corner at 1 Hz", "suffix
 CONDITIONS = {
     row.name: row
     for row in (
+        *_BETWEEN,
         *_ALARMS,
+        *_STATED,
         *_LIMITS,
         _cancelled(CANCELLATION, *_AWAY),
         _cancelled(BOTH),
@@ -483,8 +485,6 @@ CONDITIONS = {
         *_WRONG,
         *_FAULTS,
         _WRONG_SIGN,
-        *_BETWEEN,
-        *_STATED,
     )
 }
 """All by name, in the order of the table."""
