@@ -161,7 +161,7 @@ typedef struct correction {
 /* The pending scores: of an error of CDKF_BASE_GAIN that has just come about, and of each considered error as if it had
  * always been. */
 score_t cdkf_sudden_score(const cdkf_t *cdkf);
-void cdkf_constant_scores(const cdkf_t *cdkf, score_t score[CDKF_CONSIDERED]);
+score_t cdkf_constant_score(const cdkf_t *cdkf, uint32_t c);
 
 /* From now on there is a step that nothing is known of; or none any more. */
 void cdkf_begin_step(cdkf_t *cdkf);

@@ -35,11 +35,9 @@ score_t cdkf_sudden_score(const cdkf_t *cdkf)
     return score;
 }
 
-void cdkf_constant_scores(const cdkf_t *cdkf, score_t score[CDKF_CONSIDERED])
+score_t cdkf_constant_score(const cdkf_t *cdkf, uint32_t c)
 {
-    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
-        score[c] = considered_score(&cdkf->considered[c], &cdkf->pending);
-    }
+    return considered_score(&cdkf->considered[c], &cdkf->pending);
 }
 
 void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correction)
