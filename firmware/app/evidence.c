@@ -40,6 +40,12 @@ static const evidence_row_t rows[EVIDENCE_COUNT] = {
 #include "app/evidence.def"
 };
 
+/* The evidence that shows as a fault. */
+static const uint32_t shown = 0u
+#define EVIDENCE(name, threshold, off, fault, meaning) | (((fault) != 0) ? ((uint32_t)1u << (uint32_t)(name)) : 0u)
+#include "app/evidence.def"
+    ;
+
 /* Square of a change from sample to sample that does no harm, by input [m^2/s^4], [N^2 m^2]. */
 static const float harmless[INPUT_COUNT] = {4.0f, 0.09f};
 
@@ -241,8 +247,10 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
 void evidence_show(evidence_t *evidence)
 {
     evidence->faults = 0u;
-    for (uint32_t i = 0u; i < (uint32_t)EVIDENCE_COUNT; i++) {
-        evidence->faults |= evidence_has(evidence, (enum evidence_id)i) ? rows[i].fault : 0u;
+    uint32_t i = 0u;
+    for (uint32_t rest = evidence->present & shown; rest != 0u; rest >>= 1u) {
+        evidence->faults |= ((rest & 1u) != 0u) ? rows[i].fault : 0u;
+        i++;
     }
 }
 

@@ -6,16 +6,18 @@
 #include <math.h>
 #include <string.h>
 
+void grip_force_start(grip_force_t *grip)
+{
+    (void)memset(grip, 0, sizeof *grip);
+}
+
+#if LEVER_GRIP_FORCE
+
 #define MEMORY 10.0f   /* of the comparison, and of the mean square [s] */
 #define TIME_MIN 2.0f  /* before the comparison says that it is wrong [s] */
 #define TOLERATED 0.2f /* what the lever's own equation may be off */
 #define SURE 2.0f      /* standard deviations of the comparison */
 #define WALK_MIN 1e-3f /* q [1/sqrt(s)] */
-
-void grip_force_start(grip_force_t *grip)
-{
-    (void)memset(grip, 0, sizeof *grip);
-}
 
 /* Takes a valid force, or notes that it is missing. After an outage its level is a guess. */
 static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force, float period)
@@ -115,3 +117,30 @@ bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_bloc
     }
     return compared;
 }
+
+#else
+
+bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
+    const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen)
+{
+    (void)grip;
+    (void)setup;
+    (void)trim;
+    (void)force;
+    (void)step;
+    (void)alone;
+    (void)error;
+    (void)seen;
+    return false;
+}
+
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_block_t *hands, float *away)
+{
+    (void)grip;
+    (void)setup;
+    (void)hands;
+    (void)away;
+    return false;
+}
+
+#endif

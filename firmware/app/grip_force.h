@@ -16,6 +16,10 @@
 
 #include <stdbool.h>
 
+#ifndef LEVER_GRIP_FORCE
+#define LEVER_GRIP_FORCE 1 /* 0: forces are received, and nothing is made of them (2 KiB less) */
+#endif
+
 /* Means over blocks (hands.h), of the hand's impulse times the drive: what the force sensor and what the lever's motion
  * say of it. Their ratio is the sensor's gain error. */
 typedef struct grip_comparison {

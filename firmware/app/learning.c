@@ -17,10 +17,11 @@ static void keep_only(learning_t *learning, const cdkf_t *cdkf)
     learning->kept_ago = 0.0f;
 }
 
-static void keep(learning_t *learning, const cdkf_t *cdkf, float period)
+/* `now`: not in a block that ends a window of noise, to bound the worst step. */
+static void keep(learning_t *learning, const cdkf_t *cdkf, float period, bool now)
 {
     learning->kept_ago += period;
-    if (learning->kept_ago >= KEEP_PERIOD) {
+    if (now && (learning->kept_ago >= KEEP_PERIOD)) {
         learning->kept_ago = 0.0f;
         learning->kept[1] = learning->kept[0];
         cdkf_keep(cdkf, &learning->kept[0]);
@@ -112,7 +113,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
     cdkf_learn(cdkf, period, setup->settings->caution_time, &correction);
     if (learns) {
         if (cdkf->acting > (uint32_t)CDKF_STEP) {
-            cdkf_learn_step(cdkf, &step);
+            correction.bounded = cdkf_learn_step(cdkf, &step);
         }
         if (evidence_of_change(&learning->evidence, &correction, block)) {
             evidence_begin_change(&learning->evidence);
@@ -120,6 +121,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
             walk = turn(learning, setup, cdkf, verdict_of(learning->evidence.present));
         }
     }
+    evidence_note(&learning->evidence, EVIDENCE_BOUND, correction.bounded);
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         variance[i] = adaptation.floor[i] * walk;
     }
@@ -165,16 +167,17 @@ static void end_block(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, 
     if (held || !verdict_rows[learning->verdict].learn) {
         cdkf_drop_pending(cdkf);
     }
-    if (held || verdict_rows[learning->verdict].adapt) {
-        keep(learning, cdkf, block.period);
-    }
     if (held) {
         noise_estimation_begin(&learning->noise);
+        evidence_note(evidence, EVIDENCE_BOUND, scaling_bound(&cdkf->scaling, cdkf->w));
+        keep(learning, cdkf, block.period, true);
     } else {
         estimate_noise(learning, setup, cdkf, block.period);
+        if (verdict_rows[learning->verdict].adapt) {
+            keep(learning, cdkf, block.period, learning->noise.elapsed > 0.0f);
+        }
         learn(learning, setup, cdkf, &block, more);
     }
-    evidence_note(evidence, EVIDENCE_BOUND, scaling_bound(&cdkf->scaling, cdkf->w));
     evidence_show(evidence);
     cdkf_draw(cdkf, setup->model_in_use, &setup->constants);
 }

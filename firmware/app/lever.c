@@ -7,10 +7,11 @@
 #include <stddef.h>
 #include <string.h>
 
-#define DITHER_MOST 1.0e4f   /* plausible [N m] */
-#define MARGIN_US 40000u     /* least time between two margins */
-#define SETTINGS_US 1000000u /* between two looks at the settings */
-#define SILENCE_US 20000u    /* or 1.25 sample periods: mitigation.h */
+#define DITHER_MOST 1.0e4f        /* plausible [N m] */
+#define MARGIN_US 40000u          /* least time between two margins */
+#define SETTINGS_US 1000000u      /* between two looks at the settings, */
+#define SETTINGS_LATE_US 1020000u /* and at most */
+#define SILENCE_US 20000u         /* or 1.25 sample periods: mitigation.h */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -70,11 +71,14 @@ static bool permits_torque(const lever_t *lever)
            !lever->settings_changed;
 }
 
-/* A fault of the memory that the settings are in stays, whatever is in it later. */
+/* A fault of the memory that the settings are in stays, whatever is in it later. Not with the sample that ends a block,
+ * where there is another, to bound the worst step. */
 static void check_settings(lever_t *lever)
 {
     const uint32_t time_us = lever->estimator.time_us;
-    if ((time_us - lever->settings_us) >= SETTINGS_US) {
+    const uint32_t elapsed_us = time_us - lever->settings_us;
+    const bool between = (lever->estimator.learning.elapsed > 0.0f);
+    if ((elapsed_us >= SETTINGS_US) && (between || (elapsed_us >= SETTINGS_LATE_US))) {
         lever->settings_us = time_us;
         lever->settings_changed =
             lever->settings_changed || (sum_of(lever->estimator.setup.settings) != lever->settings_sum);

@@ -14,11 +14,20 @@ const verdict_row_t verdict_rows[VERDICT_COUNT] = {
 #include "app/verdict.def"
 };
 
+/* All evidence that decides. */
+static const uint32_t decisive = 0u
+#define VERDICT(name, evidence, learn, adapt, torque, correction, margin, entry, exit, meaning) | (evidence)
+#include "app/verdict.def"
+    ;
+
 uint8_t verdict_of(uint32_t present)
 {
-    uint8_t verdict = 0u;
-    while ((verdict < (uint8_t)VERDICT_LEARNING) && ((verdict_rows[verdict].evidence & present) == 0u)) {
-        verdict++;
+    uint8_t verdict = (uint8_t)VERDICT_LEARNING;
+    if ((present & decisive) != 0u) { /* seldom */
+        verdict = 0u;
+        while ((verdict_rows[verdict].evidence & present) == 0u) {
+            verdict++;
+        }
     }
     return verdict;
 }

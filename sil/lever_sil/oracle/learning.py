@@ -222,15 +222,15 @@ class Learning:
     def _estimate_noise(self, period: np.float32) -> None:
         """While innovations are those of a known arm, or of noise that has grown."""
         grown = self.verdict == "noise"
-        if self.verdict == "learning":
-            self.kept_ago += period
-            if self.kept_ago >= KEEP_PERIOD:
-                self.kept_ago = seconds(0.0)
-                self.kept = (self._snapshot(), self.kept[0])
         if not grown and self.verdict != "learning":
             self.noise.begin()
         elif self.noise.end_block(period, NOISE_WINDOW if grown else 1.0) and not grown and self.kept[1].trust < 1.0:
             self._restore()
+        if self.verdict == "learning":
+            self.kept_ago += period
+            if self.kept_ago >= KEEP_PERIOD and self.noise.elapsed > 0.0:
+                self.kept_ago = seconds(0.0)
+                self.kept = (self._snapshot(), self.kept[0])
 
     def _restore(self) -> None:
         kept = self.kept[1]

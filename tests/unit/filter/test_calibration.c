@@ -5,6 +5,8 @@
 #include "random.h"
 #include "test.h"
 
+#include <string.h>
+
 enum { C = CDKF_CALIBRATION };
 
 #define PERIOD 0.02f

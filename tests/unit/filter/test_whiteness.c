@@ -4,6 +4,8 @@
 #include "random.h"
 #include "test.h"
 
+#include <stdbool.h>
+
 enum { SAMPLES = 20 }; /* in a block */
 
 #define PERIOD 1.0e-3f
@@ -67,7 +69,9 @@ TEST(the_first_two_seconds_say_nothing)
     setUp();
     for (uint32_t sample = 1u; sample <= 400u; sample++) { /* of 10 ms */
         whiteness_add(&whiteness, 1.0f, 0.01f);
-        TEST_ASSERT_EQUAL(sample >= 200u, whiteness_correlation(&whiteness) > 0.0f);
+        if ((sample < 198u) || (sample > 202u)) { /* sums of 0.01f are rounded */
+            TEST_ASSERT_EQUAL(sample > 200u, whiteness_correlation(&whiteness) > 0.0f);
+        }
     }
 }
 
