@@ -46,7 +46,10 @@ def test_a_table_has_its_form(place: Place, root: Path) -> None:
 
 
 FLOWN = (
-    ("between accelerometer and pilot", "mode at 6 Hz, +0.3 at the seat, accelerometer at the centre of mass: cancellation"),
+    (
+        "between accelerometer and pilot",
+        "mode at 6 Hz, +0.3 at the seat, accelerometer at the centre of mass: cancellation",
+    ),
     ("margin and alarm", "alarm before the vibration doubles"),
     ("largest gearing over critical", "no mitigation, the lever's angle through a low-pass of 1 Hz"),
     ("involuntary and voluntary", "cancellation, `cancellation_corner` 1 Hz, in the loop: gain"),

@@ -27,7 +27,10 @@ from python.plants.motion import LEVER, TRIM, columns
 from scipy import io, linalg, signal
 
 SIX_HZ: dict[str, Any] = {"frequency": "6 Hz", "damping": "3 %", "rotor": "0.3 1", "seat": "1 1"}
-TWO: list[dict[str, Any]] = [{**SIX_HZ, "accelerometer": "-0.2 1"}, {"frequency": "4.5 Hz", "rotor": "0.1 1", "seat": "1 1"}]
+TWO: list[dict[str, Any]] = [
+    {**SIX_HZ, "accelerometer": "-0.2 1"},
+    {"frequency": "4.5 Hz", "rotor": "0.1 1", "seat": "1 1"},
+]
 AIRCRAFT = ("bo105_like", "ch53_like", "ec135_like", "puma_like", "uh60_like")
 KINDS = (".mat", ".npz", ".csv")
 ON_AXIS = 2j * np.pi * np.geomspace(0.5, 20.0, 80).astype(np.complex128)
@@ -60,7 +63,9 @@ def test_the_way_from_the_centre_of_mass_to_the_seat_is_that_of_one_oscillator()
 
 def test_energy_is_conserved_without_lift_and_damping() -> None:
     """Half of M z_dot^2 + M q_dot^2 + N (I beta_dot^2 + 2 S beta_dot hub_dot), and of the springs."""
-    craft = aircraft.load("puma_like", mode=[{**SIX_HZ, "damping": "0.0000001 %"}], lock_number="1 1", lift_deficiency="0.1 1")
+    craft = aircraft.load(
+        "puma_like", mode=[{**SIX_HZ, "damping": "0.0000001 %"}], lock_number="1 1", lift_deficiency="0.1 1"
+    )
     assert isinstance(craft, Helicopter)
     inertia, moment = craft.blade_inertia, 1.5 * craft.blade_inertia / craft.radius
     lifted, bare = craft.mounted().a, aircraft.load("puma_like", lock_number="1 1", lift_deficiency="0.1 1").mounted().a
@@ -71,7 +76,9 @@ def test_energy_is_conserved_without_lift_and_damping() -> None:
             (0.0, 0.3 * craft.blades * moment, craft.mass),
         )
     )
-    spring = np.diag((0.0, craft.blades * inertia * (craft.flap_frequency * craft.rotor_speed) ** 2, craft.mass * (12 * np.pi) ** 2))
+    spring = np.diag(
+        (0.0, craft.blades * inertia * (craft.flap_frequency * craft.rotor_speed) ** 2, craft.mass * (12 * np.pi) ** 2)
+    )
     accelerations = lifted[np.ix_((0, 2, 4), (1, 3))]
     assert mass @ accelerations == pytest.approx(-spring[:, 1:], abs=1e-6 * spring.max())
     assert bare.shape == (3, 3)
@@ -105,7 +112,9 @@ def critical_by_eigenvalues(craft: Aircraft, truth: Truth) -> float:
     w = 2.0 * math.pi * craft.actuator_bandwidth
     order = 12
     pade = [
-        math.factorial(2 * order - k) * math.factorial(order) / (math.factorial(2 * order) * math.factorial(k) * math.factorial(order - k))
+        math.factorial(2 * order - k)
+        * math.factorial(order)
+        / (math.factorial(2 * order) * math.factorial(k) * math.factorial(order - k))
         for k in range(order + 1)
     ]
     scaled = [value * craft.delay**k for k, value in enumerate(pade)]
@@ -318,7 +327,9 @@ def written(path: Path, craft: Aircraft, gearing: float, noise: float = 0.0, sea
 
 @pytest.mark.parametrize(("noise", "within"), [(0.0, 0.01), (0.02, 0.05)])
 @pytest.mark.parametrize("modes", [[], [SIX_HZ]], ids=["rigid", "a mode"])
-def test_a_response_is_fitted_and_flies(modes: list[dict[str, Any]], noise: float, within: float, tmp_path: Path) -> None:
+def test_a_response_is_fitted_and_flies(
+    modes: list[dict[str, Any]], noise: float, within: float, tmp_path: Path
+) -> None:
     craft, path = aircraft.load("puma_like", **({"mode": modes} if modes else {})), tmp_path / "response.csv"
     written(path, craft, 0.5, noise, seat=bool(modes))
     fitted = aircraft.load(str(path), response_gearing="0.5 1", delay="20 ms")
