@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 1,912 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,040 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[1896];
+    uint8_t rest[2024];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -169,7 +169,7 @@ typedef struct lever_sample {
 } lever_sample_t;
 
 enum lever_mode {
-    LEVER_MODE_INIT = 0,   /* no sample yet */
+    LEVER_MODE_INIT = 0,   /* no usable sample yet: none with a valid theta or theta_dot, since the start or a reset */
     LEVER_MODE_ALIGN = 1,  /* averaging the first samples; estimates are the first guess */
     LEVER_MODE_RUN = 2,    /* estimating */
     LEVER_MODE_COAST = 3,  /* no usable theta or theta_dot: predicting, uncertainty grows */
@@ -252,10 +252,19 @@ void lever_feedthrough(const lever_t *lever, float frequency, lever_feedthrough_
 
 /* --- collective bounce ----------------------------------------------------------------------------------------- */
 
-enum lever_aircraft_limits { LEVER_AIRCRAFT_POINTS = 24 };
+enum lever_aircraft_limits { LEVER_AIRCRAFT_POINTS = 24, LEVER_SEAT_MODES = 3 };
 
-/* How a helicopter answers to its collective lever: vertical acceleration of the cabin over the lever's angle, up and
- * raised positive, with gearing, delays and actuator, at frequencies about those of bounce: 1.5 to 8 Hz. */
+/* (by_rate s + by_place) / (s^2 + damping s + stiffness): a bending mode of the cabin between accelerometer and seat. */
+typedef struct lever_seat_mode {
+    float by_rate;   /* [1/s] */
+    float by_place;  /* [1/s^2] */
+    float damping;   /* above 0 [1/s] */
+    float stiffness; /* above 0 [1/s^2] */
+} lever_seat_mode_t;
+
+/* How a helicopter answers to its collective lever: vertical acceleration at the pilot's seat over the lever's angle, up
+ * and raised positive, with gearing, delays and actuator, at frequencies about those of bounce: 1.5 to 8 Hz. Where the
+ * accelerometer is not at the seat and seat_modes is 0, the acceleration is that at the accelerometer. */
 typedef struct lever_aircraft {
     uint8_t count;                          /* frequencies, at least 3 */
     float frequency[LEVER_AIRCRAFT_POINTS]; /* rising [Hz] */
@@ -265,6 +274,9 @@ typedef struct lever_aircraft {
     float phase_sigma;                      /* [rad] */
     float warning;                          /* gain margin below which there is a warning [dB] */
     float alarm;                            /* and an alarm [dB] */
+    uint8_t seat_modes; /* 0: the accelerometer is at the seat, or the way from there to the seat is not known */
+    float seat_direct;  /* z_ddot at the seat over that at the accelerometer: this, and the sum of the modes [1] */
+    lever_seat_mode_t seat[LEVER_SEAT_MODES];
 } lever_aircraft_t;
 
 enum lever_bounce {
@@ -455,7 +467,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1648 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1748 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -9,9 +9,12 @@ from pathlib import Path
 KEPT = "m_p_walk c_p_walk k_p_walk walk_ceiling robbins_monro_time z_ddot_gain z_ddot_delay lever_friction"
 SHORTER = {
     r"lever tune \S+": r"\g<0>" + "".join(f" --keep {name}" for name in KEPT.split()),
+    r"lever compare --paper": r"\g<0> --duration 4 --estimators dual_annealing rls",
+    r"lever figures --paper": r"\g<0> --only figure_4_states",
     r"(?m)^lever replay (?!.*(?:--format|out/replay))(.*(?:-o|--out) \S+)": r"lever replay \1 --format csv",
 }
-"""Commands with less to calculate: one setting is looked for, and no MF4 written, for which much is imported."""
+"""Commands with less to calculate: one setting is looked for, two estimators are compared, one figure is drawn, and no
+MF4 is written, for which much is imported."""
 
 
 def blocks(readme: Path, language: str) -> dict[int, str]:

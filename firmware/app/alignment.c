@@ -20,8 +20,11 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
     const lever_settings_t *settings = estimator->setup.settings;
     alignment_t *alignment = &estimator->alignment;
     alignment->time += elapsed;
-    estimator->mode = LEVER_MODE_ALIGN;
-    if (sample->valid[0] || sample->valid[1]) {
+    const bool usable = sample->valid[0] || sample->valid[1];
+    if (usable || (estimator->mode != LEVER_MODE_INIT)) {
+        estimator->mode = LEVER_MODE_ALIGN;
+    }
+    if (usable) {
         float angle = (alignment->count > 0.0f) ? trim_angle(&estimator->trim) : settings->lever_preload_angle;
         if (sample->valid[0]) {
             alignment->count += 1.0f;

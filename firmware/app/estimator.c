@@ -91,7 +91,7 @@ static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
     const bool late = (s->z_ddot_delay > 0.0f) && (elapsed > 0.0f);
     const float ahead = late ? (s->z_ddot_delay * ((z_ddot - estimator->raw_z_ddot) / elapsed)) : 0.0f;
     estimator->raw_z_ddot = z_ddot;
-    return (z_ddot + ahead) * estimator->setup.base_scale;
+    return seat_step(&estimator->seat, (z_ddot + ahead) * estimator->setup.base_scale, elapsed);
 }
 
 /* An input that is plausible, but for some samples far from where it was. Not after it was missing, as `fault` of the

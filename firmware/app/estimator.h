@@ -6,6 +6,7 @@
 #include "app/learning.h"
 #include "app/setup.h"
 #include "bounce/margin.h"
+#include "bounce/seat.h"
 #include "filter/cdkf.h"
 #include "filter/derived.h"
 #include "filter/trim.h"
@@ -35,7 +36,8 @@ typedef struct estimator {
     uint32_t late_series_us;
     float raw_z_ddot;   /* as it came last [m/s^2] */
     float base_missing; /* time since the base acceleration was valid last [s] */
-    float last_z_ddot;  /* inputs, compensated for what is known of the sensors [m/s^2], [N m] */
+    seat_t seat;
+    float last_z_ddot; /* inputs, compensated for what is known of the sensors, at the seat [m/s^2], [N m] */
     float last_tau_m;
     float z_ddot; /* the same as the model takes them: deviations in preload trim */
     float tau_m;

@@ -148,7 +148,6 @@ static enum lever_mode update(lever_t *lever, const lever_sample_t *sample)
 void instance_mitigate(lever_t *lever)
 {
     const uint32_t broken = (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED;
-    const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE;
     const estimator_t *estimator = &lever->estimator;
     const setup_t *setup = &estimator->setup;
     const torque_sample_t *to_gate = &lever->to_gate;
@@ -166,7 +165,8 @@ void instance_mitigate(lever_t *lever)
         .advances = to_gate->advances,
         .permitted = to_gate->permitted && verdict_of_now(lever)->correction &&
                      !torque_gate_is_abandoned(&lever->gate) && ((faults & broken) == 0u),
-        .sensed = ((faults & blind) == 0u),
+        .sensed = ((faults & (uint32_t)LEVER_FAULT_THETA) == 0u) && (estimator->base_missing <= 0.0f),
+        .fits = !evidence_has(&estimator->learning.evidence, EVIDENCE_BASE),
         .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u),
         .same_theta = ((lever->bounce.same & (uint32_t)INSTANCE_SAME_THETA) != 0u),
         .same_z_ddot = ((lever->bounce.same & (uint32_t)INSTANCE_SAME_Z_DDOT) != 0u)};
@@ -325,6 +325,7 @@ bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft)
     if (accepted) {
         const margin_t unknown = {.gain = 0.0f};
         lever->bounce.aircraft = aircraft;
+        lever->estimator.seat.aircraft = aircraft;
         lever->bounce.margin = unknown;
         lever->bounce.time_us = (aircraft != NULL) ? (lever->estimator.time_us - MARGIN_US) : 0u;
         lever->bounce.state = (uint8_t)LEVER_BOUNCE_UNKNOWN;

@@ -65,7 +65,9 @@ static const state_row_t rows[] = {
     FLOATS(estimator.trim_sine_cosine.sine, estimator.alignment.time),
     MEMBERS(estimator.mode, estimator.mode, (uint8_t)sizeof(enum lever_mode), (uint32_t)LEVER_MODE_FAULT),
     WORDS(estimator.time_us, estimator.late_series_us),
-    FLOATS(estimator.raw_z_ddot, estimator.nis),
+    FLOATS(estimator.raw_z_ddot, estimator.base_missing),
+    FLOATS(estimator.seat.z_ddot, estimator.seat.rate[LEVER_SEAT_MODES - 1]),
+    FLOATS(estimator.last_z_ddot, estimator.nis),
     BYTES(estimator.nis_size, estimator.nis_size, (uint32_t)CDKF_OUTPUTS),
     FLAGS(estimator.frozen, estimator.communication_fault),
     WORDS(estimator.faults, estimator.recoveries),
@@ -276,11 +278,12 @@ static bool is_near(float value, float expected)
     return fabsf(value - expected) <= (1.0e-3f * fabsf(expected));
 }
 
+/* Also where it goes on from: a square of a larger one would not be. */
 static bool are_finite(const float value[], uint32_t count)
 {
     bool finite = true;
     for (uint32_t i = 0u; i < count; i++) {
-        finite = finite && is_finite(value[i]);
+        finite = finite && (fabsf(value[i]) < FLOAT_LIMIT); /* NaN is not */
     }
     return finite;
 }

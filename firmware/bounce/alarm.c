@@ -1,19 +1,20 @@
 #include "bounce/alarm.h"
 
-#define ALARM_SIGMA_MOST 3.0f /* a gain margin that is less certain says nothing [dB] */
+#define ALARM_SIGMA_MOST 3.0f /* an arm that is less certain says nothing [dB] */
 #define QUANTILE 0.842f       /* 80 % of a normal distribution lie below that many standard deviations */
 
-/* Whether a state with this limit goes on, or begins: it needs to be sure of either. */
+/* Hysteresis: entering and leaving a state both need 80 % confidence in the arm. An error of the table lasts for the
+ * flight, so that waiting makes it no smaller: who made the table has the limit for that. */
 static bool is_below(bool was_below, float limit, const margin_t *margin)
 {
-    const float doubt = QUANTILE * margin->gain_sigma;
+    const float doubt = QUANTILE * margin->arm_sigma;
     return (margin->gain + (was_below ? -doubt : doubt)) < limit;
 }
 
 uint8_t alarm_next(uint8_t state, const margin_t *margin, const lever_aircraft_t *aircraft, bool carried)
 {
     uint8_t next = (uint8_t)LEVER_BOUNCE_CLEAR;
-    if (!(carried && (margin->gain_sigma <= ALARM_SIGMA_MOST))) { /* NaN is not */
+    if (!(carried && (margin->arm_sigma <= ALARM_SIGMA_MOST))) { /* NaN is not */
         next = (state == (uint8_t)LEVER_BOUNCE_ALARM) ? state : (uint8_t)LEVER_BOUNCE_UNKNOWN;
     } else if (is_below(state == (uint8_t)LEVER_BOUNCE_ALARM, aircraft->alarm, margin)) {
         next = (uint8_t)LEVER_BOUNCE_ALARM;

@@ -281,6 +281,7 @@ margin_t margin_of(const lever_aircraft_t *aircraft, const cdkf_t *cdkf, const m
     const float by_phase = critical_frequency(&loop, &places, &later) - frequency;
     const margin_t result = {.gain = (at.height > LEAST_HEIGHT) ? -(DECIBELS * logarithm(at.height)) : MARGIN_MOST,
         .gain_sigma = hidden + hypotenuse(sigma.first, louder_by(&louder, &at), louder_by(&later, &at)),
+        .arm_sigma = hidden + sigma.first,
         .modulus = at.modulus,
         .modulus_sigma = hypotenuse(modulus_sigma.first, louder.modulus - at.modulus, later.modulus - at.modulus),
         .frequency = frequency,
@@ -296,6 +297,12 @@ bool margin_accepts(const lever_aircraft_t *aircraft)
     accepted = accepted && (aircraft->phase_sigma >= 0.0f) && (aircraft->phase_sigma <= 1.0f);
     accepted = accepted && is_finite(aircraft->alarm) && (aircraft->warning >= aircraft->alarm) &&
                is_finite(aircraft->warning);
+    accepted = accepted && (aircraft->seat_modes <= (uint8_t)LEVER_SEAT_MODES) && is_finite(aircraft->seat_direct);
+    for (uint32_t i = 0u; accepted && (i < aircraft->seat_modes); i++) {
+        const lever_seat_mode_t *mode = &aircraft->seat[i];
+        accepted = (mode->damping > 0.0f) && is_finite(mode->damping) && (mode->stiffness > 0.0f) &&
+                   is_finite(mode->stiffness) && is_finite(mode->by_rate) && is_finite(mode->by_place);
+    }
     float last = 0.0f;
     for (uint32_t i = 0u; accepted && (i < count); i++) {
         accepted = (aircraft->frequency[i] > last) && is_finite(aircraft->frequency[i]) &&

@@ -18,6 +18,13 @@
 #define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
 #define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
 #define LIVELY 2.5e-5f       /* mean square of the rate from which on that can be told: (5 mrad/s)^2 */
+#define LEFT_LEAST 2.25e-4f   /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
+#define LEFT_PART 0.05f       /* and this part of the expected one */
+#define WEIGHED_EVERY 8u      /* samples */
+#define SLOW 100.0f           /* squares of the frequencies below which it is the pilot's own, */
+#define SLOW_TURN 10.0f       /* the root of that [rad/s] */
+#define FAST 230.0f           /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
+#define FASTEST 2500.0f       /* 8 Hz */
 #define NOTCH_TURN_MOST 0.8f /* corner of the notch times a sample period, up to which it is stable */
 #define PERIOD_MOST 0.02f    /* of a filter's step [s] */
 #define LONGEST 0.1f         /* without a sample, until the filters begin anew [s] */
@@ -89,7 +96,8 @@ static void pass_gate(mitigation_t *mitigation, const mitigation_sample_t *sampl
         const uint32_t period_us = lesser_count(sample->elapsed_us, sample->silence_us);
         const bool as_chosen =
             has_correction(sample->mitigation) && (mitigation->notches == has_notch(sample->mitigation));
-        fade(&mitigation->weight, mitigation->explained && as_chosen, (float)period_us);
+        fade(&mitigation->weight, as_chosen, (float)period_us);
+        fade(&mitigation->trust, mitigation->explained && sample->fits, (float)period_us);
         fade(&mitigation->damping_weight, mitigation_has_damping(sample->mitigation), (float)period_us);
     }
 }
@@ -126,6 +134,11 @@ static float pass_notch(mitigation_notch_t *notch, float value, float turn, floa
     return damping * notch->band_pass;
 }
 
+static float between_0_and_1(float value)
+{
+    return lesser(greater(value, 0.0f), 1.0f);
+}
+
 /* Of the rate in the band, whether what the estimated arm makes of base and motor is there. Other motion does not count:
  * it has nothing in common with that. */
 static void compare(mitigation_t *mitigation, float moved, float expected, float period)
@@ -139,14 +152,45 @@ static void compare(mitigation_t *mitigation, float moved, float expected, float
     }
 }
 
+/* About which frequency most of what is left is, by the mean squares of rate and angle, and how much of it a notch there
+ * is to take: none where it is quiet, or as slow as the pilot's own. */
+static void weigh(mitigation_rest_t *rest, float usual)
+{
+    const float turn_square = rest->rate_square / greater(rest->square, LEFT_LEAST / FASTEST);
+    rest->turn = sqrtf(lesser(greater(turn_square, SLOW), FASTEST));
+    rest->weight = between_0_and_1((rest->rate_square / usual) - 1.0f) *
+                   between_0_and_1((turn_square - SLOW) / (FAST - SLOW));
+}
+
+/* Takes that away. */
+static float take_rest(mitigation_rest_t *rest, float left, float period, float share, float damping)
+{
+    const float rise = (HIGH_PASS_TURN * BAND_HIGH) * (left - rest->band.low_pass);
+    const float angle = pass_band(&rest->band, left, period);
+    const float rate = rise - ((HIGH_PASS_TURN * BAND_LOW) * angle);
+    rest->square += share * ((angle * angle) - rest->square);
+    rest->rate_square += share * ((rate * rate) - rest->rate_square);
+    return left - (rest->weight * pass_notch(&rest->notch, left, rest->turn * period, damping));
+}
+
+/* Nothing of an angle [rad] at which the lever stands. */
+static void start_rest(mitigation_t *mitigation, float theta)
+{
+    const mitigation_rest_t none = {.band = {theta, theta}, .notch = {.low_pass = theta}, .turn = SLOW_TURN};
+    for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
+        mitigation->rest[i] = none;
+    }
+}
+
 /* --- a sample ----------------------------------------------------------------------------------------------------- */
 
 /* Begins with the base as it is now, and nothing known of how the lever moves. */
-static void start(mitigation_t *mitigation, float z_ddot)
+static void start(mitigation_t *mitigation, const mitigation_sample_t *sample)
 {
     const mitigation_t none = {.rated = mitigation->rated, .sensed_left = mitigation->sensed_left};
     *mitigation = none;
-    involuntary_start(&mitigation->involuntary, z_ddot);
+    involuntary_start(&mitigation->involuntary, sample->step.z_ddot);
+    start_rest(mitigation, sample->theta);
 }
 
 /* The angle to take away. */
@@ -158,7 +202,21 @@ static float angle_of(
         const float turn = sqrtf(sample->dynamics->stiffness) * period;
         angle = pass_notch(&mitigation->notch, sample->theta, turn, 2.0f * settings->notch_damping_ratio);
     } else {
-        angle = involuntary_angle(&mitigation->involuntary, settings->correction_delay);
+        const float involuntary = mitigation->trust * mitigation->involuntary.theta;
+        const float damping = 2.0f * settings->notch_damping_ratio;
+        const float share = share_of(period, MEMORY);
+        const float all = sample->theta - involuntary;
+        float left = all;
+        for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
+            left = take_rest(&mitigation->rest[i], left, period, share, damping);
+        }
+        if ((mitigation->samples % WEIGHED_EVERY) == 0u) {
+            const float usual = LEFT_LEAST + (LEFT_PART * mitigation->expected_square);
+            weigh(&mitigation->rest[0], usual);
+            weigh(&mitigation->rest[1], usual);
+        }
+        angle = (mitigation->trust * involuntary_angle(&mitigation->involuntary, settings->correction_delay)) +
+                (all - left);
     }
     return angle;
 }
@@ -167,6 +225,9 @@ static float angle_of(
 static void choose(mitigation_t *mitigation, const mitigation_sample_t *sample)
 {
     if (mitigation->weight <= 0.0f) {
+        if (mitigation->notches) {
+            start_rest(mitigation, sample->theta);
+        }
         mitigation->notches = has_notch(sample->mitigation);
         mitigation->notch.low_pass = sample->theta;
         mitigation->notch.band_pass = 0.0f;
@@ -200,7 +261,7 @@ bool mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings,
 {
     pass_gate(mitigation, sample);
     if (!mitigation->started || (sample->step.period > LONGEST)) { /* then all has faded */
-        start(mitigation, sample->step.z_ddot);
+        start(mitigation, sample);
     } else if (sample->advances) {
         advance(mitigation, settings, sample);
     } else { /* no time has passed, and the torque gate is closed */

@@ -36,12 +36,26 @@ typedef struct mitigation_notch {
     float band_pass;
 } mitigation_notch_t;
 
+/* What is left of the lever's motion, about the frequency at which most of it is. */
+typedef struct mitigation_rest {
+    mitigation_band_t band;
+    float square;      /* means of its square in the band [rad^2], */
+    float rate_square; /* and of that of its rate [rad^2/s^2] */
+    float turn;        /* frequency [rad/s] */
+    float weight;      /* 0 to 1 */
+    mitigation_notch_t notch;
+} mitigation_rest_t;
+
+enum mitigation_rests { MITIGATION_RESTS = 2 };
+
 typedef struct mitigation {
     involuntary_t involuntary;
     mitigation_band_t moved;    /* of theta_dot, */
     mitigation_band_t expected; /* and of the involuntary theta_dot */
     float expected_square;      /* means of the latter's square, and of the product of both [rad^2/s^2] */
     float product;
+    float trust;            /* weight of the involuntary motion: how far the estimated arm explains the lever's, 0 to 1 */
+    mitigation_rest_t rest[MITIGATION_RESTS]; /* of theta less that: each of what the one before leaves */
     mitigation_notch_t notch;
     float correction;       /* before the fade [rad] */
     float weight;           /* of the correction, 0 to 1 */
@@ -75,6 +89,7 @@ typedef struct mitigation_sample {
     bool permitted;
     bool sensed;      /* theta and z_ddot are valid, */
     bool rated;       /* and theta_dot */
+    bool fits;        /* z_ddot is not found to be wrong */
     bool same_theta;  /* theta as measured is that of the sample before, */
     bool same_z_ddot; /* and z_ddot */
 } mitigation_sample_t;

@@ -31,6 +31,16 @@ and imports what is heavy inside run(), because all are imported for every call 
 its own, by set_defaults(run=…).
 """
 
+GROUPS = {
+    "simulate": ("demo", "sim", "fmu", "aircraft"),
+    "logs": ("replay", "map", "tune"),
+    "a bus": ("monitor", "live", "record", "dbc", "settings"),
+    "a board": ("flash", "qemu"),
+    "test the firmware": ("envelope", "faults", "bounce", "soak"),
+    "study": ("compare", "campaign", "figures"),
+}
+"""Commands by purpose, in the order of --help; those of other packages come last."""
+
 _DESCRIPTION = """\
 Lever CDKF: estimates the equivalent mass, damping and stiffness of a helicopter pilot's arm on the collective lever,
 on line, from samples on a CAN bus. The estimator is C firmware; this command runs, feeds and inspects it.
@@ -63,6 +73,30 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         raise LeverError(f"{message} (see `{self.prog} --help`)")
+
+
+class _Group(argparse.Action):
+    """A heading with some commands, as the formatter of help wants it."""
+
+    def __init__(self, title: str, commands: list[argparse.Action]) -> None:
+        super().__init__([], title, help="", metavar=title)
+        self._commands = commands
+
+    def _get_subactions(self) -> list[argparse.Action]:
+        return self._commands
+
+    def __call__(self, *_: Any, **__: Any) -> None:
+        """Do nothing: a heading is never parsed."""
+
+
+class _Commands(argparse._SubParsersAction):  # type: ignore[type-arg]  # generic for type checkers only
+    """The sub-commands; help shows them by purpose."""
+
+    def _get_subactions(self) -> list[argparse.Action]:
+        left = {command.dest: command for command in super()._get_subactions()}
+        groups = {title: [left.pop(name) for name in names if name in left] for title, names in GROUPS.items()}
+        groups["other packages"] = list(left.values())
+        return [_Group(title, commands) for title, commands in groups.items() if commands]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -137,7 +171,7 @@ def _parser() -> Parser:
     parser = Parser(prog="lever", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("--version", action="version", version=f"lever {version()}")
     parser.set_defaults(run=lambda _: parser.print_help())
-    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND")
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", action=_Commands)
     for entry in sorted(importlib.metadata.entry_points(group=COMMANDS)):
         try:
             module = entry.load()

@@ -31,7 +31,8 @@ class Provenance:
     version: str
     """Of the package."""
     revision: str | None
-    """Of the source tree that it runs from, with -dirty where files have changed since; None where it is installed."""
+    """Of the source tree that it runs from, or was installed from, with -dirty where files had changed; None for one
+    that was installed from a source distribution."""
     library: str
     """SHA-256 of the firmware's shared library."""
     created: str
@@ -118,12 +119,14 @@ def created() -> datetime:
 
 @cache
 def revision() -> str | None:
-    """Of the git tree that the package is in, if it runs from one."""
+    """Return the revision of the git tree that the package is in, or that it was installed from."""
     import subprocess
 
     file = Path(__file__).resolve()
     root = file.parents[2]
-    if file.parent.parent.name != "host_tools" or not (root / ".git").exists():
+    if file.parent.parent.name != "host_tools":
+        return _installed_revision()
+    if not (root / ".git").exists():
         return None
     command = [
         "git",
@@ -141,6 +144,14 @@ def revision() -> str | None:
     except (OSError, subprocess.SubprocessError):
         return None
     return described.stdout.strip() or None
+
+
+def _installed_revision() -> str | None:
+    """Return what firmware/CMakeLists.txt has noted at the installation."""
+    try:
+        return native_file("revision.txt").read_text(encoding="utf-8").strip() or None
+    except (LeverError, OSError):
+        return None
 
 
 @cache

@@ -26,7 +26,7 @@ from lever_cdkf.errors import LeverError  # noqa: E402
 from lever_cdkf.files import write_text  # noqa: E402
 from lever_cdkf.progress import Progress  # noqa: E402
 from lever_sil.bounce import campaign  # noqa: E402
-from lever_sil.bounce.conditions import CONDITIONS, SPOILT  # noqa: E402
+from lever_sil.bounce.conditions import BETWEEN, CONDITIONS, FALSE, SPOILT, STATED  # noqa: E402
 from lever_sil.bounce.measure import FIGURES  # noqa: E402
 from lever_sil.judged import table  # noqa: E402
 
@@ -51,6 +51,19 @@ _CANCELLED, _GRIP = "involuntary cancelled", "back after a grip"
 _GAIN, _PHASE, _LARGEST = "gain changed", "phase changed", "gearing ÷ critical"
 
 TABLES: Mapping[Place, tuple[Row, ...]] = {
+    Place(FILE, "between accelerometer and pilot", ACCEPT): tuple(
+        Row(f"{title}: {mitigation}", f"between_{name}_{mitigation}", _LARGEST)
+        for name, title, _, mitigations, _ in BETWEEN
+        for mitigation in mitigations
+    ),
+    Place(FILE, "alarm and table", ACCEPT): (
+        *(
+            Row(f"{title}: {what}", f"alarm_{name}", figure)
+            for name, title in (*((name, title) for name, title, *_ in STATED), ("sudden", "he relaxes within 0.2 s"))
+            for what, figure in (("alarm before the vibration doubles", "alarm lead"), ("flights without", "missed"))
+        ),
+        *(Row(f"{title}: false alarms in 10 h", f"false_alarms_{name}", "false alarms") for name, title, *_ in FALSE),
+    ),
     Place(FILE, "margin and alarm", ACCEPT): (
         Row("alarm before the vibration doubles", "alarm", "alarm lead"),
         Row("alarm before that of the ROVER-like detector", "baselines", "ahead of ROVER"),
@@ -106,7 +119,12 @@ TABLES: Mapping[Place, tuple[Row, ...]] = {
         Row(f"{CONDITIONS[name].title.partition(' in mid-')[0]}: {what}", name, figure)
         for name in CONDITIONS
         if name.startswith("fault_")
-        for what, figure in (("all is zero after", "to zero"), ("jump of the correction", "jump"))
+        for what, figure in (
+            ("all is zero after", "to zero"),
+            ("the correction adds to the motion for", "adds for"),
+            ("jump of the correction", "jump"),
+        )
+        if figure in CONDITIONS[name].figures
     ),
     Place(FILE, "wrong models", ACCEPT): tuple(
         Row(f"{title}: {what}", f"{kind}_{name}", figure)

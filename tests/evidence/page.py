@@ -25,7 +25,9 @@ _STYLE = """
 
 def build(content: Mapping[str, Any]) -> str:
     """The whole page."""
-    page = Page("Evidence", "What the firmware promises, and what proves it.", "cmake --workflow --preset evidence")
+    page = Page(
+        "Evidence", "What the firmware promises, and what proves it.", "cmake --workflow --preset evidence-page"
+    )
     page.section("requirements", "Requirements", "Requirements and their tests", _requirements(content["requirements"]))
     page.section("faults", "Faults", "Fault matrix", _faults(content["fault_rows"]))
     page.section("coverage", "Coverage", "Coverage of the core by its tests", _coverage(content["coverage"]))

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.firmware.library import ffi
 from lever_cdkf.firmware.samples import sample_array
-from lever_sil.oracle.scale import PARAMETERS
+from oracle.scale import PARAMETERS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from python.oracle import test_oracle_against_firmware as reference

@@ -28,7 +28,6 @@ MAY_IMPORT = {
     "lever_cdkf/fmu": {"firmware"},
     "lever_cdkf/commands": {"firmware", "board", "fmu", "can", "results", "replay", "tune", "watch", "signals"},
     "lever_sil/plants": {"models"},
-    "lever_sil/oracle": {"models"},
     "lever_sil/aircraft": {"firmware", "models"},
     "lever_sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
     "lever_sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
@@ -54,7 +53,7 @@ MAY_IMPORT = {
     "lever_sil/faults": {"fast", "envelope", "firmware", "can", "report"},
     "lever_sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "lever_sil/study": {
-        *("run", "fast", "scenarios", "plants", "oracle", "envelope"),
+        *("run", "fast", "scenarios", "plants", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
     "lever_sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
@@ -65,6 +64,7 @@ MAY_IMPORT = {
 }
 """By folder. What lies beside the folders is for all of its package, and imports nothing in them; lever_sil may import
 that of lever_cdkf too. Plants and oracle are what the firmware is compared with, and know neither it nor each other."""
+ORACLE = "tests/oracle"
 
 
 def imported(file: Path, path: str) -> Iterator[str]:
@@ -112,6 +112,16 @@ def test_each_folder_imports_only_what_it_may() -> None:
     assert wrong_imports(tools.ROOT) == []
 
 
+def test_the_oracle_imports_models_only() -> None:
+    found = {
+        path
+        for file in (tools.ROOT / ORACLE).glob("*.py")
+        for path in imported(file, f"{ORACLE}/{file.name}")
+        if place(path, tools.ROOT) not in ("", "lever_cdkf/models") or path.startswith("lever_sil/")
+    }
+    assert not found
+
+
 def test_every_folder_has_its_row() -> None:
     folders = {
         str(file.parent.relative_to(tools.ROOT / folder))
@@ -138,12 +148,11 @@ def test_there_is_an_order() -> None:
         ("lever_cdkf/files.py", "import lever_sil"),
         ("lever_cdkf/firmware/config.py", "    from ..can import codec"),
         ("lever_cdkf/errors.py", "from .can.codec import decode"),
-        ("lever_sil/oracle/cdkf.py", "from lever_cdkf.firmware import native"),
-        ("lever_sil/plants/truth.py", "from .. import oracle"),
+        ("lever_sil/plants/truth.py", "from lever_cdkf.firmware import native"),
     ],
 )
 def test_a_wrong_import_is_found(file: str, line: str, tmp_path: Path) -> None:
-    for name in ("lever_cdkf/can", "lever_cdkf/firmware", "lever_cdkf/watch", "lever_sil/oracle", "lever_sil/plants"):
+    for name in ("lever_cdkf/can", "lever_cdkf/firmware", "lever_cdkf/watch", "lever_sil/plants"):
         (tmp_path / PACKAGES[name.split("/")[0]] / name).mkdir(parents=True)
     text = f"def late():\n{line}\n" if line[0] == " " else line
     (tmp_path / PACKAGES[file.split("/")[0]] / file).write_text(text)

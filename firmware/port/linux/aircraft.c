@@ -9,7 +9,9 @@
 #define WARNING 5.0f /* where nothing else is said [dB] */
 #define ALARM 4.0f
 
-enum { COLUMNS = 3, NAMES = 4 };
+#define SEAT "seat"
+
+enum { COLUMNS = 3, NAMES = 5, MODE_NUMBERS = 4, SEAT_LENGTH = 4 };
 
 /* A line "name = number", and where the number goes. */
 typedef struct entry {
@@ -22,6 +24,7 @@ static const entry_t entries[NAMES] = {
     {"phase_sigma", offsetof(lever_aircraft_t, phase_sigma)},
     {"warning", offsetof(lever_aircraft_t, warning)},
     {"alarm", offsetof(lever_aircraft_t, alarm)},
+    {"seat_direct", offsetof(lever_aircraft_t, seat_direct)},
 };
 
 /* A number at the beginning of a text, which then begins after it and the blanks that follow; NaN if there is none. */
@@ -35,16 +38,36 @@ static float next_number(const char **text)
     return isfinite(number) ? number : NAN;
 }
 
-static bool take_point(lever_aircraft_t *aircraft, const char *text)
+/* So many numbers and nothing else. */
+static bool take_numbers(float numbers[], uint32_t count, const char *text)
 {
-    float numbers[COLUMNS] = {0};
-    bool good = aircraft->count < (uint8_t)LEVER_AIRCRAFT_POINTS;
+    bool good = true;
 
-    for (uint32_t i = 0u; good && (i < (uint32_t)COLUMNS); i++) {
+    for (uint32_t i = 0u; good && (i < count); i++) {
         numbers[i] = next_number(&text);
         good = isfinite(numbers[i]);
     }
-    if (good && (*text == '\0')) {
+    return good && (*text == '\0');
+}
+
+static bool take_mode(lever_aircraft_t *aircraft, const char *text)
+{
+    float numbers[MODE_NUMBERS] = {0};
+
+    if ((aircraft->seat_modes < (uint8_t)LEVER_SEAT_MODES) && take_numbers(numbers, MODE_NUMBERS, text)) {
+        aircraft->seat[aircraft->seat_modes] = (lever_seat_mode_t){
+            .by_rate = numbers[0], .by_place = numbers[1], .damping = numbers[2], .stiffness = numbers[3]};
+        aircraft->seat_modes++;
+        return true;
+    }
+    return false;
+}
+
+static bool take_point(lever_aircraft_t *aircraft, const char *text)
+{
+    float numbers[COLUMNS] = {0};
+
+    if ((aircraft->count < (uint8_t)LEVER_AIRCRAFT_POINTS) && take_numbers(numbers, COLUMNS, text)) {
         aircraft->frequency[aircraft->count] = numbers[0];
         aircraft->real[aircraft->count] = numbers[1];
         aircraft->imaginary[aircraft->count] = numbers[2];
@@ -80,20 +103,29 @@ static bool take_line(void *context, const char *text, settings_error_t *error)
 {
     lever_aircraft_t *aircraft = context;
     const char *equals = strchr(text, '=');
+    const size_t first = strcspn(text, BLANK);
+    bool good = false;
 
-    if ((equals != NULL) ? take_entry(aircraft, text, equals) : take_point(aircraft, text)) {
+    if (equals != NULL) {
+        good = take_entry(aircraft, text, equals);
+    } else if ((first == (size_t)SEAT_LENGTH) && (strncmp(text, SEAT, first) == 0)) {
+        good = take_mode(aircraft, text + first + strspn(text + first, BLANK));
+    } else {
+        good = take_point(aircraft, text);
+    }
+    if (good) {
         return true;
     }
     (void)snprintf(error->text, sizeof error->text,
-        "neither gain_sigma, phase_sigma, warning or alarm = number, each once, nor frequency, real and imaginary part "
-        "(of %d at most)",
-        LEVER_AIRCRAFT_POINTS);
+        "neither gain_sigma, phase_sigma, warning, alarm or seat_direct = number, each once, nor frequency, real and "
+        "imaginary part (of %d at most), nor seat and four numbers (of %d at most)",
+        LEVER_AIRCRAFT_POINTS, LEVER_SEAT_MODES);
     return false;
 }
 
 bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, settings_error_t *error)
 {
-    *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = NAN, .alarm = NAN};
+    *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = NAN, .alarm = NAN, .seat_direct = NAN};
     if (!settings_lines(file, path, take_line, aircraft, error)) {
         return false;
     }
@@ -102,6 +134,12 @@ bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, set
             "%.200s: how well is it known? It needs the lines gain_sigma = number and phase_sigma = number", path);
         return false;
     }
+    if (isnan(aircraft->seat_direct) != (aircraft->seat_modes == 0u)) {
+        (void)snprintf(
+            error->text, sizeof error->text, "%.200s: seat_direct and lines that begin with seat go together", path);
+        return false;
+    }
+    aircraft->seat_direct = (aircraft->seat_modes == 0u) ? 1.0f : aircraft->seat_direct;
     aircraft->warning = isnan(aircraft->warning) ? WARNING : aircraft->warning;
     aircraft->alarm = isnan(aircraft->alarm) ? ALARM : aircraft->alarm;
     return true;

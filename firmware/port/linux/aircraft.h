@@ -8,6 +8,8 @@
  *     warning = 5            # gain margin below which there is a warning [dB]; 5 without this line
  *     alarm = 4              # and an alarm [dB]; 4 without this line
  *     1.5  -12.1  4.2        # frequency [Hz], real and imaginary part [(m/s^2)/rad]; 3 to LEVER_AIRCRAFT_POINTS lines
+ *     seat_direct = 1        # where the accelerometer is not at the seat: lever_seat_mode_t, up to LEVER_SEAT_MODES lines
+ *     seat  0  -0.3  1.6  710
  */
 #ifndef LEVER_PORT_AIRCRAFT_H
 #define LEVER_PORT_AIRCRAFT_H

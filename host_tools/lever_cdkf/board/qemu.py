@@ -40,10 +40,11 @@ class QemuError(LeverError):
 
 
 @contextmanager
-def running(image: Path, *, count_instructions: bool = False) -> Iterator[str]:
+def running(image: Path, *, machine: str = MACHINE, count_instructions: bool = False) -> Iterator[str]:
     """Runs an SLCAN image on the emulated board until the end of the context; gives the channel for python-can's slcan.
 
-    The image has answered when the context begins. One at a time can open the channel. Raises QemuError.
+    `machine` is QEMU's name of the board, whose first serial line is used. The image has answered when the context
+    begins. One at a time can open the channel. Raises QemuError.
     """
     check(image)
     options = ["-display", "none", "-monitor", "none", "-serial", "chardev:usart1", "-echr", _NO_ESCAPE]
@@ -52,7 +53,7 @@ def running(image: Path, *, count_instructions: bool = False) -> Iterator[str]:
     with socket.create_server(("127.0.0.1", 0)) as listener, tempfile.TemporaryFile("w+", errors="replace") as output:
         address = listener.getsockname()
         options += ["-chardev", _SERIAL.format(listener.fileno())]
-        command = [PROGRAM, "-machine", MACHINE, "-kernel", str(image), *options]
+        command = [PROGRAM, "-machine", machine, "-kernel", str(image), *options]
         with one_processor():
             process = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, pass_fds=[listener.fileno()]
@@ -108,7 +109,7 @@ def _wait_for_answer(process: subprocess.Popen[bytes], output: IO[str], address:
             raise QemuError(f"{PROGRAM} has ended: {output.read().strip() or 'it does not say why'}")
         if time.monotonic() > end:
             raise QemuError(
-                f"{image} has not answered within {_START_S:g} s on USART1: is it the image for SLCAN, "
+                f"{image} has not answered within {_START_S:g} s on its first serial line: is it the image for SLCAN, "
                 "lever_stm32f4_slcan.elf?"
             )
 

@@ -10,14 +10,15 @@ import time
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ..board.qemu import MACHINE
 from ..errors import LeverError
 
 _CHANNEL = "{channel}"
 _DESCRIPTION = """\
-Runs the image for the STM32F405 in QEMU (machine netduinoplus2), with USART1 on a TCP port of this machine, where it
-is an SLCAN adapter with the estimator behind it. Waits until it answers and prints the channel, for `lever sim
---interface slcan` and everything else that uses python-can's slcan. Runs until Ctrl-C; or, with a COMMAND, until that
-ends. In COMMAND, {channel} stands for the channel.
+Runs the image for the STM32F405 in QEMU (machine netduinoplus2), or with --machine that of another port, with its first
+serial line on a TCP port of this machine, where it is an SLCAN adapter with the estimator behind it. Waits until it
+answers and prints the channel, for `lever sim --interface slcan` and everything else that uses python-can's slcan. Runs
+until Ctrl-C; or, with a COMMAND, until that ends. In COMMAND, {channel} stands for the channel.
 
 The image has the default settings. From a scenario it takes what a COMMAND message can set (model, preload, estimator,
 adaptation, dither); one with other [settings] is refused, unless --set "settings={}" leaves them out.
@@ -35,12 +36,18 @@ Exit status: that of COMMAND; without one 130, after Ctrl-C.
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser = subparsers.add_parser(
         "qemu",
-        usage="lever qemu [-h] [--icount] IMAGE [-- COMMAND...]",
+        usage="lever qemu [-h] [--machine NAME] [--icount] IMAGE [-- COMMAND...]",
         help="run the flash image on an emulated board",
         description=_DESCRIPTION,
         epilog=_EPILOG,
     )
     parser.add_argument("image", metavar="IMAGE", type=Path, help="an .elf file, lever_stm32f4_slcan.elf")
+    parser.add_argument(
+        "--machine",
+        metavar="NAME",
+        default=MACHINE,
+        help="QEMU's name of the board, for a port of your own (firmware/port/PORTING.md; default: %(default)s)",
+    )
     parser.add_argument(
         "--icount",
         action="store_true",
@@ -61,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if command and not any(_CHANNEL in word for word in command):
         raise LeverError(f"the command does not say where the channel goes: write {_CHANNEL} in its place")
     signal.signal(signal.SIGTERM, _end)
-    with running(args.image, count_instructions=args.icount) as channel:
+    with running(args.image, machine=args.machine, count_instructions=args.icount) as channel:
         if command:
             with one_processor():
                 return _run_command([word.replace(_CHANNEL, channel) for word in command])

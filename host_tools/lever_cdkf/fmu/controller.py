@@ -7,6 +7,7 @@ from importlib.resources import files
 
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.config import CHOICES, Config, choice_value, model_parameters, settings_table
+from ..firmware.library import enum_words
 from . import bus
 from .archive import Contents, core_c, float_list, own_c
 from .description import Model
@@ -17,6 +18,7 @@ _DURATION = 60.0
 _C = ("controller.c", "controller.def", "controller.h")
 _SIGNALS_C = ("controller_signals.c",)
 _USE = "controller_signals.html"
+_FAULT = "fault_"
 
 
 def controller(config: Config, aircraft: AircraftResponse | None, has_bus: bool = False) -> Contents:
@@ -60,6 +62,8 @@ def variables(config: Config, has_bus: bool) -> list[Variable]:
             )
         elif row.name in CHOICES:
             row = replace(row, start=float(choice_value(row.enumeration, row.name, config.choices[row.name])))
+        elif row.name.startswith(_FAULT):
+            row = replace(row, meaning=enum_words("lever_fault")[row.name.removeprefix(_FAULT)])
         rows.append(row)
     for setting in settings_table():
         limits = (setting.least, setting.greatest)

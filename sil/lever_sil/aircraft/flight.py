@@ -32,11 +32,11 @@ class Flight:
         self._state, self._pitch = [0.0] * len(constants.step), 0.0
         self._correction: list[float] = []
         self._lever: list[float] = []
-        self.z_ddot = dot(constants.output, (*self._state, 0.0, self._force[0]))
-        """Of the cabin at this sample [m/s^2]."""
+        self.z_ddot, self.sensed = self._outputs(0)
+        """At this sample, at the pilot's seat and at the accelerometer [m/s^2]."""
 
     def advance(self, delta: float, correction: float = 0.0) -> float:
-        """z_ddot at the next sample [m/s^2]; `delta`: angle of the lever about its trim at this one [rad];
+        """z_ddot at the seat at the next sample [m/s^2]; `delta`: angle of the lever about its trim at this one [rad];
         `correction`: what is put out now to be added to that angle [rad], which takes a sample period and the
         aircraft's correction_delay."""
         now, constants = len(self._lever), self.constants
@@ -56,8 +56,13 @@ class Flight:
             self._pitch = limited(before + change, constants.travel)
             ends = (*self._state, before, gust + begin * rise, self._pitch, gust + end * rise)
             self._state = [dot(row, ends) for row in constants.step]
-        self.z_ddot = dot(constants.output, (*self._state, self._pitch, self._force[now + 1]))
+        self.z_ddot, self.sensed = self._outputs(now + 1)
         return self.z_ddot
+
+    def _outputs(self, sample: int) -> tuple[float, float]:
+        given = (*self._state, self._pitch, self._force[sample])
+        seat, sensor = (dot(row, given) for row in self.constants.output)
+        return seat, sensor
 
     def _delayed(self, time: float) -> float:
         """The corrected angle of the lever at `time` [samples], which is past; 0 before the start."""
@@ -74,9 +79,9 @@ class Constants:
     substeps: int
     """In a sample period."""
     step: list[list[float]]
-    """(3, 7): of the state, pitch and gust where it begins, and those where it ends."""
-    output: list[float]
-    """z_ddot of state, pitch and gust."""
+    """(n, n + 4): of the state, pitch and gust where it begins, and those where it ends."""
+    output: list[list[float]]
+    """(2, n + 2): z_ddot at seat and accelerometer of state, pitch and gust."""
     approach: float
     """Share of its way that the actuator goes, without limits."""
     most_change: float
@@ -94,12 +99,12 @@ class Constants:
     def of(cls, aircraft: Aircraft, period: float) -> Constants:
         substeps = math.ceil(period / LONGEST_SUBSTEP - 1e-6)
         step = period / substeps
-        a, b, c, d = aircraft.matrices()
+        airframe, lag = aircraft.airframe(), math.exp(-step * 2.0 * math.pi * aircraft.actuator_bandwidth)
         return cls(
             substeps,
-            np.hstack(first_order_hold(a, b, step)).tolist(),
-            np.hstack((c, d))[0].tolist(),
-            1.0 - math.exp(-step * 2.0 * math.pi * aircraft.actuator_bandwidth),
+            np.hstack(first_order_hold(airframe.a, airframe.b, step)).tolist(),
+            np.hstack((airframe.c, airframe.d)).tolist(),
+            1.0 - lag if aircraft.has_actuator else 1.0,
             aircraft.actuator_rate * step,
             aircraft.actuator_travel,
             aircraft.delay / period,
@@ -123,14 +128,18 @@ def limited(value: float, most: float) -> float:
 
 def first_order_hold(a: FloatArray, b: FloatArray, step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Matrices of x and of the input at both ends of a step [s], over which the input is linear: the exponential of
-    [[A, B, 0], [0, 0, 1/step], [0, 0, 0]] (van Loan 1978), by its series, which converges at once for a short step."""
+    [[A, B, 0], [0, 0, 1/step], [0, 0, 0]] (van Loan 1978), by its series of a part of the step, squared."""
     n, m = b.shape
     whole = np.zeros((n + 2 * m, n + 2 * m))
     whole[:n, :n], whole[:n, n : n + m] = a, b
     whole[n : n + m, n + m :] = np.eye(m) / step
+    squarings = max(0, math.ceil(math.log2(max(1.0, 0.25 * step * float(np.linalg.norm(whole, np.inf))))))
+    part = step / 2.0**squarings
     term = total = np.eye(len(whole))
     for order in range(1, 20):
-        term = term @ whole * (step / order)
+        term = term @ whole * (part / order)
         total = total + term
+    for _ in range(squarings):
+        total = total @ total
     ramp = total[:n, n + m :]
     return total[:n, :n], total[:n, n : n + m] - ramp, ramp

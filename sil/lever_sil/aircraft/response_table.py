@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+from lever_cdkf.arrays import ComplexArray
 from lever_cdkf.errors import LeverError
-from lever_cdkf.firmware.aircraft import AircraftResponse
+from lever_cdkf.firmware.aircraft import ALARM, WARNING, AircraftResponse, SeatTransfer
 
+from .aircraft import Coupled
 from .stability import Response
+from .state_space import SEAT, SENSOR
+from .tabulated import Tabulated
+from .vector_fitting import Fit, fit
 
 UNSURE = 0.05
 """How well it is known, where nothing else is said: standard deviation of gain [1] and phase [rad]."""
@@ -17,6 +23,52 @@ BAND = (1.5, 8.0)
 _NEEDED = (2.0, 7.0)
 """Of it at least, so that it has the crossing of the loop [Hz]."""
 _POINTS = 24
+LEFT = 1.5
+"""[dB]"""
+_SEAT_MODES = 3
+_AT_SEAT = 1e-6
+"""By which seat and accelerometer may differ and be one place."""
+
+
+def known_response(coupled: Coupled, off: Response | None = None, **said: Any) -> AircraftResponse:
+    """What a firmware is told of an aircraft: the response at the seat and the way from the accelerometer to there, or
+    where that is not known, the response at the accelerometer. `off`: both are wrong by a factor; the one of the way is
+    `seat_off` in `said`."""
+    craft, factor = coupled.aircraft, off or (lambda s: np.ones_like(s))
+    seat_off: Response = said.pop("seat_off", factor)
+    s = 2j * np.pi * np.geomspace(1.0, 10.0, 60).astype(np.complex128)
+    between = craft.seat_transfer(s)
+    apart = bool(np.any(np.abs(between - 1.0) > _AT_SEAT))
+    told = apart and craft.seat_transfer_known == "yes"
+    place = SENSOR if apart and not told else SEAT
+    seat = seat_modes(s, between * seat_off(s)) if told else None
+    return response_table(lambda s: coupled.response(s, place) * factor(s), name=coupled.name, seat=seat, **said)
+
+
+def measured_response(measured: Tabulated, **said: Any) -> AircraftResponse:
+    """The same of a frequency response, as it was measured."""
+    s = 2j * np.pi * measured.frequency.astype(np.complex128)
+    seat = None if measured.seat is None else seat_modes(s, measured.seat)
+    return response_table(measured.response, measured.band, seat=seat, **said)
+
+
+def seat_modes(s: ComplexArray, between: ComplexArray) -> SeatTransfer:
+    """The acceleration at the seat over that at the accelerometer as the firmware takes it, fitted at s [rad/s] on the
+    imaginary axis."""
+    return _modes(fit(s, between, _SEAT_MODES))
+
+
+def _modes(fitted: Fit) -> SeatTransfer:
+    """Its poles two by two: r / (s - p) + q / (s - o). A real one that is left over counts twice, with a zero there."""
+    poles, vectors = np.linalg.eig(fitted.a)
+    residues = (fitted.c @ vectors) * np.linalg.solve(vectors, fitted.b.astype(np.complex128))
+    known = list(zip(poles.astype(np.complex128).tolist(), residues.tolist(), strict=True))
+    pairs = [((p, r), (p.conjugate(), r.conjugate())) for p, r in known if p.imag > 0.0]
+    real = [each for each in known if each[0].imag == 0.0]
+    real += [(real[-1][0], 0.0)] if len(real) % 2 else []
+    pairs += list(zip(real[::2], real[1::2], strict=True))
+    modes = [((r + q).real, -(r * o + q * p).real, -(p + o).real, (p * o).real) for (p, r), (o, q) in pairs]
+    return SeatTransfer(fitted.d, modes)
 
 
 def response_table(response: Response, band: tuple[float, float] = BAND, **said: Any) -> AircraftResponse:
@@ -30,5 +82,13 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
         )
     table = np.geomspace(low, high, _POINTS)
     values = response(2j * np.pi * table.astype(np.complex128))
-    sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE}
-    return AircraftResponse(table.tolist(), values.tolist(), **{**sigmas, **said})
+    sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE, **said}
+    alarm = alarm_limit(sigmas["gain_sigma"])
+    limits = {"alarm": alarm, "warning": max(alarm, said.get("alarm", alarm)) + WARNING - ALARM}
+    return AircraftResponse(table.tolist(), values.tolist(), **{**limits, **sigmas})
+
+
+def alarm_limit(gain_sigma: float) -> float:
+    """The gain margin below which there is an alarm where nothing else is said [dB]: with a gain that is too small by
+    gain_sigma [1], LEFT of it are left then."""
+    return max(ALARM, LEFT - 20.0 * math.log10(1.0 - min(gain_sigma, 0.9)))

@@ -25,7 +25,7 @@ Response = Callable[[ComplexArray], ComplexArray]
 BAND = (0.5, 20.0)
 """Where crossings are looked for [Hz]; below it is the pilot's own flying."""
 _POINTS = 1000
-_COARSE = np.geomspace(*BAND, 500)
+_COARSE = np.geomspace(*BAND, 2000)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """An aircraft that is known by its frequency response alone, as a flight test or another simulation gives it: for the
-firmware's table and the linear analysis. It cannot fly (flight.py): a response has no limits of the actuator.
+firmware's table and the linear analysis, and by a state space that is fitted to it (vector_fitting.py) to fly.
 
-The file is CSV with a row a frequency, rising: frequency [Hz], real and imaginary part of the cabin's vertical
-acceleration over the lever's angle [(m/s^2)/rad], with gearing, delays and actuator. Lines that begin with #, and
-before the first row of numbers those without any number, are passed over.
+The file is CSV with a row a frequency, rising: frequency [Hz], real and imaginary part of the vertical acceleration at
+the pilot's seat over the lever's angle [(m/s^2)/rad], with gearing, delays and actuator. Where the accelerometer is not
+at the seat, two columns more: real and imaginary part of the acceleration at the seat over that at the accelerometer
+[1]. Lines that begin with #, and before the first row of numbers those without any number, are passed over.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.errors import LeverError
 from lever_cdkf.units import number_of
 
+from .state_space import StateSpace, is_state_space
+from .vector_fitting import fit
+
 
 @dataclass(frozen=True)
 class Tabulated:
@@ -26,6 +30,8 @@ class Tabulated:
     """[Hz], rising."""
     values: ComplexArray
     """[m/s^2 per rad]"""
+    seat: ComplexArray | None = None
+    """z_ddot at the seat over that at the accelerometer [1]; None: it is there."""
 
     @classmethod
     def load(cls, path: str | Path) -> Tabulated:
@@ -39,15 +45,37 @@ class Tabulated:
             if line.startswith("#") or not line.strip() or (not rows and not any(map(_is_number, line.split(",")))):
                 continue
             cells = [number_of(cell) for cell in line.split(",")]
-            if len(cells) != 3 or any(map(math.isnan, cells)):
-                raise LeverError(f"{path}: line {number}: must be three numbers: frequency [Hz], real, imaginary")
+            if len(cells) not in (3, 5) or any(map(math.isnan, cells)) or len(cells) != len((rows or [cells])[0]):
+                raise LeverError(
+                    f"{path}: line {number}: must be three numbers: frequency [Hz], real, imaginary; or in all lines "
+                    "five, with real and imaginary part of seat over accelerometer"
+                )
             if cells[0] <= (rows[-1][0] if rows else 0.0):
                 raise LeverError(f"{path}: line {number}: the frequencies must rise, from above 0")
             rows.append(cells)
         if len(rows) < 3:
             raise LeverError(f"{path}: {len(rows)} frequencies; a response has at least 3")
-        frequency, real, imaginary = np.array(rows).T
-        return cls(frequency, real + 1j * imaginary)
+        columns = np.array(rows).T
+        seat = columns[3] + 1j * columns[4] if len(columns) == 5 else None
+        if not np.all(np.abs(columns[1:3]).sum(axis=0)) or (seat is not None and not np.all(seat)):
+            raise LeverError(f"{path}: is zero at a frequency")
+        return cls(columns[0], columns[1] + 1j * columns[2], seat)
+
+    def fitted(self, gearing: float, delay: float) -> tuple[StateSpace, float]:
+        """A state space of pitch and gust to seat and accelerometer, both of which a gust accelerates, without gearing [1]
+        and delay [s], which are in the table; and its largest relative error [1]."""
+        s = 2j * np.pi * self.frequency.astype(np.complex128)
+        values = self.values * np.exp(s * delay) / gearing
+        fits = tuple(fit(s, each) for each in ((values,) if self.seat is None else (values, values / self.seat)))
+        size = sum(len(each.b) for each in fits)
+        a, b, c = np.zeros((size, size)), np.zeros((size, 2)), np.zeros((2, size))
+        d, at = np.ones((2, 2)), 0
+        for place, each in enumerate(fits):
+            block = slice(at, at + len(each.b))
+            a[block, block], b[block, 0], d[place:, 0] = each.a, each.b, each.d
+            c[place:, :at], c[place:, block] = 0.0, each.c
+            at += len(each.b)
+        return StateSpace(a, b, c, d), max(float(each.error.max()) for each in fits)
 
     @property
     def band(self) -> tuple[float, float]:
@@ -64,6 +92,15 @@ class Tabulated:
     def at(self, frequency: FloatArray) -> ComplexArray:
         """At other frequencies [Hz], such as the 24 that the firmware takes."""
         return self.response(2j * np.pi * frequency.astype(np.complex128))
+
+
+def is_response(path: Path) -> bool:
+    """Whether a file is to hold a frequency response, not a state space."""
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return path.suffix.lower() == ".csv"
+    lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    first = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    return not is_state_space(first)
 
 
 def _is_number(cell: str) -> bool:

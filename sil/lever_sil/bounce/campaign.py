@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,6 @@ import numpy as np
 from ..judged import result as judged
 from ..run.seeds import in_processes
 from .conditions import CONDITIONS, Condition
-from .flights import AIRCRAFT
 from .measure import FIGURES, Excerpt, Measured
 
 Show = Callable[[int, int, str], None]
@@ -48,13 +48,15 @@ def measure(task: Task) -> Measured:
 def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[Result]:
     """The results of the rows, in their order: `seeds` pilots with each of the aircraft. Rows that measure the same
     share the flights."""
-    flights = [(craft, seed) for craft in AIRCRAFT for seed in range(seeds)]
-    flown = list({row.measure: row.name for row in reversed(rows)}.items())
-    tasks = [Task(name, *flight) for _, name in flown for flight in flights]
-    found = in_processes(measure, tasks, os.cpu_count() or 1, show)
-    own = len(flights)
-    parts = {measured: found[own * i : own * (i + 1)] for i, (measured, _) in enumerate(flown)}
-    return [_result(row, flights, parts[row.measure]) for row in rows]
+    flown = {row.measure: row for row in reversed(rows)}
+    tasks = [Task(row.name, *flight) for row in flown.values() for flight in _flights(row, seeds)]
+    found = iter(in_processes(measure, tasks, os.cpu_count() or 1, show))
+    parts = {measured: list(islice(found, len(_flights(row, seeds)))) for measured, row in flown.items()}
+    return [_result(row, _flights(row, seeds), parts[row.measure]) for row in rows]
+
+
+def _flights(row: Condition, seeds: int) -> list[tuple[str, int]]:
+    return [(craft, seed) for craft in row.aircraft for seed in range(seeds)]
 
 
 def _result(row: Condition, flights: Sequence[tuple[str, int]], found: Sequence[Measured]) -> Result:

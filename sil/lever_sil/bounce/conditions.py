@@ -1,15 +1,15 @@
-"""What the firmware must show in flight, for each of three aircraft and many pilots."""
+"""What the firmware must show in flight, with each of several aircraft and many pilots."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 from ..judged.result import Limit
 from . import measure, pilots
-from .flights import Plan
+from .flights import AIRCRAFT, FIVE, Plan
 from .measure import FAULT, Measured
 
 
@@ -27,6 +27,7 @@ class Condition:
     """Further figures, reported without a limit."""
     unless: tuple[Limit, ...] = ()
     quick: bool = False
+    aircraft: tuple[str, ...] = AIRCRAFT
 
     @property
     def figures(self) -> list[str]:
@@ -270,8 +271,189 @@ _FAULTS = (
     _fault("clock", "the sample clock stands", lambda plan: replace(plan, clock_stops=FAULT), quick=True),
     _fault("base_stuck", "z̈ stuck but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="stuck"), quick=True),
     _fault("base_zero", "z̈ zero but “valid”", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="0 %")),
-    _fault("base_sign", "z̈ of the wrong sign", _sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="-100 %")),
     _fault("theta_stuck", "θ stuck but “valid”", _sensor("theta", "1 mrad", kind="stuck")),
+)
+
+_WRONG_SIGN = Condition(
+    "fault_base_sign",
+    "z̈ of the wrong sign in mid-mitigation, twice the critical gearing: how long the correction adds to the motion",
+    partial(
+        measure.harmful,
+        mitigation=CANCELLATION,
+        spoil=_sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="-100 %"),
+    ),
+    (_most("adds for", 1.0, "worst"), _most("jump", 0.2, "worst")),
+)
+
+# --- between accelerometer and pilot ---------------------------------------------------------------------------------
+
+AT_4_5, AT_6, AT_5_5 = (
+    {"mode": [{"frequency": f"{frequency} Hz", "damping": "3 %", "rotor": f"{rotor} 1", "seat": "1 1"}]}
+    for frequency, rotor in ((4.5, 0.1), (6.0, 0.3), (5.5, 0.1))
+)
+UNTOLD = {"seat_transfer_known": "no"}
+SLOW_ACTUATOR = {"actuator_rate": "30 deg/s"}
+
+
+def _airframe(**keys: Any) -> Callable[[Plan], Plan]:
+    return lambda plan: replace(plan, airframe={**plan.airframe, **keys})
+
+
+def _late(milliseconds: float, told: bool = False) -> Callable[[Plan], Plan]:
+    """The correction; at most 20 ms can be told."""
+
+    def spoil(plan: Plan) -> Plan:
+        seconds = 1e-3 * milliseconds
+        told_delay = min(seconds + 1e-3, 20e-3) if told else plan.told_delay
+        return replace(plan, correction_delay=seconds, told_delay=told_delay)
+
+    return spoil
+
+
+def _base_late(milliseconds: float) -> Callable[[Plan], Plan]:
+    return _more(sensors={"z_ddot": {"noise": "0.01 m/s^2", "delay": f"{milliseconds} ms"}})
+
+
+def _softening(plan: Plan) -> Plan:
+    """The grip loses 40 % of its stiffness at 45 s."""
+    k_p = pilots.arm(plan.seed, pilots.SLACK)["k_p"]
+    ramp = {"kind": "ramp", "first": f"{k_p} N/m", "last": f"{0.6 * k_p} N/m", "start": "45 s", "duration": "0.05 s"}
+    return replace(plan, pilot={**plan.pilot, "k_p": ramp})
+
+
+def _all_of(*spoils: Callable[[Plan], Plan]) -> Callable[[Plan], Plan]:
+    return lambda plan: reduce(lambda spoilt, spoil: spoil(spoilt), spoils, plan)
+
+
+_REFLEX = {
+    "model": "reflex",
+    "m_p": "2.5 kg",
+    "c_p": "30 N s/m",
+    "k_p": "1500 N/m",
+    "k_r": "300 N/m",
+    "c_r": "10 N s/m",
+    "delay": "35 ms",
+}
+_TOGETHER = (_airframe(**AT_4_5, **UNTOLD, **SLOW_ACTUATOR), _late(10.0), _base_late(10.0))
+FLOOR = (_least("gearing ÷ critical", 2.0, "median"), _least("gearing ÷ critical", 1.0, "worst"))
+TOLD = (_least("gearing ÷ critical", 4.0, "median"), _least("gearing ÷ critical", 2.5, "worst"))
+BETWEEN: tuple[tuple[str, str, Callable[[Plan], Plan], tuple[str, ...], tuple[Limit, ...]], ...] = (
+    ("rigid", "rigid cabin", _all_of(), ("none", CANCELLATION), FLOOR),
+    ("late_10", "correction 10 ms late, not told", _late(10.0), (CANCELLATION,), FLOOR),
+    ("late_20", "correction 20 ms late, not told", _late(20.0), (CANCELLATION,), FLOOR),
+    ("late_20_told", "correction 19 ms late, told", _late(19.0, told=True), (CANCELLATION,), FLOOR),
+    ("base_late_10", "z̈ 10 ms late", _base_late(10.0), (CANCELLATION,), FLOOR),
+    ("base_late_20", "z̈ 20 ms late", _base_late(20.0), (CANCELLATION,), FLOOR),
+    ("softer", "grip k_p × 0.6 at 45 s", _softening, (CANCELLATION,), FLOOR),
+    ("friction", "friction of 1.5 N m", _more(lever={"lever_friction": "1.5 N m"}), (CANCELLATION,), FLOOR),
+    ("trunk", "trunk on a seat", _held_by(_TRUNK), ("none", NOTCH, CANCELLATION), FLOOR),
+    (
+        "mode_4_5",
+        "mode at 4.5 Hz, +0.1 at the seat, accelerometer at the centre of mass",
+        _airframe(**AT_4_5, **UNTOLD),
+        ("none", NOTCH, CANCELLATION),
+        FLOOR,
+    ),
+    (
+        "mode_6",
+        "mode at 6 Hz, +0.3 at the seat, accelerometer at the centre of mass",
+        _airframe(**AT_6, **UNTOLD),
+        ("none", NOTCH, CANCELLATION),
+        FLOOR,
+    ),
+    (
+        "mode_4_5_told",
+        "the same mode at 4.5 Hz, seat transfer told within 10 %",
+        _airframe(**AT_4_5),
+        (CANCELLATION,),
+        TOLD,
+    ),
+    ("mode_6_told", "the same mode at 6 Hz, seat transfer told within 10 %", _airframe(**AT_6), (CANCELLATION,), TOLD),
+    (
+        "mode_6_seat",
+        "the same mode at 6 Hz, accelerometer at the seat",
+        _airframe(**AT_6, accelerometer="seat"),
+        (CANCELLATION,),
+        TOLD,
+    ),
+    (
+        "together_trunk",
+        "trunk, mode at 4.5 Hz, both delays of 10 ms, actuator of 30°/s",
+        _all_of(_held_by(_TRUNK), *_TOGETHER),
+        ("none", CANCELLATION),
+        FLOOR,
+    ),
+    (
+        "together_reflex",
+        "stretch reflex, mode at 4.5 Hz, both delays of 10 ms, actuator of 30°/s",
+        _all_of(_held_by(_REFLEX), *_TOGETHER),
+        ("none", CANCELLATION),
+        FLOOR,
+    ),
+)
+_BETWEEN = tuple(
+    Condition(
+        f"between_{name}_{mitigation}",
+        f"largest gearing, {title}, {mitigation}",
+        partial(measure.largest_gearing, mitigation=mitigation, spoil=spoil),
+        limits if mitigation == CANCELLATION else (),
+        also=("gearing ÷ critical",),
+        quick=name == "mode_6" and mitigation == CANCELLATION,
+        aircraft=FIVE,
+    )
+    for name, title, spoil, mitigations, limits in BETWEEN
+    for mitigation in mitigations
+)
+
+# --- a table of the aircraft that is wrong ---------------------------------------------------------------------------
+
+
+def _table(gain: float, sigma: float) -> Callable[[Plan], Plan]:
+    return lambda plan: replace(plan, table_gain=gain, table_sigma=sigma)
+
+
+_IN_TIME = (_most("missed", 0.0),)
+STATED: tuple[tuple[str, str, Callable[[Plan], Plan], tuple[Limit, ...]], ...] = (
+    ("right_5", "table right, ±5 % stated", _table(1.0, 0.05), _IN_TIME),
+    ("low_20_told_5", "table 20 % too low, ±5 % stated", _table(0.8, 0.05), ()),
+    ("low_20_told_20", "table 20 % too low, ±20 % stated", _table(0.8, 0.2), _IN_TIME),
+    ("low_40_told_40", "table 40 % too low, ±40 % stated", _table(0.6, 0.4), _IN_TIME),
+    ("mode_5_5", "mode at 5.5 Hz, accelerometer at the centre of mass, not told", _airframe(**AT_5_5, **UNTOLD), ()),
+    ("mode_5_5_told", "the same, seat transfer told within 10 %", _airframe(**AT_5_5), _IN_TIME),
+)
+FALSE: tuple[tuple[str, str, Callable[[Plan], Plan], tuple[Limit, ...]], ...] = (
+    ("right_10", "table right, ±10 % stated", _table(1.0, 0.1), (_most("false alarms", 1.0),)),
+    ("high_10_told_10", "table 10 % too high, ±10 % stated", _table(1.1, 0.1), (_most("false alarms", 1.0),)),
+    ("high_25_told_25", "table 25 % too high, ±25 % stated", _table(1.25, 0.25), ()),
+)
+_STATED = (
+    *(
+        Condition(
+            f"alarm_{name}",
+            f"a pilot relaxes, {title}",
+            partial(measure.relaxing, spoil=spoil),
+            limits,
+            ("alarm lead", "missed"),
+        )
+        for name, title, spoil, limits in STATED
+    ),
+    Condition(
+        "alarm_sudden",
+        "a pilot relaxes within 0.2 s",
+        partial(measure.relaxing, spoil=lambda plan: replace(plan, pilot=pilots.relaxing(plan.seed, 25.0, 0.2))),
+        (),
+        ("alarm lead", "missed"),
+    ),
+    *(
+        Condition(
+            f"false_alarms_{name}",
+            f"600 s each of pilots who drift, grip or move, gain margin 6 dB or more, {title}",
+            partial(measure.stable, duration=600.0, spoil=spoil),
+            limits,
+            ("false alarms", "flight time"),
+        )
+        for name, title, spoil, limits in FALSE
+    ),
 )
 
 _LOW_PASSED: dict[str, Any] = {"title": "a low-pass at 1 Hz", "suffix": "_low_pass", "low_pass": LOW_PASS}
@@ -299,6 +481,9 @@ CONDITIONS = {
         _voluntary(CANCELLATION, in_flight=True, **_AT_1_HZ),
         *_WRONG,
         *_FAULTS,
+        _WRONG_SIGN,
+        *_BETWEEN,
+        *_STATED,
     )
 }
 """All by name, in the order of the table."""

@@ -15,9 +15,8 @@ from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.units import GRAVITY
 from numpy.typing import NDArray
 
-from ..aircraft import aircraft
-from ..aircraft.aircraft import Coupled
-from ..aircraft.response_table import UNSURE, response_table
+from ..aircraft.aircraft import Aircraft
+from ..aircraft.response_table import UNSURE, known_response
 from ..aircraft.stability import critical_gearing
 from ..envelope.motions import stream
 from ..fast.closed_loop import Loop
@@ -27,8 +26,11 @@ from ..scenarios.scenario import Scenario
 from ..toml_tables import Place, read
 
 AIRCRAFT = ("uh60_like", "puma_like", "bo105_like")
+FIVE = (*AIRCRAFT, "ec135_like", "ch53_like")
 STRIDE = 20
 """Samples between two notes of what the firmware says."""
+SEAT_ERROR = 0.1
+"""Largest error of what is told of the way from the accelerometer to the seat: of the gain [1], of the phase [rad]."""
 RAISED = (20.0, 25.0)
 """When a gearing goes up that does so [s]: the firmware knows the pilot by then."""
 
@@ -59,6 +61,12 @@ class Plan:
     """What the firmware is told of that, with the sample period [s]."""
     low_pass: float = 0.0
     """Corner of a low-pass of the lever's angle, to compare with mitigation [Hz]; 0: none."""
+    airframe: Mapping[str, Any] = field(default_factory=dict)
+    """Further keys of [aircraft]."""
+    table_gain: float = 1.0
+    """Of the firmware's table over that of the aircraft, besides an error of UNSURE."""
+    table_sigma: float = UNSURE
+    """gain_sigma that the firmware is told."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further tables of the scenario."""
     clock_stops: float | None = None
@@ -77,6 +85,7 @@ class Plan:
                 "gearing": f"{self.gearing} 1",
                 "correction_delay": f"{self.correction_delay} s",
                 "lever_low_pass": f"{self.low_pass} Hz",
+                **self.airframe,
             },
             "base": [{"kind": "noise", "rms": f"{self.gust * GRAVITY} m/s^2", "low": "1 Hz", "high": "10 Hz"}],
         }
@@ -88,6 +97,13 @@ class Plan:
         }
         scenario: Scenario = read(Scenario, {**values, **self.more, **merged}, Place("flight"))
         return scenario
+
+    @property
+    def aircraft(self) -> Aircraft:
+        """That flies."""
+        coupled = self.scenario.aircraft
+        assert coupled is not None
+        return coupled.aircraft
 
     def gearings(self, time: FloatArray) -> FloatArray:
         """At these times [s]."""
@@ -109,7 +125,7 @@ class Flown:
     tau_m: FloatArray
     """[N m]"""
     z_ddot: FloatArray
-    """[m/s^2]"""
+    """At the pilot's seat [m/s^2]."""
     correction: FloatArray
     """As put out [rad]."""
     notes: FloatArray
@@ -133,7 +149,7 @@ class Flown:
     def margins(self, every: int) -> FloatArray:
         """The true gain margin at every so many-th note [dB]."""
         at = np.arange(0, len(self.time), STRIDE * every)
-        limit = critical_gearing(aircraft.load(self.plan.craft), self.truth.transfer(at))
+        limit = critical_gearing(self.plan.aircraft, self.truth.transfer(at))
         margin: FloatArray = 20.0 * np.log10(limit / np.maximum(self.plan.gearings(self.time[at]), 1e-9))
         return margin
 
@@ -142,10 +158,9 @@ def fly(plan: Plan) -> Flown:
     """One flight. Raises LeverError."""
     scenario = plan.scenario
     inputs = scenario_inputs.prepare(scenario)
-    assert scenario.aircraft is not None
     loop = Loop(scenario, inputs, by_frames=False, every=STRIDE)
     loop.gear(plan.gearings(inputs.time))
-    stability = loop.watch(uncertain_response(scenario.aircraft, plan.seed))
+    stability = loop.watch(uncertain_response(plan))
     if plan.clock_stops is not None:
         time = np.minimum(inputs.time, plan.clock_stops)
         loop.give_time(np.round(1e6 * time).astype(np.uint32))
@@ -157,7 +172,7 @@ def fly(plan: Plan) -> Flown:
         time=inputs.time,
         theta=loop.signals["theta"],
         tau_m=loop.signals["tau_m"],
-        z_ddot=loop.signals["z_ddot"],
+        z_ddot=inputs.z_ddot,
         correction=loop.correction,
         notes=inputs.time[::STRIDE],
         stability=stability,
@@ -165,11 +180,18 @@ def fly(plan: Plan) -> Flown:
     )
 
 
-def uncertain_response(coupled: Coupled, seed: int) -> AircraftResponse:
-    """What the firmware is given of an aircraft: its response, off by what is stated."""
-    gain, phase = UNSURE * stream(f"known {coupled.aircraft.title}", seed).standard_normal(2)
-    off = (1.0 + gain) * np.exp(1j * phase)
-    return response_table(lambda s: coupled.response(s) * off)
+def uncertain_response(plan: Plan) -> AircraftResponse:
+    """What the firmware is given of an aircraft: its response, off by what is stated; the way from the accelerometer to
+    the seat is off by up to SEAT_ERROR."""
+    coupled = plan.scenario.aircraft
+    assert coupled is not None
+    random = stream(f"known {coupled.aircraft.title}", plan.seed)
+    gain, phase = UNSURE * random.standard_normal(2)
+    off, seat_off = plan.table_gain * (1.0 + gain) * np.exp(1j * phase), random.uniform(-SEAT_ERROR, SEAT_ERROR, 2)
+    seat = (1.0 + seat_off[0]) * np.exp(1j * seat_off[1])
+    return known_response(
+        coupled, lambda s: np.full_like(s, off), seat_off=lambda s: np.full_like(s, seat), gain_sigma=plan.table_sigma
+    )
 
 
 def _low_passed(angle: FloatArray, plan: Plan) -> FloatArray:

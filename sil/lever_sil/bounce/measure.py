@@ -11,7 +11,6 @@ import numpy as np
 from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.library import lib
 
-from ..aircraft import aircraft
 from ..aircraft.stability import critical_gearing
 from ..fast import plants
 from ..judged.result import Figure, largest, least, mean
@@ -80,7 +79,7 @@ def _least_critical(plan: Plan) -> float:
     """The least gearing that is critical at any time of a flight [1]."""
     truth = truth_of(plan)
     at = np.arange(0, len(truth.rest), 1000 // STRIDE)
-    return float(critical_gearing(aircraft.load(plan.craft), truth.transfer(at)).min())
+    return float(critical_gearing(plan.aircraft, truth.transfer(at)).min())
 
 
 def geared(plan: Plan, ratio: float) -> Plan:
@@ -123,15 +122,23 @@ def standing(alarmed: BoolArray, time: FloatArray, until: float) -> float:
     return float(begun[begun <= until][-1]) if alarmed[at] else _first(alarmed & (time > until), time)
 
 
-def relaxing(craft: str, seed: int) -> Measured:
+Spoil = Callable[[Plan], Plan]
+
+
+def _as_it_is(plan: Plan) -> Plan:
+    return plan
+
+
+def relaxing(craft: str, seed: int, *, spoil: Spoil = _as_it_is) -> Measured:
     """A pilot relaxes until the loop is unstable: who sees it coming?"""
-    flown = fly(geared(Plan(craft, seed, pilots.relaxing(seed), 1.0, duration=75.0), BEYOND))
+    flown = fly(geared(spoil(Plan(craft, seed, pilots.relaxing(seed), 1.0, duration=75.0)), BEYOND))
     notes, doubled = flown.notes, _doubled(flown)
     alarm = standing(flown.stability["state"] == lib.LEVER_BOUNCE_ALARM, notes, doubled)
     rover, spectrum = (_first(level > limit, time) for time, level, limit in _detected(flown))
     at = int(np.searchsorted(notes, alarm)) if math.isfinite(alarm) else 0
     figures = {
-        "alarm lead": doubled - alarm,
+        "alarm lead": doubled - min(alarm, float(notes[-1])),
+        "missed": float(math.isinf(alarm)),
         "ROVER lead": doubled - rover,
         "spectrum lead": doubled - spectrum,
         "ahead of ROVER": min(rover, float(notes[-1])) - alarm,
@@ -172,9 +179,9 @@ def _margins(flown: Flown) -> Figures:
     }
 
 
-def stable(craft: str, seed: int, *, duration: float, ratio: float = STABLE) -> Measured:
+def stable(craft: str, seed: int, *, duration: float, ratio: float = STABLE, spoil: Spoil = _as_it_is) -> Measured:
     """A restless pilot in a loop that stays stable: who raises an alarm?"""
-    flown = fly(geared(Plan(craft, seed, pilots.restless(seed, duration), 1.0, duration=duration), ratio))
+    flown = fly(geared(spoil(Plan(craft, seed, pilots.restless(seed, duration), 1.0, duration=duration)), ratio))
     alarmed = flown.stability["state"] == lib.LEVER_BOUNCE_ALARM
     (_, rover, rover_limit), (_, spectrum, spectrum_limit) = _detected(flown)
     figures = {
@@ -217,9 +224,7 @@ def _uncoupled(plan: Plan) -> float:
     return _vibration(fly(replace(plan, gearing=1e-9, raised_from=None, mitigation="none", dither=0.0)))
 
 
-def largest_gearing(
-    craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Plan] = lambda plan: plan, **changes: Any
-) -> Measured:
+def largest_gearing(craft: str, seed: int, *, mitigation: str, spoil: Spoil = _as_it_is, **changes: Any) -> Measured:
     """Up to which gearing the vibration stays below LOUD times that without the lever: in steps of a factor, finer
     about the first at which it does not."""
     plan = spoil(_slack(craft, seed, mitigation, **changes))
@@ -362,6 +367,21 @@ def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Pl
     return Measured({"to zero": zero, "jump": math.degrees(float(jumps.max()))}, excerpt(flown))
 
 
+def harmful(craft: str, seed: int, *, mitigation: str, spoil: Spoil) -> Measured:
+    """For how long after a fault the correction adds to the lever's motion: the corrected angle is larger than the
+    lever's, both from 2 to 8 Hz, as rms over a quarter of a second."""
+    plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 5.0, dither=0.0))
+    flown, period = fly(raised(plan, CANCELLED_AT)), plan.scenario.period
+    passed = [_in_band(angle - flown.truth.rest, period) ** 2 for angle in (flown.corrected, flown.theta)]
+    width = round(0.25 / period)
+    with_it, without = (np.convolve(square, np.full(width, 1.0 / width), "same") for square in passed)
+    after = flown.during(FAULT, FAULT + 4.5)
+    adds = np.flatnonzero((with_it > without)[after])
+    jumps = np.abs(np.diff(flown.correction[flown.during(FAULT - 0.01, FAULT + 5.0)]))
+    figures = {"adds for": float(len(adds)) * period, "jump": math.degrees(float(jumps.max()))}
+    return Measured(figures, excerpt(flown))
+
+
 # --- figures ---------------------------------------------------------------------------------------------------------
 
 
@@ -399,6 +419,8 @@ FIGURES: Mapping[str, Figure] = {
     "vibration ÷ passive": Figure("1", "of the cabin, greatest of the mitigations", largest),
     "angle ÷ passive": Figure("1", "corrected angle of the lever, 2 to 8 Hz, greatest of the mitigations", largest),
     "destabilised": Figure("1", f"runs with more than {LOUD:g} × the vibration without mitigation", _total),
+    "missed": Figure("1", "flights in which no alarm came", _total),
+    "adds for": Figure("s", "time after the fault for which the correction adds to the lever's motion", largest),
     "to zero": Figure("s", "from the fault until correction and torque are zero", largest),
     "jump": Figure("°", "greatest change of the correction from sample to sample after the fault", largest),
 }

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 Show = Callable[[int, int, str], None]
-"""Progress: runs done, runs in all, time left."""
+"""Progress: runs done, runs in all, the same in words with the time left."""
 
 _AHEAD = 3  # chunks for each thread of the workers, so that none waits for the client
 _MOST_LOST = 10  # chunks, after which something is wrong with all
@@ -65,11 +65,11 @@ def run(plan: Plan, folder: Path, client: Client, show: Show) -> Session:
     start, total = clock.monotonic(), plan.spec.runs
 
     def progress() -> None:
-        left = ""
+        kept = f"{before + session.runs} of {total} runs kept"
         if session.runs:
             seconds = (clock.monotonic() - start) * (total - before - session.runs) / session.runs
-            left = f"{_time(seconds)} left"
-        show(before + session.runs, total, left)
+            kept += f", {_time(seconds)} left"
+        show(before + session.runs, total, kept)
 
     for chunk, result in _results(client, plan, folder, todo, progress):
         if isinstance(result, Exception):

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from lever_cdkf.firmware.aircraft import AircraftResponse
+
+    from ..aircraft.aircraft import Coupled
 
 _DESCRIPTION = """\
 Prints the response of a helicopter to its collective lever, from 1.5 to 8 Hz, as a file for `lever_can --aircraft` and
@@ -17,17 +20,30 @@ those that there are.
 
 AIRCRAFT is one of them, or a .toml file with the keys of theirs. KEY=VALUE after it changes one (delay=30 ms), and says
   gearing                  pitch of the blades over the lever's angle (default: 0.5; in service 0.3 to 0.6)
-  gain_sigma, phase_sigma  how well the response is known [1, rad] (default: 0.05)
-  warning, alarm           gain margins below which there is one [dB] (default: 5, 4)
+  gain_sigma, phase_sigma  how well the response is known [1, rad] (default: 0.05). Measure it to +-10 % in gain: an
+                           alarm can be relied on for the error that is stated, and comes later the larger that is
+  warning, alarm           gain margins below which there is one [dB] (default: 5, 4; more above a gain_sigma of 0.25)
+
+A linear model of another tool is a .mat, .npz or .csv file with the matrices A, B, C and D (at most 64 states): inputs
+collective pitch [rad] and gust [m/s^2], outputs vertical acceleration at the pilot's seat and at the accelerometer
+[m/s^2]. It flies: its name is the `model` of [aircraft] in a scenario. Keys of its own are
+  input                    what the collective input is: blade (default), or actuator, where that is in the model
+  collective_input, gust_input, seat_output, accelerometer_output
+                           which of more inputs and outputs they are, from 1
 
 A response that was measured or computed elsewhere, with gearing, is a .csv file of frequency [Hz], real and imaginary
-part of the cabin's acceleration over the lever's angle [(m/s^2)/rad].
+part of the acceleration at the seat over the lever's angle [(m/s^2)/rad]; two columns more are that at the seat over that
+at the accelerometer. The table is of what it holds; a state space is fitted to it to fly, with response_gearing= and
+delay= for what of these is in it, and the fit is shown.
 """
 _EPILOG = """\
 examples:
   lever aircraft
   lever aircraft uh60_like gearing=0.5 -o uh60.response
   lever replay session.log --aircraft uh60.response -o out/session
+  lever aircraft --state-space model.mat gearing=0.5 -o own.response
+  lever sim bounce --set 'aircraft.model="model.mat"'
+  lever aircraft uh60_like --export uh60.mat
 """
 _SAID = {"gain_sigma": "1", "phase_sigma": "rad", "warning": "dB", "alarm": "dB"}
 
@@ -39,58 +55,124 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         description=_DESCRIPTION,
         epilog=_EPILOG,
     )
-    parser.add_argument("aircraft", nargs="?", metavar="AIRCRAFT", help="a name, or a .toml or .csv file")
+    parser.add_argument("aircraft", nargs="?", metavar="AIRCRAFT", help="a name, or a .toml, .mat, .npz or .csv file")
     parser.add_argument("changes", nargs="*", metavar="KEY=VALUE", help="values to change")
-    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write it into FILE")
+    parser.add_argument(
+        "--state-space", metavar="FILE", help="AIRCRAFT is this .mat, .npz or .csv file with matrices A, B, C, D"
+    )
+    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write the table into FILE")
+    parser.add_argument(
+        "--export", metavar="FILE", type=Path, help="write the airframe as a state space into a .mat, .npz or .csv FILE"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
+    from lever_cdkf.errors import LeverError
     from lever_cdkf.files import write_text
     from lever_cdkf.provenance import provenance
     from lever_cdkf.tables import print_tables
 
     from ..aircraft import aircraft
 
-    if args.aircraft is None:
-        print_tables({"aircraft": [{"name": name, "what": aircraft.load(name).title} for name in aircraft.names()]})
+    name, changes = args.aircraft, list(args.changes)
+    if args.state_space is not None:
+        changes, name = [*([name] if name else []), *changes], args.state_space
+        if Path(name).suffix.lower() == ".csv" and aircraft.is_response(Path(name)):
+            raise LeverError(f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space")
+    if name is None:
+        print_tables({"aircraft": [{"name": each, "what": aircraft.load(each).title} for each in aircraft.names()]})
         return 0
-    text = provenance().comment() + response(args.aircraft, args.changes).text()
-    if args.out is None:
-        print(text, end="")
-    else:
+    text = provenance().comment() + response(name, changes).text()
+    try:
+        _say(name, changes)
+    except LeverError as error:
+        if args.export is not None:
+            raise
+        print(f"lever: warning: {error}", file=sys.stderr)  # the table is what was measured
+    if args.export is not None:
+        _flown(name, _of_aircraft(changes)).aircraft.airframe().write(args.export, provenance().comment())
+    if args.out is not None:
         write_text(args.out, text)
+    elif args.export is None:
+        print(text, end="")
     return 0
 
 
+def _say(name: str, changes: list[str]) -> None:
+    """What has become of a file, on standard error. Raises LeverError."""
+    from ..aircraft.aircraft import FILES, is_response
+    from ..aircraft.state_space import read
+    from ..aircraft.tabulated import Tabulated
+
+    path, given = Path(name), _of_aircraft(changes)
+    if path.suffix.lower() not in FILES:
+        return
+    system = _flown(name, given).aircraft.airframe()
+    if not is_response(path):
+        left = len(read(path).a) - len(system.a)
+        hidden = f"; {left} more are not moved by the inputs or not seen in the outputs" if left else ""
+        print(f"{name}: {len(system.a)} states{hidden}", file=sys.stderr)
+        return
+    tabulated, craft = Tabulated.load(path), _flown(name, given).aircraft
+    s = 2j * math.pi * tabulated.frequency.astype(complex)
+    fitted = craft.response(s) * _number(given.get("response_gearing", "1"))
+    error = abs(fitted / tabulated.values - 1.0)
+    print(f"{name}: fitted by {len(system.a)} states, off by {100.0 * error.max():.2g} % at most", file=sys.stderr)
+    print("  frequency   response         fitted           off", file=sys.stderr)
+    for i in range(0, len(s), max(1, len(s) // 12)):
+        cells = (f"{abs(z):8.4g} {math.degrees(math.atan2(z.imag, z.real)):6.1f}°" for z in (tabulated.values[i], fitted[i]))
+        print(f"  {tabulated.frequency[i]:6.3g} Hz  {'  '.join(cells)}  {100.0 * error[i]:.2g} %", file=sys.stderr)
+
+
+def _number(written: str) -> float:
+    return _quantity("response_gearing", written, "1")
+
+
 def response(name: str, changes: list[str]) -> AircraftResponse:
-    """Of an aircraft by its name or .toml file, or by its response in a .csv file. Raises LeverError."""
+    """Of an aircraft by its name or file, or by its response in a .csv file. Raises LeverError."""
     from lever_cdkf.errors import LeverError
     from lever_cdkf.firmware.native import Config, Estimator
 
-    from ..aircraft.aircraft import read_aircraft
-    from ..aircraft.response_table import BAND, response_table
+    from ..aircraft.aircraft import is_response
+    from ..aircraft.response_table import known_response, measured_response
     from ..aircraft.tabulated import Tabulated
-    from ..toml_tables import Place, value_of
 
     given = _assignments(changes)
-    said = {key: _quantity(key, given.pop(key), unit) for key, unit in _SAID.items() if key in given}
-    if name.lower().endswith(".csv"):
-        if given:
-            raise LeverError(f"{name}: a response has no {next(iter(given))}; it may have {', '.join(_SAID)}")
-        measured = Tabulated.load(name)
-        of, band = measured.response, measured.band
-        whole = name
-    else:
-        gearing = _quantity("gearing", given.pop("gearing", "0.5"), "1")
-        values = {key: value_of(value) for key, value in given.items()}
-        coupled = read_aircraft({"model": name, **values, "gearing": f"{gearing!r} 1"}, Place("aircraft"))
-        of, band, whole = coupled.response, BAND, coupled.name
+    said = {key: _quantity(key, given[key], unit) for key, unit in _SAID.items() if key in given}
+    flown = _of_aircraft(changes)
+    whole = name
     try:
-        table = response_table(of, band, name=whole, **said)
+        if is_response(Path(name)):
+            if other := next((key for key in flown if key not in _OF_FIT), None):
+                raise LeverError(f"a response has no {other}; it may have {', '.join((*_SAID, *_OF_FIT))}")
+            table = measured_response(Tabulated.load(name), name=name, **said)
+        else:
+            coupled = _flown(name, flown)
+            whole = coupled.name
+            table = known_response(coupled, **said)
         Estimator(Config()).watch(table)  # which refuses what it cannot use
     except LeverError as error:
-        raise LeverError(f"{whole}: {error}") from None
+        text = str(error)
+        raise LeverError(text if text.startswith((whole, "aircraft:")) else f"{whole}: {text}") from None
     return table
+
+
+_OF_FIT = ("response_gearing", "delay")
+
+
+def _of_aircraft(changes: list[str]) -> dict[str, str]:
+    """Those that are not of the table."""
+    return {key: value for key, value in _assignments(changes).items() if key not in _SAID}
+
+
+def _flown(name: str, given: dict[str, str]) -> Coupled:
+    from ..aircraft.aircraft import read_aircraft
+    from ..toml_tables import Place, value_of
+
+    keys = dict(given)
+    gearing = _quantity("gearing", keys.pop("gearing", "0.5"), "1")
+    values = {key: value_of(value) for key, value in keys.items()}
+    return read_aircraft({"model": name, **values, "gearing": f"{gearing!r} 1"}, Place("aircraft"))
 
 
 def _assignments(changes: list[str]) -> dict[str, str]:

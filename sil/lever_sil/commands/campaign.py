@@ -97,7 +97,8 @@ def run(args: argparse.Namespace) -> int:
     try:
         session = _run(plan, folder, args)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt("what is finished is kept; go on with --resume") from None
+        kept = sum(plan.runs(plan.chunk(number)) for number in plan.done(folder))
+        raise KeyboardInterrupt(f"{kept} of {plan.spec.runs} runs kept; go on with --resume") from None
     return _finish(plan, folder, session, args)
 
 

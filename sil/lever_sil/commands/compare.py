@@ -30,6 +30,10 @@ also writes into DIR
   FIGURE.pdf .svg  each figure of the page for print, two columns of a journal wide; FIGURE.csv: its numbers
   provenance.json  version, revision, date and command that made them
 
+With --paper instead: the experiment of the paper that the estimator comes from (sil/lever_sil/study/PAPER.md), by 20
+seeds: parameters that stay, drift or jump, two levels of noise in each channel, each kind of parameter noise. A table
+for each model; cells are median / worst of all runs and levels of noise. Two minutes of processor time.
+
 With --envelope instead: the firmware beside joint EKF and UKF in the conditions of `lever envelope` (8 pilots each),
 these given the true process noise and the trim, with and without a fourth-order high-pass (_hp) in front.
 Prints rms error of the natural frequency and how often the truth is within the stated ±2σ, median and worst pilot;
@@ -42,6 +46,7 @@ examples:
   lever compare --scenarios step_up step_down --seeds 20
   lever compare --models lever --estimators dual joint joint_ekf --seeds 20 --out out/lever
   lever compare --out out/compare                the whole campaign, some ten minutes of processor time
+  lever compare --paper --seeds 4                some runs of the experiment of the paper
   lever compare --envelope --quick               some conditions of `lever envelope`, a minute on two cores
   lever compare --envelope --scenarios steady retrim --estimators firmware joint_ekf_hp
 
@@ -61,7 +66,8 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     compare.add_argument(
         "--envelope", action="store_true", help="joint EKF and UKF in the conditions of lever envelope"
     )
-    compare.add_argument("--scenarios", nargs="+", metavar="NAME", help="cases of --list (default: all)")
+    compare.add_argument("--paper", action="store_true", help="the experiment of the paper, as a table for each model")
+    compare.add_argument("--scenarios", nargs="+", metavar="NAME", help="cases of --list (default: all but paper_*)")
     compare.add_argument("--models", nargs="+", metavar="MODEL", help="only cases of these models (default: all)")
     compare.add_argument("--estimators", nargs="+", metavar="NAME", help="estimators of --list (default: all)")
     compare.add_argument("--seeds", type=int, metavar="N", help=f"runs of each case (default: {_SEEDS})")
@@ -93,6 +99,8 @@ def run(args: argparse.Namespace) -> int:
 
         _check(args.seeds, args.duration, args.jobs)
         return compare_envelope.run(args)
+    if args.paper:
+        return _paper(args)
     names, estimators = _cases(args), _estimators(args)
     seeds = args.seeds if args.seeds is not None else (_QUICK_SEEDS if args.quick else _SEEDS)
     duration = args.duration if args.duration is not None else (_QUICK_DURATION if args.quick else None)
@@ -134,6 +142,26 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _paper(args: argparse.Namespace) -> int:
+    """Run `lever compare --paper`."""
+    from lever_cdkf.tables import print_tables
+
+    from ..study.compare import campaign, paper
+    from ..study.compare.cases import Plan
+
+    for option in ("scenarios", "models", "out", "quick"):
+        if getattr(args, option):
+            raise LeverError(f"--{option} does not go with --paper, which prints one fixed experiment; leave it out")
+    seeds = paper.SEEDS if args.seeds is None else args.seeds
+    _check(seeds, args.duration, args.jobs)
+    plan = Plan(seeds, args.duration, _SEED if args.seed is None else args.seed)
+    todo = campaign.tasks(paper.names(), args.estimators and _estimators(args), plan)
+    with Progress("compare") as progress:
+        results = campaign.run(todo, args.jobs, progress.show)
+    print_tables(paper.tables(results), args.json)
+    return 0
+
+
 def _listed() -> dict[str, list[Row]]:
     from ..study.compare.cases import cases
     from ..study.compare.entrants import entrants
@@ -148,7 +176,8 @@ def _listed() -> dict[str, list[Row]]:
 def _cases(args: argparse.Namespace) -> list[str]:
     from ..study.compare.cases import cases
 
-    chosen = args.scenarios or (_QUICK_CASES if args.quick else cases())
+    all_but_the_paper = [name for name, case in cases().items() if case.kind != "paper"]
+    chosen = args.scenarios or (_QUICK_CASES if args.quick else all_but_the_paper)
     check_names("scenario", chosen, cases(), _LIST)
     models = {case.model for case in cases().values()}
     check_names("model", args.models or (), models, _LIST)

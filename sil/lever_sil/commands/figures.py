@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +13,13 @@ from lever_cdkf.layout import say
 _PAGE, _CAPTIONS, _PROVENANCE = "figures.html", "captions.md", "provenance.json"
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from ..study.figures.description import Figure
     from ..study.figures.maps import MapFigure
+    from ..study.figures.runs import Extent
+
+    Make = Callable[[int, Extent], Figure | MapFigure]
 
 _DESCRIPTION = """\
 Computes figures for print from simulated runs of the firmware, and writes into DIR
@@ -26,6 +30,9 @@ Computes figures for print from simulated runs of the firmware, and writes into 
   captions.md         what each figure shows; its numbers are measured in these runs
   provenance.json     version, revision, date and command that made them
 
+With --paper: the five figures of the paper that the estimator comes from (Aresi, Zanoni, Masarati), as NAME
+figure_1_bode to figure_5_identification; their captions say what is the same there, and what is not.
+
 The same seed gives the same figures and the same numbers.
 """
 _EPILOG = """\
@@ -34,6 +41,7 @@ examples:
   lever figures --out out/figures
   lever figures --only bode grip --seed 7
   lever figures --campaign out/quick                       beside the maps of this campaign
+  lever figures --paper --out out/paper                    the five figures of the paper, by their numbers
 """
 
 
@@ -62,6 +70,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--campaign", metavar="DIR", type=Path, help="also the maps of the campaign in this folder of `lever campaign`"
     )
+    parser.add_argument("--paper", action="store_true", help="the five figures of the paper, instead of all of ours")
     parser.add_argument("--list", action="store_true", help="print the names of all figures")
 
 
@@ -81,33 +90,45 @@ def run(args: argparse.Namespace) -> int:
 
     if args.list:
         return _list()
-    maps = _maps(args.campaign)
-    written = _make(chosen(args.only, list(maps)), maps, args)
+    figures = _figures(args)
+    written = _make({name: figures[name] for name in chosen(args.only, list(figures))}, args)
     say(f"Written to {args.out}: {', '.join(written)}")
     return 0
 
 
-def _maps(folder: Path | None) -> dict[str, MapFigure]:
-    """Of a campaign, by name. Raises LeverError."""
-    if folder is None:
-        return {}
-    require("campaign")
+def _figures(args: argparse.Namespace) -> dict[str, Make]:
+    """All that can be chosen from, by name. Raises LeverError for a campaign that cannot be read."""
+    from ..study.figures.catalogue import FIGURES
+    from ..study.figures.paper import PAPER
 
-    from ..campaign.maps import figures
+    figures: dict[str, Make] = dict(PAPER if args.paper else FIGURES)
+    if args.campaign is not None:
+        require("campaign")
 
-    return {figure.name: figure for figure in figures(folder)}
+        from ..campaign.maps import figures as maps
+
+        figures |= {each.name: partial(_as_drawn, each) for each in maps(args.campaign)}
+    return figures
+
+
+def _as_drawn(figure: MapFigure, _seed: int, _extent: Extent) -> MapFigure:
+    """Return a figure that needs no runs."""
+    return figure
 
 
 def _list() -> int:
     from lever_cdkf.tables import print_tables
 
     from ..study.figures.catalogue import FIGURES, summary
+    from ..study.figures.paper import PAPER
 
-    print_tables({"figures": [{"name": name, "shows": summary(name)} for name in FIGURES]})
+    ours = [{"name": name, "shows": summary(name)} for name in FIGURES]
+    paper = [{"name": name, "shows": summary(name.split("_", 2)[2])} for name in PAPER]
+    print_tables({"figures": ours, "figures of the paper, with --paper": paper})
     return 0
 
 
-def _make(names: Sequence[str], maps: Mapping[str, MapFigure], args: argparse.Namespace) -> list[str]:
+def _make(makers: Mapping[str, Make], args: argparse.Namespace) -> list[str]:
     """Makes the figures and writes the files, all or none; returns their names. Raises LeverError."""
     from lever_cdkf.exports import pictures
     from lever_cdkf.files import Outputs, writing
@@ -115,7 +136,6 @@ def _make(names: Sequence[str], maps: Mapping[str, MapFigure], args: argparse.Na
     from lever_cdkf.provenance import provenance, with_provenance
 
     from ..study.figures import data, figures_page, printed
-    from ..study.figures.catalogue import FIGURES
     from ..study.figures.runs import Extent
 
     figures: list[Figure | MapFigure] = []
@@ -129,9 +149,9 @@ def _make(names: Sequence[str], maps: Mapping[str, MapFigure], args: argparse.Na
             path.write_bytes(content)
 
     with Outputs(args.out) as outputs, Progress("figures") as progress:
-        for done, name in enumerate(names):
-            progress.show(done, len(names))
-            figure = maps[name] if name in maps else FIGURES[name](args.seed, Extent())
+        for done, (name, make) in enumerate(makers.items()):
+            progress.show(done, len(makers))
+            figure = make(args.seed, Extent())
             figures.append(figure)
             sheet = printed.sheet(figure, args.width)
             for kind in pictures.KINDS:

@@ -40,6 +40,10 @@ class JudgedCommand(ABC, Generic[Row]):
     def conditions(self) -> Mapping[str, Row]:
         """All by name, in the order of the table."""
 
+    def groups(self) -> Mapping[str, Mapping[str, Row]]:
+        """Further conditions, in tables of their own by name: they run where --only names them, or their table."""
+        return {}
+
     @abstractmethod
     def figures(self) -> Mapping[str, Figure]:
         """All that are measured, by name."""
@@ -62,7 +66,9 @@ class JudgedCommand(ABC, Generic[Row]):
         parser.add_argument(
             "--seeds", type=int, metavar="N", help=f"random {self.each} a condition (default: {self.seeds})"
         )
-        parser.add_argument("--only", nargs="+", metavar="NAME", help="conditions of --list (default: all)")
+        parser.add_argument(
+            "--only", nargs="+", metavar="NAME", help="conditions or tables of --list (default: the first table)"
+        )
         parser.add_argument(
             "-o",
             "--out",
@@ -84,8 +90,11 @@ class JudgedCommand(ABC, Generic[Row]):
         from ..judged import table
 
         if args.list:
-            listed = [_listed(condition, self.figures()) for condition in self.conditions().values()]
-            print_tables({"conditions": listed}, args.json)
+            listed = {
+                name: [_listed(condition, self.figures()) for condition in group.values()]
+                for name, group in {"conditions": self.conditions(), **self.groups()}.items()
+            }
+            print_tables(listed, args.json)
             return 0
         require("report")
         chosen = self._chosen(args)
@@ -123,11 +132,13 @@ class JudgedCommand(ABC, Generic[Row]):
 
     def _chosen(self, args: argparse.Namespace) -> list[Row]:
         """The conditions that were asked for. Raises LeverError for one that is not known."""
-        conditions = self.conditions()
-        check_names("condition", args.only or (), conditions, f"lever {self.name} --list")
-        if args.only:
-            return [conditions[name] for name in dict.fromkeys(args.only)]
-        return [condition for condition in conditions.values() if condition.quick or not args.quick]
+        conditions, groups = self.conditions(), self.groups()
+        if not args.only:
+            return [condition for condition in conditions.values() if condition.quick or not args.quick]
+        known = {name: row for group in (conditions, *groups.values()) for name, row in group.items()}
+        check_names("condition", args.only, (*known, *groups), f"lever {self.name} --list")
+        names = (each for name in args.only for each in groups.get(name, (name,)))
+        return [known[name] for name in dict.fromkeys(names)]
 
 
 def _listed(condition: Judged, known: Mapping[str, Figure]) -> dict[str, str | bool]:

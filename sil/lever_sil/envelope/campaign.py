@@ -17,8 +17,8 @@ from .measure import FIGURES, Excerpt, Outcome, excerpt
 from .motions import Motion, Recording, lanes, truth
 from .sensors import measured
 
-LANES = 64
-"""Runs simulated at a time, which bounds the memory."""
+LANE_SECONDS = 64 * 60.0
+"""Of all runs that are simulated at a time, which bounds the memory."""
 
 Show = Callable[[int, int, str], None]
 """Progress: done, total, what."""
@@ -57,7 +57,7 @@ def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: i
     for row in {row.name: row for row in (*references, *rows)}.values():  # a reference has the motion of its row
         groups.setdefault(Group(row.motion, row.runs, row.closed_loop), []).append(row)
     parts: dict[str, list[Result]] = {row.name: [] for own in groups.values() for row in own}
-    jobs = [Job(group, each) for group in groups for each in _portions(seeds * group.runs)]
+    jobs = [Job(group, each) for group in groups for each in _portions(seeds * group.runs, group.motion.duration)]
     total = sum(len(groups[job.group]) for job in jobs)
 
     def tick(what: str = "simulating") -> None:
@@ -71,15 +71,21 @@ def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: i
     return [_joined(parts[row.name]) for row in rows]
 
 
-def _portions(runs: int) -> list[range]:
+def _portions(runs: int, duration: float) -> list[range]:
     """Seeds, not too many at a time."""
-    return [range(first, min(first + LANES, runs)) for first in range(0, runs, LANES)]
+    most = _most_lanes(duration)
+    return [range(first, min(first + most, runs)) for first in range(0, runs, most)]
+
+
+def _most_lanes(duration: float) -> int:
+    return max(1, int(LANE_SECONDS / duration))
 
 
 def _joined(parts: Sequence[Result]) -> Result:
     """One result of some for different seeds; the excerpt is of the first."""
     first = parts[0]
-    return replace(first, values={name: np.concatenate([part.values[name] for part in parts]) for name in first.values})
+    values = {name: np.concatenate([part.values[name] for part in parts]) for name in first.values}
+    return replace(first, values=values, runs=[name for part in parts for name in part.runs])
 
 
 def _result(
@@ -95,10 +101,11 @@ def _result(
         recording, track = firmware.closed_loop(config, row.motion, seeds, loop, tick)
     else:
         track = firmware.estimates(config, measured(recording, row.sensors, seeds), recording.response is not None)
-    outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""))
+    outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""), row.followed)
     outcomes[row.name] = outcome
     with np.errstate(all="ignore"):  # an estimate that is not finite is no warning but a figure that keeps no limit
-        return Result(row, {name: FIGURES[name].compute(outcome) for name in row.figures}, excerpt=excerpt(outcome))
+        values = {name: FIGURES[name].compute(outcome) for name in row.figures}
+        return Result(row, values, runs=[f"seed {seed}" for seed in seeds], excerpt=excerpt(outcome))
 
 
 def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recording | None]]:
@@ -111,7 +118,7 @@ def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recordin
             yield job, pilots.record(job.group.motion, job.seeds, tick)
         else:
             batch = batches.setdefault(job.group.motion.duration, [])
-            if sum(len(each.seeds) for each in (*batch, job)) > LANES:
+            if sum(len(each.seeds) for each in (*batch, job)) > _most_lanes(job.group.motion.duration):
                 yield from _simulated(batch, tick)
                 batch.clear()
             batch.append(job)

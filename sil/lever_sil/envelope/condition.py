@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ..judged.result import Limit
-from .motions import Motion
+from .motions import PERIOD, Motion
 from .sensors import Sensors
 
 Interval = tuple[float, float]
 
+FOLLOWED = 8.0
+"""Unless a condition says otherwise [s]."""
 REPORTED = ("f_n rms", "f_n covered", "zeta rms", "zeta covered", "flagged")
 """Figures of every condition whose pilot has a natural frequency."""
 
@@ -22,6 +24,8 @@ class ClosedLoop:
     dither: float = 0.3
     """rms [N m]"""
     lost: float = 0.5
+    lost_for: float = PERIOD
+    """At a time [s]."""
     whole: bool = False
     """The whole sample, not LEVER_SAMPLE alone."""
 
@@ -49,6 +53,8 @@ class Condition:
     events: tuple[Interval, ...] = ()
     also: tuple[str, ...] = ()
     """Further figures, reported without a limit."""
+    followed: float = FOLLOWED
+    """So long after an event errors and settling are followed [s]."""
     against: str | None = None
     """Condition that it is measured against."""
     runs: int = 1

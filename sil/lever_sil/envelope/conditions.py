@@ -15,62 +15,62 @@ from .sensors import Fault, Sensors
 _PARAMETERS = ("m_p", "c_p", "k_p")
 
 
-def _most(figure: str, value: float, over: str = "all") -> Limit:
+def most(figure: str, value: float, over: str = "all") -> Limit:
     return Limit(figure, most=value, over=over)
 
 
-def _least(figure: str, value: float) -> Limit:
+def least(figure: str, value: float) -> Limit:
     return Limit(figure, least=value)
 
 
-def _right(rms: float, covered: float = 90.0) -> tuple[Limit, ...]:
+def right(rms: float, covered: float = 90.0) -> tuple[Limit, ...]:
     """Of the natural frequency [%]."""
-    return _most("f_n rms", rms), _least("f_n covered", covered)
+    return most("f_n rms", rms), least("f_n covered", covered)
 
 
 def _within(sigmas: float) -> tuple[Limit, ...]:
     """No error is ever larger."""
-    return tuple(_most(f"{name} largest", sigmas) for name in ("f_n", "zeta", "m_p"))
+    return tuple(most(f"{name} largest", sigmas) for name in ("f_n", "zeta", "m_p"))
 
 
-_FLAGGED = (_least("flagged", 90.0),)
-_QUIET = _most("flagged", 2.0)
-_ALL_COVERED = tuple(_least(f"{name} covered", 90.0) for name in ("f_n", "zeta", *_PARAMETERS))
+_FLAGGED = (least("flagged", 90.0),)
+QUIET = most("flagged", 2.0)
+_ALL_COVERED = tuple(least(f"{name} covered", 90.0) for name in ("f_n", "zeta", *_PARAMETERS))
 _OF_PARAMETERS = tuple(f"{name} {what}" for name in _PARAMETERS for what in ("rms", "covered"))
-_NO_DITHER = Motion(dither=0.0)
+NO_DITHER = Motion(dither=0.0)
 
 _STEADY = (
-    Condition("steady", "steady flight", limits=(*_right(1.0), _QUIET), also=_OF_PARAMETERS, quick=True),
-    Condition("steady_base_only", "steady flight, no dither", _NO_DITHER, (*_right(2.0), _QUIET), also=_OF_PARAMETERS),
+    Condition("steady", "steady flight", limits=(*right(1.0), QUIET), also=_OF_PARAMETERS, quick=True),
+    Condition("steady_base_only", "steady flight, no dither", NO_DITHER, (*right(2.0), QUIET), also=_OF_PARAMETERS),
 )
 
 _MOVEMENT = (
-    Condition("sway_2deg_0.3hz", "the pilot moves the lever, ±2° at 0.3 Hz", Motion(sway=(2.0, 0.3)), _right(2.0)),
+    Condition("sway_2deg_0.3hz", "the pilot moves the lever, ±2° at 0.3 Hz", Motion(sway=(2.0, 0.3)), right(2.0)),
     Condition(
-        "sway_5deg_0.3hz", "the pilot moves the lever, ±5° at 0.3 Hz", Motion(sway=(5.0, 0.3)), _right(3.0), quick=True
+        "sway_5deg_0.3hz", "the pilot moves the lever, ±5° at 0.3 Hz", Motion(sway=(5.0, 0.3)), right(3.0), quick=True
     ),
-    Condition("sway_1deg_0.5hz", "the pilot moves the lever, ±1° at 0.5 Hz", Motion(sway=(1.0, 0.5)), _right(2.0)),
-    Condition("wander_1deg", "random movement, 0.05–0.5 Hz, 1° rms", Motion(wander=1.0), _right(1.5)),
+    Condition("sway_1deg_0.5hz", "the pilot moves the lever, ±1° at 0.5 Hz", Motion(sway=(1.0, 0.5)), right(2.0)),
+    Condition("wander_1deg", "random movement, 0.05–0.5 Hz, 1° rms", Motion(wander=1.0), right(1.5)),
     Condition(
-        "wander_1deg_base_only", "random movement, 1° rms, no dither", replace(_NO_DITHER, wander=1.0), _right(1.5)
+        "wander_1deg_base_only", "random movement, 1° rms, no dither", replace(NO_DITHER, wander=1.0), right(1.5)
     ),
-    Condition("wander_3deg", "random movement, 0.05–0.5 Hz, 3° rms", Motion(wander=3.0), _right(3.0)),
+    Condition("wander_3deg", "random movement, 0.05–0.5 Hz, 3° rms", Motion(wander=3.0), right(3.0)),
     Condition(
-        "wander_3deg_base_only", "random movement, 3° rms, no dither", replace(_NO_DITHER, wander=3.0), _right(3.0)
+        "wander_3deg_base_only", "random movement, 3° rms, no dither", replace(NO_DITHER, wander=3.0), right(3.0)
     ),
-    Condition("retrim", "re-trim by 8° in 4 s", Motion(retrim=8.0), (_most("f_n rms", 1.2),), quick=True),
+    Condition("retrim", "re-trim by 8° in 4 s", Motion(retrim=8.0), (most("f_n rms", 1.2),), quick=True),
     Condition(
         "grip_step",
         "grip step of 30 % that moves the rest angle by 1° in 50 ms",
         Motion(grip=1.3),
-        (_most("settled", 0.9, "median"), _most("settled", 2.0, "worst")),
+        (most("settled", 0.9, "median"), most("settled", 2.0, "worst")),
         events=((EVENT, EVENT),),
     ),
     Condition(
         "grip_slow",
         "grip step of 50 % that moves the rest angle by 3° in 0.5 s",
         Motion(grip=1.5, grip_moves=(3.0, 0.5)),
-        (_most("settled", 2.0, "median"), _least("f_n covered", 90.0)),
+        (most("settled", 2.0, "median"), least("f_n covered", 90.0)),
         events=((EVENT, EVENT + 0.5),),
         start=EVENT,
     ),
@@ -82,23 +82,23 @@ _TORQUES = (
         "slow_torque",
         "unknown torque, 1 N m rms, 0.3 s of correlation",
         Motion(slow_torque=1.0),
-        _right(3.0, 85.0),
+        right(3.0, 85.0),
         _FLAGGED,
     ),
-    Condition("tremor", "tremor of 0.2 N m, 3–5 Hz", Motion(tremor=0.2), _right(3.0, 85.0), _FLAGGED),
+    Condition("tremor", "tremor of 0.2 N m, 3–5 Hz", Motion(tremor=0.2), right(3.0, 85.0), _FLAGGED),
     Condition("rough_told", "process noise 0.5, as set", _ROUGH, settings={"theta_dot_process_noise": 0.5}),
     Condition(
         "rough",
         "rough air: process noise 0.5, set 0.05",
         _ROUGH,
-        (_most("zeta ratio", 1.3), _least("zeta covered", 85.0)),
+        (most("zeta ratio", 1.3), least("zeta covered", 85.0)),
         against="rough_told",
     ),
     Condition(
         "damping_ramp",
         "c_p from 42 to 18 N s/m as a ramp of 30 s",
         Motion(damping=(42.0, 18.0, 20.0, 50.0)),
-        (_least("c_p covered", 90.0), _most("lag", 1.5)),
+        (least("c_p covered", 90.0), most("lag", 1.5)),
         start=22.0,
         end=50.0,
         also=("c_p rms",),
@@ -114,7 +114,7 @@ _OUTAGES = (
     Condition(
         "base_invalid",
         "z̈ marked invalid for 0.2, 1, 3 and 10 s",
-        limits=(*_within(3.0), _most("learnt at once", 0.1)),
+        limits=(*_within(3.0), most("learnt at once", 0.1)),
         sensors=Sensors(faults=tuple(Fault("z_ddot", "invalid", *interval) for interval in _INVALID)),
         start=25.0,
         events=_INVALID,
@@ -124,14 +124,14 @@ _OUTAGES = (
     Condition(
         "lever_lost",
         "half of the LEVER_SAMPLEs lost while the firmware dithers",
-        replace(_NO_DITHER, duration=40.0),
+        replace(NO_DITHER, duration=40.0),
         _within(3.5),
         closed_loop=ClosedLoop(),
     ),
     Condition(
         "sample_lost",
         "half of all samples never come while the firmware dithers",
-        replace(_NO_DITHER, duration=40.0),
+        replace(NO_DITHER, duration=40.0),
         _within(3.5),
         closed_loop=ClosedLoop(whole=True),
     ),
@@ -145,7 +145,7 @@ def _fault(name: str, title: str, what: str, kind: str, soon: float = 0.5, quick
     return Condition(
         name,
         title,
-        limits=(_most("to flag", soon), _most(learnt, 0.1), _most("back", 1.0)),
+        limits=(most("to flag", soon), most(learnt, 0.1), most("back", 1.0)),
         sensors=Sensors(faults=(fault,)),
         start=fault.start,
         end=fault.end + 8.0,
@@ -158,7 +158,7 @@ def _fault(name: str, title: str, what: str, kind: str, soon: float = 0.5, quick
 def _missing(name: str, title: str, what: str) -> Condition:
     """A sensor that is not there."""
     sensors = Sensors(faults=(Fault(what, "invalid"),))
-    return Condition(name, title, limits=(_least("running", 99.0), *_right(3.0, 85.0)), sensors=sensors)
+    return Condition(name, title, limits=(least("running", 99.0), *right(3.0, 85.0)), sensors=sensors)
 
 
 def _hands_off(name: str, title: str, dither: float) -> Condition:
@@ -166,7 +166,7 @@ def _hands_off(name: str, title: str, dither: float) -> Condition:
         name,
         title,
         Motion(dither=dither, released=(25.0, 35.0)),
-        (_most("to HANDS_OFF", 1.0), _most("settled", 2.0)),
+        (most("to HANDS_OFF", 1.0), most("settled", 2.0)),
         events=((25.0, 35.0),),
         start=40.0,
         also=("learnt late", "back"),
@@ -179,7 +179,7 @@ def _next_pilot(name: str, title: str, seconds: float) -> Condition:
         name,
         title,
         Motion(duration=40.0, released=gap, next_pilot=2.0),
-        (_most("settled", 2.0, "median"), _least("f_n covered", 90.0)),
+        (most("settled", 2.0, "median"), least("f_n covered", 90.0)),
         events=(gap,),
         start=gap[1],
     )
@@ -194,7 +194,7 @@ _FAULTS = (
     Condition(
         "spikes",
         "1 % of the θ samples off by 0.3 rad",
-        limits=(_most("σ ratio", 1.2), *_right(1.5)),
+        limits=(most("σ ratio", 1.2), *right(1.5)),
         sensors=Sensors(faults=(Fault("theta", "spikes"),)),
         against="steady",
         quick=True,
@@ -218,7 +218,7 @@ def _rubbing(friction: float) -> Condition:
     return Condition(f"friction_{friction:g}", title, Motion(friction=friction), _ALL_COVERED, _FLAGGED)
 
 
-_RIGHT_OR_FLAGGED = _most("unflagged", 3.0)
+_RIGHT_OR_FLAGGED = most("unflagged", 3.0)
 
 
 def _slipping(friction: float) -> Condition:
@@ -233,14 +233,14 @@ _STANDING = (
         "locked",
         "lever held by 5 N m of friction or more from power-on",
         Motion(friction=5.0),
-        (_RIGHT_OR_FLAGGED, _QUIET),
+        (_RIGHT_OR_FLAGGED, QUIET),
         start=2.0,
     ),
     Condition(
         "freed",
         "lever held by friction from power-on, freed after 30 s",
         Motion(friction=30.0, freed=EVENT),
-        (_RIGHT_OR_FLAGGED, _most("settled", 2.0, "median")),
+        (_RIGHT_OR_FLAGGED, most("settled", 2.0, "median")),
         start=2.0,
         events=((0.0, EVENT),),
         also=("back",),
@@ -283,7 +283,7 @@ _CALIBRATION = (
         "calibration_told",
         "gain 1.05, delay 3 ms, torque gain 0.9, friction 0.2 N m, as set",
         Motion(friction=0.2),
-        (*_right(2.0), *_ALL_COVERED[1:]),
+        (*right(2.0), *_ALL_COVERED[1:]),
         sensors=Sensors(z_ddot_gain=1.05, z_ddot_delay=3e-3, tau_m_gain=0.9),
         settings={"z_ddot_gain": 1.05, "z_ddot_delay": 3e-3, "tau_m_gain": 0.9, "lever_friction": 0.2},
     ),
@@ -302,7 +302,7 @@ def _gripped(
     return Condition(
         name,
         title,
-        replace(_NO_DITHER, duration=120.0),
+        replace(NO_DITHER, duration=120.0),
         limits,
         sensors=Sensors(z_ddot_gain_sigma=2e-3, grip_gain=gain, grip_gain_sigma=0.005),
         settings={**_CALIBRATED, "grip_force_noise": 0.3, "grip_force_gain_sigma": 0.005},
@@ -316,7 +316,7 @@ _GRIP_FORCE = (
     Condition(
         "grip_none",
         "no dither, accelerometer calibrated to 0.2 %, no force sensor",
-        replace(_NO_DITHER, duration=120.0),
+        replace(NO_DITHER, duration=120.0),
         sensors=Sensors(z_ddot_gain_sigma=2e-3),
         settings=_CALIBRATED,
         start=60.0,
@@ -326,16 +326,16 @@ _GRIP_FORCE = (
         "grip_force",
         "the same with a sensor of the grip force, gain 0.5 %",
         1.0,
-        (_most("σ(k_p) ratio", 0.5), _least("k_p covered", 90.0)),
+        (most("σ(k_p) ratio", 0.5), least("k_p covered", 90.0)),
     ),
-    _gripped("grip_gain_wrong", "the same, its gain 50 % wrong", 1.5, (_most("k_p ratio", 1.0),)),
+    _gripped("grip_gain_wrong", "the same, its gain 50 % wrong", 1.5, (most("k_p ratio", 1.0),)),
 )
 
 
 def _pilot(name: str, title: str, dither: float) -> Condition:
     """A pilot whose arm is not the lever model's."""
-    limits = (_most("θ/z̈ rms", 10.0), _least("θ/z̈ covered", 85.0))
-    return Condition(name, title, Motion(pilot=name, dither=dither), limits, (_least("mismatch", 90.0),))
+    limits = (most("θ/z̈ rms", 10.0), least("θ/z̈ covered", 85.0))
+    return Condition(name, title, Motion(pilot=name, dither=dither), limits, (least("mismatch", 90.0),))
 
 
 def _hand(name: str, title: str) -> Condition:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from ..fast.library import Struct, lib
 from .condition import ClosedLoop
-from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, stream, truth
+from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, truth
 from .plant import TICK, Plant
-from .sensors import NOISE
+from .sensors import NOISE, lost
 
 PARAMETERS = ("m_p", "c_p", "k_p")
 MOTOR_LAG = 2e-3
@@ -61,15 +61,20 @@ class Track:
 
 
 def estimates(config: Config, signals: Mapping[str, FloatArray], response: bool = False) -> Track:
-    """Feeds each run to an estimator of its own; `response`: with the feedthrough."""
+    """Feeds each run to an estimator of its own, a sample each sample_period; `response`: with the feedthrough."""
     count, width = signals["theta"].shape
-    samples = np.zeros(count, struct_dtype("lever_sample_t"))
-    samples["time_us"] = np.arange(count) * round(PERIOD * 1e6)
+    every = round(config.settings["sample_period"] / PERIOD)
+    rate = signals.get("clock_rate", np.ones((1, width)))
+    measured = {what: column for what, column in signals.items() if what != "clock_rate"}
+    samples = np.zeros(len(range(0, count, every)), struct_dtype("lever_sample_t"))
     notes = _Notes(count, width, response)
     for run in range(width):
-        for what, column in signals.items():
-            samples[what], samples[f"{what}_valid"] = column[:, run], ~np.isnan(column[:, run])
-        notes.feed(run, Estimator(config), samples)
+        time = PERIOD * np.cumsum(np.broadcast_to(rate[:, run], count))[::every]
+        samples["time_us"] = np.rint((time - time[0]) * 1e6)
+        for what, values in measured.items():
+            column = values[::every, run]
+            samples[what], samples[f"{what}_valid"] = column, ~np.isnan(column)
+        notes.feed(run, Estimator(config), samples, STRIDE // every)
     return _track(notes)
 
 
@@ -107,7 +112,7 @@ def closed_loop(
     given = lanes(motion, seeds)
     plant, (count, width) = Plant(given), given.z_ddot.shape
     noise = [sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()]
-    gone = np.stack([stream("lost", seed).random(count) < loop.lost for seed in seeds], axis=1)
+    gone = lost(seeds, count, loop.lost, loop.lost_for)
     tau_m, notes = np.zeros((count, width)), _Notes(count, width)
     estimators = [Estimator(config) for _ in seeds]
     struct = Struct("lanes_loop_t")
@@ -140,9 +145,9 @@ class _Notes:
         shape = (width, (rows - 1) // RESPONSE_STRIDE + 1 if response else 0, len(FREQUENCIES))
         self.responses = np.zeros(shape, struct_dtype("lever_feedthrough_t"))
 
-    def feed(self, run: int, estimator: Estimator, samples: NDArray[Any]) -> None:
-        """All samples of a run, in bulk: as many at a time as there are between two responses."""
-        at, fed = np.arange(0, len(samples), STRIDE), 0
+    def feed(self, run: int, estimator: Estimator, samples: NDArray[Any], stride: int) -> None:
+        """All samples of a run, noted at every `stride`-th, in bulk: as many at a time as are between two responses."""
+        at, fed = np.arange(0, len(samples), stride), 0
         stops = [*range(1, len(at), RESPONSE_STRIDE), len(at)] if self.responses.size else [len(at)]
         for index, (first, last) in enumerate(pairwise([0, *stops])):
             notes = feed(estimator, samples[fed:], at[first:last] - fed)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..judged import result as judged
 from ..judged.result import Values, largest, mean
+from .condition import FOLLOWED
 from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from .motions import Recording
 
@@ -25,8 +26,6 @@ WRONG = 3.0
 """An error of more standard deviations is wrong, unless it is flagged."""
 WITHIN = 0.05
 """Settled is a natural frequency that stays within so much of the truth."""
-FOLLOWED = 8.0
-"""Errors and settling are followed for so long after an event [s]."""
 _CALM = 0.5  # [s] without a flag: the firmware is back
 _PENDING = 0.05  # [s] in which what was gathered before a flag may still be learnt
 
@@ -51,6 +50,8 @@ class Outcome:
     """Faults or changes, from and to [s]."""
     reference: Outcome | None = None
     """The same where it does not happen, or is given in the settings."""
+    followed: float = FOLLOWED
+    """So long after an event errors and settling are followed [s]."""
 
     def during(self, start: float, end: float) -> BoolArray:
         """Which estimates are of this time [s]."""
@@ -101,8 +102,8 @@ def _largest(quantity: str, outcome: Outcome) -> Values:
 
 
 def _unflagged_deviation(outcome: Outcome) -> FloatArray:
-    """Largest error of the parameters in standard deviations, 0 with a fault of DO_NOT_TRUST (times, runs)."""
-    worst = np.max([outcome.deviation(name)[outcome.judged] for name in PARAMETERS], axis=0)
+    """Largest error of any quantity in standard deviations, 0 with a fault of DO_NOT_TRUST (times, runs)."""
+    worst = np.max([outcome.deviation(name)[outcome.judged] for name in QUANTITIES], axis=0)
     return np.where(outcome.flagged(DO_NOT_TRUST)[outcome.judged], 0.0, worst)
 
 
@@ -118,6 +119,18 @@ def _silent(outcome: Outcome) -> Values:
     return np.array([step * max((last - first + 1 for first, last in runs(each)), default=0) for each in wrong.T])
 
 
+def _silent_share(outcome: Outcome) -> Values:
+    return _percent(_unflagged_deviation(outcome) > WRONG)
+
+
+def _changes(outcome: Outcome) -> Values:
+    """An hour; changes while CHANGE still shows the last are not told from it."""
+    shown = outcome.flagged(fault_mask("CHANGE"))[outcome.judged]
+    hours = len(shown) * (outcome.track.time[1] - outcome.track.time[0]) / 3600.0
+    rate: Values = np.sum(shown[1:] & ~shown[:-1], axis=0) / hours
+    return rate
+
+
 def _share(mask: int, outcome: Outcome) -> Values:
     return _percent(outcome.flagged(mask)[outcome.judged])
 
@@ -129,7 +142,7 @@ def _running(outcome: Outcome) -> Values:
 def _settled(outcome: Outcome) -> Values:
     """From the end of the last event until the error stays small."""
     start = outcome.events[-1][1]
-    after = outcome.during(start, start + FOLLOWED)
+    after = outcome.during(start, start + outcome.followed)
     wrong = (np.abs(outcome.error("f_n")) > WITHIN * outcome.recording.truth["f_n"])[after]
     time = outcome.track.time[after] - start
     step = time[1] - time[0]
@@ -162,7 +175,7 @@ def _back(outcome: Outcome) -> Values:
     """From the end of each event until the firmware learns again and shows no flag for a while; the slowest."""
     delays = []
     for _, end in outcome.events:
-        after = outcome.during(end, end + FOLLOWED)
+        after = outcome.during(end, end + outcome.followed)
         shown = outcome.flagged(DO_NOT_TRUST | fault_mask("SETTLING"))[after]
         time = outcome.track.time[after] - end
         calm = round(_CALM / (time[1] - time[0]))
@@ -265,8 +278,14 @@ def _figures() -> dict[str, Figure]:
         figures[f"{name} ratio"] = _figure("1", f"rms error of {name} ÷ that of the reference", ratio, _pooled_rms)
     return figures | {
         "flagged": _figure("%", "share of time with a fault that forbids trust", partial(_share, DO_NOT_TRUST), mean),
-        "unflagged": _figure("σ", "largest error of a parameter without such a fault", _unflagged, largest),
+        "unflagged": _figure("σ", "largest error of a quantity without such a fault", _unflagged, largest),
         "silent": _figure("s", f"longest time with it above {WRONG:g} σ", _silent, largest),
+        "silent share": _figure("%", f"share of time with it above {WRONG:g} σ", _silent_share, mean),
+        "changes": _figure("1/h", "how often CHANGE begins", _changes, mean),
+        **{
+            f"{name} share": _figure("%", f"share of time with {name}", partial(_share, fault_mask(name)), mean)
+            for name in ("CALIBRATION", "CHANGE", "EXCITATION", "MISMATCH")
+        },
         "mismatch": _figure("%", "share of time with MISMATCH", partial(_share, fault_mask("MISMATCH")), mean, False),
         "running": _figure("%", "share of time in mode RUN", _running, mean, False),
         "settled": _figure("s", f"until f_n stays within {100 * WITHIN:g} %", _settled, largest),

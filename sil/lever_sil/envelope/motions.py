@@ -39,6 +39,10 @@ class Motion:
     """rms of the motor torque [N m], likewise."""
     process_noise: float = 0.05
     """Random walk of theta_dot [rad/s/sqrt(s)]."""
+    rough: tuple[float, float] | None = None
+    """Rough air that comes and goes: this process noise [rad/s/sqrt(s)] for so long [s], after as long without."""
+    base_sine: tuple[float, float] | None = None
+    """Besides, the base moves as a sine of this amplitude [m/s^2] and frequency [Hz]."""
     pilot: str = "arm"
     """"arm": the lever of plant.py; otherwise one of pilots.py."""
     sway: tuple[float, float] | None = None
@@ -47,6 +51,10 @@ class Motion:
     """The pilot moves the lever at random: rms [deg], 0.05 to 0.5 Hz."""
     retrim: float = 0.0
     """From EVENT on the trim goes up by so much [deg] in 4 s."""
+    retrims: tuple[float, float, float] | None = None
+    """The trim moves by up to so much [deg], up or down at random, every so often [s], within a time [s]."""
+    jump: tuple[float, float] = (1.0, 1.0)
+    """At EVENT c_p and k_p change by these factors at once; the lever rests where it did."""
     grip: float = 1.0
     """At EVENT c_p and k_p go up by this factor, or down in every second run, and the rest angle with them."""
     grip_moves: tuple[float, float] = (1.0, 0.05)
@@ -65,6 +73,8 @@ class Motion:
     """Who holds it then: c_p and k_p are so many times as large, or as small in every second run."""
     friction: float = 0.0
     """Coulomb friction [N m]."""
+    tightened: float = 0.0
+    """Before then there is no friction [s]."""
     freed: float | None = None
     """From then on there is no friction [s]."""
     friction_sigma: float = 0.0
@@ -123,8 +133,22 @@ def excitation(motion: Motion, seeds: Sequence[int]) -> tuple[FloatArray, FloatA
         band_limited(columns(what, seeds, len(time)), BAND, rms) * active
         for what, rms in (("base", motion.base), ("dither", motion.dither))
     )
-    kick = motion.process_noise * math.sqrt(PERIOD) * columns("process", seeds, len(time)) * active
+    if motion.base_sine is not None:
+        z_ddot = z_ddot + _sine(time, motion.base_sine, "base phase", seeds) * active
+    process_noise = np.full_like(time, motion.process_noise)
+    if motion.rough is not None:
+        noise, seconds = motion.rough
+        process_noise[(time % (2.0 * seconds)) >= seconds] = noise
+    kick = process_noise[:, None] * math.sqrt(PERIOD) * columns("process", seeds, len(time)) * active
     return z_ddot, tau_m, kick
+
+
+def _sine(time: FloatArray, wave: tuple[float, float], what: str, seeds: Sequence[int]) -> FloatArray:
+    """Of this amplitude and frequency [Hz], with a random phase in each run: (samples, runs)."""
+    amplitude, frequency = wave
+    phase = np.array([stream(what, seed).uniform(0.0, 2.0 * math.pi) for seed in seeds])
+    sine: FloatArray = amplitude * np.sin(2.0 * math.pi * frequency * time[:, None] + phase)
+    return sine
 
 
 def arms(seeds: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -146,17 +170,32 @@ def _moved(motion: Motion, seeds: Sequence[int], trim: FloatArray) -> FloatArray
     time = motion.time
     if motion.sway is not None:
         amplitude, frequency = motion.sway
-        phase = np.array([stream("phase", seed).uniform(0.0, 2.0 * math.pi) for seed in seeds])
-        trim = trim + math.radians(amplitude) * np.sin(2.0 * math.pi * frequency * time[:, None] + phase)
+        trim = trim + _sine(time, (math.radians(amplitude), frequency), "phase", seeds)
     if motion.wander:
         wander = band_limited(columns("wander", seeds, len(time)), (0.05, 0.5), math.radians(motion.wander))
         trim = trim + np.clip(wander, -0.3, 0.3)
     if motion.retrim:
         trim = trim + math.radians(motion.retrim) * _ramp(time, EVENT, 4.0)
+    if motion.retrims is not None:
+        trim = trim + _retrims(time, motion.retrims, seeds)
     if motion.grip != 1.0:
         angle, seconds = motion.grip_moves
         trim = trim + math.radians(angle) * _ramp(time, EVENT, seconds)
     return trim
+
+
+def _retrims(time: FloatArray, retrims: tuple[float, float, float], seeds: Sequence[int]) -> FloatArray:
+    """Angle from the first trim [rad], which it never leaves by more than the greatest move."""
+    most, every, seconds = math.radians(retrims[0]), *retrims[1:]
+    moments = every * np.arange(1.0, time[-1] // every + 1.0)
+    knots = np.concatenate(((0.0,), np.stack((moments, moments + seconds), axis=1).ravel()))
+    angle = np.empty((len(time), len(seeds)))
+    for run, seed in enumerate(seeds):
+        places = [0.0]
+        for move in stream("retrims", seed).uniform(-most, most, len(moments)).tolist():
+            places.append(places[-1] + (move if abs(places[-1] + move) <= most else -move))
+        angle[:, run] = np.interp(time, knots, np.repeat(places, 2)[:-1])
+    return angle
 
 
 def _disturbance(motion: Motion, seeds: Sequence[int]) -> FloatArray:
@@ -184,6 +223,11 @@ def lanes(motion: Motion, seeds: Sequence[int]) -> Lanes:
     if motion.grip != 1.0:
         change = 1.0 + (_up_or_down(motion.grip, seeds) - 1.0) * _ramp(time, EVENT, motion.grip_moves[1])
         c_p, k_p = c_p * change, k_p * change
+    if motion.jump != (1.0, 1.0):
+        jumped = (time >= EVENT)[:, None]
+        c_p, k_p = (
+            np.where(jumped, factor * value, value) for factor, value in zip(motion.jump, (c_p, k_p), strict=True)
+        )
     if motion.damping is not None:
         first, last, start, end = motion.damping
         c_p = first + (last - first) * _ramp(time, start, end - start) + np.zeros_like(c_p)
@@ -192,8 +236,9 @@ def lanes(motion: Motion, seeds: Sequence[int]) -> Lanes:
         pilot = np.where((time >= motion.released[1])[:, None], _up_or_down(motion.next_pilot, seeds), 1.0)
         m_p, c_p, k_p = m_p * held, c_p * held * pilot, k_p * held * pilot
     friction = np.full((1, len(seeds)), motion.friction)
-    if motion.freed is not None:
-        friction = friction * (time < motion.freed)[:, None]
+    if motion.tightened or motion.freed is not None:
+        rubs = (time >= motion.tightened) & (time < (math.inf if motion.freed is None else motion.freed))
+        friction = friction * rubs[:, None]
     if motion.friction_sigma:
         friction = motion.friction_sigma * np.abs(columns("friction", seeds, 1))
     return Lanes(

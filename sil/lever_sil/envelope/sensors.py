@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.arrays import BoolArray, FloatArray
 
 from .motions import PERIOD, Recording, columns, stream
 
@@ -23,12 +23,13 @@ class Fault:
     """Something wrong with one signal from `start` to `end` [s]."""
 
     what: str
-    """A key of NOISE."""
+    """A key of NOISE, or "clock_rate", of the sender's clock."""
     kind: str
     """stuck: the last value stays; zero: 0 exactly; sign: turned over; invalid: marked so; spikes: 1 % of the samples
-    are off by SPIKE."""
+    are off by SPIKE; gain: `size` times as large; late: by `size` [s]."""
     start: float = 0.0
     end: float = np.inf
+    size: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,13 @@ class Sensors:
     grip_gain: float | None = None
     """Of the sensor of the grip force; None: there is none."""
     grip_gain_sigma: float = 0.0
+    lever_lost: float = 0.0
+    """Share of the LEVER_SAMPLEs that never arrive, at random: theta, theta_dot and tau_m are not valid then."""
     faults: tuple[Fault, ...] = ()
 
 
 def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> dict[str, FloatArray]:
-    """The signals that there are sensors of, (samples, runs)."""
+    """The signals that there are sensors of, (samples, runs); where a fault is the clock's, its rate."""
 
     def drawn(mean: float, sigma: float, what: str) -> FloatArray:
         values: FloatArray = mean + sigma * columns(what, seeds, 1)[0]
@@ -73,9 +76,22 @@ def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> di
         errors = GRIP_BIAS + GRIP_NOISE * columns("noise of grip_force", seeds, len(recording.time))
         gains = drawn(sensors.grip_gain, sensors.grip_gain_sigma, "grip gain")
         signals["grip_force"] = gains * recording.grip_force + errors
+    if any(fault.what == "clock_rate" for fault in sensors.faults):
+        signals["clock_rate"] = np.ones_like(recording.theta)
     for fault in sensors.faults:
         _spoil(signals[fault.what], fault, recording.time, seeds)
+    if sensors.lever_lost:
+        gone = lost(seeds, len(recording.time), sensors.lever_lost)
+        for what in ("theta", "theta_dot", "tau_m"):
+            signals[what][gone] = np.nan
     return signals
+
+
+def lost(seeds: Sequence[int], count: int, share: float, length: float = PERIOD) -> BoolArray:
+    """Which samples are lost, (samples, runs): a share of all at random, in stretches of this length [s]."""
+    each = round(length / PERIOD)
+    hit = np.stack([stream("lost", seed).random(-(-count // each)) < share for seed in seeds], axis=1)
+    return np.repeat(hit, each, axis=0)[:count]
 
 
 def _delayed(signal: FloatArray, delay: FloatArray) -> FloatArray:
@@ -95,6 +111,10 @@ def _spoil(signal: FloatArray, fault: Fault, time: FloatArray, seeds: Sequence[i
         signal[during] = 0.0
     elif fault.kind == "sign":
         signal[during] *= -1.0
+    elif fault.kind == "gain":
+        signal[during] *= fault.size
+    elif fault.kind == "late":
+        signal[during] = signal[np.maximum(0, during - round(fault.size / PERIOD))]
     elif fault.kind == "invalid":
         signal[during] = np.nan
     elif fault.kind == "spikes":

@@ -106,7 +106,7 @@ class Loop:
         self.signals = {name: np.empty(count) for name in OF_LEVER if name != "grip_force" or loop.has_grip}
         conditions, flight = scenario_inputs.conditions(scenario, inputs), scenario_inputs.flight(scenario, inputs)
         if flight is not None:
-            self.signals["z_ddot"] = inputs.z_ddot
+            self.signals["z_ddot"] = inputs.sensed
             conditions = replace(conditions, z_ddot=self._fill_cabin(flight))
         plants.fill(self.struct, loop.plant, inputs.truth, conditions)
         loop.plant.has_grip_force = loop.has_grip
@@ -128,6 +128,7 @@ class Loop:
         felt = inputs.z_ddot.copy()
         cabin.exists, cabin.period, cabin.rest = True, self._scenario.period, float(inputs.truth.rest[0])
         cabin.outside, cabin.felt = plants.outside(inputs.truth), struct.doubles(felt)
+        cabin.seat = struct.doubles(inputs.z_ddot)
         aircraft.fill(struct, cabin.aircraft, flight, self.correction)
         return felt
 

@@ -37,7 +37,7 @@ class Limit:
     most: float | None = None
     least: float | None = None
     over: str = "all"
-    """Of the runs: "all" pooled, "median" or "worst"."""
+    """Of the runs: "all" pooled, "median", "p90" or "worst"."""
 
     def holds(self, value: float) -> bool:
         """Whether a value keeps it; NaN does not."""
@@ -65,6 +65,19 @@ class Figure:
     def worst(self, values: Values) -> float:
         """Of all runs."""
         return float(values.max() if self.more_is_worse else values.min())
+
+    def p90(self, values: Values) -> float:
+        """No worse than this are nine of ten runs, or more; NaN if any run is."""
+        if np.isnan(values).any():
+            return math.nan
+        best_first = np.sort(values) if self.more_is_worse else np.sort(values)[::-1]
+        return float(best_first[math.ceil(0.9 * len(values)) - 1])
+
+    def over(self, values: Values, runs: str) -> float:
+        """All runs as one number, as `over` of a limit says."""
+        if runs == "median":
+            return float(np.median(values))
+        return {"all": self.pool, "p90": self.p90, "worst": self.worst}[runs](values)
 
 
 class Judged(Protocol):
@@ -109,10 +122,7 @@ class Result:
         """What is held against a limit; NaN without runs."""
         if limit.figure not in self.values:
             return math.nan
-        figure, values = self.known[limit.figure], self.values[limit.figure]
-        if limit.over == "median":
-            return float(np.median(values))
-        return figure.worst(values) if limit.over == "worst" else figure.pool(values)
+        return self.known[limit.figure].over(self.values[limit.figure], limit.over)
 
     def worst_run(self, figure: str) -> str | None:
         """The name of the run in which a figure was worst."""

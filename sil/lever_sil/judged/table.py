@@ -11,6 +11,8 @@ from lever_cdkf.tables import Row
 from .result import Limit, Result
 
 HOLDS, MISSED, REPORTED = "holds", "MISSED", "reported"
+COLUMNS = {"all runs": "all", "median": "median", "p90": "p90", "worst": "worst"}
+"""Of a figure: over which of the runs."""
 
 
 def state(result: Result) -> str:
@@ -38,18 +40,16 @@ def figures(result: Result) -> list[Row]:
 
 def _line(result: Result, name: str) -> Row:
     figure, values = result.known[name], result.values[name]
-    shown = {"all runs": figure.pool(values), "median": _median(values), "worst": figure.worst(values)}
     return {
         "figure": name,
         "unit": figure.unit,
-        **{column: _shown(result, name, column, value) for column, value in shown.items()},
+        **{column: _shown(result, name, over, figure.over(values, over)) for column, over in COLUMNS.items()},
         "limit": limit_text(result, name),
     }
 
 
-def _shown(result: Result, name: str, column: str, value: float) -> str:
+def _shown(result: Result, name: str, over: str, value: float) -> str:
     """With as many digits as it takes to show on which side of a limit it is."""
-    over = column.removesuffix(" runs")
     both = (*result.condition.limits, *result.condition.unless)
     limits = [limit for limit in both if (limit.figure, limit.over) == (name, over)]
     texts = (f"{value:.{digits}g}" for digits in range(3, 18))
@@ -60,14 +60,8 @@ def _shown(result: Result, name: str, column: str, value: float) -> str:
 
 
 def _problem(result: Result) -> Row:
-    nothing = dict.fromkeys(("unit", "all runs", "median", "worst", "limit"), "")
+    nothing = dict.fromkeys(("unit", *COLUMNS, "limit"), "")
     return {"figure": f"not run: {result.problem}", **nothing}
-
-
-def _median(values: Any) -> float:
-    import numpy as np
-
-    return float(np.median(values))
 
 
 def limit_text(result: Result, name: str) -> str:
@@ -111,9 +105,7 @@ def _figure(result: Result, name: str) -> dict[str, Any]:
     return {
         "figure": name,
         "unit": figure.unit,
-        "all runs": _number(figure.pool(values)),
-        "median": _number(_median(values)),
-        "worst": _number(figure.worst(values)),
+        **{column: _number(figure.over(values, over)) for column, over in COLUMNS.items()},
         "worst run": result.worst_run(name),
     }
 

@@ -109,8 +109,8 @@ class _Tape:
 
     @property
     def z_ddot(self) -> FloatArray:
-        """Of the cabin, as far as it is known [m/s^2]."""
-        return self.inputs.z_ddot
+        """Of the cabin at the accelerometer, as far as it is known [m/s^2]."""
+        return self.inputs.sensed
 
     def finished(self) -> Recording:
         """The whole."""
@@ -321,7 +321,7 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
     count = len(inputs.time)
     cabin = flight(scenario, inputs)
     body = inputs.truth.body(conditions(scenario, inputs))
-    advance = _advance(body, cabin, inputs.z_ddot)
+    advance = _advance(body, cabin, inputs)
     commands = commands_of(scenario, inputs.time)
     pace = _pace(scenario.period) if realtime else None
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
@@ -359,14 +359,15 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
         progress(count, count)
 
 
-def _advance(body: Body, cabin: Flight | None, z_ddot: FloatArray) -> Callable[[int, float, float], None]:
+def _advance(body: Body, cabin: Flight | None, inputs: Inputs) -> Callable[[int, float, float], None]:
     """A function that takes lever and cabin from a sample to the next, with the torque [N m] held and what is added to
     the lever's angle [rad]."""
     rest = body.theta
 
     def advance(sample: int, torque: float, correction: float) -> None:
         if cabin is not None:
-            z_ddot[sample + 1] = cabin.advance(body.theta - rest, correction)
+            inputs.z_ddot[sample + 1] = cabin.advance(body.theta - rest, correction)
+            inputs.sensed[sample + 1] = cabin.sensed
         body.advance(torque)
 
     return advance

@@ -29,7 +29,9 @@ class Inputs:
     time: FloatArray
     truth: Truth
     z_ddot: FloatArray
-    """True base acceleration [m/s^2]; with an aircraft the gust, until the run has made it that of the cabin."""
+    """True base acceleration [m/s^2]; with an aircraft the gust, until the run has made it that of the pilot's seat."""
+    sensed: FloatArray
+    """The same where the accelerometer is."""
     z_ddot_measured: FloatArray
     """With an aircraft, of the gust."""
     torque: FloatArray
@@ -71,6 +73,7 @@ def prepare(scenario: Scenario) -> Inputs:
         time=time,
         truth=scenario.truth(time),
         z_ddot=base,
+        sensed=base if scenario.aircraft is None else np.full_like(base, np.nan),
         z_ddot_measured=measured,
         torque=excitation.total(scenario.torque, time, scenario.streams("torque", scenario.torque)),
         disturbance=excitation.total(scenario.disturbance, time, scenario.streams("disturbance", scenario.disturbance)),
@@ -97,7 +100,7 @@ def flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
         return None
     hovering = Flight(scenario.aircraft, scenario.period, inputs.z_ddot.copy())
     inputs.z_ddot[:] = np.nan
-    inputs.z_ddot[0] = hovering.z_ddot
+    inputs.z_ddot[0], inputs.sensed[0] = hovering.z_ddot, hovering.sensed
     return hovering
 
 

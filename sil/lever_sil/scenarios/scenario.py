@@ -30,7 +30,7 @@ from lever_cdkf.toml_text import MOST_NESTED
 from lever_cdkf.units import UnitError
 
 from ..aircraft.aircraft import Coupled, read_aircraft
-from ..aircraft.response_table import response_table
+from ..aircraft.response_table import known_response
 from ..plants import excitation, lever_plant, pilots
 from ..plants.sensors import VALUES, Corruption, Sensor, Sensors
 from ..plants.truth import Truth
@@ -126,7 +126,7 @@ def _read_setting(row: Setting) -> Reader:
 
 def _read_lever() -> Reader:
     """Reader of a table of what is constant in a lever; only angles may be below 0."""
-    units = {row.name: row.unit for row in settings_table()} | {"lever_friction": "N m"}
+    units = {row.name: row.unit for row in settings_table()}
     readers = {}
     for name in lever_plant.Lever.__dataclass_fields__:
         readers[name] = read_quantity(units[name], least=-math.inf if units[name] == "rad" else 0.0)
@@ -174,7 +174,7 @@ class Scenario:
     @cached_property
     def known_aircraft(self) -> AircraftResponse | None:
         """What the estimator is given of the aircraft, so that it watches the margin."""
-        return None if self.aircraft is None else response_table(self.aircraft.response, name=self.aircraft.name)
+        return None if self.aircraft is None else known_response(self.aircraft)
 
     @cached_property
     def period(self) -> float:

@@ -21,7 +21,7 @@ _NEWTON_STEPS, _NEWTON_DIFFERENCE, _NEWTON_TOLERANCE = 30, 1e-6, 1e-9  # the lat
 
 
 class Model(Protocol):
-    """A model of arm and lever: oracle.lever.Lever, oracle.linear.LinearPhysical, oracle.linear.LinearBlackBox."""
+    """A model of arm and lever, as those of lever_cdkf.models."""
 
     @property
     def preload(self) -> str:

@@ -1,7 +1,8 @@
 """What is left of measured signals without their slow part, for estimators that do not detrend by themselves.
 
-oracle/detrend.py for all runs at once, started as the firmware does (firmware/filter/trim.c): theta from its mean over
-the first moments, everything else from 0. All signals alike: so the deviations obey the same dynamics.
+The high-pass of lever_cdkf.models.detrend for all runs at once, started as the firmware does (firmware/filter/trim.c):
+theta from its mean over the first moments, everything else from 0. All signals alike: so the deviations obey the same
+dynamics.
 """
 
 from __future__ import annotations

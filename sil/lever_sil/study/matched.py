@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from lever_cdkf.arrays import Array
@@ -115,6 +115,28 @@ def matched(condition: Condition, runs: int, duration: float, seed: int) -> Batc
     raw_y = x + assumed.output_noise * white
     y = raw_y - np.stack((trim, np.zeros_like(trim)), axis=-1)
     return Batch(model, period, y, u, trim, assumed, Truth(x, p, dynamics), raw_y, u)
+
+
+def tightened(batch: Batch, moment: int, factors: Array) -> Batch:
+    """The same runs, with the parameters from sample `moment` on times `factors` (3,): same inputs, same noises."""
+    truth = batch.truth
+    assert truth.p is not None
+    p = truth.p.copy()
+    p[:, moment:] *= factors
+    mean, x = 0.5 * (batch.u[:, 1:] + batch.u[:, :-1]), truth.x.copy()
+
+    def step(states: Array, parameters: Array, k: int | slice) -> Array:
+        inputs = (mean[:, k, 0], mean[:, k, 1])
+        states, parameters = (np.moveaxis(part, -1, 0) for part in (states, parameters))
+        return np.moveaxis(batch.model.step(states, parameters, inputs, batch.trim[:, k], batch.period), 0, -1)
+
+    kicks = truth.x[:, 1:] - step(truth.x[:, :-1], truth.p[:, :-1], slice(0, batch.samples - 1))
+    for k in range(moment, batch.samples - 1):
+        x[:, k + 1] = step(x[:, k], p[:, k], k) + kicks[:, k]
+    moved = np.moveaxis(p, -1, 0)
+    dynamics = batch.model.dynamics(moved, rest_angle(batch.model, moved, batch.trim, batch.period))
+    changed = replace(truth, x=x, p=p, dynamics=np.moveaxis(dynamics, 0, -1))
+    return replace(batch, y=batch.y + x - truth.x, raw_y=batch.raw_y + x - truth.x, truth=changed)
 
 
 def _bounds(kind: Kind) -> Array:

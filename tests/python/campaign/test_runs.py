@@ -134,6 +134,14 @@ def test_chunks_cover_all_flights_once(small: Plan) -> None:
     assert Plan(spec.load("tracking")).size * 0.1 > 10.0  # seconds of work, measured
 
 
+def test_a_chunk_is_a_second_of_work_unless_baselines_share_it(small: Plan) -> None:
+    """So that a campaign that is killed after some seconds has kept something."""
+    spec = dataclasses.replace(small.spec, chunk=None, estimators=("dual", "joint"))
+    alone, beside = Plan(spec), Plan(dataclasses.replace(spec, estimators=("dual", "rls")))
+    assert alone.size * alone.minutes * 0.06 == pytest.approx(1.0, rel=0.2)
+    assert beside.size > 10 * alone.size
+
+
 def _ends(chunk: Chunk) -> tuple[int, int]:
     return chunk.first, chunk.end
 

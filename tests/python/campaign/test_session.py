@@ -100,6 +100,6 @@ def test_when_all_kill_it_ends_early(small: Plan, tmp_path: Path, monkeypatch: p
 
 def test_the_time_left_is_told_between_chunks_too(small: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown = run(small, set(), tmp_path, monkeypatch)[2]
-    assert shown[0] == (0, small.spec.runs, "")
+    assert shown[0] == (0, small.spec.runs, f"0 of {small.spec.runs} runs kept")
     assert all(left.endswith("left") for _, _, left in shown[1:])
     assert shown[-1][:2] == (small.spec.runs, small.spec.runs)

@@ -71,6 +71,27 @@ def test_help_of_every_installed_command(installed: str, capsys: pytest.CaptureF
         assert err == ""
 
 
+def test_help_lists_commands_by_purpose(installed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each command of this project has one; those of other packages come last."""
+    assert installed
+    names = cli._parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+    assert sorted(names or ()) == sorted(name for group in cli.GROUPS.values() for name in group)
+    assert cli.main(["--help"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    at = [lines.index(f"    {title}") for title in cli.GROUPS]
+    assert at == sorted(at)
+    assert "    other packages" not in lines
+
+
+@pytest.mark.usefixtures("commands")
+def test_commands_of_other_packages_come_last(commands: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
+    act = SimpleNamespace(add_parser=lambda subparsers: subparsers.add_parser("act", help="do it"), run=None)
+    commands.append(entry("act", lambda: act))
+    cli.main(["--help"])
+    lines = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line.startswith("    ")]
+    assert lines.index("other") == lines.index("act") - 1 > lines.index("settings")
+
+
 @pytest.mark.usefixtures("commands")
 def test_version(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "version", {"lever-cdkf": "1.2.3"}.__getitem__)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from lever_cdkf import cli
 from lever_cdkf.firmware.config import Config
-from lever_sil.envelope import campaign, conditions, envelope_page, firmware
+from lever_sil.envelope import campaign, conditions, envelope_page, firmware, rules
 from lever_sil.envelope.condition import ClosedLoop, Condition
 from lever_sil.envelope.measure import fault_mask
 from lever_sil.envelope.motions import Motion
@@ -40,7 +41,7 @@ def test_the_reduced_table_holds(
         of = {
             (" " if over == "all runs" else f", {over} ").join((each["figure"], f"[{each['unit']}]")): each[over]
             for each in row["figures"]
-            for over in ("all runs", "median", "worst")
+            for over in ("all runs", "median", "p90", "worst")
         }
         assert row["measured"].items() <= of.items()
         for figure, value in row["measured"].items():
@@ -61,6 +62,8 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
         Condition("reported", "title", motion, start=1.0),
     )
     monkeypatch.setattr(conditions, "CONDITIONS", {row.name: row for row in rows})
+    further = (Condition(name, "title", motion, start=1.0) for name in ("first", "second"))
+    monkeypatch.setattr(rules, "RULES", {row.name: row for row in further})
 
 
 def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,13 +72,28 @@ def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.Mo
         Condition("steady", "", Motion(duration=3.0, friction=0.1), start=1.0),
     ]
     together = campaign.run(rows, {}, 3, lambda *_: None)
-    monkeypatch.setattr(campaign, "LANES", 2)
+    monkeypatch.setattr(campaign, "LANE_SECONDS", 6.0)
     apart = campaign.run(rows, {}, 3, lambda *_: None)
     for left, right in zip(together, apart, strict=True):
         assert left.condition is right.condition
+        assert left.runs == right.runs == ["seed 0", "seed 1", "seed 2"]
         assert len(left.values["f_n rms"]) == 3
         for name, values in left.values.items():
             np.testing.assert_allclose(values, right.values[name], rtol=1e-9)
+
+
+def test_every_row_of_the_rules_is_measured() -> None:
+    """All figures are numbers; times may be infinite."""
+    results = campaign.run(list(rules.RULES.values()), {}, 1, lambda *_: None)
+    for result in results:
+        assert result.problem == ""
+        assert not any(np.isnan(values).any() for values in result.values.values())
+        assert len(result.values["f_n rms"]) == result.condition.runs
+    jumps = {
+        result.condition.name: result.values["settled"] for result in results if result.condition.motion.jump[1] != 1
+    }
+    assert jumps.keys() == {"jump_k_1.4", "jump_ck_1.3_base_only", "jump_k_0.6"}
+    assert all(0.0 < settled < 30.0 for settled in jumps.values())
 
 
 @pytest.mark.parametrize("whole", [False, True])
@@ -107,7 +125,23 @@ def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
     condition = Condition("steady", "", limits=limits)
     result = campaign.Result(condition, dict.fromkeys(condition.figures, np.array([0.5, 1.0004])))
     (line,) = table.lines([result])
-    assert (line["all runs"], line["median"], line["worst"]) == ("1.0004", "0.75", "1")
+    assert (line["all runs"], line["median"], line["p90"], line["worst"]) == ("1.0004", "0.75", "1", "1")
+
+
+@pytest.mark.parametrize(
+    ("figure", "values", "expected"),
+    [
+        ("settled", range(40), 35.0),
+        ("settled", [*range(36), *[math.inf] * 4], 35.0),
+        ("settled", [*range(35), *[math.inf] * 5], math.inf),
+        ("f_n covered", range(40), 4.0),
+        ("f_n covered", [3.0], 3.0),
+        ("f_n covered", [*range(39), math.nan], math.nan),
+    ],
+)
+def test_nine_runs_of_ten_are_no_worse_than_p90(figure: str, values: Sequence[float], expected: float) -> None:
+    result = campaign.Result(Condition("", ""), {figure: np.array(values, np.float64)})
+    np.testing.assert_equal(result.of(Limit(figure, over="p90")), expected)
 
 
 def test_estimates_that_are_not_finite_keep_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,4 +178,20 @@ def test_bad_input_is_one_line(arguments: list[str], words: tuple[str, ...], ref
 def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["envelope", "--list"]) == 0
     printed = capsys.readouterr().out
-    assert all(name in printed for name in conditions.CONDITIONS)
+    assert all(name in printed for name in (*conditions.CONDITIONS, *rules.RULES))
+
+
+@pytest.mark.usefixtures("short")
+@pytest.mark.parametrize(
+    ("named", "ran"),
+    [
+        ((), ["missed", "unknown", "reported"]),
+        (("rules",), ["first", "second"]),
+        (("second", "reported", "rules"), ["second", "reported", "first"]),
+    ],
+)
+def test_a_table_of_its_own_runs_where_it_is_named(tmp_path: Path, named: Sequence[str], ran: list[str]) -> None:
+    only = ("--only", *named) if named else ()
+    cli.main(["envelope", *only, "--seeds", "1", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
+    rows = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
+    assert [row["name"] for row in rows] == ran

@@ -11,9 +11,11 @@ from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.conditions import CONDITIONS
 from lever_sil.envelope.measure import FIGURES
 from lever_sil.envelope.motions import Motion
+from lever_sil.envelope.rules import RULES
 from lever_sil.envelope.sensors import Sensors
 from lever_sil.judged.result import Limit
 
+ALL = CONDITIONS | RULES
 COVERED = ", ".join(f"{name} covered ≥ 90" for name in ("f_n", "zeta", "m_p", "c_p", "k_p"))
 FLAGGED, BACK = "; or flagged ≥ 90", "learnt ≤ 0.1, back ≤ 1"
 FEEDTHROUGH = "θ/z̈ rms ≤ 10, θ/z̈ covered ≥ 85"
@@ -111,10 +113,60 @@ REQUIRED: dict[str, tuple[dict[str, Any], str]] = {
     "hysteretic": ({"pilot": "hysteretic"}, ""),
     "reflex": ({"pilot": "reflex"}, ""),
 }
+SEEN = "silent worst ≤ 1, silent share ≤ 1"
+JUMP = {"events": ((30.0, 30.0),), "start": 30.0, "followed": 30.0}
+LONG = {"duration": 140.0, "runs": 2}
+SLIPS = f"flagged ≥ 90, learnt late ≤ 1, {SEEN}"
+SILENT = {"start": 30.0, "events": ((30.0, 40.0),)}
+MOVED: dict[str, dict[str, Any]] = {"sway": {"sway": (5.0, 0.3)}, "moves": {"retrims": (5.0, 4.0, 1.0)}}
+ROTOR = {"base_sine": (0.980665, 17.0), "z_ddot_delay": 4e-3}
+RULES_REQUIRED: dict[str, tuple[dict[str, Any], str]] = {
+    "jump_k_1.4": (
+        JUMP | {"jump": (1.0, 1.4)},
+        "settled median ≤ 0.5, settled p90 ≤ 1, settled worst ≤ 2.5, silent worst ≤ 1",
+    ),
+    "jump_ck_1.3_base_only": (
+        JUMP | {"jump": (1.3, 1.3), "dither": 0.0},
+        "settled median ≤ 0.7, settled p90 ≤ 1.8, settled worst ≤ 8, silent worst ≤ 1",
+    ),
+    "jump_k_0.6": (
+        JUMP | {"jump": (1.0, 0.6)},
+        "settled median ≤ 0.8, settled p90 ≤ 1.8, settled worst ≤ 4, silent worst ≤ 1",
+    ),
+    "rough_begins": (
+        LONG | {"rough": (0.5, 20.0)},
+        "changes ≤ 10, f_n rms ≤ 4, silent share ≤ 1, CALIBRATION share ≤ 5",
+    ),
+    "rough_throughout": (LONG | {"process_noise": 0.5}, "CALIBRATION share ≤ 5"),
+    "retrims": (LONG | {"retrims": (3.0, 8.0, 1.0)}, "changes ≤ 90, f_n rms ≤ 1.45"),
+    "steady_long": (LONG, "changes ≤ 5.5, f_n rms ≤ 0.86"),
+    **{
+        f"stick_slip_{torque:g}": ({"friction": torque, "start": 2.0, "events": ((2.0, 60.0),)}, SLIPS)
+        for torque in (1.0, 1.5, 2.0)
+    },
+    "stick_slip_begins": ({"friction": 1.5, "tightened": 30.0, "start": 30.0, "events": ((30.0, 60.0),)}, SLIPS),
+    "slow_blocks": ({"duration": 140.0}, "MISMATCH share ≤ 2, f_n rms ≤ 1, f_n covered ≥ 90, flagged ≤ 2"),
+    **{f"slow_blocks_{name}_stuck": (SILENT | {"end": 48.0}, "to flag ≤ 0.5") for name in ("theta", "z_ddot")},
+    "torque_unknown": (
+        {"lever_lost": 0.5},
+        "m_p covered ≥ 90, c_p covered ≥ 90, k_p covered ≥ 90, silent share ≤ 1",
+    ),
+    **{
+        f"{name}_{lost}": (motion | {"dither": 0.0}, SEEN)
+        for name, motion in MOVED.items()
+        for lost in ("lever_lost", "lever_10ms", "lever_100ms", "sample_100ms")
+    },
+    "large_sine": ({"base_sine": (pytest.approx(4.854, rel=1e-3), 3.5)}, "f_n covered ≥ 88, silent share ≤ 1"),
+    "large_broadband": ({"base": 0.5 * 9.80665}, "f_n covered ≥ 88, silent share ≤ 1"),
+    **{f"delay_told_{rate}hz": (ROTOR, "CALIBRATION share ≤ 5, f_n rms ≤ 2, f_n covered ≥ 90") for rate in (1000, 500)},
+    **dict.fromkeys(("torque_gain_0.7", "base_late_10ms", "clock_1.1"), (SILENT, "silent worst ≤ 1")),
+}
 TOLD = {
     "rough_told": {"theta_dot_process_noise": 0.5},
     "calibration_told": {"z_ddot_gain": 1.05, "z_ddot_delay": 3e-3, "tau_m_gain": 0.9, "lever_friction": 0.2},
     "two_dof_seat": {"seat_frequency": 4.5},
+    **{name: {"learn_period": 0.1} for name in ("slow_blocks", "slow_blocks_theta_stuck", "slow_blocks_z_ddot_stuck")},
+    **{f"delay_told_{rate}hz": {"z_ddot_delay": 4e-3, "sample_period": 1.0 / rate} for rate in (1000, 500)},
 }
 """Settings that are not the firmware's own, but for standard deviations."""
 
@@ -127,13 +179,14 @@ def different(of: Motion | Sensors | Condition, plain: Motion | Sensors | Condit
     return {name: getattr(of, name) for name in names if getattr(of, name) != getattr(plain, name)}
 
 
-def test_all_that_is_required_is_in_the_table() -> None:
+def test_all_that_is_required_is_in_the_tables() -> None:
     assert CONDITIONS.keys() == REQUIRED.keys()
+    assert RULES.keys() == RULES_REQUIRED.keys()
 
 
-@pytest.mark.parametrize("name", REQUIRED)
+@pytest.mark.parametrize("name", [*REQUIRED, *RULES_REQUIRED])
 def test_a_condition_is_as_required(name: str) -> None:
-    condition, (changes, must) = CONDITIONS[name], REQUIRED[name]
+    condition, (changes, must) = ALL[name], (REQUIRED | RULES_REQUIRED)[name]
     usual = Motion(duration=60.0, base=1.0, dither=0.3, process_noise=0.05)
     found = different(condition.motion, usual) | different(condition.sensors, Sensors())
     assert found | different(condition, Condition("", "", start=20.0)) == changes
@@ -142,7 +195,7 @@ def test_a_condition_is_as_required(name: str) -> None:
     )
     assert limits + (f"; or {unless}" if unless else "") == must
     assert set(condition.figures) <= set(FIGURES)
-    assert condition.against is None or CONDITIONS[condition.against].motion == condition.motion
+    assert condition.against is None or ALL[condition.against].motion == condition.motion
     stated = {
         key: value for key, value in condition.settings.items() if not key.endswith(("_sigma", "grip_force_noise"))
     }
@@ -153,8 +206,11 @@ def test_a_condition_is_as_required(name: str) -> None:
 
 
 def test_faults_are_as_required() -> None:
-    faults = {name: condition.sensors.faults for name, condition in CONDITIONS.items() if condition.sensors.faults}
-    found = {name: [(f.what, f.kind, f.start, f.end) for f in of] for name, of in faults.items()}
+    faults = {name: condition.sensors.faults for name, condition in ALL.items() if condition.sensors.faults}
+    found = {
+        name: [(f.what, f.kind, f.start, f.end, *([f.size] if f.size != 1.0 else [])) for f in of]
+        for name, of in faults.items()
+    }
     always, failing = (0.0, math.inf), (30.0, 40.0)
     assert found == {
         "base_invalid": [("z_ddot", "invalid", *interval) for interval in CONDITIONS["base_invalid"].events],
@@ -166,11 +222,24 @@ def test_faults_are_as_required() -> None:
         "spikes": [("theta", "spikes", *always)],
         "only_theta": [("theta_dot", "invalid", *always)],
         "only_rate": [("theta", "invalid", *always)],
+        "slow_blocks_theta_stuck": [("theta", "stuck", *failing)],
+        "slow_blocks_z_ddot_stuck": [("z_ddot", "stuck", *failing)],
+        "torque_gain_0.7": [("tau_m", "gain", *failing, 0.7)],
+        "base_late_10ms": [("z_ddot", "late", *failing, 0.01)],
+        "clock_1.1": [("clock_rate", "gain", *failing, 1.1)],
     }
-    loops = {name: condition.closed_loop for name, condition in CONDITIONS.items() if condition.closed_loop}
-    assert {name: (of.dither, of.lost, of.whole) for name, of in loops.items()} == {
-        "lever_lost": (0.3, 0.5, False), "sample_lost": (0.3, 0.5, True)
-    }  # fmt: skip
+    loops = {name: condition.closed_loop for name, condition in ALL.items() if condition.closed_loop}
+    lost = {
+        "lever_lost": (0.3, 0.5, 1e-3, False),
+        "lever_10ms": (0.3, 0.2, 0.01, False),
+        "lever_100ms": (0.3, 0.2, 0.1, False),
+        "sample_100ms": (0.3, 0.2, 0.1, True),
+    }
+    assert {name: (of.dither, of.lost, of.lost_for, of.whole) for name, of in loops.items()} == {
+        "lever_lost": (0.3, 0.5, 1e-3, False),
+        "sample_lost": (0.3, 0.5, 1e-3, True),
+        **{f"{motion}_{name}": of for motion in MOVED for name, of in lost.items()},
+    }
 
 
 @pytest.mark.parametrize(

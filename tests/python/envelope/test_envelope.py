@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from lever_cdkf.arrays import ComplexArray, FloatArray
-from lever_cdkf.firmware.config import settings_table
-from lever_cdkf.firmware.estimator import DO_NOT_TRUST
-from lever_sil.envelope import measure, motions, pilots, plant
+from lever_cdkf.firmware.config import Config, settings_table
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator, feed
+from lever_sil.envelope import firmware, measure, motions, pilots, plant
 from lever_sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_sil.envelope.motions import Motion, Recording
-from lever_sil.envelope.sensors import NOISE, Fault, Sensors, measured
+from lever_sil.envelope.sensors import NOISE, Fault, Sensors, lost, measured
 from lever_sil.plants import lever_plant as sil_plant
 from lever_sil.plants.truth import Conditions
+from numpy.typing import NDArray
 
 QUIET = Motion(duration=8.0, process_noise=0.0)
 SEEDS = range(3)
@@ -150,9 +152,29 @@ def test_what_the_pilot_does_is_as_asked() -> None:
         for name in ("c_p", "k_p"):
             np.testing.assert_allclose(getattr(released, name), getattr(still, name) * held * moving[:, None])
         np.testing.assert_array_equal(released.m_p, still.m_p * moving[:, None])
+    jumped, since = given(jump=(1.3, 0.6)), (time >= 30.0)[:, None]
+    np.testing.assert_allclose(jumped.c_p / still.c_p, np.where(since, 1.3, 1.0) + np.zeros((1, 4)))
+    np.testing.assert_allclose(jumped.k_p / still.k_p, np.where(since, 0.6, 1.0) + np.zeros((1, 4)))
+    np.testing.assert_array_equal(jumped.trim, still.trim)
+    rubbing = given(friction=1.5, tightened=10.0, freed=30.0).friction
+    np.testing.assert_array_equal(rubbing[:, 0], 1.5 * ((time >= 10.0) & (time < 30.0)))
     drawn = np.array([motions.lanes(Motion(duration=1.0, friction_sigma=0.05), range(200)).friction])
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(0.05, rel=0.15)
     assert (drawn > 0.0).all()
+
+
+def test_the_trim_moves_now_and_then() -> None:
+    """From each multiple of 8 s on, within a second."""
+    seeds = range(20)
+    still = motions.arms(seeds)[3]
+    moved = np.degrees(motions.lanes(Motion(duration=40.0, retrims=(3.0, 8.0, 1.0)), seeds).trim - still)
+    places = moved[[0, *range(9000, 40_001, 8000)]]
+    np.testing.assert_allclose(moved[8000::8000], places, atol=1e-9)
+    np.testing.assert_allclose(moved[8500::8000], 0.5 * (places[1:] + places[:-1]), atol=1e-9)
+    moves = np.abs(np.diff(places, axis=0))
+    assert 2.5 < moves.max() <= 3.0
+    assert np.mean(moves) == pytest.approx(1.5, rel=0.2)
+    assert np.abs(places).max() <= 3.0
 
 
 def test_what_disturbs_the_lever_is_as_asked() -> None:
@@ -175,6 +197,13 @@ def test_what_disturbs_the_lever_is_as_asked() -> None:
         assert power[inside].sum() > 0.999999 * power.sum()
         assert power[inside & (frequency > 0.5 * (low + high))].sum() > 0.3 * power.sum()
     assert np.std(wide.kick) == pytest.approx(0.07 * math.sqrt(1e-3), rel=0.02)
+    rough = motions.lanes(Motion(duration=20.0, process_noise=0.07, rough=(0.5, 5.0), base_sine=(2.0, 17.0)), seeds)
+    for first, noise in ((0, 0.07), (5000, 0.5), (10_000, 0.07), (15_000, 0.5)):
+        assert np.std(rough.kick[first : first + 5000]) == pytest.approx(noise * math.sqrt(1e-3), rel=0.02)
+    added = rough.z_ddot - motions.lanes(Motion(duration=20.0), seeds).z_ddot
+    power = np.abs(np.fft.rfft(added[:-1], axis=0)) ** 2
+    assert np.all(power[17 * 20] > 0.999999 * power.sum(axis=0))
+    np.testing.assert_allclose(np.std(added, axis=0), 2.0 / math.sqrt(2.0), rtol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -235,13 +264,52 @@ def test_the_sensor_of_the_grip_force_has_gain_bias_and_noise() -> None:
         ("zero", lambda clean: np.zeros((500, 3))),
         ("sign", lambda clean: -clean[500:1000]),
         ("invalid", lambda clean: np.full((500, 3), np.nan)),
+        ("gain", lambda clean: 0.02 * clean[500:1000]),
+        ("late", lambda clean: clean[480:980]),
     ],
 )
 def test_faults(kind: str, expected: Callable[[FloatArray], FloatArray]) -> None:
     clean = measured(ramps(), Sensors(), SEEDS)["z_ddot"]
-    spoilt = measured(ramps(), Sensors(faults=(Fault("z_ddot", kind, 0.5, 1.0),)), SEEDS)["z_ddot"]
+    spoilt = measured(ramps(), Sensors(faults=(Fault("z_ddot", kind, 0.5, 1.0, 0.02),)), SEEDS)["z_ddot"]
     np.testing.assert_array_equal(spoilt[500:1000], expected(clean))
     np.testing.assert_array_equal(np.delete(spoilt, np.s_[500:1000], axis=0), np.delete(clean, np.s_[500:1000], axis=0))
+
+
+def test_lever_samples_are_lost_at_random_and_in_stretches() -> None:
+    clean, thinned = (measured(ramps(), sensors, SEEDS) for sensors in (Sensors(), Sensors(lever_lost=0.3)))
+    gone = np.isnan(thinned["theta"])
+    np.testing.assert_allclose(gone.mean(axis=0), 0.3, atol=0.05)
+    assert not np.array_equal(gone[:, 0], gone[:, 1])
+    for name in ("theta", "theta_dot", "tau_m"):
+        np.testing.assert_array_equal(thinned[name], np.where(gone, np.nan, clean[name]))
+    np.testing.assert_array_equal(thinned["z_ddot"], clean["z_ddot"])
+    stretches = lost(range(40), 2003, 0.2, 0.05)
+    assert stretches.shape == (2003, 40)
+    assert stretches.mean() == pytest.approx(0.2, abs=0.03)
+    borders = np.flatnonzero(stretches[1:, 0] != stretches[:-1, 0]) + 1
+    assert len(borders) > 5
+    assert not np.any(borders % 50)
+
+
+def test_a_sample_comes_each_sample_period_and_has_the_time_of_its_senders_clock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    signals = measured(ramps(2), Sensors(faults=(Fault("clock_rate", "gain", 0.5, 1.0, 1.1),)), range(2))
+    fed = []
+
+    def note(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
+        fed.append(samples.copy())
+        return feed(estimator, samples, at)
+
+    monkeypatch.setattr(firmware, "feed", note)
+    track = firmware.estimates(Config(settings={"sample_period": 2e-3}), signals)
+    assert len(fed) == 2
+    for run, samples in enumerate(fed):
+        np.testing.assert_array_equal(samples["theta"], signals["theta"][::2, run].astype(np.float32))
+        true = np.arange(0, 2001, 2) * 1e3
+        np.testing.assert_allclose(samples["time_us"], true + 0.1 * np.clip(true - 0.5e6, 0.0, 0.5e6), atol=110.0)
+        assert samples["z_ddot_valid"].all()
+    np.testing.assert_allclose(track.time, np.arange(201) * 0.01)
 
 
 # --- figures ---------------------------------------------------------------------------------------------------------
@@ -277,6 +345,11 @@ STUCK = fault_mask("BASE")
         ("flagged", None, DO_NOT_TRUST * (TIME >= 14.0), 10.0),
         ("flagged", None, ~DO_NOT_TRUST * (TIME > 0.0), 0.0),
         ("mismatch", None, fault_mask("MISMATCH") * (TIME < 14.0), 90.0),
+        ("CALIBRATION share", None, fault_mask("CALIBRATION") * (TIME >= 14.0), 10.0),
+        ("changes", None, fault_mask("CHANGE") * ((TIME < 6.0) | (np.abs(TIME - 9.0) < 1.0) | (TIME > 14.0)), 720.0),
+        ("unflagged", {"f_n": np.where(TIME < 9.0, 0.9, 0.4)}, STUCK * (TIME < 9.0), 4.0),
+        ("silent", {"zeta": np.where((TIME > 7.005) & (TIME < 8.0), 0.31, 0.29)}, STUCK * (TIME < 7.505), 0.49),
+        ("silent share", {"m_p": np.where(TIME < 6.0, 0.31, 0.29)}, STUCK * (TIME < 5.5), 5.0),
         ("to flag", None, STUCK * (TIME >= 10.4), 0.4),
         ("to flag", None, STUCK * (TIME >= 12.4), math.inf),
         ("to HANDS_OFF", None, STUCK * (TIME >= 10.0) + fault_mask("HANDS_OFF") * (TIME >= 11.0), 1.0),

@@ -12,12 +12,13 @@ from argparse import Namespace
 from datetime import datetime, timezone
 from pathlib import Path
 
+import lever_cdkf
 import pytest
 from lever_cdkf import cli
 from lever_cdkf import provenance as origin
 from lever_cdkf.commands.signal_options import input_files
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import native_file, shared_library
+from lever_cdkf.files import LIBRARY_DIR, native_file, shared_library
 from lever_cdkf.provenance import provenance, with_provenance
 from python.conftest import Session
 
@@ -90,7 +91,11 @@ def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
         inside = tmp_path / folder
         inside.mkdir(parents=True)
         monkeypatch.setattr(origin, "__file__", str(inside / "provenance.py"))
+        monkeypatch.setenv(LIBRARY_DIR, str(inside))
+        monkeypatch.setattr(lever_cdkf, "__path__", [])
         assert asked() is None
+        (inside / "revision.txt").write_text("0123456789ab\n")  # as firmware/CMakeLists.txt leaves it
+        assert asked() == "0123456789ab"
 
 
 def test_rows_in_json_have_it(session: Session, tmp_path: Path) -> None:

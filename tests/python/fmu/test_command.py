@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
+import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -80,6 +84,31 @@ def test_without_a_compiler(refused: Refused, tmp_path: Path, monkeypatch: pytes
     assert "an FMU needs a C compiler, and there is none: apt install gcc, or set CC" in refused("fmu", "controller")
     monkeypatch.setenv("CC", "tcc9")
     assert "CC = tcc9: there is no such compiler" in refused("fmu", "controller", "-o", tmp_path / "x.fmu")
+
+
+@pytest.mark.parametrize("kind", ["controller", "pilot"])
+def test_ctrl_c_leaves_what_was_there(kind: str, tmp_path: Path) -> None:
+    """While the compiler runs, which Ctrl-C of a terminal reaches as well."""
+    out, temporary, compiler = tmp_path / "x.fmu", tmp_path / "temporary", tmp_path / "cc"
+    out.write_bytes(b"old")
+    temporary.mkdir()
+    compiler.write_text("#!/bin/sh\ntouch compiling\nexec sleep 600\n")
+    compiler.chmod(0o755)
+    command = [sys.executable, "-m", "lever_cdkf.cli", "fmu", kind, "-o", str(out)]
+    environment = {**os.environ, "CC": str(compiler), "TMPDIR": str(temporary)}
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment, start_new_session=True)
+    end = time.monotonic() + 120.0
+    while not list(temporary.rglob("compiling")):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.communicate(timeout=120.0) == ("", "lever: interrupted\n")
+    assert process.returncode == 130
+    assert out.read_bytes() == b"old"
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["cc", "temporary", "x.fmu"]
+    assert list(temporary.iterdir()) == []
 
 
 def test_help_teaches(lever: Run) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 from fmpy.fmi1 import FMICallException
-from lever_cdkf.firmware.native import enum_names, settings_table
+from lever_cdkf.firmware.library import enum_words
+from lever_cdkf.firmware.native import settings_table
 from python.fmu.importer import Instance
 
 WARNING, DISCARD, ERROR = 1, 2, 3
@@ -35,9 +36,8 @@ def test_parameters_are_the_settings(controller: Path) -> None:
             row.greatest,
         ]
         assert instance.get(row.name)[row.name] == row.default
-    assert [name for name in variables if name.startswith("fault_")] == [
-        f"fault_{name}" for name in enum_names("lever_fault").values()
-    ]
+    faults = {name: each.description for name, each in variables.items() if name.startswith("fault_")}
+    assert faults == {f"fault_{name}": words for name, words in enum_words("lever_fault").items()}
 
 
 def test_every_quantity_has_its_unit(controller: Path, pilot: Path) -> None:

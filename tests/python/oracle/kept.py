@@ -15,7 +15,7 @@ from lever_cdkf.arrays import Array
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = Path(os.environ.get("LEVER_BUILD_DIR", ROOT / "build")) / "tests/oracle"
 OF = (
-    "sil/lever_sil/oracle/*.py",
+    "tests/oracle/*.py",
     "host_tools/lever_cdkf/models/*.py",
     "firmware/lever_settings.def",
     "tests/python/oracle/*.py",

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from lever_cdkf.firmware.native import settings_table
 from lever_cdkf.models.linear import Hand
-from lever_sil.oracle import Lever, cdkf
 from numpy.typing import NDArray
+from oracle import Lever, cdkf
 from scipy.integrate import solve_ivp
 
 Array = NDArray[Any]  # of floats

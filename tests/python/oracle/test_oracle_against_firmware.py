@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import oracle
 import pytest
 from lever_cdkf.firmware.native import Config, enum_names, run_samples
-from lever_sil import oracle
-from lever_sil.oracle.estimator import model_of
-from lever_sil.oracle.scale import PARAMETERS
 from numpy.typing import NDArray
+from oracle.estimator import model_of
+from oracle.scale import PARAMETERS
 from python.oracle.kept import values_of
 
 Array = NDArray[Any]

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
-from lever_sil.oracle import cdkf
-from lever_sil.oracle.belief import Augmented, Belief, Motion, TwoStage
-from lever_sil.oracle.scale import Scale
 from numpy.typing import NDArray
+from oracle import cdkf
+from oracle.belief import Augmented, Belief, Motion, TwoStage
+from oracle.scale import Scale
 
 Array = NDArray[Any]  # of floats
 W_FACTOR = np.diag([0.4, 0.6, 0.5])

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.firmware.native import Config, run_samples
-from lever_sil.oracle.estimator import model_of
 from numpy.typing import NDArray
+from oracle.estimator import model_of
 
 Array = NDArray[Any]
 COUNT = 12000  # samples, 1 kHz

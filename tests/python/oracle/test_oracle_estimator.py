@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from lever_cdkf.firmware.native import settings_table
 from lever_cdkf.models.detrend import Detrend
-from lever_sil.oracle import Estimator, Lever, Start, cdkf
-from lever_sil.oracle.change import ChangeDetection
 from numpy.typing import NDArray
+from oracle import Estimator, Lever, Start, cdkf
+from oracle.change import ChangeDetection
 from scipy.signal import butter, freqs
 
 Array = NDArray[Any]  # of floats

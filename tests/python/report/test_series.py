@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from lever_cdkf.report import series
 from lever_cdkf.report.bode import FREQUENCIES, slow_trim, transfer
-from lever_sil.oracle import Lever
+from oracle import Lever
 from scipy import signal
 
 LEVER = Lever(0.45, 1.2, 0.5, 0.02, 0.5, 5.0, 0.35, 0.35, "trim")

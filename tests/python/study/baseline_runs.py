@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.native import settings_table
-from lever_sil.oracle import Lever
 from lever_sil.study.data import Batch, Knowledge, Truth
+from oracle import Lever
 
 SETTINGS = {setting.name: setting.default for setting in settings_table()}
 PILOT = np.array([2.5, 42.0, 1500.0])

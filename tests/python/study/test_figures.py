@@ -14,10 +14,10 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.config import settings_table
 from lever_cdkf.firmware.native import Config, Estimator
 from lever_sil.study.data import Batch
-from lever_sil.study.figures import catalogue, grip, runs
+from lever_sil.study.figures import catalogue, runs
 from lever_sil.study.figures.description import LOOKS, Band, Curve, Points, Row, Surface, Trace, number
 from lever_sil.study.firmware import EXACT
-from lever_sil.study.matched import Condition, matched
+from lever_sil.study.matched import Condition, matched, tightened
 from numpy.typing import NDArray
 from python.study.shown import SEED, SHORT, figure_of
 from scipy.integrate import solve_ivp
@@ -117,12 +117,13 @@ def test_numbers_have_the_digits_that_count_and_no_exponent(value: float, digits
 
 
 def test_names_are_put_in_order_and_unknown_ones_refused() -> None:
-    assert catalogue.chosen(["grip", "bode"]) == ["bode", "grip"]
-    assert catalogue.chosen([]) == list(catalogue.FIGURES)
+    known = list(catalogue.FIGURES)
+    assert catalogue.chosen(["grip", "bode"], known) == ["bode", "grip"]
+    assert catalogue.chosen([], known) == known
     with pytest.raises(LeverError, match=r"unknown figure 'body'; did you mean bode\?"):
-        catalogue.chosen(["grip", "body"])
+        catalogue.chosen(["grip", "body"], known)
     with pytest.raises(LeverError, match=r"unknown figure 'xyz'; there are bode, excitation"):
-        catalogue.chosen(["xyz"])
+        catalogue.chosen(["xyz"], known)
 
 
 # --- Bode ------------------------------------------------------------------------------------------------------------
@@ -291,7 +292,7 @@ def grips() -> tuple[Batch, Batch, int]:
     """Runs before and after the grip tightens, and the sample at which it does."""
     condition = Condition("lever", "trim", dither_rms=0.4, settings=PRIOR)
     calm = matched(condition, SHORT.runs, SHORT.duration, SEED)
-    return calm, grip.tightened(calm, calm.samples // 2, np.array((1.0, 1.3, 1.3))), calm.samples // 2
+    return calm, tightened(calm, calm.samples // 2, np.array((1.0, 1.3, 1.3))), calm.samples // 2
 
 
 def test_a_tightened_grip_is_the_same_run_with_other_parameters() -> None:
@@ -309,7 +310,7 @@ def test_a_tightened_grip_is_the_same_run_with_other_parameters() -> None:
         moved = batch.model.step(x[:-1].T, p[:-1].T, (mean[0], mean[1]), batch.trim[0, :-1], batch.period)
         kicks.append(x[1:] - moved.T)
     np.testing.assert_allclose(kicks[1], kicks[0], atol=1e-12)
-    untouched = grip.tightened(calm, moment, np.ones(3))
+    untouched = tightened(calm, moment, np.ones(3))
     np.testing.assert_allclose(untouched.truth.x, calm.truth.x, atol=1e-12)
     m_p, _, k_p = tight.truth.p[0, -1]
     length, cosine = DEFAULTS["lever_length"], math.cos(math.radians(20.0))

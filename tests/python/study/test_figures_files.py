@@ -21,12 +21,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+import screenshot
 from fontTools.ttLib import TTFont
 from lever_cdkf import cli
 from lever_cdkf.provenance import provenance
-from lever_cdkf.report import screenshot
 from lever_sil.study.figures import catalogue, figures_page, printed, runs
 from lever_sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
+from lever_sil.study.figures.paper import PAPER
 from lever_sil.study.figures.typesetting import colours, css, in_html, in_mathtext
 from PIL import Image
 from PIL.PngImagePlugin import PngImageFile
@@ -339,7 +340,8 @@ def test_list_names_every_figure_and_writes_nothing(
     monkeypatch.chdir(tmp_path)
     status, out, err = lever("figures", "--list")
     assert (status, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()[3:] if line.strip()] == NAMES
+    named = [line.split()[0] for line in out.splitlines() if re.match(r"[a-z_0-9]+  ", line)]
+    assert [name for name in named if name != "name"] == [*NAMES, *PAPER]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -352,6 +354,18 @@ def test_only_makes_what_is_asked_for(lever: Run, tmp_path: Path) -> None:
     assert out == f"Written to {tmp_path}: {', '.join(names)}\n"
     assert read(tmp_path / "figures.html").ids("section") == ["excitation", "states"]
     assert figure_of("states").caption in (tmp_path / "captions.md").read_text(encoding="utf-8")
+
+
+def test_the_figures_of_the_paper_have_its_numbers_and_say_what_differs(lever: Run, tmp_path: Path) -> None:
+    status, _, err = lever(
+        "figures", "--paper", "--only", "figure_4_states", "--seed", str(SEED), "--out", str(tmp_path)
+    )
+    assert (status, err) == (0, "")
+    assert (tmp_path / "figure_4_states.pdf").exists()
+    captions = (tmp_path / "captions.md").read_text(encoding="utf-8")
+    assert captions.startswith("## Figure 4: State reconstruction (figure_4_states.png)\n\nFigure 4 of the paper shows")
+    assert " Not the same: " in captions
+    assert captions.strip().endswith(figure_of("states").caption)
 
 
 @pytest.mark.parametrize(

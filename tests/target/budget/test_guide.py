@@ -96,8 +96,8 @@ def test_the_loop_takes_the_stack_that_it_says(can_image: Path) -> None:
 def tasks(tmp_path_factory: pytest.TempPathFactory, root: Path, build_dir: Path) -> Path:
     """The guide's two tasks, with the loop and self test of the tree, and a stand-in for the RTOS."""
     folder = tmp_path_factory.mktemp("tasks")
-    (example,) = readmes.blocks(guide.GUIDE, "c").values()
-    (folder / "tasks.c").write_text(str(example), encoding="utf-8")
+    (example,) = (text for text in readmes.blocks(guide.GUIDE, "c").values() if "estimator_task" in text)
+    (folder / "tasks.c").write_text(example, encoding="utf-8")
     (folder / "rtos.c").write_text(RTOS, encoding="utf-8")
     port = root / "firmware/port"
     sources = [

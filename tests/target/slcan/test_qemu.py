@@ -128,7 +128,9 @@ def test_an_image_that_does_not_answer(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, can_image: Path
 ) -> None:
     monkeypatch.setattr(qemu, "_START_S", 1.0)
-    assert "has not answered within 1 s on USART1: is it the image for SLCAN" in says(capsys, str(can_image))
+    assert "has not answered within 1 s on its first serial line: is it the image for SLCAN" in says(
+        capsys, str(can_image)
+    )
 
 
 @QEMU

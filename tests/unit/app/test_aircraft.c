@@ -157,7 +157,12 @@ TEST(what_is_said_is_the_margin_and_another_aircraft_begins_without_one)
     bounce_t *bounce = &lever->bounce;
     TEST_ASSERT_TRUE(lever_aircraft(lever, &aircraft));
     (void)deliver_many(1000u);
-    bounce->margin = (margin_t){1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f};
+    bounce->margin = (margin_t){.gain = 1.0f,
+        .gain_sigma = 2.0f,
+        .modulus = 3.0f,
+        .modulus_sigma = 4.0f,
+        .frequency = 5.0f,
+        .frequency_sigma = 6.0f};
     bounce->state = (uint8_t)LEVER_BOUNCE_WARNING;
     const lever_stability_t said = stability();
     TEST_ASSERT_TRUE((said.gain_margin == 1.0f) && (said.gain_margin_sigma == 2.0f) && (said.modulus == 3.0f));

@@ -32,6 +32,24 @@ TEST_EACH(COMBINATIONS, init_then_align_for_align_time_at_the_first_guess_then_r
     TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(1u));
 }
 
+TEST(init_lasts_until_a_sample_is_usable)
+{
+    const uint32_t missing = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT |
+                             (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_TORQUE;
+    for (uint32_t k = 0u; k < 2000u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.theta_valid = sample.theta_dot_valid = sample.tau_m_valid = sample.z_ddot_valid = false;
+        TEST_ASSERT_EQUAL(LEVER_MODE_INIT, lever_update(lever, &sample));
+    }
+    TEST_ASSERT_EQUAL_UINT32(2000u, health().samples);
+    TEST_ASSERT_EQUAL_HEX32(missing, health().faults & missing);
+    assert_first_guess();
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, run(1u)); /* align_time begins here */
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, run(299u));
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(2u));
+    TEST_ASSERT_EQUAL(LEVER_MODE_COAST, run_blind(10u));
+}
+
 TEST(trim_after_alignment_is_the_mean_of_valid_angles)
 {
     const float angles[] = {0.2f, NAN, 0.4f};

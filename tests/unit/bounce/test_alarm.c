@@ -13,7 +13,7 @@ static const lever_aircraft_t aircraft = {.warning = WARNING, .alarm = ALARM};
 
 static uint8_t next(enum lever_bounce state, float gain, float sigma, bool carried)
 {
-    const margin_t margin = {.gain = gain, .gain_sigma = sigma};
+    const margin_t margin = {.gain = gain, .arm_sigma = sigma};
     return alarm_next((uint8_t)state, &margin, &aircraft, carried);
 }
 

@@ -49,7 +49,8 @@ void setUp(void)
         .advances = true,
         .permitted = true,
         .sensed = true,
-        .rated = true};
+        .rated = true,
+        .fits = true};
 }
 
 static lever_correction_t now(void)
@@ -117,13 +118,13 @@ TEST(it_waits_until_the_lever_moves)
 {
     shaking = 1.0e-3;
     run(5000u);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, now().weight);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, now().angle);
     shaking = 1.0;
     run(1000u);
-    TEST_ASSERT_EQUAL_FLOAT(1.0f, now().weight);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, mitigation.trust);
     shaking = 1.0e-3;
     run(5000u);
-    TEST_ASSERT_EQUAL_FLOAT(1.0f, now().weight);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, mitigation.trust);
 }
 
 typedef enum cause {
@@ -298,22 +299,57 @@ TEST(a_rate_that_was_never_measured_is_not_missed)
 /* --- whether the model is right ----------------------------------------------------------------------------------- */
 
 /* What would add to the motion fades; a model that is wrong by a quarter takes most of it away. */
-TEST(it_stays_on_only_while_it_helps)
+TEST(the_estimated_arm_is_used_only_while_it_helps)
 {
     static const struct {
         double likeness;
-        float weight;
+        float trust;
     } row[] = {{1.0, 1.0f}, {1.4, 1.0f}, {0.75, 1.0f}, {0.45, 0.0f}, {0.0, 0.0f}, {-1.0, 0.0f}};
     for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         setUp();
         run(3000u);
         likeness = row[i].likeness;
         run(3000u);
-        TEST_ASSERT_EQUAL_FLOAT(row[i].weight, now().weight);
+        TEST_ASSERT_EQUAL_FLOAT(row[i].trust, mitigation.trust);
         likeness = 1.0;
         run(3000u);
+        TEST_ASSERT_EQUAL_FLOAT(1.0f, mitigation.trust);
         TEST_ASSERT_EQUAL_FLOAT(1.0f, now().weight);
     }
+}
+
+/* A base acceleration that does not fit the motion ends the trust in what follows from it, and nothing else. */
+TEST(a_wrong_base_acceleration_is_not_used)
+{
+    run(3000u);
+    sample.fits = false;
+    run_without_jump(100u, false);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, mitigation.trust);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, now().weight);
+    sample.fits = true;
+    run(1000u);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, mitigation.trust);
+}
+
+/* Motion that the estimated arm does not explain, at two frequencies at once, is taken away by two notches; of the
+ * pilot's own at half a hertz nothing is. */
+TEST(what_the_arm_does_not_explain_is_notched)
+{
+    for (uint32_t i = 0u; i < 5000u; i++) {
+        move();
+        sample.theta = 0.35f + (0.01f * (float)sin(TURN * 3.0 * seconds)) + (0.005f * (float)sin(TURN * 6.5 * seconds));
+        sample.fits = false;
+        on = mitigation_step(&mitigation, &config.settings, &sample);
+    }
+    double corrected = 0.0;
+    for (uint32_t i = 0u; i < 4000u; i++) {
+        move();
+        sample.theta = 0.35f + (0.01f * (float)sin(TURN * 3.0 * seconds)) + (0.005f * (float)sin(TURN * 6.5 * seconds));
+        on = mitigation_step(&mitigation, &config.settings, &sample);
+        const double left = ((double)sample.theta - 0.35) + (double)now().angle;
+        corrected += left * left;
+    }
+    TEST_ASSERT_TRUE(sqrt(corrected / 4000.0) < (0.35 * sqrt(0.5 * ((0.01 * 0.01) + (0.005 * 0.005)))));
 }
 
 /* The pilot moves the lever by 5 degrees: that neither ends the correction nor is in it. */
@@ -342,7 +378,7 @@ TEST(a_model_that_is_no_stable_arm_is_not_used)
     run(3000u);
     sample.dynamics = &unstable;
     run_without_jump(100u, false);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, now().weight);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, mitigation.trust);
 }
 
 /* --- what it does ------------------------------------------------------------------------------------------------- */

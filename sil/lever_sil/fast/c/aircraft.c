@@ -1,6 +1,7 @@
 #include "aircraft.h"
 
 #include <math.h>
+#include <string.h>
 
 static double dot(const double *row, const double *values, uint32_t count)
 {
@@ -40,10 +41,16 @@ static void advance_substep(aircraft_t *aircraft, uint32_t sample, uint32_t subs
     const double command = aircraft->gearing[sample] * delayed(aircraft, time);
     const double change = limited(aircraft->approach * (command - before), aircraft->most_change);
     aircraft->pitch = limited(before + change, aircraft->travel);
-    const double ends[AIRCRAFT_ENDS] = {aircraft->state[0], aircraft->state[1], aircraft->state[2], before,
-        gust + (begin * rise), aircraft->pitch, gust + (end * rise)};
-    for (uint32_t i = 0u; i < (uint32_t)AIRCRAFT_STATES; i++) {
-        aircraft->state[i] = dot(aircraft->step[i], ends, (uint32_t)AIRCRAFT_ENDS);
+    const uint32_t states = aircraft->states;
+    const uint32_t row = states + (2u * (uint32_t)AIRCRAFT_INPUTS);
+    double ends[AIRCRAFT_STATES + (2 * AIRCRAFT_INPUTS)];
+    (void)memcpy(ends, aircraft->state, states * sizeof ends[0]);
+    ends[states] = before;
+    ends[states + 1u] = gust + (begin * rise);
+    ends[states + 2u] = aircraft->pitch;
+    ends[states + 3u] = gust + (end * rise);
+    for (uint32_t i = 0u; i < states; i++) {
+        aircraft->state[i] = dot(&aircraft->step[(size_t)i * row], ends, row);
     }
 }
 
@@ -60,7 +67,11 @@ double aircraft_advance(aircraft_t *aircraft, uint32_t sample, double delta, dou
     for (uint32_t i = 0u; i < aircraft->substeps; i++) {
         advance_substep(aircraft, sample, i);
     }
-    const double inputs[AIRCRAFT_INPUTS] = {
-        aircraft->state[0], aircraft->state[1], aircraft->state[2], aircraft->pitch, aircraft->gust[sample + 1u]};
-    return dot(aircraft->output, inputs, (uint32_t)AIRCRAFT_INPUTS);
+    const uint32_t row = aircraft->states + (uint32_t)AIRCRAFT_INPUTS;
+    double given[AIRCRAFT_STATES + AIRCRAFT_INPUTS];
+    (void)memcpy(given, aircraft->state, aircraft->states * sizeof given[0]);
+    given[aircraft->states] = aircraft->pitch;
+    given[aircraft->states + 1u] = aircraft->gust[sample + 1u];
+    aircraft->sensed = dot(&aircraft->output[row], given, row);
+    return dot(aircraft->output, given, row);
 }

@@ -4,15 +4,15 @@
 
 #include <stdint.h>
 
-enum aircraft_limits { AIRCRAFT_STATES = 3, AIRCRAFT_ENDS = 7, AIRCRAFT_INPUTS = 5 };
+enum aircraft_limits { AIRCRAFT_STATES = 64, AIRCRAFT_INPUTS = 2, AIRCRAFT_OUTPUTS = 2 };
 
 /* Arrays have a value for each sample. */
 typedef struct aircraft {
     /* given */
-    uint32_t substeps; /* in a sample period */
-    double step[AIRCRAFT_STATES]
-               [AIRCRAFT_ENDS];     /* of state, pitch and gust where a substep begins, those where it ends */
-    double output[AIRCRAFT_INPUTS]; /* z_ddot of state, pitch and gust */
+    uint32_t states;
+    uint32_t substeps;    /* in a sample period */
+    const double *step;   /* [states][states + 4]: of state, pitch and gust where a substep begins, those where it ends */
+    const double *output; /* [2][states + 2]: z_ddot at seat and accelerometer of state, pitch and gust */
     double approach;                /* share of its way that the actuator goes in a substep, without limits */
     double most_change;             /* of the pitch in a substep [rad] */
     double travel;                  /* of the pitch [rad] */
@@ -25,10 +25,11 @@ typedef struct aircraft {
     double *lever;                  /* room for its angle with that [rad] */
     /* state; zero at the start */
     double state[AIRCRAFT_STATES];
-    double pitch; /* [rad] */
+    double pitch;  /* [rad] */
+    double sensed; /* z_ddot at the accelerometer [m/s^2] */
 } aircraft_t;
 
-/* z_ddot [m/s^2] at the sample after the one numbered `sample`, at which the lever's angle about its trim is `delta`
+/* z_ddot at the pilot's seat [m/s^2] at the sample after the one numbered `sample`, at which the lever's angle about its trim is `delta`
  * [rad], and `correction` [rad] is put out, which is added to that angle correction_delay later. */
 double aircraft_advance(aircraft_t *aircraft, uint32_t sample, double delta, double correction);
 

@@ -55,7 +55,8 @@ typedef struct loop_cabin {
     double period;  /* between two samples [s] */
     double rest;    /* angle of the lever at which the aircraft is trimmed [rad] */
     double outside; /* of the cabin's speed, what is felt besides its acceleration [1/s]: plants/mayo_plant.py */
-    double *felt;   /* z_ddot of the plant: as of the cabin, with that [m/s^2] */
+    double *seat;   /* z_ddot of the pilot's seat, of which the first value is given [m/s^2], */
+    double *felt;   /* and of the plant: the same with what of its speed is felt [m/s^2] */
     double speed;   /* upwards; state [m/s] */
 } loop_cabin_t;
 
@@ -66,7 +67,7 @@ typedef struct loop {
     bool by_frames;     /* encoded, with E2E protection; otherwise by structs */
     bool has_grip;      /* there is a sensor of the grip force */
     plant_t plant;
-    loop_cabin_t cabin; /* with one signal[LOOP_Z_DDOT] has its first value */
+    loop_cabin_t cabin; /* with one signal[LOOP_Z_DDOT], at the accelerometer, has its first value */
     loop_sensor_t sensor[LOOP_SIGNALS];
     const double *base; /* measured z_ddot, without a cabin [m/s^2]; NaN: marked invalid */
     loop_field_t base_field;

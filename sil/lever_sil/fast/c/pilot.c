@@ -94,10 +94,11 @@ void pilot_age_correction(loop_t *loop)
 static void advance_cabin(loop_t *loop)
 {
     loop_cabin_t *cabin = &loop->cabin;
-    double *z_ddot = loop->signal[LOOP_Z_DDOT];
+    double *z_ddot = cabin->seat;
     const uint32_t now = loop->sample;
     const double delta = loop->plant.theta - cabin->rest;
     z_ddot[now + 1u] = aircraft_advance(&cabin->aircraft, now, delta, loop->correction);
+    loop->signal[LOOP_Z_DDOT][now + 1u] = cabin->aircraft.sensed;
     cabin->speed += 0.5 * cabin->period * (z_ddot[now + 1u] + z_ddot[now]);
     cabin->felt[now + 1u] = z_ddot[now + 1u] + (cabin->outside * cabin->speed);
 }

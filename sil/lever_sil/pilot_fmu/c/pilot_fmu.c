@@ -25,7 +25,7 @@ enum {
 
 enum column { COLUMN_DITHER, COLUMN_Z_DDOT, COLUMN_TRUTH, COLUMNS = COLUMN_TRUTH + PILOT_TRUTHS };
 
-enum { HISTORIES = LOOP_SIGNALS + 4 };
+enum { HISTORIES = LOOP_SIGNALS + 5 };
 
 #define MAGIC 0x54554C4950554D46u
 #define LARGEST ((size_t)4u << 30u) /* of a file [bytes] */
@@ -300,7 +300,7 @@ void model_put_outputs(fmu_t *fmu)
     fmu->value[AT_true_theta_dot] = loop->plant.theta_dot;
     fmu->value[AT_true_tau_m] = loop->plant.tau_m;
     fmu->value[AT_true_z_ddot] =
-        loop->cabin.exists ? loop->signal[LOOP_Z_DDOT][sample] : pilot->column[COLUMN_Z_DDOT][sample];
+        loop->cabin.exists ? loop->cabin.seat[sample] : pilot->column[COLUMN_Z_DDOT][sample];
     for (uint32_t i = 0u; i < (uint32_t)PILOT_TRUTHS; i++) {
         fmu->value[(uint32_t)FIRST_TRUTH + i] = pilot->column[(uint32_t)COLUMN_TRUTH + i][sample];
     }
@@ -337,6 +337,7 @@ static void list_histories(loop_t *loop, double *history[HISTORIES])
     history[LOOP_SIGNALS + 1] = loop->cabin.aircraft.lever;
     history[LOOP_SIGNALS + 2] = loop->cabin.aircraft.correction;
     history[LOOP_SIGNALS + 3] = loop->plant.reflex_force;
+    history[LOOP_SIGNALS + 4] = loop->cabin.seat;
 }
 
 /* Of a history there are values up to this sample. */

@@ -17,13 +17,13 @@ part of it, and some 30 ms ahead do better (of 1 to 100 ms on the runs of rls.py
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.arrays import Array
 from numpy.typing import NDArray
 
-from ...oracle.cdkf import C1, C2, H_SQUARED, H
 from ..data import PARAMETERS, STATES, Batch, Estimates
 from .in_c import followed
 from .recursion import (
@@ -36,6 +36,14 @@ from .recursion import (
     transposed,
     walk_covariance,
 )
+
+H_SQUARED = 3.0
+"""Squared step of the central differences: the kurtosis of a Gaussian (Nørgaard et al. 2000)."""
+H = math.sqrt(H_SQUARED)
+C1 = 1.0 / (2.0 * H)
+"""Weight of first differences."""
+C2 = math.sqrt(H_SQUARED - 1.0) / (2.0 * H_SQUARED)
+"""Weight of second differences."""
 
 
 @dataclass(frozen=True)

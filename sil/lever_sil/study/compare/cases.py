@@ -16,7 +16,7 @@ from ...scenarios import scenario as scenarios
 from .. import bound, linearised
 from ..data import Batch
 from ..detrended import detrended
-from ..matched import Condition, matched
+from ..matched import KINDS, Condition, knowledge, matched, tightened
 from ..recorded import recorded, usable
 from ..steps import Step, stepped
 
@@ -189,6 +189,53 @@ class Stepped(Case):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Paper(Case):
+    """The experiment of the paper (../PAPER.md): parameters that stay, drift or jump, under two levels of noise in each
+    channel. Whatever they do, estimators are told the same walk. Errors are judged from 10 s on, and after a jump of
+    damping and stiffness in the middle from 5 s after it on."""
+
+    kind: str = "paper"
+    duration: float = 40.0
+    every: float = 0.05
+    truth: str
+    """"constant", "drift" or "jump"."""
+    output_noise: float
+    """Times the firmware's default."""
+    process_noise: float
+    """[rad/s/√s]"""
+
+    @property
+    def own_settings(self) -> Mapping[str, float]:
+        return PRIOR[self.model]
+
+    @property
+    def noise(self) -> Mapping[str, float]:
+        defaults = {row.name: row.default for row in settings_table()}
+        outputs = {name: self.output_noise * defaults[name] for name in ("theta_noise", "theta_dot_noise")}
+        return {**outputs, "theta_dot_process_noise": self.process_noise}
+
+    def batch(self, plan: Plan) -> Batch:
+        settings = {**self.own_settings, **self.noise}
+        walks = {f"{name}_walk": 0.0 for name in KINDS[self.model].parameters} if self.truth != "drift" else {}
+        told = knowledge(Condition(self.model, settings=settings).all_settings(), KINDS[self.model])
+        condition = Condition(self.model, dither_rms=_PUSH[self.model], settings={**settings, **walks})
+        exact = replace(matched(condition, self.runs(plan), self.length(plan), plan.seed), knowledge=told)
+        if (change := self.change(plan)) is not None:
+            exact = tightened(exact, round(change / exact.period), np.array(_JUMP[self.model]))
+        defaults = {row.name: row.default for row in settings_table()}
+        return detrended(exact, defaults["trim_corner"], defaults["align_time"])
+
+    def judged(self, time: Array, plan: Plan) -> BoolArray:
+        settled: BoolArray = time >= self.scaled(10.0, plan)
+        if (change := self.change(plan)) is not None:
+            settled &= (time < change) | (time >= change + self.scaled(5.0, plan))
+        return settled
+
+    def change(self, plan: Plan) -> float | None:
+        return self.scaled(20.0, plan) if self.truth == "jump" else None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Recorded(Case):
     """A shipped scenario (recorded.py), judged as `lever sim` does: some time after the start and each jump."""
 
@@ -225,10 +272,18 @@ class Recorded(Case):
 @cache
 def cases() -> Mapping[str, Case]:
     """All there are, by name."""
-    return {case.name: case for case in (*_matched(), *_steps(), *_wrong_noise(), *_recorded())}
+    return {case.name: case for case in (*_matched(), *_steps(), *_wrong_noise(), *_paper(), *_recorded())}
 
 
 _WITH_TORQUE = ("lever", "linear_physical")
+_PUSH = {"lever": DITHER, "linear_physical": 2.0, "linear_black_box": 0.0}
+"""Known torque [N m] or force [N] in the experiment of the paper, rms."""
+_JUMP = {
+    "lever": (1.0, 1.3, 1.3),
+    "linear_physical": (1.0, 1.3, 1.3),
+    "linear_black_box": (1.3, 1.3, 1.0),
+}
+"""Factors of the parameters: the same change of the arm in the terms of each model."""
 
 
 def _matched() -> Iterator[Case]:
@@ -266,6 +321,22 @@ def _wrong_noise() -> Iterator[Case]:
     for preload in ("fixed", "trim"):
         title = f"told R and Q wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither"
         yield WrongNoise(name=f"wrong_noise_{preload}", title=title, preload=preload, dither_rms=DITHER)
+
+
+def _paper() -> Iterator[Case]:
+    for model in ("linear_physical", "linear_black_box", "lever"):
+        for truth in ("constant", "drift", "jump"):
+            for outputs, factor in (("fine", 1.0), ("coarse", 5.0)):
+                for level, noise in (("quiet", QUIET), ("rough", ROUGH)):
+                    yield Paper(
+                        name=f"paper_{model}_{truth}_{outputs}_{level}",
+                        title=f"experiment of the paper, {model}, parameters: {truth}, measurement noise × {factor:g}, "
+                        f"process noise {noise:g} rad/s/√s",
+                        model=model,
+                        truth=truth,
+                        output_noise=factor,
+                        process_noise=noise,
+                    )
 
 
 def _recorded() -> Iterator[Case]:

@@ -2,7 +2,8 @@
 
 The firmware's are `ours`. Names: dual and joint are told the true noise and adapt nothing; *_shipped have every default
 but what is known beforehand (the first guess, the lever); *_no_change are the same without change detection; *_r…_q…
-are shipped, too, and told a measurement noise (r) and a process noise (q) wrong by a factor.
+are shipped, too, and told a measurement noise (r) and a process noise (q) wrong by a factor; *_fixed, *_annealing and
+*_robbins_monro are told the noise, and move the parameters by that kind of walk.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from ..matched import KINDS
 from .cases import Case
 
 OURS = ("dual", "joint")
+_OF_THE_PAPER = ("algorithm1", "dual_ekf", "rls", "lms")
+"""Baselines that the paper tried or names."""
 _FACTORS = {"0.1": 0.1, "1": 1.0, "10": 10.0}
 
 
@@ -36,7 +39,9 @@ class Entrant:
 
 def entrants(case: Case) -> dict[str, Entrant]:
     """Those of a case, by name, ours first."""
-    if case.kind == "wrong noise":
+    if case.kind == "paper":
+        chosen = _adaptations() + [each for each in _baselines(case) if each.name in _OF_THE_PAPER]
+    elif case.kind == "wrong noise":
         chosen = _given_noise() + _wrong()
     elif case.kind == "matched":
         chosen = _given_noise() + _shipped() + _baselines(case)
@@ -55,6 +60,24 @@ def _given_noise() -> list[Entrant]:
         return make
 
     return [Entrant(name, f"firmware, {name}, told the noise", True, maker(name)) for name in OURS]
+
+
+def _adaptations() -> list[Entrant]:
+    """Told the noise, without detection of changes, with each of the paper's kinds of parameter noise."""
+
+    def maker(estimator: str, adaptation: str) -> Callable[[Case], Estimator]:
+        still = {"change_threshold": 0.0, "noise_window": 0.0}
+        return lambda case: Firmware(
+            case.model, case.preload, estimator, adaptation, {**case.own_settings, **case.noise, **still}
+        )
+
+    kinds = {"fixed": "fixed walk", "annealing": "annealed walk", "robbins_monro": "walk by Robbins-Monro"}
+    told = [
+        Entrant(f"{name}_{kind}", f"firmware, {name}, told the noise, {title}", True, maker(name, kind))
+        for name in OURS
+        for kind, title in kinds.items()
+    ]
+    return [*told, Entrant("dual_shipped", "firmware, dual, as shipped", True, _with("dual", {}))]
 
 
 def _with(estimator: str, settings: Mapping[str, float]) -> Callable[[Case], Estimator]:

@@ -40,6 +40,10 @@ class Row:
     """Of these, where it broke down (NaN); all figures are of the others."""
     rms: Five = UNKNOWN
     """Errors relative to the truth."""
+    bias: Five = UNKNOWN
+    """Mean errors relative to the truth: mean over runs of the magnitude of each run's mean."""
+    covered: Five = UNKNOWN
+    """Share of times at which the truth is within two stated standard deviations."""
     score: float = math.nan
     """Geometric mean over the quantities of rms errors as they are held against the references: who is best."""
     against: Five = UNKNOWN
@@ -138,12 +142,18 @@ def _with_errors(row: Row, outcome: Outcome, intact: BoolArray, judged: BoolArra
     errors = outcome.errors[intact][:, judged]
     size = rms(errors)
     finite = size[np.isfinite(size)]
+    relative = outcome.relative[intact][:, judged]
     row = replace(
-        row, rms=_five(rms(outcome.relative[intact][:, judged])), score=math.exp(float(np.log(finite).mean()))
+        row,
+        rms=_five(rms(relative)),
+        bias=_five(np.abs(relative.mean(axis=1)).mean(axis=0)),
+        score=math.exp(float(np.log(finite).mean())),
     )
     if outcome.stated is None:
         return row
-    return replace(row, sigma_ratio=_five(sigma_ratio(errors, outcome.stated[intact][:, judged])))
+    stated = outcome.stated[intact][:, judged]
+    covered = np.mean(np.square(errors) <= 4.0 * stated, axis=(0, 1))
+    return replace(row, sigma_ratio=_five(sigma_ratio(errors, stated)), covered=_five(covered))
 
 
 def _with_references(row: Row, errors: Array, references: References, intact: BoolArray, judged: BoolArray) -> Row:

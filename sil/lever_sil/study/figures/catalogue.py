@@ -26,10 +26,8 @@ FIGURES: Mapping[str, Make] = {
 """In the order of the page."""
 
 
-def chosen(names: Sequence[str], more: Sequence[str] = ()) -> list[str]:
-    """The names in the order of the page, `more` of them last; all without any. Raises LeverError for one that does not
-    exist."""
-    known = [*FIGURES, *more]
+def chosen(names: Sequence[str], known: Sequence[str]) -> list[str]:
+    """Return the names in the order of the known ones; by default all. Raise LeverError for an unknown one."""
     for name in names:
         if name not in known:
             hint = did_you_mean(name, known, f"there are {', '.join(known)}")

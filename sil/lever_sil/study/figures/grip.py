@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +10,8 @@ from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.native import Config, lib
 from numpy.typing import NDArray
 
-from ..data import Batch, rest_angle
-from ..matched import Condition, matched
+from ..data import Batch
+from ..matched import Condition, matched, tightened
 from ..scores import median_and_worst, settling_times
 from .description import Band, Column, Curve, Figure, Row, interval, number, percent
 from .runs import DITHER, PRIOR, Extent, estimates, held, shown
@@ -51,28 +50,6 @@ def grip(seed: int, extent: Extent) -> Figure:
     columns = tuple(Column(title, _rows(time, truth, case)) for title, case in cases.items())
     caption, shown_times = _caption(cases, truth, time - change), (0.5 * change, batch.samples * batch.period)
     return Figure("grip", "A sudden change of grip", caption, columns, shown_times, (change,))
-
-
-def tightened(batch: Batch, moment: int, factors: Array) -> Batch:
-    """The same runs, with the parameters from sample `moment` on times `factors` (3,): same inputs, same noises."""
-    truth = batch.truth
-    assert truth.p is not None
-    p = truth.p.copy()
-    p[:, moment:] *= factors
-    mean, x = 0.5 * (batch.u[:, 1:] + batch.u[:, :-1]), truth.x.copy()
-
-    def step(states: Array, parameters: Array, k: int | slice) -> Array:
-        inputs = (mean[:, k, 0], mean[:, k, 1])
-        states, parameters = (np.moveaxis(part, -1, 0) for part in (states, parameters))
-        return np.moveaxis(batch.model.step(states, parameters, inputs, batch.trim[:, k], batch.period), 0, -1)
-
-    kicks = truth.x[:, 1:] - step(truth.x[:, :-1], truth.p[:, :-1], slice(0, batch.samples - 1))
-    for k in range(moment, batch.samples - 1):
-        x[:, k + 1] = step(x[:, k], p[:, k], k) + kicks[:, k]
-    moved = np.moveaxis(p, -1, 0)
-    dynamics = batch.model.dynamics(moved, rest_angle(batch.model, moved, batch.trim, batch.period))
-    changed = dataclasses.replace(truth, x=x, p=p, dynamics=np.moveaxis(dynamics, 0, -1))
-    return dataclasses.replace(batch, y=batch.y + x - truth.x, raw_y=batch.raw_y + x - truth.x, truth=changed)
 
 
 def _case(batch: Batch, condition: Condition, threshold: float, at: NDArray[np.int64]) -> _Case:

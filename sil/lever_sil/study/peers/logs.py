@@ -13,8 +13,8 @@ from lever_cdkf.firmware.config import Config
 
 from ...envelope import firmware, pilots, plant
 from ...envelope.condition import ClosedLoop, Condition
-from ...envelope.motions import Motion, Recording, arms, lanes, stream, truth
-from ...envelope.sensors import Sensors, measured
+from ...envelope.motions import Motion, Recording, arms, lanes, truth
+from ...envelope.sensors import Sensors, lost, measured
 
 LANES = 64
 """Runs filtered at a time: more would save little time and cost memory."""
@@ -102,7 +102,7 @@ def _closed_loop(condition: Condition, loop: ClosedLoop, seeds: Sequence[int], t
     config = Config(settings=condition.settings)
     recording, track = firmware.closed_loop(config, condition.motion, seeds, loop, lambda: None)
     signals = measured(recording, Sensors(), seeds)
-    lost = np.stack([stream("lost", seed).random(len(recording.time)) < loop.lost for seed in seeds], axis=1)
+    gone = lost(seeds, len(recording.time), loop.lost, loop.lost_for)
     for name in signals if loop.whole else ("theta", "theta_dot", "tau_m"):
-        signals[name][lost] = np.nan
+        signals[name][gone] = np.nan
     return Log(condition, recording, signals, trim, track)

@@ -1,0 +1,109 @@
+"""A state space from a frequency response, by vector fitting (Gustavsen and Semlyen: Rational approximation of frequency
+domain responses by vector fitting, IEEE Trans. Power Delivery 14, 1999).
+
+    f(s) = d + sum r_k / (s - p_k)
+
+Poles are relocated to the zeros of sigma(s) = 1 + sum q_k / (s - p_k), where sigma f and sigma are fitted with the same
+poles by least squares; those that come out unstable are mirrored. Errors are relative to |f|, so that a notch counts
+as much as a peak. Coefficients are real: a complex pair of poles has the basis 1/(s-p) + 1/(s-p*), i/(s-p) - i/(s-p*).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from lever_cdkf.arrays import ComplexArray, FloatArray
+
+MOST_PAIRS = 8
+GOOD = 0.005
+"""Relative error [1] at which no further poles are tried."""
+_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Fit:
+    """f(s) = d + c (s - A)^-1 b, in real blocks."""
+
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    d: float
+    error: FloatArray
+    """Relative to |f|, at the frequencies given [1]."""
+
+    def response(self, s: ComplexArray) -> ComplexArray:
+        """At the complex frequencies s [rad/s]."""
+        state = np.linalg.solve(s[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None].astype(np.complex128))
+        response: ComplexArray = (self.c @ state)[:, 0] + self.d
+        return response
+
+
+def fit(s: ComplexArray, values: ComplexArray, most_pairs: int = MOST_PAIRS, good: float = GOOD) -> Fit:
+    """The fit with the fewest pairs of poles that is good at every frequency, or the best; s [rad/s] on the imaginary
+    axis."""
+    most = max(1, min(most_pairs, (len(s) - 1) // 2))
+    found: Fit | None = None
+    for pairs in range(1, most + 1):
+        tried = _with_pairs(s, values, pairs)
+        if found is None or tried.error.max() < found.error.max():
+            found = tried
+        if found.error.max() <= good:
+            break
+    assert found is not None
+    return found
+
+
+def _with_pairs(s: ComplexArray, values: ComplexArray, pairs: int) -> Fit:
+    low, high = np.abs(s[[0, -1]])
+    centre = np.geomspace(low, high, pairs)
+    a, b = _blocks(centre * (-0.01 + 1j))
+    weight = 1.0 / np.abs(values)
+    for _ in range(_ROUNDS):
+        basis = _basis(a, b, s)
+        ones = np.ones((len(s), 1))
+        unknown = np.hstack((basis, ones, -values[:, None] * basis))
+        solution = _least_squares(unknown * weight[:, None], values * weight)
+        zeros = np.linalg.eigvals(a - np.outer(b, solution[len(a) + 1 :]))
+        a, b = _blocks(_stable_pairs(zeros))
+    basis = _basis(a, b, s)
+    solution = _least_squares(np.hstack((basis, np.ones((len(s), 1)))) * weight[:, None], values * weight)
+    error = np.abs(basis @ solution[:-1] + solution[-1] - values) * weight
+    return Fit(a, b, solution[:-1], float(solution[-1]), error)
+
+
+def _least_squares(matrix: ComplexArray, right: ComplexArray) -> FloatArray:
+    rows = np.vstack((matrix.real, matrix.imag))
+    scale = np.linalg.norm(rows, axis=0)
+    solution, *_ = np.linalg.lstsq(rows / scale, np.append(right.real, right.imag), rcond=None)
+    result: FloatArray = solution / scale
+    return result
+
+
+def _stable_pairs(poles: ComplexArray) -> ComplexArray:
+    """One of each complex pair, and real poles by themselves, mirrored into the left half-plane."""
+    stable = -np.abs(poles.real) - 1e-9 * np.abs(poles) + 1j * poles.imag
+    return stable[poles.imag >= 0.0]
+
+
+def _blocks(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """A and b in real form of the poles, of which complex ones stand for their pair."""
+    size = int(np.sum(np.where(poles.imag > 0.0, 2, 1)))
+    a, b, at = np.zeros((size, size)), np.zeros(size), 0
+    for pole in poles:
+        if pole.imag > 0.0:
+            a[at : at + 2, at : at + 2] = (pole.real, pole.imag), (-pole.imag, pole.real)
+            b[at] = 2.0
+            at += 2
+        else:
+            a[at, at], b[at] = pole.real, 1.0
+            at += 1
+    return a, b
+
+
+def _basis(a: FloatArray, b: FloatArray, s: ComplexArray) -> ComplexArray:
+    """(s - A)^-1 b at each s: (points, states)."""
+    basis: ComplexArray = np.linalg.solve(
+        s[:, None, None] * np.eye(len(a)) - a, np.broadcast_to(b[:, None], (len(s), len(a), 1)).astype(np.complex128)
+    )[:, :, 0]
+    return basis

@@ -1,0 +1,96 @@
+"""The experiment of the paper as one table for each model: `lever compare --paper`, for ../PAPER.md."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from lever_cdkf.arrays import Array
+from lever_cdkf.tables import Row
+
+from ..data import PARAMETERS
+from ..scores import settling_times
+from .campaign import Results
+from .cases import Paper, cases
+from .evaluation import FREQUENCY
+
+SEEDS = 20
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Of each run, under every level of noise; (N,) arrays."""
+
+    rms: Array
+    """Error of the three parameters relative to the truth, root of the mean square."""
+    bias: Array
+    """The largest magnitude of their mean errors."""
+    covered: Array
+    """The least share of time at which one of them is within two stated standard deviations; NaN: none are stated."""
+    followed: Array
+    """Time [s] after a jump until the natural frequency stays within 5 %; NaN: never; empty without a jump."""
+
+
+def names() -> list[str]:
+    """Return the cases of the experiment."""
+    return [name for name, case in cases().items() if isinstance(case, Paper)]
+
+
+def tables(results: Results) -> dict[str, list[Row]]:
+    """Return a table for each model, a row for each truth and estimator; a cell is median / worst of runs and levels of
+    noise."""
+    by_title: dict[str, list[Row]] = {}
+    for (model, truth, estimator), figures in _gathered(results).items():
+        by_title.setdefault(f"{model}, {results.plan.seeds} seeds", []).append(
+            {
+                "parameters": truth,
+                "estimator": estimator,
+                "rms [%]": _pair(100.0 * figures.rms),
+                "bias [%]": _pair(100.0 * figures.bias),
+                "±2σ covers [%]": _pair(-100.0 * figures.covered),
+                "f_n to 5 % [s]": _pair(np.where(np.isnan(figures.followed), np.inf, figures.followed)),
+            }
+        )
+    return by_title
+
+
+def _gathered(results: Results) -> Mapping[tuple[str, str, str], Figures]:
+    parts: dict[tuple[str, str, str], list[Figures]] = {}
+    for (name, estimator), outcome in results.outcomes.items():
+        case = cases()[name]
+        assert isinstance(case, Paper)
+        judged = case.judged(outcome.time, results.plan)
+        relative = outcome.relative[:, judged, :PARAMETERS]
+        covered = np.full(len(relative), np.nan)
+        if outcome.stated is not None:
+            inside = np.square(outcome.errors[:, judged]) <= 4.0 * outcome.stated[:, judged]
+            covered = inside[..., :PARAMETERS].mean(axis=1).min(axis=-1)
+        change = case.change(results.plan)
+        elapsed = np.empty(0) if change is None else outcome.time - change
+        figures = Figures(
+            np.sqrt(np.square(relative).mean(axis=(1, 2))),
+            np.abs(relative.mean(axis=1)).max(axis=-1),
+            covered,
+            settling_times(outcome.errors[..., FREQUENCY], elapsed) if len(elapsed) else elapsed,
+        )
+        parts.setdefault((case.model, case.truth, estimator), []).append(figures)
+    return {key: Figures(*map(np.concatenate, zip(*map(_columns, each), strict=True))) for key, each in parts.items()}
+
+
+def _columns(figures: Figures) -> Iterator[Array]:
+    yield from (figures.rms, figures.bias, figures.covered, figures.followed)
+
+
+def _pair(values: Array) -> str | None:
+    """Median and greatest of the values, of negative ones without their sign; infinity stands for never."""
+    if not len(values) or np.isnan(values).all():
+        return None
+    return " / ".join(_text(abs(float(value))) for value in (np.median(values), np.max(values)))
+
+
+def _text(value: float) -> str:
+    if not math.isfinite(value):
+        return "never"
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
