@@ -202,7 +202,8 @@ static void judge_states(evidence_t *evidence, const cdkf_t *cdkf, const evidenc
     const float since = evidence->since_change;
     evidence_note(evidence, EVIDENCE_REGRIP, since < REGRIP_TIME);
     evidence_note(evidence, EVIDENCE_NEW, !block->held && ((cdkf->trust < 1.0f) || (since < TRANSIENT)));
-    evidence_note(evidence, EVIDENCE_CHANGE, (since >= PROBATION) && (since < (PROBATION + CHANGE_REPORTED)));
+    const bool passed = (since >= PROBATION) || evidence_has(evidence, EVIDENCE_CHANGE); /* this one, or one before */
+    evidence_note(evidence, EVIDENCE_CHANGE, passed && (since < (PROBATION + CHANGE_REPORTED)));
 }
 
 void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence_block_t *block)
