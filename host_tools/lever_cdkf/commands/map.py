@@ -82,6 +82,10 @@ def run(args: argparse.Namespace) -> int:
         layout.say(f"{note}.")
     if len(changing) < len(others):
         layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
+    for each in proposed:
+        unit = mapping.sources[each.key].unit
+        if unit != each.signal.unit:
+            layout.say(f"{each.key} = {each.signal.name} has no unit: {unit} is assumed ({each.why[-1]}). Check it.")
     signals_of = _signal_options(args, mapping, proposed)
     for command in (f"lever tune {signals_of} -o my.settings", f"lever replay {signals_of}"):
         print(*layout.command_lines(command, layout.terminal_width()), sep="\n")
@@ -127,7 +131,11 @@ def _row(key: str, signal: Signal) -> Row:
 def _signal_options(args: argparse.Namespace, mapping: Mapping, proposed: list[Candidate]) -> str:
     """The log and the proposal, as arguments of commands that read signals."""
     database = f" --dbc {shlex.quote(args.dbc)}" if args.dbc else ""
-    turned = {key: ",sign=-1" if source.sign == -1 else "" for key, source in mapping.sources.items()}
-    entries = [shlex.quote(f"{each.key}={each.signal.name}{turned[each.key]}") for each in proposed]
+    entries = []
+    for each in proposed:
+        source = mapping.sources[each.key]
+        unit = f",unit={source.unit}" if source.unit != each.signal.unit else ""
+        turned = ",sign=-1" if source.sign == -1 else ""
+        entries.append(shlex.quote(f"{each.key}={each.signal.name}{unit}{turned}"))
     time = [shlex.quote(f"time={args.time}")] if args.time else []
     return f"{shlex.quote(args.log)}{database} --map {' '.join([*entries, *time])}"
