@@ -78,14 +78,10 @@ def run(args: argparse.Namespace) -> int:
     changing = [signal for signal in others if signal.changes()]
     rows = [_row("", signal) for signal in changing]
     print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json, inputs=read)
-    for note in notes_of(signals):
+    for note in [*notes_of(signals), *_assumed(mapping, proposed)]:
         layout.say(f"{note}.")
     if len(changing) < len(others):
         layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
-    for each in proposed:
-        unit = mapping.sources[each.key].unit
-        if unit != each.signal.unit:
-            layout.say(f"{each.key} = {each.signal.name} has no unit: {unit} is assumed ({each.why[-1]}). Check it.")
     signals_of = _signal_options(args, mapping, proposed)
     for command in (f"lever tune {signals_of} -o my.settings", f"lever replay {signals_of}"):
         print(*layout.command_lines(command, layout.terminal_width()), sep="\n")
@@ -98,6 +94,16 @@ def run(args: argparse.Namespace) -> int:
     if written := [str(path) for path in (args.toml, args.out) if path is not None]:
         layout.say(f"Written: {', '.join(written)}")
     return 0
+
+
+def _assumed(mapping: Mapping, proposed: list[Candidate]) -> list[str]:
+    """Units that no signal states, for the user to check."""
+    notes = []
+    for each in proposed:
+        unit = mapping.sources[each.key].unit
+        if unit != each.signal.unit:
+            notes.append(f"{each.key} = {each.signal.name} has no unit: {unit} is assumed ({each.why[-1]}); check it")
+    return notes
 
 
 def _signals(args: argparse.Namespace, start: float, length: float) -> list[Signal]:

@@ -41,7 +41,7 @@ SPELLINGS: dict[str, dict[float, tuple[str, ...]]] = {
     },
     "theta_dot": {
         1.0: ("rad/s", "rad s-1", "rad·s⁻¹", "rad*s^-1", "rad/sec", "radians per second", "rads/second"),
-        DEGREE: ("deg/s", "dps", "°/s", "deg s-1", "degs_per_sec", "degps", "dps"),
+        DEGREE: ("deg/s", "dps", "°/s", "deg s-1", "degs_per_sec", "degps"),
         math.pi / 30.0: ("rpm", "1/min", "U/min", "rev/min"),
     },
     "z_ddot": {
