@@ -301,17 +301,16 @@ class _Fit:
         return at, now, 0.0 * step
 
     def _calibrated(self, at: Array, scores: Array, now: Array) -> tuple[Calibrated, ...]:
-        """With tau_m_gain as another unknown, of which only its stated standard deviation is known."""
+        """The standard deviations contain that of tau_m_gain, of which the log says nothing: as in a Schmidt-Kalman
+        filter, it is considered, not estimated."""
         torque_sigma, h = self._settings[f"{TORQUE_GAIN}_sigma"], _STEPS[TORQUE_GAIN]
-        information = self._information(scores)
+        covariance = np.linalg.inv(self._information(scores))
         if torque_sigma > 0.0:
             gain = self._settings[TORQUE_GAIN]
             slopes = [(self._each(at, **{TORQUE_GAIN: gain + side}) - now) / side for side in (h, -h)]
-            torque = slopes[_smaller(slopes)]
-            beside = scores.T @ torque
-            own = torque @ torque + torque_sigma**-2.0
-            information = information - np.outer(beside, beside) / own
-        sigma, white = np.sqrt(np.diag(np.linalg.inv(information))), self._is_white(at)
+            shift = covariance @ (scores.T @ slopes[_smaller(slopes)]) * torque_sigma
+            covariance += np.outer(shift, shift)
+        sigma, white = np.sqrt(np.diag(covariance)), self._is_white(at)
         return tuple(
             Calibrated(
                 name,

@@ -120,7 +120,7 @@ def test_a_change_seen_with_more_torque_alone_is_no_information(
 
     def jumps(likelihood: Likelihood, assignments: Assignments, delay: float = 0.0) -> Array:
         innovations = run(likelihood, assignments, delay)
-        if assignments.get("tau_m_gain", 1.0) > 1.0:
+        if float(assignments.get("tau_m_gain", 1.0)) > 1.0:
             innovations["log_likelihood"][10_000:10_050] -= 20.0
         return innovations
 
