@@ -173,7 +173,7 @@ class Helicopter(Aircraft):
 
 @dataclass(frozen=True, kw_only=True)
 class Imported(Aircraft):
-    """An airframe from a file: [state_space.py]. Numbers of inputs and outputs count from 1; 0: the first and the second
+    """An airframe from a file: state_space.py. Numbers of inputs and outputs count from 1; 0: the first and the second
     of a file that has no more."""
 
     input: str = choice("blade", "actuator", default="blade")
@@ -262,8 +262,8 @@ def load(name_or_path: str, **changes: Any) -> Aircraft:
         system, error = response.fitted(fitted.response_gearing, fitted.delay)
         if error > WORST_FIT:
             raise place.error(
-                f"a state space fits the response to {100.0 * error:.0f} % only, and {100.0 * WORST_FIT:.0f} % is what may "
-                "fly: it needs more frequencies, or less noise"
+                f"a state space fits the response to {100.0 * error:.0f} % only, which does not fly; it must to "
+                f"{100.0 * WORST_FIT:.0f} %: give more frequencies, or less noise"
             )
         return replace(fitted, title=fitted.title or path.name, system=flyable(system, name_or_path))
     imported: Imported = read(Imported, changes, place)
@@ -290,20 +290,21 @@ def read_aircraft(values: Any, place: Place) -> Coupled:
     if not isinstance(values, dict):
         raise place.error(f"{values!r} is not a table")
     changes = {name: value for name, value in values.items() if name not in _OF_SCENARIO}
-    if not isinstance(values.get("model"), str):
+    model = values.get("model")
+    known = keys(model if isinstance(model, str) else "")
+    if unknown := next((name for name in changes if name not in known), None):
+        raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")
+    if not isinstance(model, str):
         raise place.at("model").error(
             f"must be one of {', '.join(names())}, or the path of a .toml, .mat, .npz or .csv"
         )
-    known = keys(values["model"])
-    if unknown := next((name for name in changes if name not in known), None):
-        raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")
     try:
-        aircraft = load(values["model"], **changes)
+        aircraft = load(model, **changes)
     except LeverError as error:
         raise place.error(str(error)) from None
     gearing = read_quantity("1", above=0.0, greatest=GREATEST_GEARING)(values.get("gearing"), place.at("gearing"))
     changed = "".join(f", {key} {value}" for key, value in changes.items())
-    return Coupled(aircraft, gearing, f"{values['model']}{changed}, gearing {gearing:g}")
+    return Coupled(aircraft, gearing, f"{model}{changed}, gearing {gearing:g}")
 
 
 @dataclass(frozen=True)

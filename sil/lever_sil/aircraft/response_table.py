@@ -60,15 +60,16 @@ def seat_modes(s: ComplexArray, between: ComplexArray) -> SeatTransfer:
 
 def _modes(fitted: Fit) -> SeatTransfer:
     """Its poles two by two: r / (s - p) + q / (s - o). A real one that is left over counts twice, with a zero there."""
-    poles, vectors = np.linalg.eig(fitted.a)
-    residues = (fitted.c @ vectors) * np.linalg.solve(vectors, fitted.b.astype(np.complex128))
+    system = fitted.system
+    poles, vectors = np.linalg.eig(system.a)
+    residues = (system.c @ vectors)[0] * np.linalg.solve(vectors, system.b.astype(np.complex128))[:, 0]
     known = list(zip(poles.astype(np.complex128).tolist(), residues.tolist(), strict=True))
     pairs = [((p, r), (p.conjugate(), r.conjugate())) for p, r in known if p.imag > 0.0]
     real = [each for each in known if each[0].imag == 0.0]
     real += [(real[-1][0], 0.0)] if len(real) % 2 else []
     pairs += list(zip(real[::2], real[1::2], strict=True))
     modes = [((r + q).real, -(r * o + q * p).real, -(p + o).real, (p * o).real) for (p, r), (o, q) in pairs]
-    return SeatTransfer(fitted.d, modes)
+    return SeatTransfer(float(system.d[0, 0]), modes)
 
 
 def response_table(response: Response, band: tuple[float, float] = BAND, **said: Any) -> AircraftResponse:
@@ -84,7 +85,7 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
     values = response(2j * np.pi * table.astype(np.complex128))
     sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE, **said}
     alarm = alarm_limit(sigmas["gain_sigma"])
-    limits = {"alarm": alarm, "warning": max(alarm, said.get("alarm", alarm)) + WARNING - ALARM}
+    limits = {"alarm": alarm, "warning": alarm + WARNING - ALARM}
     return AircraftResponse(table.tolist(), values.tolist(), **{**limits, **sigmas})
 
 
