@@ -9,7 +9,7 @@
 
 float estimator_state(const estimator_t *estimator, uint32_t i)
 {
-    return estimator->trim.origin[i] + estimator->trim.ahead[i] + estimator->cdkf.x[i];
+    return estimator->trim.origin[i] + estimator->cdkf.x[i];
 }
 
 void estimator_parameters(const estimator_t *estimator, float parameter[LEVER_PARAMETERS])
@@ -72,7 +72,7 @@ static float state_sigma(const estimator_t *estimator, uint32_t i, float scale)
     const float noise = trimmed ? estimator->cdkf.output_noise[i] : 0.0f;
     const float sigma = cdkf_state_sigma(&estimator->cdkf, i);
     return sqrtf((sigma * sigma) + ((noise * noise) * (LEVEL_NOISE * (s->trim_corner * s->sample_period))) +
-                 ((slow * slow) * estimator->averages.excitation_square));
+                 ((slow * slow) * estimator->learning.evidence.motion.slow));
 }
 
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate)
@@ -103,7 +103,7 @@ void estimator_health(const estimator_t *estimator, lever_health_t *health)
     health->corrupt = estimator->corrupt;
     health->late = estimator->late;
     health->recoveries = estimator->recoveries;
-    health->excitation = sqrtf(estimator->averages.excitation_square);
+    health->excitation = sqrtf(estimator->learning.evidence.motion.slow);
 }
 
 const char *lever_parameter_name(uint8_t model, uint32_t index)

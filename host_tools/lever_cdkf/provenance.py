@@ -31,8 +31,8 @@ class Provenance:
     version: str
     """Of the package."""
     revision: str | None
-    """Of the source tree that it runs from, or was installed from, with -dirty where files had changed; None where it was
-    installed from a source distribution."""
+    """Of the source tree that it runs from, or was installed from, with -dirty where files had changed; None for one
+    that was installed from a source distribution."""
     library: str
     """SHA-256 of the firmware's shared library."""
     created: str

@@ -4,8 +4,6 @@
 JSON, so plotly's Python classes are never loaded), `summary_html` makes answer and tables, `captions` says what is
 special in the estimator's model and in the truth, `page` puts it together with page.html, page.css, page.js and
 plotly.js from the plotly package.
-
-The picture of a result for a README is the top of this page: see screenshot.py.
 """
 
 from __future__ import annotations

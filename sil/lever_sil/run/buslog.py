@@ -36,19 +36,6 @@ class Frames:
         return np.flatnonzero(self.identifier == identifier)
 
 
-def interleave(parts: list[tuple[int, NDArray[np.int64], Frames]]) -> Frames:
-    """Merges lists of frames: parts are (order, sample, frames), sorted by sample, then order, then as they stand."""
-    sample = np.concatenate([sample for _, sample, _ in parts])
-    order = np.concatenate([np.full(len(frames), order) for order, _, frames in parts])
-    place = np.lexsort((order, sample))
-    return Frames(
-        np.concatenate([frames.time_us for _, _, frames in parts])[place],
-        np.concatenate([frames.identifier for _, _, frames in parts])[place],
-        np.concatenate([frames.data for _, _, frames in parts])[place],
-        np.concatenate([frames.received for _, _, frames in parts])[place],
-    )
-
-
 def lines(frames: Frames, channel: str) -> Iterator[bytes]:
     """The log in pieces; lines whose seconds have the same number of digits have the same length and go together."""
     seconds = frames.time_us // 1_000_000

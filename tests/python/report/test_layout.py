@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.report import screenshot
+import screenshot
 from lever_cdkf.report.figure import Figure, axis, line
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import screenshot
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import enum_words
-from lever_cdkf.report import screenshot, summary_html, write_report
+from lever_cdkf.report import summary_html, write_report
 from lever_cdkf.report.charts import tracking
 from lever_cdkf.report.run import COHERENT, Run
 from lever_sil.run.runner import Result

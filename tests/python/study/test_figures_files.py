@@ -21,10 +21,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+import screenshot
 from fontTools.ttLib import TTFont
 from lever_cdkf import cli
 from lever_cdkf.provenance import provenance
-from lever_cdkf.report import screenshot
 from lever_sil.study.figures import catalogue, figures_page, printed, runs
 from lever_sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
 from lever_sil.study.figures.paper import PAPER

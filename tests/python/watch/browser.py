@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lever_cdkf.report import screenshot
+import screenshot
 from processes import PATIENCE
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 

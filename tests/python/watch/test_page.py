@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import screenshot
 from lever_cdkf.can import codec
-from lever_cdkf.report import screenshot
 from processes import PATIENCE
 from python.watch.browser import Browser
 

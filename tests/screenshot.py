@@ -1,8 +1,8 @@
 """The picture of a result for a README: the top of a report (verdict, figures, the pilot's parameters) as a PNG.
 
-    python -m lever_cdkf.report.screenshot build/demo/report.html picture.png
+    python tests/screenshot.py build/demo/report.html picture.png
 
-Needs Chromium (Debian: chromium) on the PATH; nothing else in the project does.
+Needs Chromium (Debian: chromium) on the PATH; the tests of pages use it, too.
 """
 
 import os
@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from ..errors import LeverError
+from lever_cdkf.errors import LeverError
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 OFFLINE = (
@@ -51,7 +51,7 @@ def write_picture(report: str | os.PathLike[str], path: str | os.PathLike[str]) 
 
 def main(arguments: list[str]) -> int:
     if len(arguments) != 2:
-        print("usage: python -m lever_cdkf.report.screenshot REPORT.html PICTURE.png", file=sys.stderr)
+        print("usage: python tests/screenshot.py REPORT.html PICTURE.png", file=sys.stderr)
         return 2
     try:
         write_picture(*arguments)
