@@ -21,8 +21,8 @@ def build(results: Sequence[Result], seeds: int) -> str:
     """The whole page."""
     page = Page(
         "Collective bounce: seen coming, and how far it is held off",
-        f"{seeds} random pilots with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn where it is about what "
-        f"lies between accelerometer and pilot ({', '.join(FIVE)}), the firmware as shipped in the loop. What "
+        f"{seeds} random pilots with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn where it is about "
+        f"what lies between accelerometer and pilot ({', '.join(FIVE)}), the firmware as shipped in the loop. What "
         "limits the mitigation is that airframe and body: mount the accelerometer on the structure that carries the "
         "pilot's seat. "
         "Charts: of each condition the flight in which its first figure was worst.",
