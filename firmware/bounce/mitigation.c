@@ -18,13 +18,13 @@
 #define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
 #define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
 #define LIVELY 2.5e-5f       /* mean square of the rate from which on that can be told: (5 mrad/s)^2 */
-#define LEFT_LEAST 2.25e-4f   /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
-#define LEFT_PART 0.05f       /* and this part of the expected one */
-#define WEIGHED_EVERY 8u      /* samples */
-#define SLOW 100.0f           /* squares of the frequencies below which it is the pilot's own, */
-#define SLOW_TURN 10.0f       /* the root of that [rad/s] */
-#define FAST 230.0f           /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
-#define FASTEST 2500.0f       /* 8 Hz */
+#define LEFT_LEAST 2.25e-4f  /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
+#define LEFT_PART 0.05f      /* and this part of the expected one */
+#define WEIGHED_EVERY 8u     /* samples */
+#define SLOW 100.0f          /* squares of the frequencies below which it is the pilot's own, */
+#define SLOW_TURN 10.0f      /* the root of that [rad/s] */
+#define FAST 230.0f          /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
+#define FASTEST 2500.0f      /* 8 Hz */
 #define NOTCH_TURN_MOST 0.8f /* corner of the notch times a sample period, up to which it is stable */
 #define PERIOD_MOST 0.02f    /* of a filter's step [s] */
 #define LONGEST 0.1f         /* without a sample, until the filters begin anew [s] */
@@ -158,8 +158,8 @@ static void weigh(mitigation_rest_t *rest, float usual)
 {
     const float turn_square = rest->rate_square / greater(rest->square, LEFT_LEAST / FASTEST);
     rest->turn = sqrtf(lesser(greater(turn_square, SLOW), FASTEST));
-    rest->weight = between_0_and_1((rest->rate_square / usual) - 1.0f) *
-                   between_0_and_1((turn_square - SLOW) / (FAST - SLOW));
+    rest->weight =
+        between_0_and_1((rest->rate_square / usual) - 1.0f) * between_0_and_1((turn_square - SLOW) / (FAST - SLOW));
 }
 
 /* Takes that away. */

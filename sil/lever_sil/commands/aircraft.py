@@ -78,7 +78,9 @@ def run(args: argparse.Namespace) -> int:
     if args.state_space is not None:
         changes, name = [*([name] if name else []), *changes], args.state_space
         if Path(name).suffix.lower() == ".csv" and aircraft.is_response(Path(name)):
-            raise LeverError(f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space")
+            raise LeverError(
+                f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space"
+            )
     if name is None:
         print_tables({"aircraft": [{"name": each, "what": aircraft.load(each).title} for each in aircraft.names()]})
         return 0
@@ -120,7 +122,9 @@ def _say(name: str, changes: list[str]) -> None:
     print(f"{name}: fitted by {len(system.a)} states, off by {100.0 * error.max():.2g} % at most", file=sys.stderr)
     print("  frequency   response         fitted           off", file=sys.stderr)
     for i in range(0, len(s), max(1, len(s) // 12)):
-        cells = (f"{abs(z):8.4g} {math.degrees(math.atan2(z.imag, z.real)):6.1f}°" for z in (tabulated.values[i], fitted[i]))
+        cells = (
+            f"{abs(z):8.4g} {math.degrees(math.atan2(z.imag, z.real)):6.1f}°" for z in (tabulated.values[i], fitted[i])
+        )
         print(f"  {tabulated.frequency[i]:6.3g} Hz  {'  '.join(cells)}  {100.0 * error[i]:.2g} %", file=sys.stderr)
 
 
