@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray
+from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.aircraft import ALARM, WARNING, AircraftResponse, SeatTransfer
 
@@ -25,6 +25,8 @@ _NEEDED = (2.0, 7.0)
 _POINTS = 24
 LEFT = 1.5
 """[dB]"""
+_OFF = 0.05
+"""Of straight lines between the points of a table, relative to the response [1]."""
 _SEAT_MODES = 3
 _AT_SEAT = 1e-6
 """By which seat and accelerometer may differ and be one place."""
@@ -81,12 +83,32 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
             f"the response is from {band[0]:g} to {band[1]:g} Hz; the margin to bounce needs it from {_NEEDED[0]:g} to "
             f"{_NEEDED[1]:g} Hz at least, better from {BAND[0]:g} to {BAND[1]:g} Hz (frequencies are in Hz, not rad/s)"
         )
-    table = np.geomspace(low, high, _POINTS)
+    table = _frequencies(response, low, high)
     values = response(2j * np.pi * table.astype(np.complex128))
     sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE, **said}
     alarm = alarm_limit(sigmas["gain_sigma"])
     limits = {"alarm": alarm, "warning": alarm + WARNING - ALARM}
     return AircraftResponse(table.tolist(), values.tolist(), **{**limits, **sigmas})
+
+
+def _frequencies(response: Response, low: float, high: float) -> FloatArray:
+    """Those of the table [Hz]: equal ratios, or where a mode of the fuselage lies between two of them, each where
+    straight lines between the ones before are furthest off."""
+    fine = np.geomspace(low, high, 1000)
+    exact = response(2j * np.pi * fine.astype(np.complex128))
+
+    def off(table: FloatArray) -> FloatArray:
+        values = response(2j * np.pi * table.astype(np.complex128))
+        lines = np.interp(fine, table, values.real) + 1j * np.interp(fine, table, values.imag)
+        error: FloatArray = np.abs(lines / exact - 1.0)
+        return error
+
+    table = np.geomspace(low, high, _POINTS)
+    if off(table).max() > _OFF:
+        table = fine[[0, -1]]
+        while len(table) < _POINTS:
+            table = np.sort(np.append(table, fine[np.argmax(off(table))]))
+    return table
 
 
 def alarm_limit(gain_sigma: float) -> float:

@@ -352,3 +352,16 @@ def test_a_response_of_zero_is_refused(tmp_path: Path) -> None:
 def test_a_state_space_of_no_states_is_one(tmp_path: Path) -> None:
     system = StateSpace(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.full((2, 2), 60.0))
     assert len(system.minimal().balanced().a) == 0
+
+
+@pytest.mark.parametrize("name", AIRCRAFT)
+def test_a_table_shows_the_mode_between_its_frequencies(name: str) -> None:
+    """The margin of the firmware's table, linear between its points, is that of the aircraft."""
+    craft, transfer = aircraft.load(name, mode=[SIX_HZ]), arm().transfer(np.array([0]))
+    table = known_response(Coupled(craft, 1.0)).pointer
+    points = [list(getattr(table, part))[: table.count] for part in ("frequency", "real", "imaginary")]
+    tabulated = Tabulated(np.array(points[0]), np.array(points[1]) + 1j * np.array(points[2]))
+    loops = (loop_of(each, transfer, 0) for each in (Coupled(craft, 1.0), tabulated))
+    known, found = (stability.margins(loop, (1.5, 8.0)) for loop in loops)
+    assert found.gain_db == pytest.approx(known.gain_db, abs=0.5)
+    assert found.frequency == pytest.approx(known.frequency, rel=0.02)
