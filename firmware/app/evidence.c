@@ -15,11 +15,12 @@
 #define BASE_MEMORY_WRONG 0.2f /* and while it is wrong */
 #define BASE_DOUBT 0.35f       /* standard deviation of the gain up to which there may be doubt, */
 #define BASE_SURE 0.1f         /* standard deviation of the gain up to which it counts, */
-#define BASE_SURE_WRONG 0.35f  /* and while the base is wrong, when the state hardly follows it */
+#define BASE_SURE_WRONG 0.2f   /* and while the base is wrong, when the state hardly follows it */
 #define TORQUE_MEMORY 0.5f     /* [s] */
 #define TORQUE_MIN 4e-4f       /* mean square of the command from which on it says anything [N^2 m^2] */
 #define TORQUE_SURE 1.6f       /* torque of other origin over the command, both rms, that this is allowed times */
 #define NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: what a mean of products may be by chance */
+#define AWAKE 0.3f             /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
 #define REGRIP_TIME 0.038f     /* two blocks: a new grip is complete [s] [grip_step] */
 #define PROBATION 0.29f        /* until then a change has to explain the innovations [s] [rough_on_off] */
 #define EXPLAINED 0.6f         /* and leave no more of EVIDENCE_NOISE at its end */
@@ -200,8 +201,11 @@ static void judge_noise(evidence_t *evidence, const evidence_block_t *block)
 static void judge_states(evidence_t *evidence, const cdkf_t *cdkf, const evidence_block_t *block)
 {
     const float since = evidence->since_change;
+    evidence->awake = evidence_has(evidence, EVIDENCE_REST) ? 0.0f : lesser(evidence->awake + block->period, AWAKE);
+    evidence_note(evidence, EVIDENCE_REST, evidence->awake < (AWAKE - 0.001f));
     evidence_note(evidence, EVIDENCE_REGRIP, since < REGRIP_TIME);
-    evidence_note(evidence, EVIDENCE_NEW, !block->held && ((cdkf->trust < 1.0f) || (since < TRANSIENT)));
+    const float transient = evidence->opened ? CHANGE_REPORTED : TRANSIENT;
+    evidence_note(evidence, EVIDENCE_NEW, !block->held && ((cdkf->trust < 1.0f) || (since < transient)));
     const bool passed = (since >= PROBATION) || evidence_has(evidence, EVIDENCE_CHANGE); /* this one, or one before */
     evidence_note(evidence, EVIDENCE_CHANGE, passed && (since < (PROBATION + CHANGE_REPORTED)));
 }
@@ -239,7 +243,8 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     judge_noise(evidence, block);
     judge_states(evidence, cdkf, block);
     (void)evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
-    if (adapts && moves && !block->held) { /* of an arm that has changed meanwhile it would say the same */
+    if (adapts && moves && !block->held &&
+        (evidence->ratio[EVIDENCE_BASE] < DOUBT)) { /* of an arm that has changed meanwhile it would say the same */
         (void)evidence_set(evidence, EVIDENCE_CALIBRATION, calibration_step(&evidence->calibration, cdkf, period));
     }
     (void)evidence_set(evidence, EVIDENCE_INNOVATION, evidence->nis_slow);
@@ -269,10 +274,11 @@ bool evidence_of_change(evidence_t *evidence, const correction_t *correction, co
     return (ratio > 1.0f) && ((since >= CHANGE_REPORTED) || again) && (evidence->ratio[EVIDENCE_BASE] < DOUBT);
 }
 
-void evidence_begin_change(evidence_t *evidence)
+void evidence_begin_change(evidence_t *evidence, bool known, bool opened)
 {
-    evidence->since_change = 0.0f;
-    evidence_note(evidence, EVIDENCE_REGRIP, true);
+    evidence->since_change = known ? 0.0f : PROBATION;
+    evidence->opened = opened;
+    evidence_note(evidence, EVIDENCE_REGRIP, known);
 }
 
 float evidence_of_torque(const evidence_t *evidence)

@@ -56,6 +56,7 @@ typedef struct evidence {
     float nis_slow;                /* and over excitation_time */
     motion_t motion;
     stillness_t stillness[SIGNAL_COUNT];
+    float awake;                 /* time since there was too little motion [s] */
     float alive;                 /* time in which the base acceleration has changed all the time [s] */
     float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been refused [s] */
     input_gate_t input[INPUT_COUNT];
@@ -67,6 +68,7 @@ typedef struct evidence {
     hands_t hands;
     grip_force_t force;
     bool seen[SIGNAL_COUNT]; /* in this block */
+    bool opened;             /* the last change was to another pilot */
 } evidence_t;
 
 #define EVIDENCE_LONG_AGO 1.0e3f /* [s] */
@@ -144,8 +146,8 @@ void evidence_show(evidence_t *evidence);
 /* A correction that the block has taught. Returns true when the pilot has changed. */
 bool evidence_of_change(evidence_t *evidence, const correction_t *correction, const evidence_block_t *block);
 
-/* The pilot changed just now. */
-void evidence_begin_change(evidence_t *evidence);
+/* The pilot changed just now; `opened`: to another one. An arm that is not known yet does not grip anew. */
+void evidence_begin_change(evidence_t *evidence, bool known, bool opened);
 
 /* How much torque the lever is moved by that nobody knows, 0 to 1: as far as innovations are larger than expected. */
 float evidence_of_torque(const evidence_t *evidence);

@@ -5,7 +5,7 @@
 #define KEEP_PERIOD 1.0f      /* [s] [base_sign] */
 #define DISTURBANCE 2.0f      /* process noise when the torque is unknown, in noise_range times the one that is set */
 #define DISTURBANCE_TIME 0.4f /* its time constant [s] [hands_off] */
-#define NOISE_WINDOW 0.15f    /* of noise_window while noise has grown */
+#define NOISE_WINDOW 0.15f    /* of noise_window while noise has grown [rough_begins] */
 
 /* --- actions ------------------------------------------------------------------------------------------------------ */
 
@@ -60,8 +60,7 @@ static float turn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, uint
     if ((actions & (uint32_t)ACTION_OPEN) != 0u) {
         cdkf_open(cdkf);
         keep_only(learning, cdkf);
-        evidence_begin_change(&learning->evidence);
-        learning->opened = true;
+        evidence_begin_change(&learning->evidence, true, true);
         learning->verdict = verdict_of(learning->evidence.present);
     }
     if ((actions & (uint32_t)ACTION_RESTORE) != 0u) {
@@ -69,7 +68,7 @@ static float turn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, uint
     }
     if ((actions & (uint32_t)ACTION_LEVELS) != 0u) {
         const float part = evidence_of_torque(&learning->evidence);
-        learning->levels = setup->constants.trim && (learning->opened || (part > 0.0f));
+        learning->levels = setup->constants.trim && (learning->evidence.opened || (part > 0.0f));
         if (!learning->levels && (part > 0.0f)) {
             disturb(s, cdkf, part);
         }
@@ -98,6 +97,16 @@ static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *c
     }
 }
 
+/* A change of an arm that is not known yet: far from the truth, or with noise set far too small, torque is unknown. */
+static float disturb_unknown(const learning_t *learning, const lever_settings_t *s, cdkf_t *cdkf)
+{
+    const float part = evidence_of_torque(&learning->evidence);
+    if (part > 0.0f) {
+        disturb(s, cdkf, part);
+    }
+    return s->change_walk;
+}
+
 /* The parameters take what the block says, and walk. */
 static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, const evidence_block_t *block, float more)
 {
@@ -116,9 +125,9 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
             correction.bounded = cdkf_learn_step(cdkf, &step);
         }
         if (evidence_of_change(&learning->evidence, &correction, block)) {
-            evidence_begin_change(&learning->evidence);
-            learning->opened = false;
-            walk = turn(learning, setup, cdkf, verdict_of(learning->evidence.present));
+            evidence_begin_change(&learning->evidence, block->known, false);
+            walk = block->known ? turn(learning, setup, cdkf, verdict_of(learning->evidence.present))
+                                : disturb_unknown(learning, setup->settings, cdkf);
         }
     }
     evidence_note(&learning->evidence, EVIDENCE_BOUND, correction.bounded);
@@ -173,8 +182,9 @@ static void end_block(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, 
         keep(learning, cdkf, block.period, true);
     } else {
         estimate_noise(learning, setup, cdkf, block.period);
-        if (verdict_rows[learning->verdict].adapt) {
-            keep(learning, cdkf, block.period, learning->noise.elapsed > 0.0f);
+        if (verdict_rows[learning->verdict].adapt ||
+            (evidence->opened && verdict_rows[learning->verdict].learn)) { /* nothing else is left to return to */
+            keep(learning, cdkf, block.period, evidence->opened || (learning->noise.elapsed > 0.0f));
         }
         learn(learning, setup, cdkf, &block, more);
     }
@@ -193,7 +203,6 @@ void learning_start(learning_t *learning, const setup_t *setup, cdkf_t *cdkf)
     keep_only(learning, cdkf);
     learning->elapsed = 0.0f;
     learning->verdict = (uint8_t)VERDICT_REST;
-    learning->opened = false;
     learning->levels = false;
 }
 

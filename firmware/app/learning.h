@@ -18,7 +18,6 @@ typedef struct learning {
     float kept_ago;     /* time since the first [s] */
     float elapsed;      /* since the parameters learnt last [s] */
     uint8_t verdict;    /* enum verdict */
-    bool opened;        /* the last change was another pilot */
     bool levels;        /* levels and state are to begin anew */
 } learning_t;
 

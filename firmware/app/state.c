@@ -55,10 +55,10 @@ static const state_row_t rows[] = {
     FLAGS(estimator.learning.evidence.hands.idle, estimator.learning.evidence.hands.idle),
     FLOATS(estimator.learning.evidence.force.raw, estimator.learning.evidence.force.means.time),
     FLAGS(estimator.learning.evidence.force.seen, estimator.learning.evidence.force.wrong),
-    FLAGS(estimator.learning.evidence.seen[0], estimator.learning.evidence.seen[SIGNAL_BASE]),
+    FLAGS(estimator.learning.evidence.seen[0], estimator.learning.evidence.opened),
     FLOATS(estimator.learning.noise.elapsed, estimator.learning.elapsed),
     BYTES(estimator.learning.verdict, estimator.learning.verdict, (uint32_t)VERDICT_COUNT - 1u),
-    FLAGS(estimator.learning.opened, estimator.learning.levels),
+    FLAGS(estimator.learning.levels, estimator.learning.levels),
 
     FLOATS(estimator.trim.output[0].section[0].level, estimator.trim.corner),
     FLAGS(estimator.trim.deviations, estimator.trim.deviations),
@@ -322,14 +322,14 @@ static bool can_return(const estimator_t *estimator, const snapshot_t *kept)
 /* What the belief is moved by is no more than settings and samples can make it, so that no product of it overflows. */
 static bool is_moderate(const cdkf_t *cdkf)
 {
-    float size = fabsf(cdkf->growth);
+    float size = cdkf->growth;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         size += fabsf(cdkf->walk[i]);
         for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
             size += fabsf(cdkf->considered[c].w[i]);
         }
     }
-    return size < MODERATE;
+    return (size < MODERATE) && (cdkf->growth >= 0.0f);
 }
 
 /* Values that are possible one by one may contradict each other: the filter keeps its invariant, and all of the

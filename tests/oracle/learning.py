@@ -25,6 +25,7 @@ UNEXPLAINED = (3.0, 1.8)  # their mean square until then, and at its end
 EXPLAINED = 1.3  # with which noise that had grown is right again
 NOISE_WINDOW = 0.15  # of noise_window, while noise has grown
 LONG_AGO = 1e3  # [s]
+AWAKE = 0.3  # [s] until motion is believed after a rest
 KEEP_PERIOD = 1.0  # [s]
 DISTURBANCE = 2.0  # process noise after a change, in noise_range times the one that is set
 DISTURBANCE_TIME = 0.4  # [s] in which it dies away
@@ -88,7 +89,7 @@ class Learning:
         self.change = ChangeDetection(settings["change_memory"], settings["change_threshold"])
         self.elapsed = 0.0  # since the parameters learnt last [s]
         self.counted = seconds(0.0)  # the same
-        self.since_change = seconds(LONG_AGO)
+        self.since_change, self.awake = seconds(LONG_AGO), seconds(0.0)
         self.verdict = "rest"
         self.explains = False  # innovations tell from now on whether a change explains them
         self.moved = False  # a new grip is complete, and has moved the lever
@@ -119,6 +120,7 @@ class Learning:
 
     def _end_block(self, period: float, counted: np.float32, lesson: Lesson) -> None:
         self.since_change = min(self.since_change + counted, seconds(LONG_AGO))
+        self.awake = min(self.awake + counted, seconds(AWAKE)) if lesson.excited else seconds(0.0)
         suddenly = self._turn(self._verdict(counted, lesson), lesson)  # seconds of the walk at once
         if self.verdict == "noise":
             self.since_change = seconds(LONG_AGO)  # it was no change
@@ -135,8 +137,7 @@ class Learning:
         if learns and self.step_sigma > 0.0:
             self._learn_step(score)
         if learns and self.adapted and self._has_changed(correction, variance, period):
-            self.since_change = seconds(0.0)
-            suddenly = self._turn("regrip", lesson)
+            suddenly = self._follow(lesson)
         self.belief.forget(self.growth * period)
         self.belief.walk(self.walk * period + self.floor * suddenly)
         self.belief.limit(self.greatest_sigma)
@@ -156,7 +157,7 @@ class Learning:
             return "noise"
         if not lesson.measured:
             return "blind"
-        if not lesson.excited:
+        if self.awake < AWAKE - 0.001:
             return "rest"
         if self.since_change < seconds(GRIP):
             return "regrip"
@@ -180,13 +181,11 @@ class Learning:
         if verdict == "noise":
             self._restore()
         if before == "regrip":
-            part = float(np.interp(lesson.surprise, SURPRISES, (0.0, 1.0)))
             self.explains = True
-            self.moved = self.detrended and part > 0.0
-            if part > 0.0 and not self.detrended:
-                self.disturbance = (
-                    part * DISTURBANCE * self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
-                )
+            if self.detrended:
+                self.moved = lesson.surprise > SURPRISES[0]
+            else:
+                self._disturb(lesson)
         return self.settings["change_walk"] if verdict == "regrip" else 0.0
 
     def _learn(self, period: np.float32) -> tuple[Array, Array]:
@@ -202,6 +201,22 @@ class Learning:
         if self.adapted:
             correction = self.belief.w - w
         return correction, np.sum(factor**2 - self.belief.w_factor**2, axis=1)
+
+    def _follow(self, lesson: Lesson) -> float:
+        """A known arm has changed, and grips anew; of an unknown one, torque is unknown. Returns seconds of the walk."""
+        if self.kept[1].trust >= 1.0:
+            self.since_change = seconds(0.0)
+            return self._turn("regrip", lesson)
+        self.since_change = seconds(PROBATION)
+        self._disturb(lesson)
+        return self.settings["change_walk"]
+
+    def _disturb(self, lesson: Lesson) -> None:
+        """As far as innovations are larger than expected, the state is moved by unknown torque."""
+        part = float(np.interp(lesson.surprise, SURPRISES, (0.0, 1.0)))
+        if part > 0.0:
+            noise = self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
+            self.disturbance = part * DISTURBANCE * noise
 
     def _has_changed(self, correction: Array, variance: Array, period: float) -> bool:
         """Whether the corrections say so; soon after another change of a known arm only."""

@@ -129,7 +129,7 @@ TEST(a_reset_leaves_nothing_of_what_was)
     for (uint32_t i = 0u; i < (sizeof value / sizeof value[0]); i++) {
         *value[i] = 1.0f;
     }
-    bool *const flag[] = {&learning->opened, &learning->levels, &now->frozen};
+    bool *const flag[] = {&learning->levels, &now->frozen};
     for (uint32_t i = 0u; i < (sizeof flag / sizeof flag[0]); i++) {
         *flag[i] = true;
     }

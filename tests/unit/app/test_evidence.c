@@ -304,7 +304,7 @@ TEST(a_torque_that_follows_again_is_right_and_without_dither_nothing_is_said)
     TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_MOTOR));
 }
 
-/* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.35, they
+/* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.2, they
  * count: of a gain of 0 and of 1. Nothing is held against it before the arm is known, but while the parameters are held. */
 TEST(the_verdict_on_the_base_waits_until_it_is_sure)
 {
@@ -315,8 +315,8 @@ TEST(the_verdict_on_the_base_waits_until_it_is_sure)
         bool is;
         float kept;
     } row[] = {{50.0f, 0.02f, false, false, 48.0f}, {5.0f, 0.02f, true, true, 4.5f},
-        {99.0f, 1e-9f, false, false, 99.0f}, {101.0f, 1e-9f, false, true, 0.0f}, {8.0f, 1e-9f, true, true, 8.0f},
-        {8.3f, 1e-9f, true, false, 0.0f}};
+        {99.0f, 1e-9f, false, false, 99.0f}, {101.0f, 1e-9f, false, true, 0.0f}, {24.0f, 1e-9f, true, true, 24.0f},
+        {26.0f, 1e-9f, true, false, 0.0f}};
     for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         const evidence_block_t block = {.setup = &setup, .period = row[i].period, .held = true};
         setUp();
@@ -365,6 +365,19 @@ TEST(the_verdict_on_the_torque_waits_until_enough_is_asked)
     }
 }
 
+/* The lack of motion is noted with each sample; the rest ends 0.3 s later. */
+/* R56 */
+TEST(a_rest_lasts_so_much_longer_than_the_lack_of_motion)
+{
+    evidence_note(&evidence, EVIDENCE_REST, true);
+    end_block();
+    for (uint32_t k = 1u; k <= 20u; k++) {
+        evidence_note(&evidence, EVIDENCE_REST, false);
+        end_block();
+        TEST_ASSERT_EQUAL(k < 15u, evidence_has(&evidence, EVIDENCE_REST));
+    }
+}
+
 /* --- changes ------------------------------------------------------------------------------------------------------ */
 
 /* Blocks of 20 ms from a change on: the fast mean of NIS that each verdict allows, and what is found at its end. */
@@ -398,8 +411,10 @@ TEST(a_change_has_to_explain_the_innovations_within_its_probation)
 /* One is reported from the end of its probation for three seconds; learnt with noise as it was for the first. */
 TEST(a_change_passes_through_its_stages)
 {
-    evidence_begin_change(&evidence);
-    TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_REGRIP));
+    evidence_begin_change(&evidence, false, false);
+    TEST_ASSERT_TRUE(!evidence_has(&evidence, EVIDENCE_REGRIP) && (evidence.since_change > 0.28f));
+    evidence_begin_change(&evidence, true, false);
+    TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_REGRIP) && (evidence.since_change == 0.0f));
     for (uint32_t k = 1u; k <= 200u; k++) {
         const double since = 0.02 * (double)k;
         end_block();

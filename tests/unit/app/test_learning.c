@@ -225,10 +225,10 @@ TEST_EACH(4, a_new_grip_moves_the_level_of_a_trim_that_is_followed)
     start();
     estimator_t *estimator = &lever->estimator;
     (void)run(5000u);
-    evidence_begin_change(&estimator->learning.evidence);
+    evidence_begin_change(&estimator->learning.evidence, true, false);
     estimator->learning.verdict = (uint8_t)VERDICT_REGRIP;
     estimator->learning.evidence.since_change = 0.0375f;
-    estimator->learning.opened = true;
+    estimator->learning.evidence.opened = true;
     for (uint32_t k = 0u; (k < 20u) && (estimator->cdkf.acting <= (uint32_t)CDKF_STEP); k++) {
         (void)run(1u);
     }
@@ -327,9 +327,9 @@ static learning_t *start_learning(uint32_t samples)
 TEST(what_was_under_way_ends_when_it_is_frozen)
 {
     learning_t *learning = start_learning(400u);
-    evidence_begin_change(&learning->evidence);
+    evidence_begin_change(&learning->evidence, true, false);
     learning->verdict = (uint8_t)VERDICT_REGRIP;
-    learning->opened = true;
+    learning->evidence.opened = true;
     lever->estimator.cdkf.acting = (uint32_t)CDKF_CONSIDERED;
     request(LEVER_REQUEST_FREEZE);
     (void)run(20u);
