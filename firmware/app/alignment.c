@@ -31,7 +31,8 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
             angle += (sample->y[0] - angle) / greater(alignment->count, 1.0f);
         }
         trim_start(&estimator->trim, angle, settings->trim_corner, estimator->setup.constants.trim);
-        estimator->trim_sine_cosine = sine_cosine(trim_angle(&estimator->trim));
+        estimator->rest_angle = trim_angle(&estimator->trim);
+        estimator->trim_sine_cosine = sine_cosine(estimator->rest_angle);
         estimator->z_ddot = sample->z_ddot;
         estimator->tau_m = sample->tau_m;
         (void)memset(&estimator->base_motion, 0, sizeof estimator->base_motion);
@@ -63,6 +64,7 @@ void alignment_begin_grip(estimator_t *estimator, const checked_t *sample)
     const float x[MODEL_STATES] = {
         sample->valid[0] ? sample->y[0] : cdkf->x[0], sample->valid[1] ? sample->y[1] : cdkf->x[1]};
     trim_begin(&estimator->trim, x);
+    estimator->rest_angle = trim_angle(&estimator->trim);
     cdkf_start_state(cdkf, origin, cdkf->output_noise);
     cdkf_begin_step(cdkf);
     estimator->z_ddot = 0.0f;

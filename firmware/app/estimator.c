@@ -50,6 +50,7 @@ void estimator_start_over(estimator_t *estimator)
     estimator->restarts = 0.0f;
     (void)memset(&estimator->trim, 0, sizeof estimator->trim);
     estimator->trim_sine_cosine = sine_cosine(0.0f);
+    estimator->rest_angle = 0.0f;
     estimator->mode = LEVER_MODE_INIT;
     estimator->frozen = false;
     estimator->last_z_ddot = 0.0f;

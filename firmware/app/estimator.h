@@ -29,6 +29,7 @@ typedef struct estimator {
     learning_t learning;
     trim_t trim;
     sine_cosine_t trim_sine_cosine; /* sine and cosine of the trim angle */
+    float rest_angle;               /* mean trim angle, about which dynamics are reported [rad] */
     alignment_t alignment;
     enum lever_mode mode;
     uint32_t time_us;      /* of the last sample */

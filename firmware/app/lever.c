@@ -92,12 +92,11 @@ bool instance_is_estimating(const lever_t *lever)
            ((lever->estimator.faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
 }
 
-/* The estimate is trustworthy enough for a margin: it has been learnt, the model fits and the sensors work. */
+/* The estimate is trustworthy enough for a margin: it has been learnt, and the sensors work. */
 static bool carries_margin(const lever_t *lever)
 {
     const uint32_t broken = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_CLOCK |
-                            (uint32_t)LEVER_FAULT_BOUND | (uint32_t)LEVER_FAULT_RECOVERED |
-                            (uint32_t)LEVER_FAULT_MISMATCH;
+                            (uint32_t)LEVER_FAULT_BOUND | (uint32_t)LEVER_FAULT_RECOVERED;
     const enum lever_mode mode = lever->estimator.mode;
     return verdict_of_now(lever)->margin && ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) &&
            ((lever->estimator.faults & broken) == 0u) && (lever->estimator.cdkf.trust >= 1.0f);
@@ -111,7 +110,8 @@ void instance_watch(lever_t *lever)
     if ((time_us - bounce->time_us) >= greater_count(publish_us, MARGIN_US)) {
         bounce->time_us = time_us;
         bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
-        bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever));
+        const bool doubtful = ((lever->estimator.faults & (uint32_t)LEVER_FAULT_MISMATCH) != 0u);
+        bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever), doubtful);
     }
 }
 

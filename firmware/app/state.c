@@ -66,7 +66,7 @@ static const state_row_t rows[] = {
     MEMBERS(estimator.mode, estimator.mode, (uint8_t)sizeof(enum lever_mode), (uint32_t)LEVER_MODE_FAULT),
     WORDS(estimator.time_us, estimator.late_series_us),
     FLOATS(estimator.raw_z_ddot, estimator.base_missing),
-    FLOATS(estimator.seat.z_ddot, estimator.seat.rate[LEVER_SEAT_MODES - 1]),
+    FLOATS(estimator.seat.place[0], estimator.seat.z_ddot),
     FLOATS(estimator.last_z_ddot, estimator.nis),
     BYTES(estimator.nis_size, estimator.nis_size, (uint32_t)CDKF_OUTPUTS),
     FLAGS(estimator.frozen, estimator.communication_fault),

@@ -14,6 +14,7 @@
 #define SAME_US 22000u       /* a sensor that says the same for longer is stuck, */
 #define SAME_LEAST 8u        /* if for so many samples more than */
 #define SAME_USUAL 3u        /* times the most for which it did lately */
+#define LETTING_GO 0.95f     /* of a correction that no model stands behind any more, what a sample leaves */
 #define MEMORY 0.5f          /* of how the lever moves [s] */
 #define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
 #define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
@@ -205,8 +206,8 @@ static float angle_of(
         const float involuntary = mitigation->trust * mitigation->involuntary.theta;
         const float damping = 2.0f * settings->notch_damping_ratio;
         const float share = share_of(period, MEMORY);
-        const float all = sample->theta - involuntary;
-        float left = all;
+        const float unexplained = sample->theta - involuntary;
+        float left = unexplained;
         for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
             left = take_rest(&mitigation->rest[i], left, period, share, damping);
         }
@@ -216,7 +217,7 @@ static float angle_of(
             weigh(&mitigation->rest[1], usual);
         }
         angle = (mitigation->trust * involuntary_angle(&mitigation->involuntary, settings->correction_delay)) +
-                (all - left);
+                (unexplained - left);
     }
     return angle;
 }
@@ -254,6 +255,7 @@ static void advance(mitigation_t *mitigation, const lever_settings_t *settings, 
         mitigation->correction = -clamped(angle_of(mitigation, settings, sample, period), settings->correction_limit);
     } else {
         mitigation->explained = false;
+        mitigation->correction *= LETTING_GO;
     }
 }
 

@@ -33,6 +33,7 @@ UNKNOWN = 10.0  # process noise for an unknown base acceleration, in those that 
 SPIKE = 8.0  # standard deviations
 SURPRISE_TIME = 0.1  # [s] of the shorter average of normalised innovations
 SURPRISE_MOST = 100.0  # of a single sample
+REST_TIME = 1.0  # [s]
 UNSETTLED = 4.0  # innovations while levels settle, in squares: as much larger as they may be
 SPIKE_TIME = 0.02  # [s] longer than this it is no spike
 STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
@@ -91,6 +92,7 @@ class Estimator:
         self.detrended = preload == "trim"
 
         self.outputs = (Detrend(start.trim), Detrend())  # θ, whose level is the trim angle, and θ̇
+        self.rest = start.trim  # mean of the trim angle, about which dynamics are reported [rad]
         self.inputs = (Detrend(), Detrend(), Detrend())  # z̈, τ_m, friction of 1 N m
         self.origin = np.array((start.trim, 0.0)) if self.detrended else np.zeros(2)  # what x counts from
         x = start.state.astype(np.float64) - self.origin
@@ -272,6 +274,7 @@ class Estimator:
             if waiting:
                 detrend.hold()
             self.missing[i] += seconds(dt)
+        self.rest += min(dt / REST_TIME, 1.0) * (self.trim - self.rest)
         return deviation, back
 
     def _begin_grip(self, x: Array) -> None:
@@ -281,6 +284,7 @@ class Estimator:
             return
         for detrend, value in zip(self.outputs, self.origin + x, strict=True):
             detrend.begin(float(value))
+        self.rest = self.trim
         for detrend in self.inputs:
             detrend.begin(detrend.level)
         if self.grip is not None:
@@ -383,7 +387,7 @@ class Estimator:
     def dynamics(self) -> tuple[Array, Array]:
         """Natural frequency [Hz] and damping ratio [1] of the estimate; standard deviations by sigma points."""
         points = self.scale.physical(cdkf.draw(self.belief.w, self.belief.w_factor))
-        values = self.model.dynamics(points, self.trim)
+        values = self.model.dynamics(points, self.rest)
         _, first, second = cdkf.differences(values)
         slope = np.linalg.solve(self.belief.w_factor.T, first.T).T
         errors = slope @ self.belief.errors[: len(self.scale.names)]

@@ -32,9 +32,9 @@ collective pitch [rad] and gust [m/s^2], outputs vertical acceleration at the pi
                            which of more inputs and outputs they are, from 1
 
 A response that was measured or computed elsewhere, with gearing, is a .csv file of frequency [Hz], real and imaginary
-part of the acceleration at the seat over the lever's angle [(m/s^2)/rad]; two columns more are that at the seat over that
-at the accelerometer. The table is of what it holds; a state space is fitted to it to fly, with response_gearing= and
-delay= for what of these is in it, and the fit is shown.
+part of the acceleration at the seat over the lever's angle [(m/s^2)/rad]; two columns more are that at the seat over
+that at the accelerometer. The table is of what it holds; a state space is fitted to it to fly, with response_gearing=
+and delay= for what of these is in it, and the fit is shown.
 """
 _EPILOG = """\
 examples:
@@ -73,11 +73,12 @@ def run(args: argparse.Namespace) -> int:
     from lever_cdkf.tables import print_tables
 
     from ..aircraft import aircraft
+    from ..aircraft.tabulated import is_response
 
     name, changes = args.aircraft, list(args.changes)
     if args.state_space is not None:
         changes, name = [*([name] if name else []), *changes], args.state_space
-        if Path(name).suffix.lower() == ".csv" and aircraft.is_response(Path(name)):
+        if Path(name).suffix.lower() == ".csv" and is_response(Path(name)):
             raise LeverError(
                 f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space"
             )
@@ -102,9 +103,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _say(name: str, changes: list[str]) -> None:
     """What has become of a file, on standard error. Raises LeverError."""
-    from ..aircraft.aircraft import FILES, is_response
+    from ..aircraft.aircraft import FILES
     from ..aircraft.state_space import read
-    from ..aircraft.tabulated import Tabulated
+    from ..aircraft.tabulated import Tabulated, is_response
 
     path, given = Path(name), _of_aircraft(changes)
     if path.suffix.lower() not in FILES:
@@ -137,9 +138,8 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
     from lever_cdkf.errors import LeverError
     from lever_cdkf.firmware.native import Config, Estimator
 
-    from ..aircraft.aircraft import is_response
     from ..aircraft.response_table import known_response, measured_response
-    from ..aircraft.tabulated import Tabulated
+    from ..aircraft.tabulated import Tabulated, is_response
 
     given = _assignments(changes)
     said = {key: _quantity(key, given[key], unit) for key, unit in _SAID.items() if key in given}
@@ -153,7 +153,7 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
         else:
             coupled = _flown(name, flown)
             whole = coupled.name
-            table = known_response(coupled, **said)
+            table = known_response(coupled, None, **said)
         Estimator(Config()).watch(table)  # which refuses what it cannot use
     except LeverError as error:
         text = str(error)
