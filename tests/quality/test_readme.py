@@ -41,6 +41,8 @@ SHORTER = {
     **readmes.SHORTER,
     r"--seeds 4": "--seeds 2",
     r"lever compare --scenarios step_up": r"\g<0> --duration 3",
+    r"--seeds 20": "--seeds 1 --duration 2",
+    r"lever compare --paper": r"\g<0> --seeds 1 --duration 2 --estimators dual_annealing rls",
     r"lever campaign quick(?= -o)": "lever campaign quick.toml --workers 1",
     r"lever campaign quick(?= --run)": "lever campaign quick.toml",
     r'duration="1 s"': 'duration="0.5 s"',

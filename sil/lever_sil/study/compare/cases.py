@@ -52,6 +52,8 @@ class Plan:
     duration: float | None = None
     """[s]; None: each case's own. Moments inside a run move in proportion."""
     seed: int = 1
+    data: str | None = None
+    """Folder of files that batches are read from (dataset.py); None: they are drawn."""
 
     @property
     def is_whole(self) -> bool:
@@ -164,6 +166,13 @@ class WrongNoise(Matched):
 
 
 @dataclass(frozen=True, kw_only=True)
+class WrongTuning(Matched):
+    """A matched case for firmware whose noise, first uncertainty or walk is wrong, alone and in pairs."""
+
+    kind: str = "wrong tuning"
+
+
+@dataclass(frozen=True, kw_only=True)
 class Stepped(Case):
     """A step of stiffness and damping (steps.py); errors are judged from 15 s to the step, while nothing happens."""
 
@@ -269,10 +278,16 @@ class Recorded(Case):
         return jumps[-1] if jumps else None
 
 
+ON_REQUEST = ("paper", "wrong tuning")
+"""Kinds of cases that are run only where they are named: they belong to ../PAPER.md."""
+
+
 @cache
 def cases() -> Mapping[str, Case]:
     """All there are, by name."""
-    return {case.name: case for case in (*_matched(), *_steps(), *_wrong_noise(), *_paper(), *_recorded())}
+    return {
+        case.name: case for case in (*_matched(), *_steps(), *_wrong_noise(), *_wrong_tuning(), *_paper(), *_recorded())
+    }
 
 
 _WITH_TORQUE = ("lever", "linear_physical")
@@ -321,6 +336,12 @@ def _wrong_noise() -> Iterator[Case]:
     for preload in ("fixed", "trim"):
         title = f"told R and Q wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither"
         yield WrongNoise(name=f"wrong_noise_{preload}", title=title, preload=preload, dither_rms=DITHER)
+
+
+def _wrong_tuning() -> Iterator[Case]:
+    for preload in ("fixed", "trim"):
+        title = f"R, Q, prior, walk wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither"
+        yield WrongTuning(name=f"wrong_tuning_{preload}", title=title, preload=preload, dither_rms=DITHER)
 
 
 def _paper() -> Iterator[Case]:
