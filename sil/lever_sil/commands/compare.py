@@ -35,11 +35,13 @@ also writes into DIR
 
 With --paper instead: the experiment of the paper that the estimator comes from (sil/lever_sil/study/PAPER.md), by 20
 seeds: parameters that stay, drift or jump, two levels of noise in each channel, each kind of parameter noise. A table
-for each model; cells are median / worst of all runs and levels of noise. Two minutes of processor time.
+for each model; cells are median / worst of all runs and levels of noise. Some minutes of processor time.
 
 With --data alone: writes the runs into DIR as Parquet, with their truth, and an index with checksums, for estimators
 that are not in Python. With --score: an estimator of yours takes part, a class with the methods start(config),
-step(sample) and estimate() (sil/lever_sil/study/PAPER.md has an example); with both, on the runs in DIR.
+step(sample) and estimate() (sil/lever_sil/study/PAPER.md has an example), beside two others unless --estimators names
+some, on 20 runs each of lever_trim_dither_rough and step_up unless --scenarios and --seeds say otherwise; with both
+options, on the runs in DIR.
 
 With --envelope instead: the firmware beside joint EKF and UKF in the conditions of `lever envelope` (8 pilots each),
 these given the true process noise and the trim, with and without a fourth-order high-pass (_hp) in front.
@@ -55,6 +57,7 @@ examples:
   lever compare --out out/compare                the whole campaign, some ten minutes of processor time
   lever compare --paper --seeds 4                some runs of the experiment of the paper
   lever compare --score mine:Ukf --scenarios step_up --seeds 8        an estimator of yours beside two of these
+  lever compare --data out/runs                                       the runs of two cases as files, for others
   lever compare --envelope --quick               some conditions of `lever envelope`, a minute on two cores
   lever compare --envelope --scenarios steady retrim --estimators firmware joint_ekf_hp
 
@@ -82,7 +85,10 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     compare.add_argument("--score", metavar="MODULE:CLASS", help="an estimator of yours, as one more")
     compare.add_argument("--data", metavar="DIR", type=Path, help="write the runs there; with --score read them")
     compare.add_argument(
-        "--scenarios", nargs="+", metavar="NAME", help="cases of --list (default: all but paper_*, wrong_tuning_*)"
+        "--scenarios",
+        nargs="+",
+        metavar="NAME",
+        help="cases of --list (default: all but those of --paper, wrong_tuning_*, remnant_*, square_wave)",
     )
     compare.add_argument("--models", nargs="+", metavar="MODEL", help="only cases of these models (default: all)")
     compare.add_argument("--estimators", nargs="+", metavar="NAME", help="estimators of --list (default: all)")
@@ -182,7 +188,7 @@ def _paper(args: argparse.Namespace) -> int:
     from ..study.compare import campaign, paper
     from ..study.compare.cases import Plan
 
-    for option in ("scenarios", "models", "out", "quick"):
+    for option in ("scenarios", "models", "out", "quick", "score", "data"):
         if getattr(args, option):
             raise LeverError(f"--{option} does not go with --paper, which prints one fixed experiment; leave it out")
     seeds = paper.SEEDS if args.seeds is None else args.seeds
@@ -213,11 +219,13 @@ def _data(args: argparse.Namespace) -> int:
 def _of_files(args: argparse.Namespace) -> tuple[Plan, list[str]]:
     """Return plan and cases of the files that --data names."""
     from ..study.compare import dataset
+    from ..study.compare.cases import cases
 
     for option in ("seeds", "seed", "duration", "quick", "models"):
         if getattr(args, option):
             raise LeverError(f"--{option} does not go with --data, which has its own runs; leave it out")
     plan, there = dataset.plan_of(args.data)
+    check_names("scenario", there, cases(), _LIST)
     names: list[str] = args.scenarios or there
     check_names("scenario", names, there, f"{args.data / dataset.INDEX}")
     return plan, names

@@ -88,7 +88,13 @@ def test_a_file_that_was_changed_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [(None, "lever compare --data"), ("{}", "is no index"), ("[", "is no index"), ('{"format": 9}', "has format 9")],
+    [
+        (None, "lever compare --data"),
+        ("{}", "is no index"),
+        ("[", "is no index"),
+        ('{"format": 1}', "is no index"),
+        ('{"format": 9}', "has format 9"),
+    ],
 )
 def test_an_index_that_cannot_be_read_says_what_to_do(text: str | None, says: str, tmp_path: Path) -> None:
     if text is not None:
@@ -161,6 +167,8 @@ def test_move_is_the_step_of_the_batch() -> None:
         (("--data", "there", "--score", "own_estimators:Guess"), "`lever compare --data there` writes it"),
         (("--score", "own_estimators:Nobody"), "cannot be imported"),
         (("--data", "there", "--scenarios", "nonsense"), "no scenario 'nonsense'"),
+        (("--paper", "--score", "own_estimators:Guess"), "--score does not go with --paper"),
+        (("--envelope", "--data", "there"), "--data does not go with --envelope"),
     ],
 )
 def test_the_command_says_what_does_not_go_together(

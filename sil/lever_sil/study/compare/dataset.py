@@ -126,10 +126,13 @@ def _index(folder: Path) -> dict[str, Any]:
     try:
         index: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         found = index["format"]
+        complete = found != FORMAT or {"seed", "seeds", "duration_s", "cases"} <= index.keys()
     except OSError as error:
         raise LeverError(f"cannot read {path}: {error.strerror}; `lever compare --data {folder}` writes it") from None
     except (ValueError, KeyError, TypeError):
-        raise LeverError(f"{path}: is no index of `lever compare --data`") from None
+        complete, found = False, None
+    if not complete:
+        raise LeverError(f"{path}: is no index of `lever compare --data`")
     if found != FORMAT:
         raise LeverError(f"{path}: has format {found}, and {FORMAT} is read here; write the data anew with --data")
     return index

@@ -58,6 +58,8 @@ def entrants(case: Case) -> dict[str, Entrant]:
     """Those of a case, by name, ours first."""
     if case.kind == "paper":
         chosen = _adaptations() + [each for each in _baselines(case) if each.name in _OF_THE_PAPER]
+    elif case.kind == "protocol":
+        chosen = _shipped()[:1] + [each for each in _baselines(case) if not each.name.startswith("algorithm1")]
     elif case.kind == "wrong noise":
         chosen = _given_noise() + _wrong()
     elif case.kind == "wrong tuning":

@@ -37,7 +37,7 @@ class Figures:
 
 def names() -> list[str]:
     """Return the cases of the experiment."""
-    return [name for name, case in cases().items() if isinstance(case, Paper)]
+    return [name for name, case in cases().items() if case.kind == "paper"]
 
 
 def tables(results: Results) -> dict[str, list[Row]]:
@@ -49,10 +49,10 @@ def tables(results: Results) -> dict[str, list[Row]]:
             {
                 "parameters": truth,
                 "estimator": estimator,
-                "rms [%]": _pair(100.0 * figures.rms),
-                "bias [%]": _pair(100.0 * figures.bias),
-                "±2σ covers [%]": _pair(-100.0 * figures.covered),
-                "f_n to 5 % [s]": _pair(np.where(np.isnan(figures.followed), np.inf, figures.followed)),
+                "rms [%]": pair(100.0 * figures.rms),
+                "bias [%]": pair(100.0 * figures.bias),
+                "±2σ covers [%]": pair(-100.0 * figures.covered),
+                "f_n to 5 % [s]": pair(np.where(np.isnan(figures.followed), np.inf, figures.followed)),
             }
         )
     return by_title
@@ -67,8 +67,8 @@ def tuning(results: Results) -> list[Row]:
             preload = cases()[name].preload
             figures = of_runs(results.outcomes[name, tuning_name(wrong)], cases()[name], results.plan)
             row |= {
-                f"{preload}: rms [%]": _pair(100.0 * figures.rms),
-                f"{preload}: ±2σ covers [%]": _pair(-100.0 * figures.covered),
+                f"{preload}: rms [%]": pair(100.0 * figures.rms),
+                f"{preload}: ±2σ covers [%]": pair(-100.0 * figures.covered),
             }
         rows.append(row)
     return rows
@@ -105,7 +105,7 @@ def _columns(figures: Figures) -> Iterator[Array]:
     yield from (figures.rms, figures.bias, figures.covered, figures.followed)
 
 
-def _pair(values: Array) -> str | None:
+def pair(values: Array) -> str | None:
     """Median and greatest of the values, of negative ones without their sign; infinity stands for never."""
     if not len(values) or np.isnan(values).all():
         return None
