@@ -306,8 +306,8 @@ typedef struct lever_stability {
 bool lever_aircraft(lever_t *lever, const lever_aircraft_t *aircraft);
 
 /* As of the last publish_period, or 40 ms where that is shorter; all but `state` is 0 before the first. A state is
- * entered when the margin is below its limit with a probability of 80 %, and left when it is above with that. ALARM
- * stays while nothing better is known. */
+ * entered when the margin is below its limit with a confidence of 80 % in the arm, and left when it is above with that.
+ * ALARM stays while nothing better is known. */
 void lever_stability(const lever_t *lever, lever_stability_t *stability);
 
 /* What mitigation adds to the lever's angle, until the next sample: pitch = gearing (theta - trim + angle). */
@@ -467,7 +467,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 1724 };
+enum lever_state_limits { LEVER_STATE_BYTES = 1752 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

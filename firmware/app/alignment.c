@@ -1,5 +1,6 @@
 #include "app/alignment.h"
 
+#include "math/bounds.h"
 #include "math/trigonometry.h"
 
 #include <string.h>
@@ -24,12 +25,14 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
         estimator->mode = LEVER_MODE_ALIGN;
     }
     if (usable) {
-        alignment->theta_sum += sample->valid[0] ? sample->y[0] : 0.0f;
-        alignment->count += sample->valid[0] ? 1.0f : 0.0f;
-        const bool seen = (alignment->count > 0.0f);
-        trim_start(&estimator->trim, seen ? (alignment->theta_sum / alignment->count) : settings->lever_preload_angle,
-            settings->trim_corner, estimator->setup.constants.trim);
-        estimator->trim_sine_cosine = sine_cosine(trim_angle(&estimator->trim));
+        float angle = (alignment->count > 0.0f) ? trim_angle(&estimator->trim) : settings->lever_preload_angle;
+        if (sample->valid[0]) {
+            alignment->count += 1.0f;
+            angle += (sample->y[0] - angle) / greater(alignment->count, 1.0f);
+        }
+        trim_start(&estimator->trim, angle, settings->trim_corner, estimator->setup.constants.trim);
+        estimator->rest_angle = trim_angle(&estimator->trim);
+        estimator->trim_sine_cosine = sine_cosine(estimator->rest_angle);
         estimator->z_ddot = sample->z_ddot;
         estimator->tau_m = sample->tau_m;
         (void)memset(&estimator->base_motion, 0, sizeof estimator->base_motion);
@@ -38,19 +41,18 @@ void alignment_step(estimator_t *estimator, const checked_t *sample, float elaps
         if (alignment->time > (settings->align_time - (0.5f * settings->sample_period))) {
             estimator->mode = LEVER_MODE_RUN;
             learning_resume(&estimator->learning, &estimator->cdkf);
-            hands_begin(&estimator->learning.hands);
+            hands_begin(&estimator->learning.evidence.hands);
         }
     }
 }
 
 void alignment_begin(estimator_t *estimator, const checked_t *sample)
 {
-    averages_t *averages = &estimator->averages;
+    evidence_t *evidence = &estimator->learning.evidence;
     (void)memset(&estimator->alignment, 0, sizeof estimator->alignment);
-    averages->excitation_square = 0.0f; /* nothing is learnt before the lever is seen to move */
-    averages->motion_square = 0.0f;
-    (void)memset(averages->last, 0, sizeof averages->last);
-    averages->innovation = 1.0f;
+    (void)memset(
+        &evidence->motion, 0, sizeof evidence->motion); /* nothing is learnt before the lever is seen to move */
+    evidence->nis_slow = 1.0f;
     alignment_step(estimator, sample, 0.0f);
 }
 
@@ -62,6 +64,7 @@ void alignment_begin_grip(estimator_t *estimator, const checked_t *sample)
     const float x[MODEL_STATES] = {
         sample->valid[0] ? sample->y[0] : cdkf->x[0], sample->valid[1] ? sample->y[1] : cdkf->x[1]};
     trim_begin(&estimator->trim, x);
+    estimator->rest_angle = trim_angle(&estimator->trim);
     cdkf_start_state(cdkf, origin, cdkf->output_noise);
     cdkf_begin_step(cdkf);
     estimator->z_ddot = 0.0f;
@@ -69,12 +72,4 @@ void alignment_begin_grip(estimator_t *estimator, const checked_t *sample)
     if (rigid) { /* the velocity of the base until now acts as a step, too */
         estimator->base_motion.seat_dot = 0.0f;
     }
-}
-
-void alignment_end_outage(estimator_t *estimator, const checked_t *sample)
-{
-    if (sample->valid[0] && sample->valid[1]) {
-        alignment_start_state(estimator, sample->y, sample->valid);
-    }
-    trim_unsettle(&estimator->trim);
 }

@@ -33,7 +33,4 @@ void alignment_start_state(estimator_t *estimator, const float y[CDKF_OUTPUTS], 
  * what was before does not tell of the arm that is now. */
 void alignment_begin_grip(estimator_t *estimator, const checked_t *sample);
 
-/* After an outage the prediction is worth little: the state starts again where it is measured. */
-void alignment_end_outage(estimator_t *estimator, const checked_t *sample);
-
 #endif

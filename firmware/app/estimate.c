@@ -1,5 +1,6 @@
 /* What is known: from the belief to the estimate that is reported. */
 #include "app/estimator.h"
+#include "math/trigonometry.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -9,7 +10,7 @@
 
 float estimator_state(const estimator_t *estimator, uint32_t i)
 {
-    return estimator->trim.origin[i] + estimator->trim.ahead[i] + estimator->cdkf.x[i];
+    return estimator->trim.origin[i] + estimator->cdkf.x[i];
 }
 
 void estimator_parameters(const estimator_t *estimator, float parameter[LEVER_PARAMETERS])
@@ -24,39 +25,39 @@ void estimator_parameter_sigma(const estimator_t *estimator, float sigma[LEVER_P
     }
 }
 
-static model_step_t at_trim(const estimator_t *estimator)
+/* The trim angle of a sample follows large motion; what is reported is about its mean. */
+static model_step_t at_rest(const estimator_t *estimator)
 {
-    const sine_cosine_t *angle = &estimator->trim_sine_cosine;
-    const model_step_t step = {
-        .trim = trim_angle(&estimator->trim), .trim_sine = angle->sine, .trim_cosine = angle->cosine};
+    const sine_cosine_t angle = sine_cosine(estimator->rest_angle);
+    const model_step_t step = {.trim = estimator->rest_angle, .trim_sine = angle.sine, .trim_cosine = angle.cosine};
     return step;
 }
 
 derived_dynamics_t estimator_dynamics(const estimator_t *estimator)
 {
     const setup_t *setup = &estimator->setup;
-    const model_step_t step = at_trim(estimator);
+    const model_step_t step = at_rest(estimator);
     return derived_dynamics(&estimator->cdkf, setup->model_in_use, &setup->constants, &step);
 }
 
 model_dynamics_t estimator_linearised(const estimator_t *estimator, model_step_t *step)
 {
     const setup_t *setup = &estimator->setup;
-    *step = at_trim(estimator);
+    *step = at_rest(estimator);
     return setup->model_in_use->dynamics(&setup->constants, step, &estimator->cdkf.points[0]);
 }
 
 derived_feedthrough_t estimator_feedthrough(const estimator_t *estimator, float frequency)
 {
     const setup_t *setup = &estimator->setup;
-    const model_step_t step = at_trim(estimator);
+    const model_step_t step = at_rest(estimator);
     return derived_feedthrough(&estimator->cdkf, setup->model_in_use, &setup->constants, &step, frequency);
 }
 
 margin_t estimator_margin(const estimator_t *estimator, const lever_aircraft_t *aircraft)
 {
     const setup_t *setup = &estimator->setup;
-    const model_step_t step = at_trim(estimator);
+    const model_step_t step = at_rest(estimator);
     return margin_of(aircraft, &estimator->cdkf, setup->model_in_use, &setup->constants, &step);
 }
 
@@ -72,7 +73,7 @@ static float state_sigma(const estimator_t *estimator, uint32_t i, float scale)
     const float noise = trimmed ? estimator->cdkf.output_noise[i] : 0.0f;
     const float sigma = cdkf_state_sigma(&estimator->cdkf, i);
     return sqrtf((sigma * sigma) + ((noise * noise) * (LEVEL_NOISE * (s->trim_corner * s->sample_period))) +
-                 ((slow * slow) * estimator->averages.excitation_square));
+                 ((slow * slow) * estimator->learning.evidence.motion.slow));
 }
 
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate)
@@ -103,7 +104,7 @@ void estimator_health(const estimator_t *estimator, lever_health_t *health)
     health->corrupt = estimator->corrupt;
     health->late = estimator->late;
     health->recoveries = estimator->recoveries;
-    health->excitation = sqrtf(estimator->averages.excitation_square);
+    health->excitation = sqrtf(estimator->learning.evidence.motion.slow);
 }
 
 const char *lever_parameter_name(uint8_t model, uint32_t index)

@@ -19,19 +19,9 @@
 
 /* The first samples, averaged. */
 typedef struct alignment {
-    float theta_sum; /* [rad] */
-    float count;     /* valid angles in the sum */
-    float time;      /* since the first sample [s] */
+    float count; /* valid angles in the mean, which the trim has */
+    float time;  /* since the first sample [s] */
 } alignment_t;
-
-/* Slow averages for health. */
-typedef struct averages {
-    float excitation_square;  /* mean square of the measured rate, without the noise of its sensor [rad^2/s^2] */
-    float motion_square;      /* the same over MOTION_TIME: whether the lever moves now */
-    float last[MODEL_STATES]; /* deviations of the last sample that measured each output [rad, rad/s] */
-    float innovation;         /* mean of nis / nis_size; expected 1 */
-    float restarts;           /* number of restarts within about RESTART_MEMORY */
-} averages_t;
 
 typedef struct estimator {
     setup_t setup;
@@ -39,7 +29,7 @@ typedef struct estimator {
     learning_t learning;
     trim_t trim;
     sine_cosine_t trim_sine_cosine; /* sine and cosine of the trim angle */
-    averages_t averages;
+    float rest_angle;               /* mean trim angle, about which dynamics are reported [rad] */
     alignment_t alignment;
     enum lever_mode mode;
     uint32_t time_us;      /* of the last sample */
@@ -53,6 +43,7 @@ typedef struct estimator {
     float z_ddot; /* the same as the model takes them: deviations in preload trim */
     float tau_m;
     base_motion_t base_motion; /* what follows from that */
+    float restarts;            /* of the filter, those of more than some 10 s ago forgotten */
     float nis;                 /* of the last sample */
     uint8_t nis_size;
     bool frozen;
@@ -71,14 +62,11 @@ void estimator_init(estimator_t *estimator, const lever_config_t *config);
 /* Back to before the first sample, with the choices as they are; counts go on. */
 void estimator_start_over(estimator_t *estimator);
 
-/* The functions of lever_cdkf.h of the same names. own_torque: what was asked of the motor until this sample [N m], for
+/* The functions of lever_cdkf.h of the same names. commanded_torque: what was asked of the motor until this sample [N m], for
  * when the measured torque is missing. A command's dither is not the estimator's. */
-enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample, float own_torque);
+enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *sample, float commanded_torque);
 bool estimator_command(estimator_t *estimator, const lever_command_t *command);
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate);
-
-/* Samples teach the parameters now, as far as it depends on inputs, motion and commands. */
-bool estimator_may_learn(const estimator_t *estimator);
 
 /* State i of the estimate as the sensors see it: theta [rad], theta_dot [rad/s]. */
 float estimator_state(const estimator_t *estimator, uint32_t i);

@@ -6,16 +6,18 @@
 #include <math.h>
 #include <string.h>
 
-#define MEMORY 10.0f     /* of the comparison, and of the mean square [s] */
-#define LEAST 2.0f       /* before the comparison says that it is wrong [s] */
-#define TOLERATED 0.2f   /* what the lever's own equation may be off */
-#define SURE 2.0f        /* standard deviations of the comparison */
-#define WALK_LEAST 1e-3f /* q [1/sqrt(s)] */
-
 void grip_force_start(grip_force_t *grip)
 {
     (void)memset(grip, 0, sizeof *grip);
 }
+
+#if LEVER_GRIP_FORCE
+
+#define MEMORY 10.0f   /* of the comparison, and of the mean square [s] */
+#define TIME_MIN 2.0f  /* before the comparison says that it is wrong [s] */
+#define TOLERATED 0.2f /* what the lever's own equation may be off */
+#define SURE 2.0f      /* standard deviations of the comparison */
+#define WALK_MIN 1e-3f /* q [1/sqrt(s)] */
 
 /* Takes a valid force, or notes that it is missing. After an outage its level is a guess. */
 static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force, float period)
@@ -27,7 +29,7 @@ static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, cons
         grip->missing = 0.0f;
         if (starts) {
             trim_start_input(trim, TRIM_GRIP_FORCE, grip->raw);
-            grip->settling = trim->deviations ? trim->settling_time : 0.0f;
+            grip->settling = trim->deviations ? trim_settling_time(trim) : 0.0f;
             grip->right = false;
             (void)memset(&grip->means, 0, sizeof grip->means);
         }
@@ -40,7 +42,7 @@ static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, cons
 static float noise_of(const grip_force_t *grip, const lever_settings_t *s, float period)
 {
     const float gain = s->grip_force_gain_sigma;
-    const float walk = greater(s->k_p_walk, WALK_LEAST);
+    const float walk = greater(s->k_p_walk, WALK_MIN);
     const float relative = (gain * gain) / walk; /* root of the density */
     return sqrtf((s->grip_force_noise * s->grip_force_noise) + (grip->square * ((relative * relative) / period)));
 }
@@ -68,7 +70,7 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
 {
     const float period = step->period;
     receive(grip, setup, trim, force, period);
-    const bool known = (force != NULL) && grip->right && !grip->wrong;
+    const bool known = (force != NULL) && grip_force_is_used(grip);
     if (grip->seen) {
         float now = grip->raw;
         trim_inputs(trim, &now, TRIM_GRIP_FORCE, 1u, period);
@@ -84,11 +86,11 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
 
 /* Compares the impulses that sensor and motion say of the hand. Both are multiplied by the drive, which no noise is in:
  * torque that nobody knows moves lever and force differently. */
-static void compare(grip_force_t *grip, const lever_settings_t *s, const hands_t *hands)
+static float compare(grip_force_t *grip, const lever_settings_t *s, const hands_block_t *hands)
 {
     grip_comparison_t *means = &grip->means;
-    means->time += (means->time < MEMORY) ? hands->ended : 0.0f;
-    const float share = hands->ended / means->time; /* a mean first, and then one with exponential forgetting */
+    means->time += (means->time < MEMORY) ? hands->length : 0.0f;
+    const float share = hands->length / means->time; /* a mean first, and then one with exponential forgetting */
     const float difference = grip->impulse - hands->of_hand;
     means->measured += share * ((grip->impulse * hands->driven) - means->measured);
     means->expected += share * ((hands->of_hand * hands->driven) - means->expected);
@@ -98,17 +100,47 @@ static void compare(grip_force_t *grip, const lever_settings_t *s, const hands_t
     const float off = fabsf(means->measured - means->expected);
     const float sure = SURE * sqrtf(means->drive_square * (means->difference_square * share));
     grip->right = ((off + sure) < limit);
-    grip->wrong = grip->wrong || ((off > (limit + sure)) && (means->time > LEAST));
+    const float away = (means->time > TIME_MIN) ? (off / greater(limit + sure, 1.0e-9f)) : 0.0f;
+    grip->wrong = grip->wrong || (away > 1.0f);
+    return away;
 }
 
-bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands)
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_block_t *hands, float *away)
 {
-    const bool used = grip->right && !grip->wrong;
-    if (hands->ended > 0.0f) {
+    bool compared = false;
+    if (hands->length > 0.0f) {
         if (hands->counted && grip->seen && (grip->missing < TRIM_OUTAGE) && (grip->settling <= 0.0f)) {
-            compare(grip, setup->settings, hands);
+            *away = compare(grip, setup->settings, hands);
+            compared = true;
         }
         grip->impulse = 0.0f;
     }
-    return used && grip->wrong;
+    return compared;
 }
+
+#else
+
+bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
+    const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen)
+{
+    (void)grip;
+    (void)setup;
+    (void)trim;
+    (void)force;
+    (void)step;
+    (void)alone;
+    (void)error;
+    (void)seen;
+    return false;
+}
+
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_block_t *hands, float *away)
+{
+    (void)grip;
+    (void)setup;
+    (void)hands;
+    (void)away;
+    return false;
+}
+
+#endif

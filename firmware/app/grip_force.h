@@ -16,6 +16,10 @@
 
 #include <stdbool.h>
 
+#ifndef LEVER_GRIP_FORCE
+#define LEVER_GRIP_FORCE 1 /* 0: forces are received, and nothing is made of them (2 KiB less) */
+#endif
+
 /* Means over blocks (hands.h), of the hand's impulse times the drive: what the force sensor and what the lever's motion
  * say of it. Their ratio is the sensor's gain error. */
 typedef struct grip_comparison {
@@ -46,7 +50,13 @@ void grip_force_start(grip_force_t *grip);
 bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force,
     const model_step_t *step, float alone, const float error[CDKF_CONSIDERED], cdkf_grip_t *seen);
 
-/* After hands_step(). Returns true when the force has just been found wrong. */
-bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_t *hands);
+/* The force is used. */
+static inline bool grip_force_is_used(const grip_force_t *grip)
+{
+    return grip->right && !grip->wrong;
+}
+
+/* After hands_step(). Returns true when the force was compared, and its gain error over what that may be. */
+bool grip_force_judge(grip_force_t *grip, const setup_t *setup, const hands_block_t *hands, float *away);
 
 #endif

@@ -1,12 +1,11 @@
 #include "app/hands.h"
+#include "math/bounds.h"
 #include "math/share.h"
 
 #include <string.h>
 
 #define BLOCK 0.038f /* [s]: two blocks of learning. In less, the noise of theta_dot is a good part of the change */
 #define MEMORY 0.16f /* [s] */
-#define OFF 0.03f    /* residual over change, in squares; a hand leaves several times 1 */
-#define ON 0.10f
 
 void hands_start(hands_t *hands)
 {
@@ -37,11 +36,11 @@ float hands_predict(
     return impulse;
 }
 
-void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts)
+hands_block_t hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts)
 {
+    hands_block_t block = {.length = 0.0f};
     hands->elapsed += period;
     hands->idle = hands->idle || !counts;
-    hands->ended = 0.0f;
     if (hands->elapsed > BLOCK) {
         const float change = theta_dot - hands->begin;
         const float residual = change - (hands->impulse / constants->inertia);
@@ -49,16 +48,21 @@ void hands_step(hands_t *hands, const model_constants_t *constants, float theta_
             const float share = share_of(hands->elapsed, MEMORY);
             hands->change += share * ((change * change) - hands->change);
             hands->residual += share * ((residual * residual) - hands->residual);
-            hands->off = (hands->residual < ((hands->off ? ON : OFF) * hands->change));
         }
-        hands->of_hand = residual * constants->inertia;
-        hands->driven = hands->drive;
-        hands->counted = !hands->idle;
-        hands->ended = hands->elapsed;
+        block.length = hands->elapsed;
+        block.of_hand = residual * constants->inertia;
+        block.driven = hands->drive;
+        block.counted = !hands->idle;
         hands->begin = theta_dot;
         hands->impulse = 0.0f;
         hands->drive = 0.0f;
         hands->elapsed = 0.0f;
         hands->idle = false;
     }
+    return block;
+}
+
+float hands_statistic(const hands_t *hands)
+{
+    return hands->change / greater(hands->residual, 1.0e-9f);
 }

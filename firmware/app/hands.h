@@ -18,13 +18,16 @@ typedef struct hands {
     float change;   /* mean square of a block's change [rad^2/s^2] */
     float residual; /* mean square of what the lever alone does not explain of it, likewise */
     float elapsed;  /* since the block began [s] */
-    float ended;    /* length of a block that has just ended; 0: none has [s] */
-    float of_hand;  /* what the lever alone does not explain of it: the hand's impulse [N m s] */
-    float driven;   /* drive of that block */
-    bool counted;   /* there was motion enough in all of it */
-    bool idle;      /* there was not motion enough in all of this one */
-    bool off;       /* the verdict */
+    bool idle;      /* there was not motion enough in all of it */
 } hands_t;
+
+/* A block that has ended. */
+typedef struct hands_block {
+    float length;  /* [s]; 0: none has */
+    float of_hand; /* what the lever alone does not explain of it: the hand's impulse [N m s] */
+    float driven;  /* its part that is torque and base */
+    bool counted;  /* there was motion enough in all of it: the statistic is new */
+} hands_block_t;
 
 void hands_start(hands_t *hands);
 
@@ -36,7 +39,11 @@ void hands_begin(hands_t *hands);
 float hands_predict(
     hands_t *hands, const model_constants_t *constants, const model_step_t *step, const float x[MODEL_STATES]);
 
-/* The end of a block of `period` seconds at theta_dot; `counts`: there was motion enough. */
-void hands_step(hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts);
+/* After `period` seconds at theta_dot; `counts`: there was motion enough. Returns the block that this ends. */
+hands_block_t hands_step(
+    hands_t *hands, const model_constants_t *constants, float theta_dot, float period, bool counts);
+
+/* Change of theta_dot over what the lever alone does not explain of it, in squares: large when nobody holds it. */
+float hands_statistic(const hands_t *hands);
 
 #endif

@@ -41,17 +41,8 @@ struct lever {
     bool settings_changed; /* since they were checked: their memory is faulty */
 };
 
-/* One sample, by struct or from the bus: the estimator first, then what is done about bounce, the motor's torque, and the
- * margin. One by one, so that the stack of one is not beneath that of another. */
-enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample);
-
 /* Where something mitigates: renews correction and lever damping. */
 void instance_mitigate(lever_t *lever);
-
-static inline void instance_drive(lever_t *lever)
-{
-    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &lever->to_gate);
-}
 
 /* With an aircraft: works the margin out, once a publish_period, but at most 25 times a second. */
 void instance_watch(lever_t *lever);

@@ -7,10 +7,11 @@
 #include <stddef.h>
 #include <string.h>
 
-#define DITHER_MOST 1.0e4f   /* plausible [N m] */
-#define MARGIN_US 40000u     /* least time between two margins */
-#define SETTINGS_US 1000000u /* between two looks at the settings */
-#define SILENCE_US 20000u    /* or 1.25 sample periods: mitigation.h */
+#define DITHER_MOST 1.0e4f        /* plausible [N m] */
+#define MARGIN_US 40000u          /* least time between two margins */
+#define SETTINGS_US 1000000u      /* between two looks at the settings, */
+#define SETTINGS_LATE_US 1020000u /* and at most */
+#define SILENCE_US 20000u         /* or 1.25 sample periods: mitigation.h */
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -55,6 +56,11 @@ lever_t *lever_init(lever_memory_t *memory, const lever_config_t *config)
 
 /* --- samples ------------------------------------------------------------------------------------------------------ */
 
+static const verdict_row_t *verdict_of_now(const lever_t *lever)
+{
+    return &verdict_rows[lever->estimator.learning.verdict];
+}
+
 /* COAST is closed by torque_sample_t.measured, once it has lasted. */
 static bool permits_torque(const lever_t *lever)
 {
@@ -65,18 +71,14 @@ static bool permits_torque(const lever_t *lever)
            !lever->settings_changed;
 }
 
-/* A missing torque sensor is none: the motor may still do what it is asked. */
-static bool is_harmful(const lever_t *lever)
-{
-    const learning_t *learning = &lever->estimator.learning;
-    return learning->monitor.torque_wrong || learning->hands.off;
-}
-
-/* A fault of the memory that the settings are in stays, whatever is in it later. */
+/* A fault of the memory that the settings are in stays, whatever is in it later. Not with the sample that ends a block,
+ * where there is another, to bound the worst step. */
 static void check_settings(lever_t *lever)
 {
     const uint32_t time_us = lever->estimator.time_us;
-    if ((time_us - lever->settings_us) >= SETTINGS_US) {
+    const uint32_t elapsed_us = time_us - lever->settings_us;
+    const bool between = (lever->estimator.learning.elapsed > 0.0f);
+    if ((elapsed_us >= SETTINGS_US) && (between || (elapsed_us >= SETTINGS_LATE_US))) {
         lever->settings_us = time_us;
         lever->settings_changed =
             lever->settings_changed || (sum_of(lever->estimator.setup.settings) != lever->settings_sum);
@@ -90,15 +92,14 @@ bool instance_is_estimating(const lever_t *lever)
            ((lever->estimator.faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
 }
 
-/* The estimate is trustworthy enough for a margin: it has been learnt, the model fits and the sensors work. */
+/* The estimate is trustworthy enough for a margin: it has been learnt, and the sensors work. */
 static bool carries_margin(const lever_t *lever)
 {
     const uint32_t broken = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_CLOCK |
-                            (uint32_t)LEVER_FAULT_BOUND | (uint32_t)LEVER_FAULT_RECOVERED |
-                            (uint32_t)LEVER_FAULT_MISMATCH | (uint32_t)LEVER_FAULT_HANDS_OFF;
+                            (uint32_t)LEVER_FAULT_BOUND | (uint32_t)LEVER_FAULT_RECOVERED;
     const enum lever_mode mode = lever->estimator.mode;
-    return ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) && ((lever->estimator.faults & broken) == 0u) &&
-           (lever->estimator.cdkf.trust >= 1.0f);
+    return verdict_of_now(lever)->margin && ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) &&
+           ((lever->estimator.faults & broken) == 0u) && (lever->estimator.cdkf.trust >= 1.0f);
 }
 
 void instance_watch(lever_t *lever)
@@ -109,27 +110,28 @@ void instance_watch(lever_t *lever)
     if ((time_us - bounce->time_us) >= greater_count(publish_us, MARGIN_US)) {
         bounce->time_us = time_us;
         bounce->margin = estimator_margin(&lever->estimator, bounce->aircraft);
-        bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever));
+        const bool doubtful = ((lever->estimator.faults & (uint32_t)LEVER_FAULT_MISMATCH) != 0u);
+        bounce->state = alarm_next(bounce->state, &bounce->margin, bounce->aircraft, carries_margin(lever), doubtful);
     }
 }
 
 /* Which sensors say what they said last. */
-static uint8_t repeated(const monitor_t *monitor, const lever_sample_t *sample)
+static uint8_t repeated(const evidence_t *evidence, const lever_sample_t *sample)
 {
-    const uint32_t theta = monitor_repeats(monitor, MONITOR_THETA, sample->theta) ? (uint32_t)INSTANCE_SAME_THETA : 0u;
-    const uint32_t base =
-        monitor_repeats(monitor, MONITOR_Z_DDOT, sample->z_ddot) ? (uint32_t)INSTANCE_SAME_Z_DDOT : 0u;
+    const uint32_t theta = evidence_repeats(evidence, SIGNAL_THETA, sample->theta) ? (uint32_t)INSTANCE_SAME_THETA : 0u;
+    const uint32_t base = evidence_repeats(evidence, SIGNAL_BASE, sample->z_ddot) ? (uint32_t)INSTANCE_SAME_Z_DDOT : 0u;
     return (uint8_t)(theta | base);
 }
 
-enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
+/* One sample: what the estimator makes of it, and what the torque gate is to know. */
+static enum lever_mode update(lever_t *lever, const lever_sample_t *sample)
 {
     const uint32_t blind = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_THETA_DOT;
     estimator_t *estimator = &lever->estimator;
     torque_sample_t *to_gate = &lever->to_gate;
     const uint32_t last_us = estimator->time_us;
     if (lever->bounce.mitigates) {
-        lever->bounce.same = repeated(&estimator->learning.monitor, sample);
+        lever->bounce.same = repeated(&estimator->learning.evidence, sample);
     }
     const bool starts = (estimator->mode == LEVER_MODE_INIT);
     const enum lever_mode mode = estimator_update(estimator, sample, lever->gate.torque);
@@ -139,14 +141,13 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
     to_gate->advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
     to_gate->measured = ((faults & blind) != blind);
     to_gate->permitted = permits_torque(lever);
-    to_gate->harmful = is_harmful(lever);
+    to_gate->harmful = !verdict_of_now(lever)->torque;
     return mode;
 }
 
 void instance_mitigate(lever_t *lever)
 {
-    const uint32_t broken =
-        (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED | (uint32_t)LEVER_FAULT_HANDS_OFF;
+    const uint32_t broken = (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED;
     const estimator_t *estimator = &lever->estimator;
     const setup_t *setup = &estimator->setup;
     const torque_sample_t *to_gate = &lever->to_gate;
@@ -162,9 +163,10 @@ void instance_mitigate(lever_t *lever)
         .drive = lever->gate.gain,
         .mitigation = lever->bounce.chosen,
         .advances = to_gate->advances,
-        .permitted = to_gate->permitted && !torque_gate_is_abandoned(&lever->gate) && ((faults & broken) == 0u),
+        .permitted = to_gate->permitted && verdict_of_now(lever)->correction &&
+                     !torque_gate_is_abandoned(&lever->gate) && ((faults & broken) == 0u),
         .sensed = ((faults & (uint32_t)LEVER_FAULT_THETA) == 0u) && (estimator->base_missing <= 0.0f),
-        .fits = !estimator->learning.monitor.base_wrong,
+        .fits = !evidence_has(&estimator->learning.evidence, EVIDENCE_BASE),
         .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u),
         .same_theta = ((lever->bounce.same & (uint32_t)INSTANCE_SAME_THETA) != 0u),
         .same_z_ddot = ((lever->bounce.same & (uint32_t)INSTANCE_SAME_Z_DDOT) != 0u)};
@@ -176,13 +178,14 @@ void instance_mitigate(lever_t *lever)
     lever->bounce.mitigates = mitigation_step(mitigation, setup->settings, &sample);
 }
 
+/* Called in sequence rather than nested, to bound peak stack. */
 enum lever_mode lever_update(lever_t *lever, const lever_sample_t *sample)
 {
-    const enum lever_mode mode = instance_update(lever, sample);
+    const enum lever_mode mode = update(lever, sample);
     if (lever->bounce.mitigates) {
         instance_mitigate(lever);
     }
-    instance_drive(lever);
+    torque_gate_step(&lever->gate, dither_step(&lever->dither) + lever->bounce.mitigation.damping, &lever->to_gate);
     if (lever->bounce.aircraft != NULL) {
         instance_watch(lever);
     }

@@ -285,14 +285,7 @@ enum lever_mode link_step(lever_t *lever)
         const bool was_driving = instance_is_driving(lever);
         const bool mitigates = lever->bounce.mitigates;
         link->has_sample = false;
-        (void)instance_update(lever, &link->sample);
-        if (mitigates) {
-            instance_mitigate(lever);
-        }
-        instance_drive(lever);
-        if (lever->bounce.aircraft != NULL) {
-            instance_watch(lever);
-        }
+        (void)lever_update(lever, &link->sample);
         pass_time(link, link->sample.time_us);
         link->latched |= instance_faults(lever);
         uint32_t due = BIT(OUTPUT_STATE_ESTIMATE) | divided_due(link);

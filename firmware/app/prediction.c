@@ -10,6 +10,7 @@
 #define UNSETTLED 4.0f    /* innovations while levels settle, in squares: as much larger as they may be */
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
 #define RATE_MOST 1.0e4f  /* [rad/s] */
+#define REST_TIME 1.0f    /* mean of the trim angle, which follows motion of 1 to 3 Hz with its whole amplitude [s] */
 #define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is
@@ -41,7 +42,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     learning_t *learning = &estimator->learning;
     const setup_t *setup = &estimator->setup;
     const lever_settings_t *s = setup->settings;
-    const bool unknown = (estimator->base_missing > 0.0f) || learning->monitor.base_wrong;
+    const bool wrong = evidence_has(&learning->evidence, EVIDENCE_BASE);
+    const bool unknown = (estimator->base_missing > 0.0f) || wrong;
     const bool steps = (cdkf->acting > (uint32_t)CDKF_STEP);
     float input[] = {friction(trim->origin[1] + cdkf->x[1]), z_ddot, tau_m, 1.0f}; /* as in enum trim_signal */
     trim_inputs(trim, input, TRIM_FRICTION, steps ? 4u : 3u, period);
@@ -61,11 +63,11 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     if (setup->model_in_use->uses_base_motion) {
         base_motion_step(&estimator->base_motion, &setup->constants, &step);
     }
-    const float alone = hands_predict(&learning->hands, &setup->constants, &step, cdkf->x);
+    const float alone = hands_predict(&learning->evidence.hands, &setup->constants, &step, cdkf->x);
     if (unknown) {
         step.z_ddot = 0.0f;
         step.seat_dot = 0.0f;
-        cdkf->disturbance = (learning->monitor.base_wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
+        cdkf->disturbance = (wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);
     error[CDKF_STEP] = input[3]; /* not read without a step */
@@ -73,9 +75,10 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
         cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
     }
     const bool gripped =
-        grip_force_step(&learning->force, setup, trim, unknown ? NULL : force, &step, alone, error, &grip);
+        grip_force_step(&learning->evidence.force, setup, trim, unknown ? NULL : force, &step, alone, error, &grip);
     if (gripped) {
-        grip.learn = estimator_may_learn(estimator);
+        grip.learn =
+            !estimator->frozen && learning_informs(learning) && !evidence_has(&learning->evidence, EVIDENCE_REST);
     }
     cdkf_time_update(cdkf, setup->model_in_use, &setup->constants, &step, error, gripped ? &grip : NULL);
     estimator->z_ddot = next_z_ddot;
@@ -85,8 +88,10 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
 /* Subtracts the slow level from the outputs, and renews the trim angle. Returns true at the end of an outage. */
 static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], float period)
 {
-    const bool back = trim_outputs(&estimator->trim, estimator->cdkf.x, y, valid, period);
-    estimator->trim_sine_cosine = sine_cosine(trim_angle(&estimator->trim));
+    const bool back = trim_outputs(&estimator->trim, y, valid, period);
+    const float angle = trim_angle(&estimator->trim);
+    estimator->trim_sine_cosine = sine_cosine(angle);
+    estimator->rest_angle += lesser(period * (1.0f / REST_TIME), 1.0f) * (angle - estimator->rest_angle);
     return back;
 }
 
@@ -118,14 +123,13 @@ static void follow_base(estimator_t *estimator, bool valid, float elapsed)
 /* An output far from what is expected is not valid. */
 static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elapsed)
 {
-    const float average = estimator->averages.innovation;
     const float least = (estimator->trim.unsettled > 0.0f) ? UNSETTLED : 1.0f;
-    const float level = greater(average, least);
-    monitor_t *monitor = &estimator->learning.monitor;
+    const float level = greater(estimator->learning.evidence.nis_slow, least);
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
-        const float y = sample->y[i] - (estimator->trim.origin[i] + estimator->trim.ahead[i]);
+        const float y = sample->y[i] - estimator->trim.origin[i];
         const bool expected = sample->valid[i] && !trim_is_waiting(&estimator->trim, i);
-        if (expected && monitor_is_spike(monitor, &estimator->cdkf, i, y, level, elapsed)) {
+        if (expected &&
+            evidence_refuses_output(&estimator->learning.evidence, &estimator->cdkf, i, y, level, elapsed)) {
             sample->valid[i] = false;
             estimator->corrupt++;
             estimator->faults |= (i == 0u) ? (uint32_t)LEVER_FAULT_THETA : (uint32_t)LEVER_FAULT_THETA_DOT;
@@ -146,6 +150,6 @@ void prediction_advance(
     predict(estimator, sample->z_ddot, sample->tau_m, sample->gripped ? &sample->grip_force : NULL, period);
     refuse_spikes(estimator, sample, elapsed);
     if (subtract_trim(estimator, sample->y, sample->valid, period)) {
-        alignment_end_outage(estimator, sample);
+        trim_unsettle(&estimator->trim);
     }
 }

@@ -12,8 +12,10 @@
 #define ANY_HALF 0xFFFFu
 #define COUNTER 15u /* of E2E */
 #define FLAG 1u
+#define EVERY_EVIDENCE (((uint32_t)1u << (uint32_t)EVIDENCE_COUNT) - 1u)
 #define BYTE_BITS 8u
 #define FLOAT_LIMIT 1.0e9f
+#define MODERATE 1.0e6f
 
 enum { SINGLE = 9, GROUPS = 4 }; /* floats of an estimate that are no array; these and its arrays */
 
@@ -34,11 +36,6 @@ enum { SINGLE = 9, GROUPS = 4 }; /* floats of an estimate that are no array; the
  * anywhere do no harm. A float is finite and below FLOAT_LIMIT in size, but in a sample that waits: there, any may come. */
 /* cppcheck-suppress misra-c2012-20.7 ; D1 */
 #define RECEIVER(name) BYTES(link.name.max_delta, link.name.lost, COUNTER), FLAGS(link.name.waiting, link.name.waiting)
-#define STILLNESS(i)                                                                                                   \
-    FLOATS(estimator.learning.monitor.stillness[i].now, estimator.learning.monitor.stillness[i].before),               \
-        BYTES(                                                                                                         \
-            estimator.learning.monitor.stillness[i].same, estimator.learning.monitor.stillness[i].changes, ANY_BYTE),  \
-        FLAGS(estimator.learning.monitor.stillness[i].seen, estimator.learning.monitor.stillness[i].stuck)
 
 static const state_row_t rows[] = {
     WORDS(link.settings_crc, link.settings_crc), /* not restored: it must be the instance's own */
@@ -51,30 +48,25 @@ static const state_row_t rows[] = {
     MEMBERS(estimator.cdkf.acting, estimator.cdkf.acting, 4u, (uint32_t)CDKF_CONSIDERED),
     FLOATS(estimator.cdkf.trust, estimator.cdkf.points[MODEL_POINTS - 1].c[MODEL_COEFFICIENTS - 1]),
 
-    FLOATS(estimator.learning.change.sum[0], estimator.learning.whiteness.time),
-    FLAGS(estimator.learning.whiteness.coloured, estimator.learning.whiteness.coloured),
-    FLOATS(estimator.learning.calibration.score[0].vector,
-        estimator.learning.calibration.score[CDKF_FRICTION].information),
-    FLAGS(estimator.learning.calibration.wrong, estimator.learning.calibration.wrong),
-    STILLNESS(MONITOR_THETA),
-    STILLNESS(MONITOR_THETA_DOT),
-    STILLNESS(MONITOR_Z_DDOT),
-    FLOATS(estimator.learning.monitor.refused[0], estimator.learning.monitor.torque.product),
-    FLAGS(estimator.learning.monitor.base_wrong, estimator.learning.monitor.torque_wrong),
-    FLOATS(estimator.learning.hands.begin, estimator.learning.hands.driven),
-    FLAGS(estimator.learning.hands.counted, estimator.learning.hands.off),
-    FLOATS(estimator.learning.force.raw, estimator.learning.force.means.time),
-    FLAGS(estimator.learning.force.seen, estimator.learning.force.wrong),
-    FLOATS(estimator.learning.kept[0].w[0], estimator.learning.gripping),
-    FLAGS(estimator.learning.calm, estimator.learning.bounded),
+    FLOATS(estimator.learning.evidence.ratio[0], estimator.learning.evidence.ratio[EVIDENCE_MISSING - 1]),
+    MEMBERS(estimator.learning.evidence.present, estimator.learning.evidence.present, 4u, EVERY_EVIDENCE),
+    WORDS(estimator.learning.evidence.faults, estimator.learning.evidence.faults),
+    FLOATS(estimator.learning.evidence.since_change, estimator.learning.evidence.hands.elapsed),
+    FLAGS(estimator.learning.evidence.hands.idle, estimator.learning.evidence.hands.idle),
+    FLOATS(estimator.learning.evidence.force.raw, estimator.learning.evidence.force.means.time),
+    FLAGS(estimator.learning.evidence.force.seen, estimator.learning.evidence.force.wrong),
+    FLAGS(estimator.learning.evidence.seen[0], estimator.learning.evidence.opened),
+    FLOATS(estimator.learning.noise.elapsed, estimator.learning.elapsed),
+    BYTES(estimator.learning.verdict, estimator.learning.verdict, (uint32_t)VERDICT_COUNT - 1u),
+    FLAGS(estimator.learning.levels, estimator.learning.levels),
 
-    FLOATS(estimator.trim.output[0].section[0].level, estimator.trim.settling_time),
+    FLOATS(estimator.trim.output[0].section[0].level, estimator.trim.corner),
     FLAGS(estimator.trim.deviations, estimator.trim.deviations),
     FLOATS(estimator.trim_sine_cosine.sine, estimator.alignment.time),
     MEMBERS(estimator.mode, estimator.mode, (uint8_t)sizeof(enum lever_mode), (uint32_t)LEVER_MODE_FAULT),
     WORDS(estimator.time_us, estimator.late_series_us),
     FLOATS(estimator.raw_z_ddot, estimator.base_missing),
-    FLOATS(estimator.seat.z_ddot, estimator.seat.rate[LEVER_SEAT_MODES - 1]),
+    FLOATS(estimator.seat.place[0], estimator.seat.z_ddot),
     FLOATS(estimator.last_z_ddot, estimator.nis),
     BYTES(estimator.nis_size, estimator.nis_size, (uint32_t)CDKF_OUTPUTS),
     FLAGS(estimator.frozen, estimator.communication_fault),
@@ -314,6 +306,32 @@ static bool is_drawn(const estimator_t *estimator)
     return same;
 }
 
+/* A belief that may be returned to keeps the invariant, and all that is stated of it is finite. */
+static bool can_return(const estimator_t *estimator, const snapshot_t *kept)
+{
+    cdkf_t returned = estimator->cdkf; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
+    cdkf_return(&returned, kept);
+    cdkf_draw(&returned, estimator->setup.model_in_use, &estimator->setup.constants);
+    float size = cdkf_state_sigma(&returned, 0u) + cdkf_state_sigma(&returned, 1u);
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        size += cdkf_parameter_sigma(&returned, i);
+    }
+    return cdkf_is_valid(&returned) && (size < FLOAT_LIMIT);
+}
+
+/* What the belief is moved by is no more than settings and samples can make it, so that no product of it overflows. */
+static bool is_moderate(const cdkf_t *cdkf)
+{
+    float size = cdkf->growth;
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        size += fabsf(cdkf->walk[i]);
+        for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
+            size += fabsf(cdkf->considered[c].w[i]);
+        }
+    }
+    return (size < MODERATE) && (cdkf->growth >= 0.0f);
+}
+
 /* Values that are possible one by one may contradict each other: the filter keeps its invariant, and all of the
  * estimate is finite. */
 static bool is_consistent(const lever_t *lever)
@@ -330,8 +348,11 @@ static bool is_consistent(const lever_t *lever)
     for (uint32_t i = 0u; i < (uint32_t)GROUPS; i++) {
         finite = finite && are_finite(group[i], count[i]);
     }
-    const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.averages.excitation_square >= 0.0f);
-    return finite && squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator);
+    const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.learning.evidence.motion.slow >= 0.0f);
+    const snapshot_t *kept = lever->estimator.learning.kept;
+    return finite && squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
+           is_moderate(&lever->estimator.cdkf) && can_return(&lever->estimator, &kept[0]) &&
+           can_return(&lever->estimator, &kept[1]);
 }
 
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])

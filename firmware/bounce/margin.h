@@ -18,7 +18,7 @@ typedef struct margin {
     float gain; /* by which the loop may grow until it is unstable, at most 40 [dB] */
     float gain_sigma;
     float arm_sigma; /* the part of that which is the arm's, without the table's [dB] */
-    float modulus; /* least |1 - L|, negative where the loop is unstable [1] */
+    float modulus;   /* least |1 - L|, negative where the loop is unstable [1] */
     float modulus_sigma;
     float frequency; /* of the crossing, or without one where |1 - L| is least [Hz] */
     float frequency_sigma;

@@ -14,17 +14,18 @@
 #define SAME_US 22000u       /* a sensor that says the same for longer is stuck, */
 #define SAME_LEAST 8u        /* if for so many samples more than */
 #define SAME_USUAL 3u        /* times the most for which it did lately */
+#define LETTING_GO 0.95f     /* of a correction that no model stands behind any more, what a sample leaves */
 #define MEMORY 0.5f          /* of how the lever moves [s] */
 #define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
 #define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
 #define LIVELY 2.5e-5f       /* mean square of the rate from which on that can be told: (5 mrad/s)^2 */
-#define LEFT_LEAST 2.25e-4f   /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
-#define LEFT_PART 0.05f       /* and this part of the expected one */
-#define WEIGHED_EVERY 8u      /* samples */
-#define SLOW 100.0f           /* squares of the frequencies below which it is the pilot's own, */
-#define SLOW_TURN 10.0f       /* the root of that [rad/s] */
-#define FAST 230.0f           /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
-#define FASTEST 2500.0f       /* 8 Hz */
+#define LEFT_LEAST 2.25e-4f  /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
+#define LEFT_PART 0.05f      /* and this part of the expected one */
+#define WEIGHED_EVERY 8u     /* samples */
+#define SLOW 100.0f          /* squares of the frequencies below which it is the pilot's own, */
+#define SLOW_TURN 10.0f      /* the root of that [rad/s] */
+#define FAST 230.0f          /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
+#define FASTEST 2500.0f      /* 8 Hz */
 #define NOTCH_TURN_MOST 0.8f /* corner of the notch times a sample period, up to which it is stable */
 #define PERIOD_MOST 0.02f    /* of a filter's step [s] */
 #define LONGEST 0.1f         /* without a sample, until the filters begin anew [s] */
@@ -158,8 +159,8 @@ static void weigh(mitigation_rest_t *rest, float usual)
 {
     const float turn_square = rest->rate_square / greater(rest->square, LEFT_LEAST / FASTEST);
     rest->turn = sqrtf(lesser(greater(turn_square, SLOW), FASTEST));
-    rest->weight = between_0_and_1((rest->rate_square / usual) - 1.0f) *
-                   between_0_and_1((turn_square - SLOW) / (FAST - SLOW));
+    rest->weight =
+        between_0_and_1((rest->rate_square / usual) - 1.0f) * between_0_and_1((turn_square - SLOW) / (FAST - SLOW));
 }
 
 /* Takes that away. */
@@ -205,8 +206,8 @@ static float angle_of(
         const float involuntary = mitigation->trust * mitigation->involuntary.theta;
         const float damping = 2.0f * settings->notch_damping_ratio;
         const float share = share_of(period, MEMORY);
-        const float all = sample->theta - involuntary;
-        float left = all;
+        const float unexplained = sample->theta - involuntary;
+        float left = unexplained;
         for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
             left = take_rest(&mitigation->rest[i], left, period, share, damping);
         }
@@ -216,7 +217,7 @@ static float angle_of(
             weigh(&mitigation->rest[1], usual);
         }
         angle = (mitigation->trust * involuntary_angle(&mitigation->involuntary, settings->correction_delay)) +
-                (all - left);
+                (unexplained - left);
     }
     return angle;
 }
@@ -254,6 +255,7 @@ static void advance(mitigation_t *mitigation, const lever_settings_t *settings, 
         mitigation->correction = -clamped(angle_of(mitigation, settings, sample, period), settings->correction_limit);
     } else {
         mitigation->explained = false;
+        mitigation->correction *= LETTING_GO;
     }
 }
 

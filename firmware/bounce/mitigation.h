@@ -54,7 +54,7 @@ typedef struct mitigation {
     mitigation_band_t expected; /* and of the involuntary theta_dot */
     float expected_square;      /* means of the latter's square, and of the product of both [rad^2/s^2] */
     float product;
-    float trust;            /* weight of the involuntary motion: how far the estimated arm explains the lever's, 0 to 1 */
+    float trust; /* weight of the involuntary motion: how far the estimated arm explains the lever's, 0 to 1 */
     mitigation_rest_t rest[MITIGATION_RESTS]; /* of theta less that: each of what the one before leaves */
     mitigation_notch_t notch;
     float correction;       /* before the fade [rad] */

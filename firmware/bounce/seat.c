@@ -1,7 +1,5 @@
 #include "bounce/seat.h"
 
-#include "math/bounds.h"
-
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -10,12 +8,11 @@
 float seat_bent(seat_t *seat, float z_ddot, float elapsed)
 {
     const lever_aircraft_t *aircraft = seat->aircraft;
-    const uint32_t modes = lesser_count(aircraft->seat_modes, (uint32_t)LEVER_SEAT_MODES);
     const bool goes_on = (elapsed > 0.0f) && (elapsed <= LONGEST);
     const float half = 0.5f * elapsed;
     const float middle = 0.5f * (seat->z_ddot + z_ddot);
     float at_seat = aircraft->seat_direct * z_ddot;
-    for (uint32_t k = 0u; k < modes; k++) {
+    for (uint32_t k = 0u; k < aircraft->seat_modes; k++) {
         const lever_seat_mode_t *mode = &aircraft->seat[k];
         const float place = seat->place[k];
         const float rate = seat->rate[k];

@@ -14,9 +14,9 @@
 
 typedef struct seat {
     const lever_aircraft_t *aircraft; /* NULL, or none of its modes: the accelerometer is at the seat */
-    float z_ddot;                     /* at the accelerometer, of the last sample [m/s^2] */
     float place[LEVER_SEAT_MODES];
     float rate[LEVER_SEAT_MODES];
+    float z_ddot; /* at the accelerometer, of the last sample [m/s^2] */
 } seat_t;
 
 /* z_ddot at the seat [m/s^2] of that at the accelerometer, on a cabin that bends, `elapsed` [s] after the last one; 0, or

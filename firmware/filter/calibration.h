@@ -8,14 +8,12 @@
 
 typedef struct calibration {
     score_t score[CDKF_CALIBRATION]; /* with exponential forgetting */
-    bool wrong;
 } calibration_t;
 
 void calibration_start(calibration_t *calibration);
 
-/* Adds a block of `period` seconds; an error counts when it is beyond what its standard deviation in `cdkf` and the
- * innovations' own noise allow. */
-void calibration_step(
-    calibration_t *calibration, const cdkf_t *cdkf, const score_t score[CDKF_CALIBRATION], float period);
+/* Adds a block of `period` seconds, from the pending scores. Returns the largest error over what its standard deviation
+ * and the innovations' own noise allow. */
+float calibration_step(calibration_t *calibration, const cdkf_t *cdkf, float period);
 
 #endif

@@ -156,20 +156,21 @@ typedef struct score {
 typedef struct correction {
     float w[MODEL_PARAMETERS];
     float variance[MODEL_PARAMETERS];
+    bool bounded; /* a parameter rests on a bound */
 } correction_t;
 
 /* The pending scores: of an error of CDKF_BASE_GAIN that has just come about, and of each considered error as if it had
  * always been. */
 score_t cdkf_sudden_score(const cdkf_t *cdkf);
-void cdkf_constant_scores(const cdkf_t *cdkf, score_t score[CDKF_CONSIDERED]);
+score_t cdkf_constant_score(const cdkf_t *cdkf, uint32_t c);
 
 /* From now on there is a step that nothing is known of; or none any more. */
 void cdkf_begin_step(cdkf_t *cdkf);
 void cdkf_end_step(cdkf_t *cdkf);
 
 /* Corrects w and x for the step by its score (Friedland 1969), after cdkf_learn(); its part in their standard
- * deviations shrinks with it. */
-void cdkf_learn_step(cdkf_t *cdkf, const score_t *score);
+ * deviations shrinks with it. Returns true when a parameter rests on a bound. */
+bool cdkf_learn_step(cdkf_t *cdkf, const score_t *score);
 
 /* Line 11: conditions w, and x with it, on the pending information of the last `period` seconds. From the start, or
  * an opened covariance, on it counts in part only, and fully after `caution` seconds of information: far from the

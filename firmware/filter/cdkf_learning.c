@@ -35,11 +35,9 @@ score_t cdkf_sudden_score(const cdkf_t *cdkf)
     return score;
 }
 
-void cdkf_constant_scores(const cdkf_t *cdkf, score_t score[CDKF_CONSIDERED])
+score_t cdkf_constant_score(const cdkf_t *cdkf, uint32_t c)
 {
-    for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
-        score[c] = considered_score(&cdkf->considered[c], &cdkf->pending);
-    }
+    return considered_score(&cdkf->considered[c], &cdkf->pending);
 }
 
 void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correction)
@@ -67,7 +65,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
     }
     considered_learn(cdkf->considered, cdkf->acting, cdkf->trust, u);
     cdkf_drop_pending(cdkf);
-    (void)scaling_bound(&cdkf->scaling, cdkf->w);
+    correction->bounded = scaling_bound(&cdkf->scaling, cdkf->w);
     for (uint32_t i = 0u; i < L; i++) {
         correction->variance[i] -= factor_variance(cdkf->s, L, i);
         correction->w[i] = cdkf->w[i] - correction->w[i];
@@ -88,7 +86,7 @@ void cdkf_end_step(cdkf_t *cdkf)
     cdkf->acting = (uint32_t)CDKF_CALIBRATION;
 }
 
-void cdkf_learn_step(cdkf_t *cdkf, const score_t *score)
+bool cdkf_learn_step(cdkf_t *cdkf, const score_t *score)
 {
     const considered_t *of = &cdkf->considered[CDKF_STEP];
     const float before = cdkf->considered_sigma[CDKF_STEP];
@@ -103,7 +101,7 @@ void cdkf_learn_step(cdkf_t *cdkf, const score_t *score)
             cdkf->x[r - L] += step * (of_w + of->x[r - L]);
         }
     }
-    (void)scaling_bound(&cdkf->scaling, cdkf->w);
+    return scaling_bound(&cdkf->scaling, cdkf->w);
 }
 
 /* Adds independent deviations of the state, columns [MODEL_STATES x MODEL_PARAMETERS], to its own uncertainty. */

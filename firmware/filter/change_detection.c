@@ -13,8 +13,7 @@ void change_detection_init(change_detection_t *change)
     change->average = 1.0f;
 }
 
-bool change_detection_step(
-    change_detection_t *change, const correction_t *correction, float period, float memory, float threshold)
+float change_detection_step(change_detection_t *change, const correction_t *correction, float period, float memory)
 {
     const float share = share_of(period, memory);
     const float keep = 1.0f - share;
@@ -28,11 +27,11 @@ bool change_detection_step(
         }
     }
     change->average += (share / LONG) * ((statistic / (float)L) - change->average);
-    const float level = greater(change->average, 1.0f);
-    const bool changed = (threshold > 0.0f) && (statistic > (threshold * level));
-    if (changed) {
-        (void)memset(change->sum, 0, sizeof change->sum);
-        (void)memset(change->variance, 0, sizeof change->variance);
-    }
-    return changed;
+    return statistic / greater(change->average, 1.0f);
+}
+
+void change_detection_restart(change_detection_t *change)
+{
+    (void)memset(change->sum, 0, sizeof change->sum);
+    (void)memset(change->variance, 0, sizeof change->variance);
 }

@@ -20,9 +20,10 @@ typedef struct change_detection {
 
 void change_detection_init(change_detection_t *change);
 
-/* Takes a correction of w, `period` seconds after the last one. Memory of the sum [s]; threshold on the statistic
- * (0: never). True: a change; the sum starts anew. */
-bool change_detection_step(
-    change_detection_t *change, const correction_t *correction, float period, float memory, float threshold);
+/* Takes a correction of w, `period` seconds after the last one; memory of the sum [s]. Returns the statistic. */
+float change_detection_step(change_detection_t *change, const correction_t *correction, float period, float memory);
+
+/* The sum starts anew: after a change. */
+void change_detection_restart(change_detection_t *change);
 
 #endif

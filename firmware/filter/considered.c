@@ -43,7 +43,9 @@ void considered_correct_by(considered_t considered[CDKF_CONSIDERED], uint32_t co
 void considered_drop_pending(considered_t considered[CDKF_CONSIDERED])
 {
     for (uint32_t c = 0u; c < CONSIDERED; c++) {
-        (void)memset(considered[c].cross, 0, sizeof considered[c].cross);
+        for (uint32_t i = 0u; i < L; i++) {
+            considered[c].cross[i] = 0.0f;
+        }
         considered[c].vector = 0.0f;
         considered[c].information = 0.0f;
     }

@@ -6,7 +6,8 @@
 #include <string.h>
 
 #define SECTIONS ((uint32_t)TRIM_SECTIONS)
-#define STEPS_MOST 24.0f /* of that line */
+#define SETTLING_TURNS 0.9f /* of the corner */
+#define STEPS_MOST 24.0f    /* of that line */
 
 /* The sections in units of the corner: 2 cos(pi / 12), 2 cos(3 pi / 12), 2 cos(5 pi / 12). */
 static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f};
@@ -25,7 +26,6 @@ void trim_start(trim_t *trim, float angle, float corner, bool deviations)
 {
     (void)memset(trim, 0, sizeof *trim);
     trim->corner = HIGH_PASS_TURN * corner;
-    trim->settling_time = 0.9f / corner;
     trim->deviations = deviations;
     trim->output[0].section[0].level = angle;
     trim->last[0] = angle;
@@ -49,19 +49,23 @@ static void begin(level_t *level, float value)
 void trim_begin(trim_t *trim, const float x[MODEL_STATES])
 {
     for (uint32_t i = 0u; i < (uint32_t)MODEL_STATES; i++) {
-        begin(&trim->output[i], trim->origin[i] + trim->ahead[i] + x[i]);
+        begin(&trim->output[i], trim->origin[i] + x[i]);
     }
     for (uint32_t i = 0u; i < (uint32_t)TRIM_INPUTS; i++) {
         begin(&trim->input[i], (i == (uint32_t)TRIM_STEP) ? 0.0f : level_of(&trim->input[i]));
     }
     trim->begin_rate = trim->output[1].section[0].level;
-    (void)memset(trim->ahead, 0, sizeof trim->ahead);
     trim_set_origin(trim);
+}
+
+float trim_settling_time(const trim_t *trim)
+{
+    return (SETTLING_TURNS * HIGH_PASS_TURN) / trim->corner;
 }
 
 void trim_unsettle(trim_t *trim)
 {
-    trim->unsettled = trim->deviations ? trim->settling_time : 0.0f;
+    trim->unsettled = trim->deviations ? trim_settling_time(trim) : 0.0f;
 }
 
 /* The deviation of a value, `turn` = corner times period after the last one. */
@@ -110,43 +114,33 @@ static float pass_line(trim_t *trim, uint32_t i, float value, float period)
     return deviation;
 }
 
-/* Where the level of a missing output has gone: at its rate for the deviation x, which its last section sees. The level
- * itself stays: its sections would integrate their own sum. */
-static void follow(trim_t *trim, uint32_t i, float x, float period)
+/* The level of a missing output stays, as its sections would integrate their own sum. */
+static void wait_for_output(trim_t *trim, uint32_t i, float period)
 {
-    const bool waiting = trim_is_waiting(trim, i);
-    float deviation = (fabsf(x) <= MODEL_THETA_MOST) ? x : 0.0f;
-    float rate = 0.0f;
-    for (uint32_t left = SECTIONS; left > 0u; left--) {
-        high_pass_t *section = &trim->output[i].section[left - 1u];
-        section->slope = waiting ? 0.0f : section->slope;
-        rate += section->slope + (damping[left - 1u] * deviation);
-        deviation += section->level;
-    }
-    if (trim->deviations && !waiting) {
-        trim->ahead[i] += (trim->corner * period) * rate;
+    if (trim_is_waiting(trim, i)) {
+        for (uint32_t k = 0u; k < SECTIONS; k++) {
+            trim->output[i].section[k].slope = 0.0f;
+        }
     }
     trim->missing[i] += period;
 }
 
 /* An output that is missing, or was. Returns the deviation of a valid one. */
-static float irregular(trim_t *trim, uint32_t i, float x, float value, bool valid, float period, bool *back)
+static float irregular(trim_t *trim, uint32_t i, float value, bool valid, float period, bool *back)
 {
     float deviation = value;
     if (!valid) {
-        follow(trim, i, x, period);
+        wait_for_output(trim, i, period);
     } else {
         const bool waiting = trim_is_waiting(trim, i);
         deviation = waiting ? pass(&trim->output[i], value, trim->corner * period) : pass_line(trim, i, value, period);
         *back = *back || waiting;
-        trim->ahead[i] = 0.0f;
         trim->missing[i] = 0.0f;
     }
     return deviation;
 }
 
-bool trim_outputs(
-    trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period)
+bool trim_outputs(trim_t *trim, float y[MODEL_STATES], const bool valid[MODEL_STATES], float period)
 {
     const float turn = trim->corner * period;
     bool back = false;
@@ -154,7 +148,7 @@ bool trim_outputs(
         const float value = y[i];
         const bool regular = valid[i] && (trim->missing[i] <= 0.0f);
         const float deviation =
-            regular ? pass(&trim->output[i], value, turn) : irregular(trim, i, x[i], value, valid[i], period, &back);
+            regular ? pass(&trim->output[i], value, turn) : irregular(trim, i, value, valid[i], period, &back);
         y[i] = (valid[i] && trim->deviations) ? deviation : value;
         trim->last[i] = valid[i] ? value : trim->last[i];
     }

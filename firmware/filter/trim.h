@@ -64,10 +64,8 @@ typedef struct trim {
     float begin_rate;             /* theta_dot when the levels were begun anew last [rad/s] */
     float missing[MODEL_STATES];  /* time since the last sample of each output [s] */
     float last[MODEL_STATES];     /* value of that sample */
-    float ahead[MODEL_STATES];    /* by which the level of a missing output has moved since */
     float unsettled;              /* time until the levels have settled: nothing can be learnt before [s] */
     float corner;                 /* [rad/s] */
-    float settling_time;          /* [s] */
     bool deviations;              /* preload trim */
 } trim_t;
 
@@ -92,13 +90,15 @@ void trim_set_origin(trim_t *trim);
 
 /* Replaces valid outputs y by deviations from the levels, in preload trim, `period` seconds after the last sample.
  * While an output is not valid its level waits, and when it is back takes the straight line between both samples: to
- * follow its own prediction x would be to integrate six times (seen: one sample in three, and the state exploded).
- * `ahead` follows x, for 20 ms. Returns true when an output is back after that. */
-bool trim_outputs(
-    trim_t *trim, const float x[MODEL_STATES], float y[MODEL_STATES], const bool valid[MODEL_STATES], float period);
+ * follow its own prediction would be to integrate six times (seen: one sample in three, and the state exploded). Returns
+ * true when an output is back after an outage. */
+bool trim_outputs(trim_t *trim, float y[MODEL_STATES], const bool valid[MODEL_STATES], float period);
 
 /* The level of output i waits for samples. */
 bool trim_is_waiting(const trim_t *trim, uint32_t i);
+
+/* Time in which the levels settle [s]. */
+float trim_settling_time(const trim_t *trim);
 
 /* The levels are guesses: in preload trim nothing can be learnt until they have settled. */
 void trim_unsettle(trim_t *trim);

@@ -8,29 +8,32 @@
 #ifndef FILTER_WHITENESS_H
 #define FILTER_WHITENESS_H
 
-#include <stdbool.h>
-
-enum { WHITENESS_LAGS = 4 }; /* blocks: 20 to 80 ms */
+enum { WHITENESS_LAGS = 4 }; /* blocks of 20 ms: 20 to 80 ms */
 
 typedef struct whiteness {
     float sum;                     /* of this block */
+    float elapsed;                 /* since it began [s] */
     float before[WHITENESS_LAGS];  /* sums of the last blocks, the latest first */
     float variance;                /* mean square of a sum */
     float product[WHITENESS_LAGS]; /* mean product of a sum and that so many blocks before */
     float time;                    /* that these means are made of, up to their memory [s] */
-    bool coloured;                 /* the verdict */
 } whiteness_t;
 
 void whiteness_start(whiteness_t *whiteness);
 
-/* Adds a normalised innovation. */
-static inline void whiteness_add(whiteness_t *whiteness, float innovation)
+#define WHITENESS_BLOCK 0.0195f /* [s] */
+
+void whiteness_end_block(whiteness_t *whiteness);
+
+/* Adds a normalised innovation of a sample in flight, `elapsed` seconds after the last. */
+static inline void whiteness_add(whiteness_t *whiteness, float innovation, float elapsed)
 {
     whiteness->sum += innovation;
+    whiteness->elapsed += elapsed;
+    if (whiteness->elapsed > WHITENESS_BLOCK) {
+        whiteness_end_block(whiteness);
+    }
 }
-
-/* At the end of a block of `period` seconds; `counts`: it was flight, and nothing was missing. */
-void whiteness_step(whiteness_t *whiteness, float period, bool counts);
 
 /* Largest correlation, 0 before enough has been seen. */
 float whiteness_correlation(const whiteness_t *whiteness);

@@ -153,7 +153,10 @@ def _cells(row: Row, measured: Mapping[str, Any]) -> tuple[str, ...]:
     limits = [limit for limit in CONDITIONS[row.condition].limits if limit.figure == row.figure]
     missed = any(not limit.holds(number(values[limit.over])) for limit in limits)
     unit = {"1": "", "°": "°"}.get(FIGURES[row.figure].unit, f" {FIGURES[row.figure].unit}")
-    shown = {over: f"{number(value):.3g}{unit}" for over, value in values.items()}
+    sought = FIGURES[row.figure].sought_to
+    shown = {
+        over: f"{'≥ ' if number(value) >= sought else ''}{number(value):.3g}{unit}" for over, value in values.items()
+    }
     limit = ", ".join(map(str, limits)) + (MISSED if missed else "")
     return (row.says, shown["median"], shown["worst"], found["worst run"] or "", shown["all"], limit)
 

@@ -33,6 +33,7 @@ UNKNOWN = 10.0  # process noise for an unknown base acceleration, in those that 
 SPIKE = 8.0  # standard deviations
 SURPRISE_TIME = 0.1  # [s] of the shorter average of normalised innovations
 SURPRISE_MOST = 100.0  # of a single sample
+REST_TIME = 1.0  # [s]
 UNSETTLED = 4.0  # innovations while levels settle, in squares: as much larger as they may be
 SPIKE_TIME = 0.02  # [s] longer than this it is no spike
 STOP_RATE = 0.002  # [rad/s] friction is at half of its limit
@@ -91,6 +92,7 @@ class Estimator:
         self.detrended = preload == "trim"
 
         self.outputs = (Detrend(start.trim), Detrend())  # θ, whose level is the trim angle, and θ̇
+        self.rest = start.trim  # mean of the trim angle, about which dynamics are reported [rad]
         self.inputs = (Detrend(), Detrend(), Detrend())  # z̈, τ_m, friction of 1 N m
         self.origin = np.array((start.trim, 0.0)) if self.detrended else np.zeros(2)  # what x counts from
         x = start.state.astype(np.float64) - self.origin
@@ -112,7 +114,6 @@ class Estimator:
         self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
         self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
         self.last_output = [0.0, 0.0]
-        self.ahead: Array = np.zeros(2)  # of the levels since the last sample of each output
         self.base_missing = seconds(0.0)
         self._wait_for_levels()
         self.last_raw = start.input
@@ -152,7 +153,7 @@ class Estimator:
         valid = valid & ~self._are_spikes(y, valid, duration)
         y, back = self._subtract_trim(y, valid, dt)
         if back:
-            self._end_outage(y, valid)
+            self._wait_for_levels()
         self._correct(y, valid, duration)
         self._average_motion(y, valid, duration)
 
@@ -160,14 +161,14 @@ class Estimator:
         """Measurement update, and learning when it is due."""
         excited = self._is_excited()
         measured = self._is_settled() and bool(valid.any()) and bool(self.base_missing <= 0.0)
-        lesson = Lesson(measured, excited, self.surprise)
         self.nis = 0.0
         if valid.any():
             noise = np.diag(self.learning.noise.output_noise)
-            innovation = self.belief.update(y, valid, noise, learn=lesson.measured)
+            innovation = self.belief.update(y, valid, noise, learn=measured)
             self.nis = innovation.normalised_square
             self._average_innovation(self.nis / int(valid.sum()), duration)
-            self.learning.add(innovation, valid, lesson)
+            self.learning.add(innovation, valid, measured and excited)
+        lesson = Lesson(measured, excited, self.surprise)
         rate = float(self.belief.x[1])
         if self.grip is None:
             self.learning.step(duration, lesson)
@@ -175,6 +176,8 @@ class Estimator:
             grip = self.grip
             self.learning.step(duration, lesson, lambda period: grip.end_block(rate, period, measured and excited))
         self.considered_sigma[STEP] = self.learning.step_sigma
+        if self.learning.explains:
+            self.learning.explains, self.surprise = False, 1.0
         if self.learning.moved:
             self._begin_grip(np.where(valid, y, self.belief.x))
 
@@ -193,7 +196,7 @@ class Estimator:
         least = UNSETTLED if self.unsettled > 0.0 else 1.0
         expected = np.maximum(max(self.average_nis, least) * (state**2 + noise**2), noise**2)
         checked = valid & (np.array(self.missing) <= OUTAGE)
-        far = checked & ((y - self.origin - self.ahead - self.belief.x) ** 2 > SPIKE**2 * expected)
+        far = checked & ((y - self.origin - self.belief.x) ** 2 > SPIKE**2 * expected)
         for i in np.flatnonzero(checked):
             self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
@@ -255,8 +258,7 @@ class Estimator:
     def _subtract_trim(self, y: Array, valid: NDArray[np.bool_], dt: float) -> tuple[Array, bool]:
         """The outputs without their slow level, as x is in preload trim, and whether one is back after an outage.
 
-        Through a few missing samples a level goes `ahead` with the prediction, and takes a straight line when it
-        is back; after more of them it waits.
+        A level waits for samples, and after a few missing ones takes a straight line when the output is back.
         """
         deviation, back = np.zeros(2), False
         for i, detrend in enumerate(self.outputs):
@@ -267,35 +269,29 @@ class Estimator:
                 for value in np.linspace(self.last_output[i], float(y[i]), steps + 1)[1:].tolist():
                     deviation[i] = self._deviation(detrend, value, elapsed / steps)
                 back = back or waiting
-                self.last_output[i], self.ahead[i], self.missing[i] = float(y[i]), 0.0, seconds(0.0)
+                self.last_output[i], self.missing[i] = float(y[i]), seconds(0.0)
                 continue
             if waiting:
                 detrend.hold()
-            elif self.detrended:
-                self.ahead[i] += dt * detrend.rate(float(self.belief.x[i]), self.settings["trim_corner"])
             self.missing[i] += seconds(dt)
+        self.rest += min(dt / REST_TIME, 1.0) * (self.trim - self.rest)
         return deviation, back
-
-    def _end_outage(self, y: Array, valid: NDArray[np.bool_]) -> None:
-        """The state starts again where it is measured; levels must settle before anything can be learnt."""
-        if valid.all():
-            self.belief.start_state(y, np.diag(self.learning.noise.output_noise))
-        self._wait_for_levels()
 
     def _begin_grip(self, x: Array) -> None:
         """Levels and state begin anew where the lever is, with a step of its acceleration."""
         self.learning.moved = False
         if not isinstance(self.belief, TwoStage):
             return
-        for detrend, value in zip(self.outputs, self.origin + self.ahead + x, strict=True):
+        for detrend, value in zip(self.outputs, self.origin + x, strict=True):
             detrend.begin(float(value))
+        self.rest = self.trim
         for detrend in self.inputs:
             detrend.begin(detrend.level)
         if self.grip is not None:
             self.grip.begin()
         self.step_input.begin(0.0)
         self.begin_rate = self.outputs[1].level
-        self.origin, self.ahead = np.array([detrend.level for detrend in self.outputs]), np.zeros(2)
+        self.origin = np.array([detrend.level for detrend in self.outputs])
         self.belief.start_state(np.zeros(2), np.diag(self.learning.noise.output_noise))
         self.belief.begin_step()
         self.learning.step_sigma = STEP_SIGMA
@@ -334,10 +330,10 @@ class Estimator:
         return math.sqrt(dt) * np.array([[own, rate * dt / 2.0, rate * dt / math.sqrt(12.0)], [0.0, rate, 0.0]])
 
     def _average_innovation(self, square: float, duration: float) -> None:
-        share = min(duration / self.settings["excitation_time"], 1.0)
-        if self.unsettled <= 0.0:
-            self.average_nis += share * (square - self.average_nis)
-        self.surprise += min(duration / SURPRISE_TIME, 1.0) * (min(square, SURPRISE_MOST) - self.surprise)
+        share, bounded = min(duration / self.settings["excitation_time"], 1.0), min(square, SURPRISE_MOST)
+        if self._is_settled():
+            self.average_nis += share * (bounded - self.average_nis)
+        self.surprise += min(duration / SURPRISE_TIME, 1.0) * (bounded - self.surprise)
 
     def _average_motion(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Average the measured square of the rate, over a long time and a short one.
@@ -391,7 +387,7 @@ class Estimator:
     def dynamics(self) -> tuple[Array, Array]:
         """Natural frequency [Hz] and damping ratio [1] of the estimate; standard deviations by sigma points."""
         points = self.scale.physical(cdkf.draw(self.belief.w, self.belief.w_factor))
-        values = self.model.dynamics(points, self.trim)
+        values = self.model.dynamics(points, self.rest)
         _, first, second = cdkf.differences(values)
         slope = np.linalg.solve(self.belief.w_factor.T, first.T).T
         errors = slope @ self.belief.errors[: len(self.scale.names)]
@@ -447,7 +443,7 @@ def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, ever
         force = None if math.isnan(forces[index]) else forces[index]
         estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index], force)
         if (index - first) % every == 0:
-            x = (estimator.origin + estimator.ahead + estimator.belief.x, estimator.state_deviations())
+            x = (estimator.origin + estimator.belief.x, estimator.state_deviations())
             others = (*estimator.parameters(), *estimator.dynamics(), (estimator.trim, estimator.nis))
             rows.append(np.concatenate((*x, *others)))
     return dict(zip(columns(estimator), np.array(rows).T, strict=True))

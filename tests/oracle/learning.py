@@ -18,10 +18,15 @@ from .noise import NoiseEstimation
 from .scale import Scale
 
 ADAPTATIONS = ("fixed", "annealing", "robbins_monro", "forgetting")
-REPORTED = 3.0  # [s] from a change on, in which there is no other
-TRANSIENT = 2.0  # [s] left of it when noise is estimated again
+REPORTED = 3.0  # [s] from a change on, in which its step is estimated
+TRANSIENT = 1.0  # [s] after it, noise is estimated again
+PROBATION = 0.29  # [s] until then a change has to explain the innovations:
+UNEXPLAINED = (3.0, 1.8)  # their mean square until then, and at its end
+EXPLAINED = 1.3  # with which noise that had grown is right again
+NOISE_WINDOW = 0.15  # of noise_window, while noise has grown
+LONG_AGO = 1e3  # [s]
+AWAKE = 0.3  # [s] until motion is believed after a rest
 KEEP_PERIOD = 1.0  # [s]
-AWAKE = 0.3  # [s] after a rest
 DISTURBANCE = 2.0  # process noise after a change, in noise_range times the one that is set
 DISTURBANCE_TIME = 0.4  # [s] in which it dies away
 GRIP = 0.038  # [s] until a new grip is complete
@@ -84,19 +89,19 @@ class Learning:
         self.change = ChangeDetection(settings["change_memory"], settings["change_threshold"])
         self.elapsed = 0.0  # since the parameters learnt last [s]
         self.counted = seconds(0.0)  # the same
-        self.changed = seconds(0.0)  # time left of a change
-        self.wait = seconds(0.0)  # until anything is taught
-        self.grip = seconds(0.0)  # until a new grip is complete
-        self.moved = False  # it is, and has moved the lever
+        self.since_change, self.awake = seconds(LONG_AGO), seconds(0.0)
+        self.verdict = "rest"
+        self.explains = False  # innovations tell from now on whether a change explains them
+        self.moved = False  # a new grip is complete, and has moved the lever
         self.step_sigma = 0.0  # of the step; 0: there is none
         self.kept_ago = seconds(0.0)
         self.kept = (self._snapshot(), self._snapshot())  # one and two KEEP_PERIODs ago
 
     # --- one sample ------------------------------------------------------------------------------------------------
 
-    def add(self, innovation: Innovation, valid: NDArray[np.bool_], lesson: Lesson) -> None:
+    def add(self, innovation: Innovation, valid: NDArray[np.bool_], counts: bool) -> None:
         """What a sample says of the noise."""
-        if self.adapted and lesson.measured and lesson.excited:
+        if self.adapted and counts:
             self.noise.add(innovation, valid)
 
     def step(self, duration: float, lesson: Lesson, before: Callable[[float], None] = lambda period: None) -> None:
@@ -114,34 +119,74 @@ class Learning:
     # --- a block -----------------------------------------------------------------------------------------------------
 
     def _end_block(self, period: float, counted: np.float32, lesson: Lesson) -> None:
-        self.wait = max(self.wait - counted, seconds(0.0))
-        if not lesson.excited:
-            self.wait = max(self.wait, seconds(AWAKE))
-        self.changed = max(self.changed - counted, seconds(0.0))
+        self.since_change = min(self.since_change + counted, seconds(LONG_AGO))
+        self.awake = min(self.awake + counted, seconds(AWAKE)) if lesson.excited else seconds(0.0)
+        suddenly = self._turn(self._verdict(counted, lesson), lesson)  # seconds of the walk at once
+        if self.verdict == "noise":
+            self.since_change = seconds(LONG_AGO)  # it was no change
         self.disturbance *= 1.0 - min(period / DISTURBANCE_TIME, 1.0)
-        self._follow_grip(counted, lesson.surprise)
-        taught = lesson.measured and self.wait <= 0.0
-        if not (taught and lesson.excited):
+        if self.since_change >= REPORTED:
+            self.step_sigma = 0.0
+        learns = self.verdict in ("new", "learning")
+        if not learns:
             self.belief.drop_pending()
-            self.noise.begin()
-        elif self.adapted:
+        if self.adapted:
             self._estimate_noise(counted)
         score = self.belief.step_score if isinstance(self.belief, TwoStage) else StepScore()
         correction, variance = self._learn(counted)
-        if taught and lesson.excited and self.step_sigma > 0.0:
+        if learns and self.step_sigma > 0.0:
             self._learn_step(score)
-        suddenly = 0.0  # seconds of the walk at once
-        if taught and lesson.excited and self.adapted:
-            suddenly = self._detect_change(correction, variance, period, lesson.surprise)
+        if learns and self.adapted and self._has_changed(correction, variance, period):
+            suddenly = self._follow(lesson)
         self.belief.forget(self.growth * period)
         self.belief.walk(self.walk * period + self.floor * suddenly)
         self.belief.limit(self.greatest_sigma)
-        if self.changed > 0.0:
+        rests = self.verdict == "rest"
+        if self.since_change < REPORTED:
             self._start_walk()  # the jump is no drift
-        elif (taught and lesson.excited) or (not lesson.excited and self.trust > 0.0):
-            self._adapt_walk(correction, period, lesson.excited)
+        elif learns or (rests and self.trust > 0.0):
+            self._adapt_walk(correction, period, excited=not rests)
         else:
             self.growth = 0.0  # what cannot be learnt again is not forgotten
+
+    # --- the verdict -------------------------------------------------------------------------------------------------
+
+    def _verdict(self, period: np.float32, lesson: Lesson) -> str:
+        """The first that holds. An arm is known that was, two KEEP_PERIODs ago."""
+        if self.adapted and self._is_noise(period, lesson.surprise):
+            return "noise"
+        if not lesson.measured:
+            return "blind"
+        if self.awake < AWAKE - 0.001:
+            return "rest"
+        if self.since_change < seconds(GRIP):
+            return "regrip"
+        return "new" if self.trust < 1.0 or self.since_change < TRANSIENT else "learning"
+
+    def _is_noise(self, period: np.float32, mean_square: float) -> bool:
+        """A change of a known arm has not explained the innovations, or they are still too large."""
+        if self.verdict == "noise":
+            return mean_square > EXPLAINED
+        known = self.kept[1].trust >= 1.0
+        if known and self.since_change <= seconds(PROBATION):
+            return self.verdict != "regrip" and mean_square > UNEXPLAINED[0]
+        ends = self.since_change < PROBATION + 1.01 * period
+        return bool(known and ends and mean_square > UNEXPLAINED[1])
+
+    def _turn(self, verdict: str, lesson: Lesson) -> float:
+        """Leaves one verdict and enters another. Returns seconds of the walk that are due at once."""
+        before, self.verdict = self.verdict, verdict
+        if verdict == before:
+            return 0.0
+        if verdict == "noise":
+            self._restore()
+        if before == "regrip":
+            self.explains = True
+            if self.detrended:
+                self.moved = lesson.surprise > SURPRISES[0]
+            else:
+                self._disturb(lesson)
+        return self.settings["change_walk"] if verdict == "regrip" else 0.0
 
     def _learn(self, period: np.float32) -> tuple[Array, Array]:
         """The change of w, and by how much its variance shrinks. At first information counts in part: far from the
@@ -157,29 +202,28 @@ class Learning:
             correction = self.belief.w - w
         return correction, np.sum(factor**2 - self.belief.w_factor**2, axis=1)
 
-    def _detect_change(self, correction: Array, variance: Array, period: float, surprise: float) -> float:
-        """A sudden change counts as change_walk seconds of the walk. With his grip the pilot moves the lever: when
-        innovations are large, so is the state's process noise for a while."""
-        if not self.change.step(correction, variance, period) or self.changed > 0.0:
-            return 0.0
-        self.changed = seconds(REPORTED)
-        part = float(np.interp(surprise, SURPRISES, (0.0, 1.0)))
-        if self.kept[1].trust >= 1.0 and self.detrended:
-            self.grip = self.wait = seconds(GRIP)
-        elif part > 0.0:
-            self.disturbance = (
-                part * DISTURBANCE * self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
-            )
+    def _follow(self, lesson: Lesson) -> float:
+        """A known arm has changed, and grips anew; of an unknown one, torque is unknown. Returns seconds of the walk."""
+        if self.kept[1].trust >= 1.0:
+            self.since_change = seconds(0.0)
+            return self._turn("regrip", lesson)
+        self.since_change = seconds(PROBATION)
+        self._disturb(lesson)
         return self.settings["change_walk"]
 
-    def _follow_grip(self, period: np.float32, surprise: float) -> None:
-        """When it is complete it has moved the lever, if innovations are larger than expected."""
-        if self.changed <= 0.0:
-            self.step_sigma = 0.0
-        if self.grip > 0.0:
-            self.grip -= period
-            if self.grip <= 0.0:
-                self.grip, self.moved = seconds(0.0), surprise > SURPRISES[0]
+    def _disturb(self, lesson: Lesson) -> None:
+        """As far as innovations are larger than expected, the state is moved by unknown torque."""
+        part = float(np.interp(lesson.surprise, SURPRISES, (0.0, 1.0)))
+        if part > 0.0:
+            noise = self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
+            self.disturbance = part * DISTURBANCE * noise
+
+    def _has_changed(self, correction: Array, variance: Array, period: float) -> bool:
+        """Whether the corrections say so; soon after another change of a known arm only."""
+        detected = self.change.step(correction, variance, period)
+        known = self.kept[1].trust >= 1.0
+        again = self.since_change > seconds(self.settings["change_memory"]) and known
+        return bool(detected and (self.since_change >= REPORTED or again))
 
     def _learn_step(self, score: StepScore) -> None:
         variance = self.step_sigma**2 / (1.0 + self.step_sigma**2 * score.information)
@@ -191,22 +235,24 @@ class Learning:
     # --- noise, and what was learnt with a wrong one -----------------------------------------------------------------
 
     def _estimate_noise(self, period: np.float32) -> None:
-        """Unless innovations are those of a start or a change."""
-        if self.trust < 1.0 or self.changed > TRANSIENT:
+        """While innovations are those of a known arm, or of noise that has grown."""
+        grown = self.verdict == "noise"
+        if not grown and self.verdict != "learning":
             self.noise.begin()
-            return
-        started = self.kept[1].trust < 1.0
-        if self.noise.end_block(period) and (started or self.changed <= 0.0):
-            kept = self.kept[1]
-            self.belief.restore(kept.w, kept.w_factor, errors=bool(kept.trust >= 1.0))
-            self.trust = kept.trust
-            self.noise.begin()
-            self.kept, self.kept_ago = (kept, kept), seconds(0.0)
-            return
-        self.kept_ago += period
-        if self.kept_ago >= KEEP_PERIOD:
-            self.kept_ago = seconds(0.0)
-            self.kept = (self._snapshot(), self.kept[0])
+        elif self.noise.end_block(period, NOISE_WINDOW if grown else 1.0) and not grown and self.kept[1].trust < 1.0:
+            self._restore()
+        if self.verdict == "learning":
+            self.kept_ago += period
+            if self.kept_ago >= KEEP_PERIOD and self.noise.elapsed > 0.0:
+                self.kept_ago = seconds(0.0)
+                self.kept = (self._snapshot(), self.kept[0])
+
+    def _restore(self) -> None:
+        kept = self.kept[1]
+        self.belief.restore(kept.w, kept.w_factor, errors=bool(kept.trust >= 1.0))
+        self.trust = kept.trust
+        self.noise.begin()
+        self.kept, self.kept_ago = (kept, kept), seconds(0.0)
 
     def _snapshot(self) -> Snapshot:
         return Snapshot(self.belief.w.copy(), self.belief.w_factor.copy(), self.trust)

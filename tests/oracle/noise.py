@@ -54,10 +54,10 @@ class NoiseEstimation:
         self.product += float(white @ response)
         self.response_square += float(response @ response)
 
-    def end_block(self, period: np.float32) -> bool:
-        """After `period` [s]: at the end of a window sets the noise. Returns whether it was far too small."""
+    def end_block(self, period: np.float32, part: float = 1.0) -> bool:
+        """After `period` [s]: at the end of that part of a window sets the noise. Returns whether it was far too small."""
         self.elapsed += period
-        if self.window <= 0.0 or self.elapsed < self.window:
+        if self.window <= 0.0 or self.elapsed < np.float32(self.window) * np.float32(part):
             return False
         gain = 1.0 + (self.product / self.response_square if self.response_square > 0.0 else 0.0)
         starved = gain > STARVED and self.product > CHANCE * math.sqrt(self.response_square)

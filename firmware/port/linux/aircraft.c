@@ -125,7 +125,8 @@ static bool take_line(void *context, const char *text, settings_error_t *error)
 
 bool aircraft_read(lever_aircraft_t *aircraft, FILE *file, const char *path, settings_error_t *error)
 {
-    *aircraft = (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = NAN, .alarm = NAN, .seat_direct = NAN};
+    *aircraft =
+        (lever_aircraft_t){.gain_sigma = NAN, .phase_sigma = NAN, .warning = NAN, .alarm = NAN, .seat_direct = NAN};
     if (!settings_lines(file, path, take_line, aircraft, error)) {
         return false;
     }

@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     changing = [signal for signal in others if signal.changes()]
     rows = [_row("", signal) for signal in changing]
     print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json, inputs=read)
-    for note in notes_of(signals):
+    for note in [*notes_of(signals), *_assumed(mapping, proposed)]:
         layout.say(f"{note}.")
     if len(changing) < len(others):
         layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
@@ -94,6 +94,16 @@ def run(args: argparse.Namespace) -> int:
     if written := [str(path) for path in (args.toml, args.out) if path is not None]:
         layout.say(f"Written: {', '.join(written)}")
     return 0
+
+
+def _assumed(mapping: Mapping, proposed: list[Candidate]) -> list[str]:
+    """Units that no signal states, for the user to check."""
+    notes = []
+    for each in proposed:
+        unit = mapping.sources[each.key].unit
+        if unit != each.signal.unit:
+            notes.append(f"{each.key} = {each.signal.name} has no unit: {unit} is assumed ({each.why[-1]}); check it")
+    return notes
 
 
 def _signals(args: argparse.Namespace, start: float, length: float) -> list[Signal]:
@@ -127,7 +137,11 @@ def _row(key: str, signal: Signal) -> Row:
 def _signal_options(args: argparse.Namespace, mapping: Mapping, proposed: list[Candidate]) -> str:
     """The log and the proposal, as arguments of commands that read signals."""
     database = f" --dbc {shlex.quote(args.dbc)}" if args.dbc else ""
-    turned = {key: ",sign=-1" if source.sign == -1 else "" for key, source in mapping.sources.items()}
-    entries = [shlex.quote(f"{each.key}={each.signal.name}{turned[each.key]}") for each in proposed]
+    entries = []
+    for each in proposed:
+        source = mapping.sources[each.key]
+        unit = f",unit={source.unit}" if source.unit != each.signal.unit else ""
+        turned = ",sign=-1" if source.sign == -1 else ""
+        entries.append(shlex.quote(f"{each.key}={each.signal.name}{unit}{turned}"))
     time = [shlex.quote(f"time={args.time}")] if args.time else []
     return f"{shlex.quote(args.log)}{database} --map {' '.join([*entries, *time])}"

@@ -136,9 +136,9 @@ def read_response(path: str) -> AircraftResponse:
         is_entry = len(cells) == 1 and name in (*_NUMBERS, _DIRECT) and name not in numbers
         if not (is_entry if equals else len(cells) == (len(_MODE) if is_mode else 3)) or any(map(math.isnan, cells)):
             raise LeverError(
-                f"{place}: neither {', '.join(_NUMBERS)}, {_DIRECT} = number, each once, nor frequency, real and imaginary "
-                f"part, nor {_SEAT} and four numbers; `lever aircraft FILE.csv -o FILE.response` makes such a file of a "
-                "CSV one"
+                f"{place}: neither {', '.join(_NUMBERS)}, {_DIRECT} = number, each once, nor frequency, real and "
+                f"imaginary part, nor {_SEAT} and four numbers; `lever aircraft FILE.csv -o FILE.response` makes such "
+                "a file of a CSV one"
             )
         if equals:
             numbers[name] = cells[0]

@@ -16,11 +16,11 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..errors import LeverError
-from ..slope import STEP, slope_likeness, together
+from ..slope import STEP, slope_likeness, slope_ratio, together
 from ..units import GRAVITY
 from .mapping import Mapping, Source
 from .recorded import Signal
-from .units import INPUTS, factor, fitting, is_unit
+from .units import INPUTS, factor, fitting, is_unit, likely
 
 _UNIT_FITS, _NO_UNIT, _UNIT_DOES_NOT = 4.0, 2.0, -8.0
 _UNIT_OF_TORQUE = 7.0
@@ -118,7 +118,9 @@ def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candid
         lacking = "an acceleration of the base" if chosen.keys() & {"theta", "theta_dot"} else "the angle of a lever"
         raise LeverError(f"{where}: no signal looks like {lacking}: map it by hand, with --map KEY=SIGNAL")
     proposed = [chosen[key] for key in INPUTS if key in chosen]
-    return Mapping({each.key: _source(each, chosen) for each in proposed}), proposed
+    units = {each.key: _unit(each, chosen) for each in proposed}
+    sources = {each.key: _source(each, chosen, units[each.key][0]) for each in proposed}
+    return Mapping(sources), [replace(each, why=each.why + units[each.key][1]) for each in proposed]
 
 
 def _goes_with(each: Candidate, chosen: dict[str, Candidate]) -> bool:
@@ -133,10 +135,28 @@ def _is_clear(key: str, best: Sequence[Candidate]) -> bool:
     return key != "tau_m" or len(best) == 1 or best[0].score - best[1].score >= _CLEAR
 
 
-def _source(each: Candidate, chosen: dict[str, Candidate]) -> Source:
+def _source(each: Candidate, chosen: dict[str, Candidate], unit: str) -> Source:
     turned = each.key == "theta_dot" and "theta" in chosen
     turned = turned and slope_likeness(chosen["theta"].signal, each.signal) < 0.0
-    return Source(each.signal.name, each.signal.unit, sign=-1 if turned else None)
+    return Source(each.signal.name, unit, sign=-1 if turned else None)
+
+
+def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str, ...]]:
+    """The unit of a signal; where it has none and a replay could not tell or would be wrong, the likely one and why."""
+    if each.signal.unit:
+        return each.signal.unit, ()
+    if each.key == "z_ddot":
+        unit, why = likely(each.key, each.signal.values)
+        return unit, (why,)
+    if each.key == "theta_dot" and "theta" in chosen:
+        angle = chosen["theta"].signal
+        scale = factor("theta", angle.unit or likely("theta", angle.values)[0])
+        ratio = abs(slope_ratio(angle, each.signal))
+        for unit in ("rad/s", "deg/s"):
+            one = factor(each.key, unit)
+            if scale and one and 0.5 < ratio * one / scale < 2.0:
+                return unit, (f"{ratio:.2g} times the slope of {angle.name} as it stands",)
+    return "", ()
 
 
 def words_of(name: str) -> set[str]:

@@ -51,7 +51,8 @@ _SPELLINGS = (
     (r"revolutions?|turns?", "rev"),
     (r"1/min|rev/min|u/min", "rpm"),
     (r"lbs?f?(?!t)", "lb"),
-    (r"dps", "deg/s"),
+    (r"^dps$", "deg/s"),
+    (r"(deg|rad|m)ps(2?)$", r"\1/s\2"),
     (r"/s/s", "/s2"),
     (r"per", "/"),
     (r"//", "/"),
@@ -94,6 +95,9 @@ def split_name(label: str) -> tuple[str, str]:
     return label, ""
 
 
+_SHAKEN = 0.7
+"""Of the 99th percentile of an acceleration without a unit: above it g is not likely, below it m/s² is not."""
+
 # --- what values look like -------------------------------------------------------------------------------------------
 
 
@@ -113,6 +117,18 @@ def guess(key: str, values: FloatArray) -> tuple[str, str]:
             return "m/s^2", f"it rests at {level:.2f}, which is gravity in m/s²"
         raise LeverError("it has no unit and shows no gravity to tell it by: say unit=g or unit=m/s^2")
     return KINDS[key][1], "none is said"
+
+
+def likely(key: str, values: FloatArray) -> tuple[str, str]:
+    """As guess(), but where that refuses, the unit that a flight most likely has, for a person to confirm."""
+    try:
+        return guess(key, values)
+    except LeverError:
+        size = float(np.nanpercentile(np.abs(values), 99.0))
+        in_si = size > _SHAKEN
+        unit, other = ("m/s^2", "g") if in_si else ("g", "m/s^2")
+        much = "more than a cabin shakes" if in_si else "less than anything can be learnt from"
+        return unit, f"{size:.2g} {other} would be {much}"
 
 
 def level_in(values: FloatArray) -> float:

@@ -275,17 +275,15 @@ class _Fit:
     def _scores(self, at: Array, now: Array) -> tuple[Array, Array]:
         """Derivatives of `now`, a column for each unknown, and their sum, by differences to both sides.
 
-        Of the two the smaller counts: a change of the pilot that is detected on one side alone would look like
-        information. A difference is halfway to its other end, where the sum is less by half a step of information.
+        A difference is halfway to its other end, where the sum is less by half a step of information.
         """
         columns, gradient = [], []
         for i, each in enumerate(self._unknowns):
             sides = [h for h in (each.step, -each.step) if self._least[i] <= at[i] + h <= self._greatest[i]]
             slopes = [(self._each(at + h * np.eye(len(at))[i]) - now) / h for h in sides]
-            sizes = [float(column @ column) for column in slopes]
-            best = int(np.argmin(sizes))
+            best = _smaller(slopes)
             columns.append(slopes[best])
-            gradient.append(slopes[best].sum() + 0.5 * sides[best] * sizes[best])
+            gradient.append(slopes[best].sum() + 0.5 * sides[best] * float(slopes[best] @ slopes[best]))
         return np.stack(columns, axis=1), np.array(gradient)
 
     def _information(self, scores: Array) -> Array:
@@ -303,15 +301,16 @@ class _Fit:
         return at, now, 0.0 * step
 
     def _calibrated(self, at: Array, scores: Array, now: Array) -> tuple[Calibrated, ...]:
-        """With tau_m_gain as another unknown, of which only its stated standard deviation is known."""
+        """The standard deviations contain that of tau_m_gain, of which the log says nothing: as in a Schmidt-Kalman
+        filter, it is considered, not estimated."""
         torque_sigma, h = self._settings[f"{TORQUE_GAIN}_sigma"], _STEPS[TORQUE_GAIN]
-        information = self._information(scores)
+        covariance = np.linalg.inv(self._information(scores))
         if torque_sigma > 0.0:
-            torque = (self._each(at, **{TORQUE_GAIN: self._settings[TORQUE_GAIN] + h}) - now) / h
-            beside = scores.T @ torque
-            own = torque @ torque + torque_sigma**-2.0
-            information = information - np.outer(beside, beside) / own
-        sigma, white = np.sqrt(np.diag(np.linalg.inv(information))), self._is_white(at)
+            gain = self._settings[TORQUE_GAIN]
+            slopes = [(self._each(at, **{TORQUE_GAIN: gain + side}) - now) / side for side in (h, -h)]
+            shift = covariance @ (scores.T @ slopes[_smaller(slopes)]) * torque_sigma
+            covariance += np.outer(shift, shift)
+        sigma, white = np.sqrt(np.diag(covariance)), self._is_white(at)
         return tuple(
             Calibrated(
                 name,
@@ -323,3 +322,9 @@ class _Fit:
             )
             for i, name in enumerate(self._names)
         )
+
+
+def _smaller(slopes: Sequence[Array]) -> int:
+    """Which of two differences, to either side, has the smaller sum of squares: a change of the pilot that is detected
+    on one side alone would look like information."""
+    return int(np.argmin([float(column @ column) for column in slopes]))

@@ -18,6 +18,9 @@ Science and Technology 36, 2014.) Signs: a cabin that accelerates upwards leaves
 at low frequency the loop is a negative feedback; the arm beyond its own frequency, the delay and the actuator turn it
 round.
 
+A fuselage that bends has modes q beside that (README.md): the hub moves by z + rotor q, the seat by z + seat q, the
+accelerometer by z + accelerometer q.
+
 The pitch follows gearing * (delta + correction)(t - delay) as a first-order actuator with limits of rate and travel.
 The correction is what the estimator has put out correction_delay and a sample period earlier. With lever_low_pass their
 sum passes a first-order low-pass with that corner: what flight control computers do against bounce, to compare with.
@@ -53,7 +56,6 @@ from .tabulated import Tabulated, is_response
 
 Z_DOT, BETA, BETA_DOT = range(3)
 """Places in the state of a helicopter [m/s, rad, rad/s]."""
-
 
 MOST_MODES = 3
 """Of the fuselage."""
@@ -172,8 +174,20 @@ class Helicopter(Aircraft):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Imported(Aircraft):
-    """An airframe from a file: [state_space.py]. Numbers of inputs and outputs count from 1; 0: the first and the second
+class FromFile(Aircraft):
+    """One whose airframe was computed or measured elsewhere."""
+
+    system: StateSpace | None = None
+    """The airframe, once the file has been read."""
+
+    def mounted(self) -> StateSpace:
+        assert self.system is not None
+        return self.system
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imported(FromFile):
+    """An airframe from a file: state_space.py. Numbers of inputs and outputs count from 1; 0: the first and the second
     of a file that has no more."""
 
     input: str = choice("blade", "actuator", default="blade")
@@ -182,12 +196,6 @@ class Imported(Aircraft):
     gust_input: int = whole(0)
     seat_output: int = whole(0)
     accelerometer_output: int = whole(0)
-    system: StateSpace | None = None
-    """Picked from the file."""
-
-    def mounted(self) -> StateSpace:
-        assert self.system is not None
-        return self.system
 
     @property
     def has_actuator(self) -> bool:
@@ -220,18 +228,13 @@ def _chosen(numbers: tuple[int, int], count: int, names: tuple[str, str], where:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fitted(Aircraft):
+class Fitted(FromFile):
     """An airframe that is fitted to a frequency response from the lever to the seat: tabulated.py."""
 
     delay: float = quantity("s", 0.001, least=0.0, greatest=0.2)
     """In the response; it is flown as such, the rest by a state space."""
     response_gearing: float = quantity("1", 1.0, above=0.0, greatest=100.0)
     """That is in the response."""
-    system: StateSpace | None = None
-
-    def mounted(self) -> StateSpace:
-        assert self.system is not None
-        return self.system
 
     @property
     def has_actuator(self) -> bool:
@@ -262,8 +265,8 @@ def load(name_or_path: str, **changes: Any) -> Aircraft:
         system, error = response.fitted(fitted.response_gearing, fitted.delay)
         if error > WORST_FIT:
             raise place.error(
-                f"a state space fits the response to {100.0 * error:.0f} % only, and {100.0 * WORST_FIT:.0f} % is what may "
-                "fly: it needs more frequencies, or less noise"
+                f"a state space fits the response to {100.0 * error:.0f} % only, which does not fly; it must to "
+                f"{100.0 * WORST_FIT:.0f} %: give more frequencies, or less noise"
             )
         return replace(fitted, title=fitted.title or path.name, system=flyable(system, name_or_path))
     imported: Imported = read(Imported, changes, place)
@@ -290,20 +293,21 @@ def read_aircraft(values: Any, place: Place) -> Coupled:
     if not isinstance(values, dict):
         raise place.error(f"{values!r} is not a table")
     changes = {name: value for name, value in values.items() if name not in _OF_SCENARIO}
-    if not isinstance(values.get("model"), str):
+    model = values.get("model")
+    known = keys(model if isinstance(model, str) else "")
+    if unknown := next((name for name in changes if name not in known), None):
+        raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")
+    if not isinstance(model, str):
         raise place.at("model").error(
             f"must be one of {', '.join(names())}, or the path of a .toml, .mat, .npz or .csv"
         )
-    known = keys(values["model"])
-    if unknown := next((name for name in changes if name not in known), None):
-        raise place.error(f"unknown key {unknown!r}; allowed: {', '.join((*_OF_SCENARIO, *known))}")
     try:
-        aircraft = load(values["model"], **changes)
+        aircraft = load(model, **changes)
     except LeverError as error:
         raise place.error(str(error)) from None
     gearing = read_quantity("1", above=0.0, greatest=GREATEST_GEARING)(values.get("gearing"), place.at("gearing"))
     changed = "".join(f", {key} {value}" for key, value in changes.items())
-    return Coupled(aircraft, gearing, f"{values['model']}{changed}, gearing {gearing:g}")
+    return Coupled(aircraft, gearing, f"{model}{changed}, gearing {gearing:g}")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray
+from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.aircraft import ALARM, WARNING, AircraftResponse, SeatTransfer
 
@@ -25,6 +25,8 @@ _NEEDED = (2.0, 7.0)
 _POINTS = 24
 LEFT = 1.5
 """[dB]"""
+_OFF = 0.05
+"""Of straight lines between the points of a table, relative to the response [1]."""
 _SEAT_MODES = 3
 _AT_SEAT = 1e-6
 """By which seat and accelerometer may differ and be one place."""
@@ -60,15 +62,16 @@ def seat_modes(s: ComplexArray, between: ComplexArray) -> SeatTransfer:
 
 def _modes(fitted: Fit) -> SeatTransfer:
     """Its poles two by two: r / (s - p) + q / (s - o). A real one that is left over counts twice, with a zero there."""
-    poles, vectors = np.linalg.eig(fitted.a)
-    residues = (fitted.c @ vectors) * np.linalg.solve(vectors, fitted.b.astype(np.complex128))
+    system = fitted.system
+    poles, vectors = np.linalg.eig(system.a)
+    residues = (system.c @ vectors)[0] * np.linalg.solve(vectors, system.b.astype(np.complex128))[:, 0]
     known = list(zip(poles.astype(np.complex128).tolist(), residues.tolist(), strict=True))
     pairs = [((p, r), (p.conjugate(), r.conjugate())) for p, r in known if p.imag > 0.0]
     real = [each for each in known if each[0].imag == 0.0]
     real += [(real[-1][0], 0.0)] if len(real) % 2 else []
     pairs += list(zip(real[::2], real[1::2], strict=True))
     modes = [((r + q).real, -(r * o + q * p).real, -(p + o).real, (p * o).real) for (p, r), (o, q) in pairs]
-    return SeatTransfer(fitted.d, modes)
+    return SeatTransfer(float(system.d[0, 0]), modes)
 
 
 def response_table(response: Response, band: tuple[float, float] = BAND, **said: Any) -> AircraftResponse:
@@ -80,12 +83,32 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
             f"the response is from {band[0]:g} to {band[1]:g} Hz; the margin to bounce needs it from {_NEEDED[0]:g} to "
             f"{_NEEDED[1]:g} Hz at least, better from {BAND[0]:g} to {BAND[1]:g} Hz (frequencies are in Hz, not rad/s)"
         )
-    table = np.geomspace(low, high, _POINTS)
+    table = _frequencies(response, low, high)
     values = response(2j * np.pi * table.astype(np.complex128))
     sigmas = {"gain_sigma": UNSURE, "phase_sigma": UNSURE, **said}
     alarm = alarm_limit(sigmas["gain_sigma"])
-    limits = {"alarm": alarm, "warning": max(alarm, said.get("alarm", alarm)) + WARNING - ALARM}
+    limits = {"alarm": alarm, "warning": alarm + WARNING - ALARM}
     return AircraftResponse(table.tolist(), values.tolist(), **{**limits, **sigmas})
+
+
+def _frequencies(response: Response, low: float, high: float) -> FloatArray:
+    """Those of the table [Hz]: equal ratios, or where a mode of the fuselage lies between two of them, each where
+    straight lines between the ones before are furthest off."""
+    fine = np.geomspace(low, high, 1000)
+    exact = response(2j * np.pi * fine.astype(np.complex128))
+
+    def off(table: FloatArray) -> FloatArray:
+        values = response(2j * np.pi * table.astype(np.complex128))
+        lines = np.interp(fine, table, values.real) + 1j * np.interp(fine, table, values.imag)
+        error: FloatArray = np.abs(lines / exact - 1.0)
+        return error
+
+    table = np.geomspace(low, high, _POINTS)
+    if off(table).max() > _OFF:
+        table = fine[[0, -1]]
+        while len(table) < _POINTS:
+            table = np.sort(np.append(table, fine[np.argmax(off(table))]))
+    return table
 
 
 def alarm_limit(gain_sigma: float) -> float:

@@ -125,7 +125,7 @@ def _krylov(a: FloatArray, b: FloatArray) -> FloatArray:
     return basis
 
 
-# --- reading -----------------------------------------------------------------------------------------------------------
+# --- reading ---------------------------------------------------------------------------------------------------------
 
 
 def read(path: Path) -> StateSpace:
@@ -152,7 +152,7 @@ def _real(array: Any, where: str) -> FloatArray:
         raise LeverError(f"{where} is no matrix of numbers")
     if array.dtype.kind == "c" and np.any(array.imag != 0.0):
         raise LeverError(f"{where} is complex; write the real form of each pair of conjugate modes")
-    values = np.real(array).astype(np.float64)
+    values: FloatArray = np.real(array).astype(np.float64)
     if not np.all(np.isfinite(values)):
         raise LeverError(f"{where} has a value that is not finite")
     return values

@@ -62,19 +62,19 @@ class Tabulated:
         return cls(columns[0], columns[1] + 1j * columns[2], seat)
 
     def fitted(self, gearing: float, delay: float) -> tuple[StateSpace, float]:
-        """A state space of pitch and gust to seat and accelerometer, both of which a gust accelerates, without gearing [1]
-        and delay [s], which are in the table; and its largest relative error [1]."""
+        """A state space of pitch and gust to seat and accelerometer, both of which a gust accelerates, without gearing
+        [1] and delay [s], which are in the table; and its largest relative error [1]."""
         s = 2j * np.pi * self.frequency.astype(np.complex128)
         values = self.values * np.exp(s * delay) / gearing
         fits = tuple(fit(s, each) for each in ((values,) if self.seat is None else (values, values / self.seat)))
-        size = sum(len(each.b) for each in fits)
-        a, b, c = np.zeros((size, size)), np.zeros((size, 2)), np.zeros((2, size))
-        d, at = np.ones((2, 2)), 0
-        for place, each in enumerate(fits):
-            block = slice(at, at + len(each.b))
-            a[block, block], b[block, 0], d[place:, 0] = each.a, each.b, each.d
-            c[place:, :at], c[place:, block] = 0.0, each.c
-            at += len(each.b)
+        size = sum(len(each.system.a) for each in fits)
+        a, b, c, d = np.zeros((size, size)), np.zeros((size, 2)), np.zeros((2, size)), np.ones((2, 2))
+        at = 0
+        for place, each in enumerate(fits):  # what is at the seat is at the accelerometer, unless it has its own
+            system, block = each.system, slice(at, at + len(each.system.a))
+            a[block, block], b[block, :1], d[place:, :1] = system.a, system.b, system.d
+            c[place:, :at], c[place:, block] = 0.0, system.c
+            at = block.stop
         return StateSpace(a, b, c, d), max(float(each.error.max()) for each in fits)
 
     @property

@@ -1,5 +1,5 @@
-"""A state space from a frequency response, by vector fitting (Gustavsen and Semlyen: Rational approximation of frequency
-domain responses by vector fitting, IEEE Trans. Power Delivery 14, 1999).
+"""A state space from a frequency response, by vector fitting (Gustavsen and Semlyen: Rational approximation of
+frequency domain responses by vector fitting, IEEE Trans. Power Delivery 14, 1999).
 
     f(s) = d + sum r_k / (s - p_k)
 
@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from lever_cdkf.arrays import ComplexArray, FloatArray
 
+from .state_space import StateSpace
+
 MOST_PAIRS = 8
 GOOD = 0.005
 """Relative error [1] at which no further poles are tried."""
@@ -23,20 +25,11 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class Fit:
-    """f(s) = d + c (s - A)^-1 b, in real blocks."""
+    """A state space of one input and one output, in real blocks."""
 
-    a: FloatArray
-    b: FloatArray
-    c: FloatArray
-    d: float
+    system: StateSpace
     error: FloatArray
     """Relative to |f|, at the frequencies given [1]."""
-
-    def response(self, s: ComplexArray) -> ComplexArray:
-        """At the complex frequencies s [rad/s]."""
-        state = np.linalg.solve(s[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None].astype(np.complex128))
-        response: ComplexArray = (self.c @ state)[:, 0] + self.d
-        return response
 
 
 def fit(s: ComplexArray, values: ComplexArray, most_pairs: int = MOST_PAIRS, good: float = GOOD) -> Fit:
@@ -62,14 +55,15 @@ def _with_pairs(s: ComplexArray, values: ComplexArray, pairs: int) -> Fit:
     for _ in range(_ROUNDS):
         basis = _basis(a, b, s)
         ones = np.ones((len(s), 1))
-        unknown = np.hstack((basis, ones, -values[:, None] * basis))
-        solution = _least_squares(unknown * weight[:, None], values * weight)
-        zeros = np.linalg.eigvals(a - np.outer(b, solution[len(a) + 1 :]))
+        unknown = np.hstack((basis, ones, -values[:, None] * basis)) * weight[:, None]
+        solution = _least_squares(unknown.astype(np.complex128), values * weight)
+        zeros = np.linalg.eigvals(a - np.outer(b, solution[len(a) + 1 :])).astype(np.complex128)
         a, b = _blocks(_stable_pairs(zeros))
     basis = _basis(a, b, s)
-    solution = _least_squares(np.hstack((basis, np.ones((len(s), 1)))) * weight[:, None], values * weight)
-    error = np.abs(basis @ solution[:-1] + solution[-1] - values) * weight
-    return Fit(a, b, solution[:-1], float(solution[-1]), error)
+    known = (np.hstack((basis, np.ones((len(s), 1)))) * weight[:, None]).astype(np.complex128)
+    solution = _least_squares(known, values * weight)
+    error = np.abs(known @ solution - values * weight)
+    return Fit(StateSpace(a, b[:, None], solution[None, :-1], solution[None, -1:]), error)
 
 
 def _least_squares(matrix: ComplexArray, right: ComplexArray) -> FloatArray:
@@ -103,7 +97,6 @@ def _blocks(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
 
 def _basis(a: FloatArray, b: FloatArray, s: ComplexArray) -> ComplexArray:
     """(s - A)^-1 b at each s: (points, states)."""
-    basis: ComplexArray = np.linalg.solve(
-        s[:, None, None] * np.eye(len(a)) - a, np.broadcast_to(b[:, None], (len(s), len(a), 1)).astype(np.complex128)
-    )[:, :, 0]
+    right = np.broadcast_to(b[:, None], (len(s), len(a), 1)).astype(np.complex128)
+    basis: ComplexArray = np.linalg.solve(s[:, None, None] * np.eye(len(a)) - a, right)[:, :, 0].astype(np.complex128)
     return basis

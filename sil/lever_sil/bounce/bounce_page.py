@@ -11,7 +11,7 @@ from lever_cdkf.report.page import Page
 
 from ..judged import judged_page
 from .campaign import Result
-from .flights import AIRCRAFT
+from .flights import AIRCRAFT, FIVE
 from .measure import Excerpt
 
 _MOST = 15.0  # [dB]
@@ -20,9 +20,12 @@ _MOST = 15.0  # [dB]
 def build(results: Sequence[Result], seeds: int) -> str:
     """The whole page."""
     page = Page(
-        "Collective bounce: seen coming, and stopped",
-        f"{seeds} random pilots with each of {len(AIRCRAFT)} aircraft ({', '.join(AIRCRAFT)}), the firmware as shipped "
-        "in the loop. Charts: of each condition the flight in which its first figure was worst.",
+        "Collective bounce: seen coming, and how far it is held off",
+        f"{seeds} random pilots with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn where it is about "
+        f"what lies between accelerometer and pilot ({', '.join(FIVE)}), the firmware as shipped in the loop. What "
+        "limits the mitigation is that airframe and body: mount the accelerometer on the structure that carries the "
+        "pilot's seat. "
+        "Charts: of each condition the flight in which its first figure was worst.",
         "lever bounce",
     )
     charts = [

@@ -28,6 +28,8 @@ class Condition:
     unless: tuple[Limit, ...] = ()
     quick: bool = False
     aircraft: tuple[str, ...] = AIRCRAFT
+    in_turn: bool = False
+    """Each pilot flies one of the aircraft, in turn, instead of all of them."""
 
     @property
     def figures(self) -> list[str]:
@@ -282,7 +284,8 @@ _WRONG_SIGN = Condition(
         mitigation=CANCELLATION,
         spoil=_sensor("z_ddot", "0.01 m/s^2", kind="scale", factor="-100 %"),
     ),
-    (_most("adds for", 1.0, "worst"), _most("jump", 0.2, "worst")),
+    (_most("adds for", 0.5, "worst"),),
+    ("jump",),
 )
 
 # --- between accelerometer and pilot ---------------------------------------------------------------------------------
@@ -338,7 +341,7 @@ _TOGETHER = (_airframe(**AT_4_5, **UNTOLD, **SLOW_ACTUATOR), _late(10.0), _base_
 FLOOR = (_least("gearing ÷ critical", 2.0, "median"), _least("gearing ÷ critical", 1.0, "worst"))
 TOLD = (_least("gearing ÷ critical", 4.0, "median"), _least("gearing ÷ critical", 2.5, "worst"))
 BETWEEN: tuple[tuple[str, str, Callable[[Plan], Plan], tuple[str, ...], tuple[Limit, ...]], ...] = (
-    ("rigid", "rigid cabin", _all_of(), ("none", CANCELLATION), FLOOR),
+    ("rigid", "rigid cabin", _all_of(), ("none", NOTCH, CANCELLATION), FLOOR),
     ("late_10", "correction 10 ms late, not told", _late(10.0), (CANCELLATION,), FLOOR),
     ("late_20", "correction 20 ms late, not told", _late(20.0), (CANCELLATION,), FLOOR),
     ("late_20_told", "correction 19 ms late, told", _late(19.0, told=True), (CANCELLATION,), FLOOR),
@@ -380,14 +383,14 @@ BETWEEN: tuple[tuple[str, str, Callable[[Plan], Plan], tuple[str, ...], tuple[Li
         "together_trunk",
         "trunk, mode at 4.5 Hz, both delays of 10 ms, actuator of 30°/s",
         _all_of(_held_by(_TRUNK), *_TOGETHER),
-        ("none", CANCELLATION),
+        ("none", NOTCH, CANCELLATION),
         FLOOR,
     ),
     (
         "together_reflex",
         "stretch reflex, mode at 4.5 Hz, both delays of 10 ms, actuator of 30°/s",
         _all_of(_held_by(_REFLEX), *_TOGETHER),
-        ("none", CANCELLATION),
+        ("none", NOTCH, CANCELLATION),
         FLOOR,
     ),
 )
@@ -400,6 +403,7 @@ _BETWEEN = tuple(
         also=("gearing ÷ critical",),
         quick=name == "mode_6" and mitigation == CANCELLATION,
         aircraft=FIVE,
+        in_turn=True,
     )
     for name, title, spoil, mitigations, limits in BETWEEN
     for mitigation in mitigations
@@ -462,7 +466,9 @@ _AT_1_HZ: dict[str, Any] = {"title": "cancellation, its corner at 1 Hz", "suffix
 CONDITIONS = {
     row.name: row
     for row in (
+        *_BETWEEN,
         *_ALARMS,
+        *_STATED,
         *_LIMITS,
         _cancelled(CANCELLATION, *_AWAY),
         _cancelled(BOTH),
@@ -482,8 +488,6 @@ CONDITIONS = {
         *_WRONG,
         *_FAULTS,
         _WRONG_SIGN,
-        *_BETWEEN,
-        *_STATED,
     )
 }
 """All by name, in the order of the table."""

@@ -199,8 +199,8 @@ def stable(craft: str, seed: int, *, duration: float, ratio: float = STABLE, spo
 
 _JUDGED = (40.0, 60.0)
 """When vibration is [s]."""
-_LEAST, _COARSE, _FINE, _MOST = 0.5, 1.5, 2, 13.0
-_SOUGHT_TO = 12.8  # eight coarse steps up
+_LEAST, _COARSE, _FINE, _MOST = 0.5, 1.5, 2, 9.0
+_SOUGHT_TO = 8.54  # seven coarse steps up
 
 
 def _slack(craft: str, seed: int, mitigation: str, **changes: Any) -> Plan:

@@ -32,9 +32,9 @@ collective pitch [rad] and gust [m/s^2], outputs vertical acceleration at the pi
                            which of more inputs and outputs they are, from 1
 
 A response that was measured or computed elsewhere, with gearing, is a .csv file of frequency [Hz], real and imaginary
-part of the acceleration at the seat over the lever's angle [(m/s^2)/rad]; two columns more are that at the seat over that
-at the accelerometer. The table is of what it holds; a state space is fitted to it to fly, with response_gearing= and
-delay= for what of these is in it, and the fit is shown.
+part of the acceleration at the seat over the lever's angle [(m/s^2)/rad]; two columns more are that at the seat over
+that at the accelerometer. The table is of what it holds; a state space is fitted to it to fly, with response_gearing=
+and delay= for what of these is in it, and the fit is shown.
 """
 _EPILOG = """\
 examples:
@@ -73,12 +73,15 @@ def run(args: argparse.Namespace) -> int:
     from lever_cdkf.tables import print_tables
 
     from ..aircraft import aircraft
+    from ..aircraft.tabulated import is_response
 
     name, changes = args.aircraft, list(args.changes)
     if args.state_space is not None:
         changes, name = [*([name] if name else []), *changes], args.state_space
-        if Path(name).suffix.lower() == ".csv" and aircraft.is_response(Path(name)):
-            raise LeverError(f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space")
+        if Path(name).suffix.lower() == ".csv" and is_response(Path(name)):
+            raise LeverError(
+                f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space"
+            )
     if name is None:
         print_tables({"aircraft": [{"name": each, "what": aircraft.load(each).title} for each in aircraft.names()]})
         return 0
@@ -100,9 +103,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _say(name: str, changes: list[str]) -> None:
     """What has become of a file, on standard error. Raises LeverError."""
-    from ..aircraft.aircraft import FILES, is_response
+    from ..aircraft.aircraft import FILES
     from ..aircraft.state_space import read
-    from ..aircraft.tabulated import Tabulated
+    from ..aircraft.tabulated import Tabulated, is_response
 
     path, given = Path(name), _of_aircraft(changes)
     if path.suffix.lower() not in FILES:
@@ -120,7 +123,9 @@ def _say(name: str, changes: list[str]) -> None:
     print(f"{name}: fitted by {len(system.a)} states, off by {100.0 * error.max():.2g} % at most", file=sys.stderr)
     print("  frequency   response         fitted           off", file=sys.stderr)
     for i in range(0, len(s), max(1, len(s) // 12)):
-        cells = (f"{abs(z):8.4g} {math.degrees(math.atan2(z.imag, z.real)):6.1f}°" for z in (tabulated.values[i], fitted[i]))
+        cells = (
+            f"{abs(z):8.4g} {math.degrees(math.atan2(z.imag, z.real)):6.1f}°" for z in (tabulated.values[i], fitted[i])
+        )
         print(f"  {tabulated.frequency[i]:6.3g} Hz  {'  '.join(cells)}  {100.0 * error[i]:.2g} %", file=sys.stderr)
 
 
@@ -133,9 +138,8 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
     from lever_cdkf.errors import LeverError
     from lever_cdkf.firmware.native import Config, Estimator
 
-    from ..aircraft.aircraft import is_response
     from ..aircraft.response_table import known_response, measured_response
-    from ..aircraft.tabulated import Tabulated
+    from ..aircraft.tabulated import Tabulated, is_response
 
     given = _assignments(changes)
     said = {key: _quantity(key, given[key], unit) for key, unit in _SAID.items() if key in given}
@@ -149,7 +153,7 @@ def response(name: str, changes: list[str]) -> AircraftResponse:
         else:
             coupled = _flown(name, flown)
             whole = coupled.name
-            table = known_response(coupled, **said)
+            table = known_response(coupled, None, **said)
         Estimator(Config()).watch(table)  # which refuses what it cannot use
     except LeverError as error:
         text = str(error)

@@ -16,7 +16,8 @@ _DESCRIPTION = """\
 Flies three helicopters in gusts, each with random pilots whose arm may close the loop of collective bounce through
 lever and rotor, with the firmware in the loop: does its alarm come in time, is its gain margin right, how far does
 mitigation move the limit, what does it do to the pilot's own flying, and does it do harm where the estimated arm is
-wrong or a sensor fails?
+wrong or a sensor fails? With five helicopters: what a fuselage that bends between accelerometer and seat, a trunk on a
+cushion, delays, friction and a slow actuator leave of that (the conditions that begin with between_).
 
 The firmware knows the aircraft by a table of its response, which is off by 5 % and 0.05 rad (standard deviations, which
 it is given). "all runs" pools the flights (sum, mean, rms or worst, as `--list` and the page say); a limit applies to

@@ -19,7 +19,7 @@ from lever_cdkf.results.summary import SimulationSummary
 from lever_cdkf.results.whiteness import CANNOT_SEE
 from lever_cdkf.tables import Row, Tables
 
-from .summary import missed_limits
+from .summary import kept_limits, missed_limits
 
 _Task = TypeVar("_Task")
 _Done = TypeVar("_Done")
@@ -123,7 +123,7 @@ def troubles(summaries: Sequence[SimulationSummary]) -> list[str]:
 def verdict(summaries: Sequence[SimulationSummary]) -> str:
     """The runs in a few sentences."""
     reasons = troubles(summaries) + missed(summaries)
-    kept = "All limits kept." if summaries[0].scenario.limits else ""
+    kept = kept_limits(*summaries) if summaries[0].scenario.limits else ""
     sentences = [f"Limits missed: {'; '.join(reasons)}." if reasons else kept]
     covered = {key: float(np.mean(coverage(summaries, key))) for key in judged(summaries)}
     if not covered:

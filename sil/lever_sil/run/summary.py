@@ -280,6 +280,12 @@ def _verdict_truth(summary: SimulationSummary) -> str:
     )
 
 
+def kept_limits(*summaries: SimulationSummary) -> str:
+    """That the limits of the scenario are kept. They are the estimate's alone where the loop was unstable."""
+    unstable = any(each.stability is not None and each.stability.unstable_s for each in summaries)
+    return "The estimate keeps its limits, in a loop that was unstable." if unstable else "All limits kept."
+
+
 def _verdict_limits(summary: SimulationSummary) -> str:
     errors = ", ".join(
         f"{_spelled(name)} {entry.rms_percent:.1f} %"
@@ -290,7 +296,7 @@ def _verdict_limits(summary: SimulationSummary) -> str:
         return "Too short to judge: the run ends before converged_after."
     if summary.missed:
         return f"Limits missed: {'; '.join(summary.missed)}. Rms errors after convergence: {errors}."
-    kept = "All limits kept. " if summary.scenario.limits else ""
+    kept = f"{kept_limits(summary)} " if summary.scenario.limits else ""
     return f"{kept}Rms errors after convergence: {errors}."
 
 

@@ -18,7 +18,7 @@ from python.aircraft.loops import loop_of
 from python.plants.motion import LEVER, PERIOD, TRIM
 from scipy import integrate
 
-AIRCRAFT = ("bo105_like", "puma_like", "uh60_like")
+AIRCRAFT = ("bo105_like", "ch53_like", "ec135_like", "puma_like", "uh60_like")
 
 
 def accelerations(craft: Helicopter, pitch: float, z_dot: float, beta: float, beta_dot: float) -> FloatArray:
@@ -158,7 +158,7 @@ def test_instability_ends_in_a_limit_cycle() -> None:
 @pytest.mark.parametrize(
     ("name", "changes", "error"),
     [
-        ("ka50", {}, "no aircraft 'ka50'; there are bo105_like, puma_like, uh60_like"),
+        ("ka50", {}, "no aircraft 'ka50'; there are bo105_like, ch53_like, ec135_like, puma_like, uh60_like"),
         ("none.toml", {}, "none.toml: no such file"),
         ("uh60_like", {"mass": "7400"}, "uh60_like: mass: '7400' has no unit"),
         ("uh60_like", {"wings": 2}, "uh60_like: unknown key 'wings'"),

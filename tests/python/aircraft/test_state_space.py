@@ -1,4 +1,4 @@
-"""Airframes that bend, and those of other tools: their equations, their files, and that they fly as those they are of."""
+"""Airframes that bend, and those of other tools: equations, files, and that they fly as those they are of."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def arm(c_p: float = 25.0) -> Truth:
     return lever_plant.LeverTruth(LEVER, lever_plant.Truth(*columns(1, 2.5, c_p, 1500.0, TRIM)), "trim")
 
 
-# --- fuselage modes -----------------------------------------------------------------------------------------------------
+# --- fuselage modes ---------------------------------------------------------------------------------------------------
 
 
 def test_a_mode_has_its_frequency_and_damping_where_the_blades_weigh_nothing() -> None:
@@ -102,11 +102,11 @@ def test_a_fuselage_has_three_modes_at_most() -> None:
         aircraft.load("uh60_like", mode=4 * [SIX_HZ])
 
 
-# --- the linearised loop ------------------------------------------------------------------------------------------------
+# --- the linearised loop ----------------------------------------------------------------------------------------------
 
 
 def critical_by_eigenvalues(craft: Aircraft, truth: Truth) -> float:
-    """The gearing at which an eigenvalue of the closed loop crosses the imaginary axis; the delay by Pade of order 12."""
+    """The gearing at which an eigenvalue of the closed loop crosses the imaginary axis; delay by Pade of order 12."""
     airframe, transfer = craft.airframe(), truth.transfer(np.array([0]))
     hand = signal.tf2ss(transfer.numerator[0], transfer.denominator[0])
     w = 2.0 * math.pi * craft.actuator_bandwidth
@@ -168,7 +168,7 @@ def test_mayos_pilots_bounce_where_people_did() -> None:
         assert f"| `{name}` | {' | '.join(cells)} |" in said
 
 
-# --- files --------------------------------------------------------------------------------------------------------------
+# --- files ------------------------------------------------------------------------------------------------------------
 
 
 def flown(model: str, *more: str) -> FloatArray:
@@ -296,20 +296,20 @@ def test_a_damaged_file_is_one_line(name: str, content: bytes | None, error: str
 def test_a_kind_of_file_that_is_not_known_is_refused(tmp_path: Path) -> None:
     with pytest.raises(LeverError, match="must end in"):
         aircraft.load("uh60_like").airframe().write(tmp_path / "a.txt")
+    (tmp_path / "a.txt").touch()
     with pytest.raises(LeverError, match="a state space is a"):
-        (tmp_path / "a.txt").touch()
         state_space.read(tmp_path / "a.txt")
 
 
-# --- frequency responses ------------------------------------------------------------------------------------------------
+# --- frequency responses ----------------------------------------------------------------------------------------------
 
 
 def test_vector_fitting_finds_a_rational_function() -> None:
     values = 3.0 + (5.0 * ON_AXIS + 2000.0) / (ON_AXIS**2 + 2.0 * ON_AXIS + 900.0) - 40.0 / (ON_AXIS + 9.0)
     found = fit(ON_AXIS, values)
     assert found.error.max() < 1e-6
-    assert found.response(ON_AXIS) == pytest.approx(values, rel=1e-5)
-    assert np.linalg.eigvals(found.a).real.max() < 0.0
+    assert found.system.response(ON_AXIS, 0, 0) == pytest.approx(values, rel=1e-5)
+    assert found.system.poles().real.max() < 0.0
 
 
 def written(path: Path, craft: Aircraft, gearing: float, noise: float = 0.0, seat: bool = False) -> Tabulated:
@@ -352,3 +352,16 @@ def test_a_response_of_zero_is_refused(tmp_path: Path) -> None:
 def test_a_state_space_of_no_states_is_one(tmp_path: Path) -> None:
     system = StateSpace(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.full((2, 2), 60.0))
     assert len(system.minimal().balanced().a) == 0
+
+
+@pytest.mark.parametrize("name", AIRCRAFT)
+def test_a_table_shows_the_mode_between_its_frequencies(name: str) -> None:
+    """The margin of the firmware's table, linear between its points, is that of the aircraft."""
+    craft, transfer = aircraft.load(name, mode=[SIX_HZ]), arm().transfer(np.array([0]))
+    table = known_response(Coupled(craft, 1.0)).pointer
+    points = [list(getattr(table, part))[: table.count] for part in ("frequency", "real", "imaginary")]
+    tabulated = Tabulated(np.array(points[0]), np.array(points[1]) + 1j * np.array(points[2]))
+    loops = (loop_of(each, transfer, 0) for each in (Coupled(craft, 1.0), tabulated))
+    known, found = (stability.margins(loop, (1.5, 8.0)) for loop in loops)
+    assert found.gain_db == pytest.approx(known.gain_db, abs=0.5)
+    assert found.frequency == pytest.approx(known.frequency, rel=0.02)

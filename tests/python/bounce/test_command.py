@@ -11,6 +11,7 @@ import pytest
 from lever_cdkf import cli
 from lever_sil.bounce import bounce_page, campaign, conditions
 from lever_sil.bounce.conditions import CONDITIONS, Condition
+from lever_sil.bounce.flights import FIVE
 from lever_sil.bounce.measure import FIGURES, Measured
 from lever_sil.judged.result import Limit
 from python.conftest import Refused
@@ -47,6 +48,15 @@ def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch)
     assert result.worst_run("alarm lead") == "uh60_like, pilot 0"
     assert "MISSED" in bounce_page.build([result], 2)
     assert np.isclose(result.of(row.limits[0]), 9.0)
+
+
+def test_pilots_may_fly_the_aircraft_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    limit = Limit("alarm lead", least=0.0, over="worst")
+    row = Condition("made_up", "title", lambda *_: Measured({"alarm lead": 1.0}), (limit,), aircraft=FIVE, in_turn=True)
+    monkeypatch.setattr(campaign, "CONDITIONS", {"made_up": row})
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    (result,) = campaign.run([row], 7, lambda *_: None)
+    assert result.runs == [f"{craft}, pilot {seed}" for seed, craft in enumerate((*FIVE, *FIVE[:2]))]
 
 
 def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> None:

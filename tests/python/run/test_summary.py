@@ -16,7 +16,7 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import enum_names
 from lever_cdkf.firmware.quantities import quantities
 from lever_cdkf.results import whiteness
-from lever_cdkf.results.summary import Firmware, SimulationSummary, of, read, text
+from lever_cdkf.results.summary import Firmware, SimulationSummary, Stability, of, read, text
 from lever_cdkf.results.trace import Trace
 from lever_cdkf.results.whiteness import Whiteness
 from lever_sil.run import loop, summary
@@ -304,3 +304,13 @@ def test_a_limit_that_is_missed_does_not_look_kept(rms: float, shown: str) -> No
     (text,) = summary.missed_limits({"m_p": 0.05}, {"m_p": rms}, {})
     assert text == f"rms error of m_p {shown} % (limit 5 %)"
     assert summary.missed_limits({"m_p": 0.05}, {"m_p": 5.0}, {}) == []
+
+
+def test_limits_of_the_estimate_are_not_all_where_the_loop_was_unstable(recording: loop.Recording) -> None:
+    """A run in which the loop was unstable for a while does not say that all limits are kept."""
+    summarised = summary.build(recording, perfect(recording))
+    assert summary.kept_limits(summarised) == "All limits kept."
+    states = {"warning": 0.0, "alarm": 2.0}
+    unstable = Stability(states, -1.0, 0.4, 5.0, 5.0, 4.0, None, "an aircraft", -1.3, 2.0)
+    shaken = replace(summarised, stability=unstable)
+    assert summary.kept_limits(summarised, shaken) == "The estimate keeps its limits, in a loop that was unstable."

@@ -220,7 +220,7 @@ def test_what_is_nested_too_deeply_is_refused(load: Load, value: str) -> None:
             "torque.1={kind='firmware',rms='1 N m'}",
             r"no 'torque.1'; torque has 0 entries, .* torque.0=\{...\} appends one",
         ),
-        ("aircraft={name='uh60_like'}", "aircraft: unknown key 'name'; allowed: model, gearing, title"),
+        ("aircraft={name='uh60_like'}", "aircraft: unknown key 'name'; allowed: model, gearing, title, accelerometer"),
     ],
 )
 def test_a_wrong_override_is_refused(load: Load, override: str, message: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from pathlib import Path
 
 import can
@@ -79,6 +80,38 @@ def test_columns_and_a_picture(folder: Path, tmp_path: Path, capsys: pytest.Capt
     assert cli.main(["map", str(folder / "columns.csv"), "-o", str(picture)]) == 0
     assert "--map 'theta=Lever angle' 'theta_dot=Lever rate' 'z_ddot=Vertical acc.'" in capsys.readouterr().out
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("unit", ["m/s^2", "g"])
+@pytest.mark.parametrize("rate", ["rad/s", "deg/s"])
+def test_what_has_no_unit_is_proposed_with_one(
+    rate: str, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An acceleration by its size, a rate by the slope of the angle; and the command that is proposed is taken."""
+    time = np.arange(0.0, 30.0, 0.002)
+    random = np.random.default_rng(1)
+    waves = [(random.uniform(1.0, 8.0), random.uniform(0.0, 6.0)) for _ in range(20)]
+    base = sum(0.3 * np.sin(2.0 * np.pi * hertz * time + phase) for hertz, phase in waves)
+    theta, theta_dot = np.zeros_like(time), np.zeros_like(time)
+    for k in range(1, len(time)):
+        theta_dot[k] = theta_dot[k - 1] - 0.002 * (2.1 * base[k] + 13.0 * theta_dot[k - 1] + 500.0 * theta[k - 1])
+        theta[k] = theta[k - 1] + 0.002 * theta_dot[k]
+    columns = {
+        "time": time,
+        "lever_angle": 0.3 + theta,
+        "lever_rate": theta_dot * (1.0 if rate == "rad/s" else 180.0 / np.pi),
+        "floor_acc": base / (1.0 if unit == "m/s^2" else 9.80665),
+    }
+    log = tmp_path / "flight.csv"
+    rows = (",".join(f"{value:.6f}" for value in row) for row in zip(*columns.values(), strict=True))
+    log.write_text("\n".join([",".join(columns), *rows]))
+    assert cli.main(["map", str(log)]) == 0
+    said = capsys.readouterr().out
+    assert f"z_ddot = floor_acc has no unit: {unit} is assumed (" in said
+    assert f"theta_dot = lever_rate has no unit: {rate} is assumed (" in said
+    (command,) = (line for line in said.splitlines() if line.startswith("lever replay"))
+    assert cli.main(shlex.split(command)[1:]) == 0
+    assert "is one of them in another unit" not in capsys.readouterr().out
 
 
 def test_a_signal_that_begins_later_is_drawn_later(tmp_path: Path) -> None:

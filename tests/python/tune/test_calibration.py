@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lever_cdkf.arrays import Array
+from lever_cdkf.firmware.settings_file import Assignments
 from lever_cdkf.tune import recording
 from lever_cdkf.tune.calibration import NAMES, Calibrated, calibrate
 from lever_cdkf.tune.likelihood import Likelihood
@@ -104,3 +106,24 @@ def test_what_is_not_known_of_the_torque_is_part_of_the_gain(steady_log: Path) -
     alone, beside = (calibrate(likelihood, {**NOISE, "tau_m_gain_sigma": s}, kept).entries[0] for s in (0.0, e))
     assert beside.best == alone.best
     assert math.sqrt(beside.sigma**2 - alone.sigma**2) == pytest.approx(share * e, rel=0.2)
+
+
+def test_a_change_seen_with_more_torque_alone_is_no_information(
+    steady_log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise the standard deviations would not have that of the torque's gain in them."""
+    kept = ("z_ddot_delay", "lever_friction", *NOISE)
+
+    def sigma() -> float:
+        likelihood = Likelihood(recording.read([steady_log]), held_out=0.0)
+        return calibrate(likelihood, {**NOISE, "tau_m_gain_sigma": 0.07}, kept).entries[0].sigma
+
+    def jumps(likelihood: Likelihood, assignments: Assignments, delay: float = 0.0) -> Array:
+        innovations = run(likelihood, assignments, delay)
+        if float(assignments.get("tau_m_gain", 1.0)) > 1.0:
+            innovations["log_likelihood"][10_000:10_050] -= 20.0
+        return innovations
+
+    undisturbed, run = sigma(), Likelihood.run
+    monkeypatch.setattr(Likelihood, "run", jumps)
+    assert sigma() == pytest.approx(undisturbed, rel=0.1)

@@ -119,22 +119,21 @@ TEST(a_reset_leaves_nothing_of_what_was)
     const dither_t no_dither = lever->dither;
     dither(0.3f);
     (void)run(2000u);
-    void *const all[] = {&learning->hands, &learning->monitor, &learning->force, &learning->whiteness,
-        &learning->calibration, &now->trim, &now->averages};
-    const size_t size[] = {sizeof learning->hands, sizeof learning->monitor, sizeof learning->force,
-        sizeof learning->whiteness, sizeof learning->calibration, sizeof now->trim, sizeof now->averages};
+    void *const all[] = {&learning->evidence, &now->trim};
+    const size_t size[] = {sizeof learning->evidence, sizeof now->trim};
     for (uint32_t i = 0u; i < (sizeof size / sizeof size[0]); i++) {
         (void)memset(all[i], 1, size[i]);
     }
-    float *const value[] = {&learning->wait, &learning->changed, &learning->gripping, &learning->kept_ago,
-        &learning->elapsed, &now->nis, &now->base_missing, &now->last_z_ddot, &now->raw_z_ddot, &now->last_tau_m};
+    float *const value[] = {&learning->kept_ago, &learning->elapsed, &now->restarts, &now->nis, &now->base_missing,
+        &now->last_z_ddot, &now->raw_z_ddot, &now->last_tau_m};
     for (uint32_t i = 0u; i < (sizeof value / sizeof value[0]); i++) {
         *value[i] = 1.0f;
     }
-    bool *const flag[] = {&learning->calm, &learning->held_again, &learning->moved, &learning->bounded, &now->frozen};
+    bool *const flag[] = {&learning->levels, &now->frozen};
     for (uint32_t i = 0u; i < (sizeof flag / sizeof flag[0]); i++) {
         *flag[i] = true;
     }
+    learning->verdict = (uint8_t)VERDICT_NEW;
     now->faults = LEVER_FAULT_GAP;
     request(LEVER_REQUEST_RESET);
     expected.samples = now->samples;

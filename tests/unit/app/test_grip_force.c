@@ -19,7 +19,7 @@ void setUp(void)
     config = config_of(0u);
     start();
     learning = &lever->estimator.learning;
-    grip = &learning->force;
+    grip = &learning->evidence.force;
     theta_is_missing = false;
 }
 
@@ -49,9 +49,12 @@ static uint32_t judge(uint32_t blocks, float measured, float driven)
     uint32_t found = 0u;
     for (uint32_t k = 0u; k < blocks; k++) {
         const float sign = ((k % 2u) == 0u) ? 1.0f : -1.0f;
-        const hands_t hands = {.ended = BLOCK, .of_hand = sign, .driven = sign * driven, .counted = true};
+        const hands_block_t hands = {.length = BLOCK, .of_hand = sign, .driven = sign * driven, .counted = true};
         grip->impulse = sign * measured;
-        found += grip_force_judge(grip, &lever->estimator.setup, &hands) ? 1u : 0u;
+        const bool used = grip_force_is_used(grip);
+        float away = 0.0f;
+        (void)grip_force_judge(grip, &lever->estimator.setup, &hands, &away);
+        found += ((away > 1.0f) && used) ? 1u : 0u;
         TEST_ASSERT_EQUAL_FLOAT(0.0f, grip->impulse);
     }
     return found;

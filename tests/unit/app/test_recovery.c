@@ -110,14 +110,14 @@ TEST(six_restarts_in_a_row_are_a_fault_and_now_and_then_are_none)
 /* A tenth of them each second; innovations from before a restart say nothing of the filter after it. */
 TEST(restarts_are_forgotten_and_innovations_begin_anew)
 {
-    averages_t *averages = &lever->estimator.averages;
-    averages->innovation = 50.0f;
+    evidence_t *evidence = &lever->estimator.learning.evidence;
+    evidence->nis_slow = 50.0f;
     (void)run_damaged(1u);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, estimate().nis);
-    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.0f, averages->innovation);
-    averages->restarts = 0.8f;
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.0f, evidence->nis_slow);
+    lever->estimator.restarts = 0.8f;
     (void)run(1000u);
-    TEST_ASSERT_FLOAT_WITHIN(0.001f, 0.8f * 0.9048f, averages->restarts);
+    TEST_ASSERT_FLOAT_WITHIN(0.001f, 0.8f * 0.9048f, lever->estimator.restarts);
 }
 
 /* R13 */
@@ -181,7 +181,7 @@ TEST(a_huge_innovation_after_an_outage_does_not_spoil_the_average)
     sample.theta += 20.0f;
     sample.theta_valid = true;
     (void)lever_update(lever, &sample);
-    TEST_ASSERT_TRUE(isfinite(lever->estimator.averages.innovation) && has_fault(LEVER_FAULT_THETA));
+    TEST_ASSERT_TRUE(isfinite(lever->estimator.learning.evidence.nis_slow) && has_fault(LEVER_FAULT_THETA));
     (void)run(16000u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_INNOVATION));
     simulation.theta_noise *= 4.0;

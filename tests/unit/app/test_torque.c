@@ -304,19 +304,14 @@ TEST_EACH(8, what_bars_torque_lasts_in_every_mode_until_it_is_asked_for)
 {
     const enum lever_request requests[] = {
         LEVER_REQUEST_NONE, LEVER_REQUEST_FREEZE, LEVER_REQUEST_RUN, LEVER_REQUEST_RESET};
-    monitor_t *monitor = &lever->estimator.learning.monitor;
+    uint8_t *verdict = &lever->estimator.learning.verdict;
     start_dithering();
     request(requests[test_round % 2u]);
     for (uint32_t k = 0u; k < 3u; k++) { /* one of them may end a block, whose verdict is another */
-        if (test_round < 4u) {
-            monitor->torque_wrong = true;
-        } else {
-            lever->estimator.learning.hands.off = true;
-        }
+        *verdict = (uint8_t)((test_round < 4u) ? VERDICT_MOTOR_WRONG : VERDICT_HANDS_OFF);
         (void)deliver_many(1u);
     }
-    monitor->torque_wrong = false;
-    lever->estimator.learning.hands.off = false;
+    *verdict = (uint8_t)VERDICT_LEARNING;
     TEST_ASSERT_FALSE(health().gate_open);
     (void)run_blind(30u);
     lever_idle(lever, 5000u);

@@ -14,7 +14,13 @@ static const lever_aircraft_t aircraft = {.warning = WARNING, .alarm = ALARM};
 static uint8_t next(enum lever_bounce state, float gain, float sigma, bool carried)
 {
     const margin_t margin = {.gain = gain, .arm_sigma = sigma};
-    return alarm_next((uint8_t)state, &margin, &aircraft, carried);
+    return alarm_next((uint8_t)state, &margin, &aircraft, carried, false);
+}
+
+static uint8_t next_doubtful(enum lever_bounce state, float gain)
+{
+    const margin_t margin = {.gain = gain, .arm_sigma = 1.0f};
+    return alarm_next((uint8_t)state, &margin, &aircraft, true, true);
 }
 
 /* R44 */
@@ -53,4 +59,14 @@ TEST(a_margin_that_nothing_carries_says_nothing_and_leaves_an_alarm)
     TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_ALARM, next(LEVER_BOUNCE_ALARM, 10.0f, 1.0f, false));
     TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_ALARM, next(LEVER_BOUNCE_ALARM, 10.0f, 3.1f, true));
     TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_CLEAR, next(LEVER_BOUNCE_ALARM, 10.0f, 2.9f, true));
+}
+
+/* R44 */
+TEST(with_a_model_that_does_not_fit_there_is_an_alarm_or_nothing)
+{
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, next_doubtful(LEVER_BOUNCE_CLEAR, 10.0f));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, next_doubtful(LEVER_BOUNCE_WARNING, WARNING - SURE));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_UNKNOWN, next_doubtful(LEVER_BOUNCE_CLEAR, ALARM - SURE - 1.4f));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_ALARM, next_doubtful(LEVER_BOUNCE_CLEAR, ALARM - SURE - 1.6f));
+    TEST_ASSERT_EQUAL_UINT8(LEVER_BOUNCE_ALARM, next_doubtful(LEVER_BOUNCE_ALARM, 10.0f));
 }

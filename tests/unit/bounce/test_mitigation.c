@@ -379,6 +379,7 @@ TEST(a_model_that_is_no_stable_arm_is_not_used)
     sample.dynamics = &unstable;
     run_without_jump(100u, false);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, mitigation.trust);
+    TEST_ASSERT_FLOAT_WITHIN(2.0e-4f, 0.0f, now().angle);
 }
 
 /* --- what it does ------------------------------------------------------------------------------------------------- */

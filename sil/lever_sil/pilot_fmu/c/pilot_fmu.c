@@ -299,8 +299,7 @@ void model_put_outputs(fmu_t *fmu)
     fmu->value[AT_true_theta] = loop->plant.theta;
     fmu->value[AT_true_theta_dot] = loop->plant.theta_dot;
     fmu->value[AT_true_tau_m] = loop->plant.tau_m;
-    fmu->value[AT_true_z_ddot] =
-        loop->cabin.exists ? loop->cabin.seat[sample] : pilot->column[COLUMN_Z_DDOT][sample];
+    fmu->value[AT_true_z_ddot] = loop->cabin.exists ? loop->cabin.seat[sample] : pilot->column[COLUMN_Z_DDOT][sample];
     for (uint32_t i = 0u; i < (uint32_t)PILOT_TRUTHS; i++) {
         fmu->value[(uint32_t)FIRST_TRUTH + i] = pilot->column[(uint32_t)COLUMN_TRUTH + i][sample];
     }

@@ -1,0 +1,294 @@
+#include "app/evidence.h"
+
+#include "lever_cdkf.h"
+#include "math/bounds.h"
+#include "math/share.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NIS_TIME 0.1f          /* of nis_fast, and of motion.fast [s] */
+#define NIS_MAX 100.0f         /* of a single sample, so that the means recover */
+#define SURPRISED 1.3f         /* nis_fast with which a signal that stands still is stuck; in flight it is 1 +- 0.07 */
+#define ALIVE 0.4f             /* a base acceleration that changed for so long never stands still [s] */
+#define BASE_MEMORY 0.5f       /* [s], */
+#define BASE_MEMORY_WRONG 0.2f /* and while it is wrong */
+#define BASE_DOUBT 0.35f       /* standard deviation of the gain up to which there may be doubt, */
+#define BASE_SURE 0.1f         /* standard deviation of the gain up to which it counts, */
+#define BASE_SURE_WRONG 0.2f   /* and while the base is wrong, when the state hardly follows it */
+#define TORQUE_MEMORY 0.5f     /* [s] */
+#define TORQUE_MIN 4e-4f       /* mean square of the command from which on it says anything [N^2 m^2] */
+#define TORQUE_SURE 1.6f       /* torque of other origin over the command, both rms, that this is allowed times */
+#define NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: what a mean of products may be by chance */
+#define AWAKE 0.3f             /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
+#define REGRIP_TIME 0.038f     /* two blocks: a new grip is complete [s] [grip_step] */
+#define PROBATION 0.29f        /* until then a change has to explain the innovations [s] [rough_on_off] */
+#define EXPLAINED 0.6f         /* and leave no more of EVIDENCE_NOISE at its end */
+#define TRANSIENT 1.0f         /* innovations are noise again, and not of the change [s] */
+#define DOUBT 0.6f             /* of EVIDENCE_BASE from which on the sensor is to be judged before a change */
+#define HELD 0.043f            /* EVIDENCE_HANDS above which nobody may hold the lever any more */
+#define TORQUE_UNKNOWN 1.2f    /* nis_fast at a change from which on torque is thought to have changed, too, */
+#define TORQUE_ALL 2.0f        /* and by as much as can be */
+
+typedef struct evidence_row {
+    float inverse; /* of the threshold */
+    float off;
+    uint32_t fault;
+} evidence_row_t;
+
+static const evidence_row_t rows[EVIDENCE_COUNT] = {
+#define EVIDENCE(name, threshold, off, fault, meaning) {1.0f / (threshold), (off), (uint32_t)(fault)},
+#include "app/evidence.def"
+};
+
+/* The evidence that shows as a fault. */
+static const uint32_t shown = 0u
+#define EVIDENCE(name, threshold, off, fault, meaning) | (((fault) != 0) ? ((uint32_t)1u << (uint32_t)(name)) : 0u)
+#include "app/evidence.def"
+    ;
+
+/* Square of a change from sample to sample that does no harm, by input [m^2/s^4], [N^2 m^2]. */
+static const float harmless[INPUT_COUNT] = {4.0f, 0.09f};
+
+void evidence_start(evidence_t *evidence)
+{
+    (void)memset(evidence, 0, sizeof *evidence);
+    evidence->input[INPUT_BASE].limit = harmless[INPUT_BASE];
+    evidence->input[INPUT_TORQUE].limit = harmless[INPUT_TORQUE];
+    evidence->since_change = EVIDENCE_LONG_AGO;
+    evidence->nis_fast = 1.0f;
+    evidence->nis_slow = 1.0f;
+    change_detection_init(&evidence->change);
+    hands_start(&evidence->hands);
+}
+
+bool evidence_set(evidence_t *evidence, enum evidence_id which, float statistic)
+{
+    const evidence_row_t *row = &rows[which];
+    const bool before = evidence_has(evidence, which);
+    const float ratio = statistic * row->inverse;
+    const bool now = (ratio > (before ? row->off : 1.0f));
+    evidence->ratio[which] = ratio;
+    evidence_note(evidence, which, now);
+    return now && !before;
+}
+
+/* --- with each sample --------------------------------------------------------------------------------------------- */
+
+bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed)
+{
+    const float innovation = y - cdkf->x[i];
+    const float square = (innovation * innovation) * (1.0f / (GATE_SIGMA * GATE_SIGMA));
+    const float noise = cdkf->output_noise[i]; /* the least that the variance can be */
+    const bool far = (square > (noise * noise)) && (square > (level * cdkf_output_variance(cdkf, i)));
+    return gate_refuses(&evidence->refused[i], far, elapsed);
+}
+
+void evidence_add_torque(evidence_t *evidence, float commanded, float measured)
+{
+    agreement_t *torque = &evidence->torque;
+    torque->commanded += commanded * commanded;
+    torque->measured += measured * measured;
+    torque->product += commanded * measured;
+}
+
+void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time)
+{
+    const float bounded = lesser(ratio, NIS_MAX);
+    evidence->nis_fast += lesser(elapsed * (1.0f / NIS_TIME), 1.0f) * (bounded - evidence->nis_fast);
+    if (!evidence_has(evidence, EVIDENCE_UNSETTLED)) { /* innovations are those of the filter, not of the levels */
+        evidence->nis_slow += share_of(elapsed, slow_time) * (bounded - evidence->nis_slow);
+    }
+}
+
+void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float slow_time)
+{
+    motion_t *motion = &evidence->motion;
+    const float square = rate * motion->last[i];
+    motion->last[i] = rate;
+    if (elapsed < TRIM_OUTAGE) {
+        motion->slow = greater(motion->slow + (share_of(elapsed, slow_time) * (square - motion->slow)), 0.0f);
+        motion->fast += lesser(elapsed * (1.0f / NIS_TIME), 1.0f) * (square - motion->fast);
+    }
+}
+
+bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise)
+{
+    const float square = (least * least) + (NOISE_LIKE_MOTION * (noise * noise));
+    return (evidence->motion.slow < square) || (evidence->motion.fast < (0.25f * square));
+}
+
+/* --- at the end of a block ---------------------------------------------------------------------------------------- */
+
+static void judge_stillness(evidence_t *evidence, enum signal signal, float period)
+{
+    stillness_t *of = &evidence->stillness[signal];
+    const enum evidence_id which = (enum evidence_id)((uint32_t)EVIDENCE_THETA_STUCK + (uint32_t)signal);
+    const bool changed = (of->now < of->before) || (of->now > of->before);
+    const bool seen = evidence->seen[signal];
+    const bool taken = (signal == SIGNAL_BASE) && (evidence->alive > (ALIVE - (0.5f * period)));
+    const bool told = evidence_has(evidence, which) || (evidence->nis_fast > SURPRISED) || taken;
+    of->before = of->now;
+    of->still = (changed || !seen) ? 0.0f : (of->still + period);
+    (void)evidence_set(evidence, which, told ? of->still : 0.0f);
+    if ((signal == SIGNAL_BASE) && seen && changed) {
+        evidence->alive = lesser(evidence->alive + period, ALIVE);
+    }
+    if ((signal == SIGNAL_BASE) && ((of->still * rows[which].inverse) > 1.0f)) {
+        evidence->alive = 0.0f;
+    }
+    evidence->seen[signal] = false;
+}
+
+static void judge_base(evidence_t *evidence, const score_t *sudden, float period)
+{
+    score_t *base = &evidence->base;
+    const bool before = evidence_has(evidence, EVIDENCE_BASE);
+    const float keep = 1.0f - share_of(period, before ? BASE_MEMORY_WRONG : BASE_MEMORY);
+    const float sure = before ? BASE_SURE_WRONG : BASE_SURE;
+    base->vector = (keep * base->vector) + sudden->vector;
+    base->information = (keep * base->information) + sudden->information;
+    evidence->ratio[EVIDENCE_BASE] = 0.0f;
+    if ((base->information * (BASE_DOUBT * BASE_DOUBT)) > 1.0f) {
+        const float gain = (before ? 0.0f : 1.0f) - (base->vector / base->information);
+        const float away = fabsf(gain - 1.0f);
+        evidence->ratio[EVIDENCE_BASE] = away * rows[EVIDENCE_BASE].inverse;
+        if ((base->information * (sure * sure)) > 1.0f) {
+            (void)evidence_set(evidence, EVIDENCE_BASE, away);
+        }
+    }
+    if (evidence_has(evidence, EVIDENCE_BASE) != before) {
+        (void)memset(base, 0, sizeof *base);
+    }
+}
+
+/* Forgets what was seen of the base: the arm has changed, or is not known yet. */
+static void trust_base(evidence_t *evidence)
+{
+    (void)memset(&evidence->base, 0, sizeof evidence->base);
+    (void)evidence_set(evidence, EVIDENCE_BASE, 0.0f);
+}
+
+static void judge_motor(evidence_t *evidence, float period, float sample_period)
+{
+    agreement_t *torque = &evidence->torque;
+    float away = 0.0f;
+    if ((torque->commanded * sample_period) > (TORQUE_MIN * (TORQUE_MEMORY / (float)EVIDENCE_TORQUE_EVERY))) {
+        const float gain = torque->product / torque->commanded;
+        const float other = (torque->measured / torque->commanded) - (gain * gain); /* of other origin, in squares */
+        away = fabsf(gain - 1.0f) - (TORQUE_SURE * sqrtf(greater(other, 0.0f)));
+    }
+    const float keep = 1.0f - share_of(period, TORQUE_MEMORY);
+    torque->commanded *= keep;
+    torque->measured *= keep;
+    torque->product *= keep;
+    (void)evidence_set(evidence, EVIDENCE_MOTOR, away);
+}
+
+/* A change of an arm that was known has to explain the innovations within its probation; otherwise noise has grown. */
+static void judge_noise(evidence_t *evidence, const evidence_block_t *block)
+{
+    const float since = evidence->since_change;
+    const bool ends = (since > PROBATION) && (since < (PROBATION + (1.01f * block->period)));
+    const bool tests = block->known && (block->verdict != (uint8_t)VERDICT_REGRIP) && (since <= PROBATION);
+    float statistic = (tests || evidence_has(evidence, EVIDENCE_NOISE)) ? evidence->nis_fast : 0.0f;
+    if (ends && block->known) {
+        statistic = (1.0f / EXPLAINED) * evidence->nis_fast;
+    }
+    (void)evidence_set(evidence, EVIDENCE_NOISE, statistic);
+}
+
+static void judge_states(evidence_t *evidence, const cdkf_t *cdkf, const evidence_block_t *block)
+{
+    const float since = evidence->since_change;
+    evidence->awake = evidence_has(evidence, EVIDENCE_REST) ? 0.0f : lesser(evidence->awake + block->period, AWAKE);
+    evidence_note(evidence, EVIDENCE_REST, evidence->awake < (AWAKE - 0.001f));
+    evidence_note(evidence, EVIDENCE_REGRIP, since < REGRIP_TIME);
+    const float transient = evidence->opened ? CHANGE_REPORTED : TRANSIENT;
+    evidence_note(evidence, EVIDENCE_NEW, !block->held && ((cdkf->trust < 1.0f) || (since < transient)));
+    const bool passed = (since >= PROBATION) || evidence_has(evidence, EVIDENCE_CHANGE); /* this one, or one before */
+    evidence_note(evidence, EVIDENCE_CHANGE, passed && (since < (PROBATION + CHANGE_REPORTED)));
+}
+
+void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence_block_t *block)
+{
+    const setup_t *setup = block->setup;
+    const float period = block->period;
+    const bool adapts = verdict_rows[block->verdict].adapt;
+    const bool moves = !evidence_has(evidence, EVIDENCE_MISSING) && !evidence_has(evidence, EVIDENCE_UNSETTLED) &&
+                       !evidence_has(evidence, EVIDENCE_REST);
+    const score_t sudden = cdkf_sudden_score(cdkf);
+    float force = 0.0f;
+    evidence->since_change = lesser(evidence->since_change + period, EVIDENCE_LONG_AGO);
+    for (uint32_t i = 0u; i < (uint32_t)INPUT_COUNT; i++) {
+        input_gate_end_block(&evidence->input[i], harmless[i], period, setup->settings->sample_period);
+    }
+    for (uint32_t i = 0u; i < (uint32_t)SIGNAL_COUNT; i++) {
+        judge_stillness(evidence, (enum signal)i, period);
+    }
+    const hands_block_t hands = hands_step(
+        &evidence->hands, &setup->constants, cdkf->x[1], period, moves && (setup->model == (uint8_t)LEVER_MODEL_LEVER));
+    if (hands.counted) {
+        (void)evidence_set(evidence, EVIDENCE_HANDS, hands_statistic(&evidence->hands));
+    }
+    if (grip_force_judge(&evidence->force, setup, &hands, &force)) {
+        (void)evidence_set(evidence, EVIDENCE_FORCE, force);
+    }
+    if ((block->known || block->held) && !evidence_has(evidence, EVIDENCE_HANDS)) {
+        judge_base(evidence, &sudden, period);
+    } else {
+        trust_base(evidence);
+    }
+    judge_motor(evidence, period, setup->settings->sample_period);
+    judge_noise(evidence, block);
+    judge_states(evidence, cdkf, block);
+    (void)evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
+    if (adapts && moves && !block->held &&
+        (evidence->ratio[EVIDENCE_BASE] < DOUBT)) { /* of an arm that has changed meanwhile it would say the same */
+        (void)evidence_set(evidence, EVIDENCE_CALIBRATION, calibration_step(&evidence->calibration, cdkf, period));
+    }
+    (void)evidence_set(evidence, EVIDENCE_INNOVATION, evidence->nis_slow);
+}
+
+void evidence_show(evidence_t *evidence)
+{
+    evidence->faults = 0u;
+    uint32_t i = 0u;
+    for (uint32_t rest = evidence->present & shown; rest != 0u; rest >>= 1u) {
+        evidence->faults |= ((rest & 1u) != 0u) ? rows[i].fault : 0u;
+        i++;
+    }
+}
+
+bool evidence_of_change(evidence_t *evidence, const correction_t *correction, const evidence_block_t *block)
+{
+    const lever_settings_t *s = block->setup->settings;
+    const float statistic = change_detection_step(&evidence->change, correction, block->period, s->change_memory);
+    const float ratio = (s->change_threshold > 0.0f) ? (statistic / s->change_threshold) : 0.0f;
+    const float since = evidence->since_change;
+    const bool again = (since > s->change_memory) && block->known && (evidence->ratio[EVIDENCE_HANDS] < HELD);
+    evidence->ratio[EVIDENCE_CHANGE] = ratio;
+    if (ratio > 1.0f) {
+        change_detection_restart(&evidence->change);
+    }
+    return (ratio > 1.0f) && ((since >= CHANGE_REPORTED) || again) && (evidence->ratio[EVIDENCE_BASE] < DOUBT);
+}
+
+void evidence_begin_change(evidence_t *evidence, bool known, bool opened)
+{
+    evidence->since_change = known ? 0.0f : PROBATION;
+    evidence->opened = opened;
+    evidence_note(evidence, EVIDENCE_REGRIP, known);
+}
+
+float evidence_of_torque(const evidence_t *evidence)
+{
+    const float part = (evidence->nis_fast - TORQUE_UNKNOWN) * (1.0f / (TORQUE_ALL - TORQUE_UNKNOWN));
+    return greater(lesser(part, 1.0f), 0.0f);
+}
+
+void evidence_resume(evidence_t *evidence)
+{
+    trust_base(evidence);
+    whiteness_start(&evidence->whiteness);
+}

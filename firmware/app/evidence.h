@@ -1,0 +1,158 @@
+/* What the samples say of sensors, pilot and model: statistics with their thresholds (evidence.def). Nothing here changes
+ * the filter; what follows from the evidence is the verdict's (verdict.h).
+ *
+ *   stuck    a signal has not changed by a bit for a while, and the innovations say that it should have. For the base
+ *            acceleration, which innovations tell late, it is enough that it did change all the time before
+ *   base     the response to the base acceleration is not about once what it should be: no sensor, the wrong sign, the
+ *            wrong unit. By the score of a sudden error of the accelerometer's gain (filter/cdkf.h)
+ *   motor    the measured torque does not follow the commanded one. By regression; other torque makes it less sure
+ *   motion   the mean square of the measured rate without the noise of its sensor
+ */
+#ifndef APP_EVIDENCE_H
+#define APP_EVIDENCE_H
+
+#include "app/gate.h"
+#include "app/grip_force.h"
+#include "app/hands.h"
+#include "app/setup.h"
+#include "app/verdict.h"
+#include "filter/calibration.h"
+#include "filter/cdkf.h"
+#include "filter/change_detection.h"
+#include "filter/trim.h"
+#include "filter/whiteness.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum signal { SIGNAL_THETA, SIGNAL_THETA_DOT, SIGNAL_BASE, SIGNAL_COUNT };
+enum input { INPUT_BASE, INPUT_TORQUE, INPUT_COUNT };
+
+typedef struct stillness {
+    float now;    /* value of the last sample, */
+    float before; /* and of the last one of the block before */
+    float still;  /* time for which it has been that [s] */
+} stillness_t;
+
+/* Of measured with commanded torque: sums over samples, with exponential forgetting [N^2 m^2]. */
+typedef struct agreement {
+    float commanded;
+    float measured;
+    float product;
+} agreement_t;
+
+typedef struct motion {
+    float slow;               /* mean square over excitation_time [rad^2/s^2], */
+    float fast;               /* and over 0.1 s */
+    float last[MODEL_STATES]; /* deviations of the last sample that measured each output, as a rate [rad/s] */
+} motion_t;
+
+typedef struct evidence {
+    float ratio[EVIDENCE_MISSING]; /* statistic over threshold, of those that are no states */
+    uint32_t present;              /* a bit each */
+    uint32_t faults;               /* of enum lever_fault, that it shows as at the end of a block */
+    float since_change;            /* time since the pilot changed last [s] */
+    float nis_fast;                /* mean of nis / nis_size over 0.1 s; expected 1, */
+    float nis_slow;                /* and over excitation_time */
+    motion_t motion;
+    stillness_t stillness[SIGNAL_COUNT];
+    float awake;                 /* time since there was too little motion [s] */
+    float alive;                 /* time in which the base acceleration has changed all the time [s] */
+    float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been refused [s] */
+    input_gate_t input[INPUT_COUNT];
+    score_t base; /* of CDKF_BASE_GAIN, with exponential forgetting */
+    agreement_t torque;
+    change_detection_t change;
+    whiteness_t whiteness;
+    calibration_t calibration;
+    hands_t hands;
+    grip_force_t force;
+    bool seen[SIGNAL_COUNT]; /* in this block */
+    bool opened;             /* the last change was to another pilot */
+} evidence_t;
+
+#define EVIDENCE_LONG_AGO 1.0e3f /* [s] */
+#define CHANGE_REPORTED 3.0f     /* a change is reported, and its step estimated, until then [s] */
+
+void evidence_start(evidence_t *evidence);
+
+static inline bool evidence_has(const evidence_t *evidence, enum evidence_id which)
+{
+    return (evidence->present & ((uint32_t)1u << (uint32_t)which)) != 0u;
+}
+
+/* A statistic: its ratio, and with hysteresis whether the evidence is present. Returns true when it has just come. */
+bool evidence_set(evidence_t *evidence, enum evidence_id which, float statistic);
+
+/* A state. */
+static inline void evidence_note(evidence_t *evidence, enum evidence_id which, bool present)
+{
+    const uint32_t bit = (uint32_t)1u << (uint32_t)which;
+    evidence->present = present ? (evidence->present | bit) : (evidence->present & ~bit);
+}
+
+/* --- with each sample --------------------------------------------------------------------------------------------- */
+
+/* A value that its sender calls valid; true when it is not stuck. */
+static inline bool evidence_sees(evidence_t *evidence, enum signal signal, float value)
+{
+    evidence->stillness[signal].now = value;
+    evidence->seen[signal] = true;
+    return !evidence_has(evidence, (enum evidence_id)((uint32_t)EVIDENCE_THETA_STUCK + (uint32_t)signal));
+}
+
+/* Before the next sample: its value would be that of the last. */
+static inline bool evidence_repeats(const evidence_t *evidence, enum signal signal, float value)
+{
+    const float last = evidence->stillness[signal].now;
+    return !((value < last) || (value > last));
+}
+
+/* Output y, which is not valid where it is refused. Innovations are now `level` times as large as expected, in squares. */
+bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed);
+
+/* A measured torque and the one that was commanded before it [N m]; one sample in EVIDENCE_TORQUE_EVERY is enough. */
+enum { EVIDENCE_TORQUE_EVERY = 8 };
+void evidence_add_torque(evidence_t *evidence, float commanded, float measured);
+
+/* After the update: nis / nis_size of the sample. */
+void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time);
+
+/* The measured rate, or what is presumed of it [rad/s], by output i. As the product of successive samples: unlike motion,
+ * the noise of a sensor differs from sample to sample. The prediction is no evidence of motion: the base drives it on a
+ * lever that is locked. */
+void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float slow_time);
+
+/* Whether there is motion enough to learn from, beyond what the noise of theta_dot looks like. */
+bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise);
+
+/* --- at the end of a block ---------------------------------------------------------------------------------------- */
+
+/* What a block is judged with. */
+typedef struct evidence_block {
+    const setup_t *setup;
+    float period;    /* [s] */
+    bool known;      /* the arm was known two seconds ago */
+    bool held;       /* the parameters do not learn: they are compared with as they are */
+    uint8_t verdict; /* so far */
+} evidence_block_t;
+
+/* Judges the block, from the scores that are pending. */
+void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence_block_t *block);
+
+/* The faults that the evidence shows as, after it. */
+void evidence_show(evidence_t *evidence);
+
+/* A correction that the block has taught. Returns true when the pilot has changed. */
+bool evidence_of_change(evidence_t *evidence, const correction_t *correction, const evidence_block_t *block);
+
+/* The pilot changed just now; `opened`: to another one. An arm that is not known yet does not grip anew. */
+void evidence_begin_change(evidence_t *evidence, bool known, bool opened);
+
+/* How much torque the lever is moved by that nobody knows, 0 to 1: as far as innovations are larger than expected. */
+float evidence_of_torque(const evidence_t *evidence);
+
+/* The parameters learn again after they were held: what was compared with them begins anew. */
+void evidence_resume(evidence_t *evidence);
+
+#endif

@@ -1,0 +1,491 @@
+/* Each item of evidence: it must be found, within its time and with its hysteresis, and nothing where nothing is wrong. */
+#include "app/evidence.h"
+#include "lever_cdkf.h"
+
+#include "random.h"
+#include "test.h"
+
+#include <string.h>
+
+enum { SAMPLES = 20 }; /* in a block */
+
+#define PERIOD 1.0e-3f
+
+static evidence_t evidence;
+static setup_t setup;
+static lever_config_t config;
+static cdkf_t cdkf;
+static random_source_t source;
+
+void setUp(void)
+{
+    lever_config_default(&config);
+    setup.settings = &config.settings;
+    setup.model = (uint8_t)LEVER_MODEL_LEVER;
+    setup.constants.inertia = 1.0f;
+    (void)memset(&cdkf, 0, sizeof cdkf);
+    cdkf.trust = 1.0f;
+    evidence_start(&evidence);
+    source.state = 21u;
+}
+
+/* --- stuck signals ------------------------------------------------------------------------------------------------ */
+
+static void surprise(double ratio, uint32_t samples)
+{
+    for (uint32_t k = 0u; k < samples; k++) {
+        evidence_add_nis(&evidence, (float)ratio, PERIOD, 1.0f);
+    }
+}
+
+/* The end of a block of an arm that is known. */
+static void end_block(void)
+{
+    const evidence_block_t block = {
+        .setup = &setup, .period = (float)SAMPLES * PERIOD, .known = true, .verdict = (uint8_t)VERDICT_REST};
+    evidence_end_block(&evidence, &cdkf, &block);
+}
+
+static bool is_stuck(void)
+{
+    return evidence_has(&evidence, EVIDENCE_THETA_STUCK) || evidence_has(&evidence, EVIDENCE_THETA_DOT_STUCK) ||
+           evidence_has(&evidence, EVIDENCE_BASE_STUCK);
+}
+
+static bool has_just_stuck(void)
+{
+    const bool before = is_stuck();
+    end_block();
+    return is_stuck() && !before;
+}
+
+/* A block at whose end signal `which` is at a value and the others at one never seen before; true when one has just
+ * been found stuck. */
+static bool block(uint32_t which, float value)
+{
+    for (uint32_t i = 0u; i < (uint32_t)SIGNAL_COUNT; i++) {
+        const float other = (float)random_normal(&source);
+        (void)evidence_sees(&evidence, (enum signal)i, (i == which) ? value : other);
+    }
+    return has_just_stuck();
+}
+
+static bool is_alive(uint32_t which, float value)
+{
+    return evidence_sees(&evidence, (enum signal)which, value);
+}
+
+/* 100 ms without a change, when the innovations say that something is wrong; said once, and no longer as soon as it
+ * changes. */
+/* R32 */
+TEST(a_signal_that_stands_still_against_the_innovations_is_stuck)
+{
+    for (uint32_t which = 0u; which < (uint32_t)SIGNAL_COUNT; which++) {
+        setUp();
+        TEST_ASSERT_FALSE(block(which, 0.5f));
+        surprise(4.0, 300u);
+        for (uint32_t k = 0u; k < 4u; k++) {
+            TEST_ASSERT_TRUE(!block(which, 0.5f) && is_alive(which, 0.5f));
+        }
+        TEST_ASSERT_TRUE(block(which, 0.5f));
+        TEST_ASSERT_TRUE(!is_alive(which, 0.5f) && is_stuck());
+        surprise(1.0, 1000u); /* without the signal nothing surprises any more */
+        TEST_ASSERT_TRUE(!block(which, 0.5f) && !is_alive(which, 0.5f));
+        TEST_ASSERT_FALSE(is_alive(which, 0.6f)); /* until the end of the block */
+        TEST_ASSERT_FALSE(block(which, 0.6f));
+        TEST_ASSERT_TRUE(is_alive(which, 0.6f) && !is_stuck());
+    }
+}
+
+/* Its sender says so itself: then it is missing, not stuck, however long, and counts anew when it is back. */
+TEST(a_signal_that_is_not_sent_or_not_valid_is_not_stuck)
+{
+    surprise(4.0, 300u);
+    for (uint32_t k = 0u; k < 4u; k++) {
+        TEST_ASSERT_FALSE(block((uint32_t)SIGNAL_THETA, 0.5f));
+    }
+    for (uint32_t k = 0u; k < 50u; k++) {
+        TEST_ASSERT_FALSE(has_just_stuck());
+    }
+    for (uint32_t k = 0u; k < 4u; k++) {
+        TEST_ASSERT_FALSE(block((uint32_t)SIGNAL_THETA, 0.5f));
+    }
+    TEST_ASSERT_TRUE(block((uint32_t)SIGNAL_THETA, 0.5f));
+    TEST_ASSERT_FALSE(has_just_stuck() || is_stuck());
+}
+
+/* Innovations tell it late of the base acceleration; but one that has changed in 20 blocks on end never
+ * stands still. */
+TEST(a_base_acceleration_that_always_changed_is_stuck_without_the_innovations)
+{
+    for (uint32_t changes = 19u; changes <= 20u; changes++) {
+        bool stuck = false;
+        setUp();
+        for (uint32_t k = 0u; k < changes; k++) {
+            stuck = block((uint32_t)SIGNAL_BASE, 1.0f + (float)k) || stuck;
+        }
+        for (uint32_t k = 0u; k < 10u; k++) {
+            stuck = block((uint32_t)SIGNAL_BASE, (float)changes) || stuck;
+        }
+        TEST_ASSERT_EQUAL(changes == 20u, stuck);
+        for (uint32_t k = 0u; k < 18u; k++) { /* having stood still, it is not taken for granted any more */
+            (void)block((uint32_t)SIGNAL_BASE, 0.5f + (float)k);
+        }
+        for (uint32_t k = 0u; k < 10u; k++) {
+            TEST_ASSERT_FALSE(block((uint32_t)SIGNAL_BASE, 0.1f));
+        }
+    }
+}
+
+TEST(an_angle_that_stands_still_without_a_surprise_rests)
+{
+    for (uint32_t k = 0u; k < 50u; k++) {
+        TEST_ASSERT_FALSE(block((uint32_t)SIGNAL_THETA, (k < 25u) ? (float)k : 0.5f));
+    }
+}
+
+TEST(the_fast_mean_of_nis_is_over_a_tenth_of_a_second)
+{
+    surprise(3.0, 100u);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 + (2.0 * (1.0 - exp(-1.0))), (double)evidence.nis_fast);
+    evidence_start(&evidence);
+    surprise(1.0e3, 1u);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 1.0f + (0.01f * 99.0f), evidence.nis_fast);
+    evidence_add_nis(&evidence, 2.0f, 10.0f, 1.0f);
+    TEST_ASSERT_TRUE(evidence.nis_fast == 2.0f);
+}
+
+/* --- spikes ------------------------------------------------------------------------------------------------------- */
+
+/* Output i so many standard deviations off: of its state 3 in the directions of the parameters and 4 in its own, so 5,
+ * and 12 of its noise, so 13 in all; in mrad, or 0.01 rad/s. */
+static bool is_spike(uint32_t i, float sigmas, float level)
+{
+    static const cdkf_t belief = {.x = {0.1f, -0.2f},
+        .s = {[9] = 2.0e-3f, 1.0e-3f, 2.0e-3f, 0.02f, 0.01f, 0.02f},
+        .s_xx = {4.0e-3f, 0.0f, 0.0f, 0.04f},
+        .output_noise = {12.0e-3f, 0.12f}};
+    const float sigma = (i == 0u) ? 13.0e-3f : 0.13f;
+    return evidence_refuses_output(&evidence, &belief, i, belief.x[i] + (sigmas * sigma), level, PERIOD);
+}
+
+/* R34 */
+TEST(an_output_beyond_eight_standard_deviations_is_refused)
+{
+    for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {
+        TEST_ASSERT_TRUE(!is_spike(i, 7.9f, 1.0f) && !is_spike(i, -7.9f, 1.0f));
+        TEST_ASSERT_TRUE(is_spike(i, 8.1f, 1.0f) && is_spike(i, -8.1f, 1.0f));
+        TEST_ASSERT_TRUE(
+            !is_spike(i, 15.8f, 4.0f) && is_spike(i, 16.2f, 4.0f)); /* innovations are twice as large anyway */
+    }
+}
+
+TEST(what_lasts_for_20_ms_is_no_spike)
+{
+    for (uint32_t repeat = 0u; repeat < 3u; repeat++) {
+        for (uint32_t k = 0u; k < 19u; k++) {
+            TEST_ASSERT_TRUE(is_spike(0u, 100.0f, 1.0f));
+            TEST_ASSERT_FALSE(is_spike(1u, 1.0f, 1.0f));
+        }
+        TEST_ASSERT_FALSE(is_spike(0u, (repeat == 1u) ? 1.0f : 100.0f, 1.0f) && (repeat == 1u));
+        (void)is_spike(0u, 100.0f, 1.0f);
+        TEST_ASSERT_EQUAL(repeat == 1u, is_spike(0u, 100.0f, 1.0f));
+        TEST_ASSERT_TRUE(is_spike(1u, 100.0f, 1.0f)); /* each output for itself */
+        TEST_ASSERT_FALSE(is_spike(0u, 1.0f, 1.0f) || is_spike(1u, 1.0f, 1.0f));
+    }
+}
+
+/* --- the base ----------------------------------------------------------------------------------------------------- */
+
+/* Blocks with the base acceleration so many times the measured one, of which the filter expects it once, or not at all
+ * while it is not used: the score is of the gain's error. The response is known to 1 / sqrt(rate) in a second. Returns
+ * how often it has been said that it is wrong. */
+static uint32_t respond(uint32_t blocks, double gain, double rate)
+{
+    uint32_t said = 0u;
+    for (uint32_t k = 0u; k < blocks; k++) {
+        const double information = rate * (double)SAMPLES * (double)PERIOD;
+        const bool before = evidence_has(&evidence, EVIDENCE_BASE);
+        const double error = (before ? 0.0 : 1.0) - gain;
+        considered_t *considered = &cdkf.considered[CDKF_BASE_GAIN];
+        considered->vector = (float)((information * error) + (sqrt(information) * random_normal(&source)));
+        considered->information = (float)information;
+        end_block();
+        said += (evidence_has(&evidence, EVIDENCE_BASE) && !before) ? 1u : 0u;
+    }
+    return said;
+}
+
+/* No sensor, the wrong sign, the wrong unit: within a second, said once; and used again within one when it is right. */
+/* R33 */
+TEST(a_wrong_base_is_found_and_trusted_again)
+{
+    const double gains[] = {0.0, -1.0, 9.81, 2.0};
+    for (uint32_t k = 0u; k < 4u; k++) {
+        setUp();
+        (void)respond(500u, 1.0, 1000.0);
+        TEST_ASSERT_EQUAL_UINT32(1u, respond(50u, gains[k], 1000.0));
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(5000u, gains[k], 1000.0));
+        TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_BASE));
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(50u, 1.0, 1000.0));
+        TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_BASE));
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(5000u, 1.0, 1000.0));
+    }
+}
+
+/* Gains between: not wrong enough to be refused, not right enough to be trusted again. */
+TEST(the_verdict_on_the_base_has_hysteresis)
+{
+    const double gains[] = {0.55, 1.45};
+    const double beyond[] = {0.0, 9.81};
+    for (uint32_t k = 0u; k < 2u; k++) {
+        setUp();
+        TEST_ASSERT_EQUAL_UINT32(0u, respond(500u, gains[k], 1.0e5));
+        (void)respond(100u, beyond[k], 1.0e5);
+        TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_BASE));
+        (void)respond(500u, gains[k], 1.0e5);
+        TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_BASE));
+    }
+}
+
+/* Two seconds of samples of 1 ms in blocks of 20: asked is a sine of 3 Hz, measured a gain times that and a sine of 4 Hz.
+ * Returns after how many blocks it was wrong, 0: never. */
+static uint32_t torque_wrong_after(double amplitude, double gain, double other)
+{
+    uint32_t after = 0u;
+    for (uint32_t block = 1u; block <= 100u; block++) {
+        for (uint32_t k = 0u; k < 20u; k++) {
+            const double time = 1.0e-3 * (double)((20u * block) + k);
+            const double asked = amplitude * sin(6.283185307 * 3.0 * time);
+            const double measured = (gain * asked) + (other * sin(6.283185307 * 4.0 * time));
+            if ((k % (uint32_t)EVIDENCE_TORQUE_EVERY) == 0u) {
+                evidence_add_torque(&evidence, (float)asked, (float)measured);
+            }
+        }
+        const bool before = evidence_has(&evidence, EVIDENCE_MOTOR);
+        end_block();
+        if (evidence_has(&evidence, EVIDENCE_MOTOR) && !before && (after == 0u)) {
+            after = block;
+        }
+    }
+    return after;
+}
+
+TEST(a_torque_that_does_not_follow_what_is_asked_is_wrong)
+{
+    static const struct {
+        double amplitude;
+        double gain;
+        double other;
+        bool wrong;
+    } row[] = {{0.3, 1.0, 0.0, false}, {0.3, 0.8, 0.0, false}, {0.3, 1.25, 0.0, false}, {0.3, 0.5, 0.0, true},
+        {0.3, 2.0, 0.0, true}, {0.3, -1.0, 0.0, true}, {0.3, 0.0, 0.0, true}, {0.3, 1.0, 0.6, false},
+        {0.3, 0.0, 0.3, false}, {0.02, -1.0, 0.0, false}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        setUp();
+        TEST_ASSERT_EQUAL_UINT32(0u, torque_wrong_after(row[i].amplitude, 1.0, 0.0));
+        TEST_ASSERT_EQUAL(row[i].wrong, torque_wrong_after(row[i].amplitude, row[i].gain, row[i].other) != 0u);
+        TEST_ASSERT_EQUAL(row[i].wrong, evidence_has(&evidence, EVIDENCE_MOTOR));
+    }
+}
+
+TEST(a_torque_that_follows_again_is_right_and_without_dither_nothing_is_said)
+{
+    (void)torque_wrong_after(0.3, 1.0, 0.0);
+    TEST_ASSERT_LESS_THAN_UINT32(60u, torque_wrong_after(0.3, 2.0, 0.0));
+    TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_MOTOR));
+    (void)torque_wrong_after(0.3, 1.0, 0.0);
+    TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_MOTOR));
+    (void)torque_wrong_after(0.3, -1.0, 0.0);
+    TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_MOTOR));
+    for (uint32_t k = 0u; k < 5u; k++) {
+        (void)torque_wrong_after(0.0, 0.0, 0.2);
+    }
+    TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_MOTOR));
+}
+
+/* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.2, they
+ * count: of a gain of 0 and of 1. Nothing is held against it before the arm is known, but while the parameters are held. */
+TEST(the_verdict_on_the_base_waits_until_it_is_sure)
+{
+    static const struct {
+        float information;
+        float period;
+        bool before;
+        bool is;
+        float kept;
+    } row[] = {{50.0f, 0.02f, false, false, 48.0f}, {5.0f, 0.02f, true, true, 4.5f},
+        {99.0f, 1e-9f, false, false, 99.0f}, {101.0f, 1e-9f, false, true, 0.0f}, {24.0f, 1e-9f, true, true, 24.0f},
+        {26.0f, 1e-9f, true, false, 0.0f}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        const evidence_block_t block = {.setup = &setup, .period = row[i].period, .held = true};
+        setUp();
+        evidence_note(&evidence, EVIDENCE_BASE, row[i].before);
+        evidence.base.information = row[i].information;
+        evidence.base.vector = row[i].before ? -row[i].information : row[i].information;
+        evidence_end_block(&evidence, &cdkf, &block);
+        TEST_ASSERT_EQUAL(row[i].is, evidence_has(&evidence, EVIDENCE_BASE));
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, row[i].kept, evidence.base.information);
+    }
+    for (uint32_t i = 0u; i < 3u; i++) {
+        const evidence_block_t block = {.setup = &setup, .period = 0.02f, .known = (i == 1u)};
+        setUp();
+        evidence_note(&evidence, EVIDENCE_HANDS, i == 2u);
+        evidence_note(&evidence, EVIDENCE_BASE, true);
+        evidence.base.information = 1.0f;
+        evidence_end_block(&evidence, &cdkf, &block);
+        TEST_ASSERT_EQUAL(i == 1u, evidence_has(&evidence, EVIDENCE_BASE));
+        TEST_ASSERT_EQUAL(i == 1u, evidence.base.information > 0.0f);
+    }
+    evidence_resume(&evidence);
+    TEST_ASSERT_TRUE(!evidence_has(&evidence, EVIDENCE_BASE) && (evidence.base.information == 0.0f));
+}
+
+/* Sums over samples of 1 ms of which every eighth counts: from 0.025 on they say something. A quarter off is right
+ * again. */
+TEST(the_verdict_on_the_torque_waits_until_enough_is_asked)
+{
+    static const struct {
+        float asked;
+        float gain;
+        float sample_period;
+        bool before;
+        bool is;
+    } row[] = {{0.024f, -1.0f, 1.0e-3f, false, false}, {0.026f, -1.0f, 1.0e-3f, false, true},
+        {4.0e-4f, -1.0f, 0.0625f, false, false}, {0.0f, 1.0f, 1.0e-3f, true, false},
+        {1.0f, 0.752f, 1.0e-3f, true, false}, {1.0f, 0.74f, 1.0e-3f, true, true}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        const float product = row[i].gain * row[i].asked;
+        setUp();
+        config.settings.sample_period = row[i].sample_period;
+        evidence.torque = (agreement_t){row[i].asked, row[i].gain * product, product};
+        evidence_note(&evidence, EVIDENCE_MOTOR, row[i].before);
+        end_block();
+        TEST_ASSERT_EQUAL(row[i].is, evidence_has(&evidence, EVIDENCE_MOTOR));
+    }
+}
+
+/* The lack of motion is noted with each sample; the rest ends 0.3 s later. */
+/* R56 */
+TEST(a_rest_lasts_so_much_longer_than_the_lack_of_motion)
+{
+    evidence_note(&evidence, EVIDENCE_REST, true);
+    end_block();
+    for (uint32_t k = 1u; k <= 20u; k++) {
+        evidence_note(&evidence, EVIDENCE_REST, false);
+        end_block();
+        TEST_ASSERT_EQUAL(k < 15u, evidence_has(&evidence, EVIDENCE_REST));
+    }
+}
+
+/* --- changes ------------------------------------------------------------------------------------------------------ */
+
+/* Blocks of 20 ms from a change on: the fast mean of NIS that each verdict allows, and what is found at its end. */
+/* R58 */
+TEST(a_change_has_to_explain_the_innovations_within_its_probation)
+{
+    static const struct {
+        float since; /* before the block [s] */
+        float nis;
+        uint8_t verdict;
+        bool known;
+        bool before;
+        bool is;
+    } row[] = {{0.1f, 3.1f, VERDICT_NEW, true, false, true}, {0.1f, 2.9f, VERDICT_NEW, true, false, false},
+        {0.1f, 3.1f, VERDICT_NEW, false, false, false}, {0.03f, 3.1f, VERDICT_REGRIP, true, false, false},
+        {0.28f, 1.9f, VERDICT_NEW, true, false, true}, {0.28f, 1.7f, VERDICT_NEW, true, false, false},
+        {0.28f, 1.9f, VERDICT_NEW, false, false, false}, {0.31f, 9.0f, VERDICT_NEW, true, false, false},
+        {9.0f, 1.4f, VERDICT_NOISE, true, true, true}, {9.0f, 1.2f, VERDICT_NOISE, true, true, false}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        const evidence_block_t block = {
+            .setup = &setup, .period = 0.02f, .known = row[i].known, .verdict = row[i].verdict};
+        setUp();
+        evidence.since_change = row[i].since;
+        evidence.nis_fast = row[i].nis;
+        evidence_note(&evidence, EVIDENCE_NOISE, row[i].before);
+        evidence_end_block(&evidence, &cdkf, &block);
+        TEST_ASSERT_EQUAL(row[i].is, evidence_has(&evidence, EVIDENCE_NOISE));
+    }
+}
+
+/* One is reported from the end of its probation for three seconds; learnt with noise as it was for the first. */
+TEST(a_change_passes_through_its_stages)
+{
+    evidence_begin_change(&evidence, false, false);
+    TEST_ASSERT_TRUE(!evidence_has(&evidence, EVIDENCE_REGRIP) && (evidence.since_change > 0.28f));
+    evidence_begin_change(&evidence, true, false);
+    TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_REGRIP) && (evidence.since_change == 0.0f));
+    for (uint32_t k = 1u; k <= 200u; k++) {
+        const double since = 0.02 * (double)k;
+        end_block();
+        TEST_ASSERT_EQUAL(since < 0.038, evidence_has(&evidence, EVIDENCE_REGRIP));
+        if (fabs(since - 1.0) > 0.01) { /* sums of 0.02f are rounded */
+            TEST_ASSERT_EQUAL(since < 1.0, evidence_has(&evidence, EVIDENCE_NEW));
+        }
+        TEST_ASSERT_EQUAL((since > 0.289) && (since < 3.285), evidence_has(&evidence, EVIDENCE_CHANGE));
+    }
+}
+
+/* A drift of so many standard deviations; again only after change_memory, while hands are on and the base is not in
+ * doubt. */
+TEST(a_change_is_found_once_and_not_while_something_else_is_to_be_judged_first)
+{
+    static const struct {
+        float drift;
+        float since;
+        float hands;
+        float base;
+        float threshold;
+        bool known;
+        bool is;
+    } row[] = {{6.0f, 10.0f, 0.0f, 0.0f, 30.0f, true, true}, {3.0f, 10.0f, 0.0f, 0.0f, 30.0f, true, false},
+        {6.0f, 10.0f, 0.0f, 0.0f, 0.0f, true, false}, {6.0f, 1.0f, 0.0f, 0.0f, 30.0f, true, true},
+        {6.0f, 0.2f, 0.0f, 0.0f, 30.0f, true, false}, {6.0f, 1.0f, 0.0f, 0.0f, 30.0f, false, false},
+        {6.0f, 1.0f, 0.05f, 0.0f, 30.0f, true, false}, {6.0f, 10.0f, 0.05f, 0.0f, 30.0f, false, true},
+        {6.0f, 10.0f, 0.0f, 0.7f, 30.0f, true, false}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        const evidence_block_t block = {.setup = &setup, .period = 0.02f, .known = row[i].known};
+        const float drift = row[i].drift;
+        const correction_t correction = {.w = {drift, drift, drift}, .variance = {1.0f, 1.0f, 1.0f}};
+        setUp();
+        config.settings.change_threshold = row[i].threshold;
+        evidence.since_change = row[i].since;
+        evidence.ratio[EVIDENCE_HANDS] = row[i].hands;
+        evidence.ratio[EVIDENCE_BASE] = row[i].base;
+        TEST_ASSERT_EQUAL(row[i].is, evidence_of_change(&evidence, &correction, &block));
+    }
+}
+
+/* As far as innovations are larger than expected. */
+TEST(unknown_torque_is_a_part_between_none_and_all)
+{
+    static const float nis[] = {0.9f, 1.2f, 1.6f, 2.0f, 5.0f};
+    static const float part[] = {0.0f, 0.0f, 0.5f, 1.0f, 1.0f};
+    for (uint32_t i = 0u; i < 5u; i++) {
+        evidence.nis_fast = nis[i];
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, part[i], evidence_of_torque(&evidence));
+    }
+}
+
+/* --- jumps of inputs ---------------------------------------------------------------------------------------------- */
+
+/* Motion of 0.3 N m at 10 Hz, and every fiftieth sample 30 N m off; a step is believed after 20 ms. */
+/* R31 */
+TEST(an_input_far_from_where_it_was_is_a_jump_for_20_ms)
+{
+    float last = 0.0f;
+    uint32_t refused = 0u;
+    for (uint32_t k = 1u; k <= 5000u; k++) {
+        const bool off = ((k % 50u) == 0u);
+        const float value = (0.42f * (float)sin(0.0628 * (double)k)) + (off ? 30.0f : 0.0f);
+        const bool jump = input_gate_step(&evidence.input[INPUT_TORQUE], value - last, PERIOD);
+        TEST_ASSERT_EQUAL(off, jump);
+        last = jump ? last : value;
+    }
+    while (input_gate_step(&evidence.input[INPUT_TORQUE], 1.0f, PERIOD)) {
+        refused++;
+    }
+    TEST_ASSERT_UINT32_WITHIN(1u, 19u, refused);
+    TEST_ASSERT_FALSE(input_gate_step(&evidence.input[INPUT_BASE], 1.9f, PERIOD)); /* does no harm */
+    TEST_ASSERT_TRUE(input_gate_step(&evidence.input[INPUT_BASE], 2.1f, PERIOD));
+}
