@@ -43,7 +43,8 @@ static const evidence_row_t rows[EVIDENCE_COUNT] = {
 
 /* The evidence that shows as a fault. */
 static const uint32_t shown = 0u
-#define EVIDENCE(name, threshold, off, fault, meaning) | (((fault) != 0) ? ((uint32_t)1u << (uint32_t)(name)) : 0u)
+#define EVIDENCE(name, threshold, off, fault, meaning)                                                                 \
+    | (((uint32_t)(fault) != 0u) ? ((uint32_t)1u << (uint32_t)(name)) : 0u)
 #include "app/evidence.def"
     ;
 
@@ -123,7 +124,7 @@ bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise)
 static void judge_stillness(evidence_t *evidence, enum signal signal, float period)
 {
     stillness_t *of = &evidence->stillness[signal];
-    const enum evidence_id which = (enum evidence_id)((uint32_t)EVIDENCE_THETA_STUCK + (uint32_t)signal);
+    const enum evidence_id which = evidence_of_stuck(signal);
     const bool changed = (of->now < of->before) || (of->now > of->before);
     const bool seen = evidence->seen[signal];
     const bool taken = (signal == SIGNAL_BASE) && (evidence->alive > (ALIVE - (0.5f * period)));

@@ -93,12 +93,19 @@ static inline void evidence_note(evidence_t *evidence, enum evidence_id which, b
 
 /* --- with each sample --------------------------------------------------------------------------------------------- */
 
+/* The evidence that a signal is stuck. */
+static inline enum evidence_id evidence_of_stuck(enum signal signal)
+{
+    const enum evidence_id other = (signal == SIGNAL_BASE) ? EVIDENCE_BASE_STUCK : EVIDENCE_THETA_DOT_STUCK;
+    return (signal == SIGNAL_THETA) ? EVIDENCE_THETA_STUCK : other;
+}
+
 /* A value that its sender calls valid; true when it is not stuck. */
 static inline bool evidence_sees(evidence_t *evidence, enum signal signal, float value)
 {
     evidence->stillness[signal].now = value;
     evidence->seen[signal] = true;
-    return !evidence_has(evidence, (enum evidence_id)((uint32_t)EVIDENCE_THETA_STUCK + (uint32_t)signal));
+    return !evidence_has(evidence, evidence_of_stuck(signal));
 }
 
 /* Before the next sample: its value would be that of the last. */

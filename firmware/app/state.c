@@ -48,7 +48,7 @@ static const state_row_t rows[] = {
     MEMBERS(estimator.cdkf.acting, estimator.cdkf.acting, 4u, (uint32_t)CDKF_CONSIDERED),
     FLOATS(estimator.cdkf.trust, estimator.cdkf.points[MODEL_POINTS - 1].c[MODEL_COEFFICIENTS - 1]),
 
-    FLOATS(estimator.learning.evidence.ratio[0], estimator.learning.evidence.ratio[EVIDENCE_MISSING - 1]),
+    FLOATS(estimator.learning.evidence.ratio[0], estimator.learning.evidence.ratio[EVIDENCE_FORCE]),
     MEMBERS(estimator.learning.evidence.present, estimator.learning.evidence.present, 4u, EVERY_EVIDENCE),
     WORDS(estimator.learning.evidence.faults, estimator.learning.evidence.faults),
     FLOATS(estimator.learning.evidence.since_change, estimator.learning.evidence.hands.elapsed),

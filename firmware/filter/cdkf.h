@@ -2,23 +2,25 @@
  *
  * The belief is a Gaussian over z = [w; x] with the lower-triangular factor S = [S_ww 0; S_xw S_xx], P = S S^T,
  * parameters first: a time update then changes the two rows of the state only. Algorithm 1 of the dual estimator
- * (van der Merwe 2004, algorithms 3.4 and 3.8; Wan & Nelson 2001), for each sample k, and the function that does it
- * here:
+ * (van der Merwe 2004, algorithms 3.4 and 3.8; Wan & Nelson 2001), by the lines of Algorithm 1 in Aresi, Zanoni and
+ * Masarati (THEORY.md, 9), which has the parameters only, and the function that does it here:
  *
- *    1  S_w- = tria[S_w, sqrt(R_r)] or S_w / sqrt(lambda)   random walk, or forgetting        cdkf_walk, cdkf_forget
- *    2  X = [x, x + h S_j, x - h S_j]                       sigma points                      cdkf_time_update
- *    3  F = f(X, u, w)                                      the model                         model_t.respond
- *    4  x- = m0 F0 + m sum F                                predicted mean                    cdkf_time_update
- *    5  S- = tria[c1 (F+ - F-), c2 (F+ + F- - 2 F0), S_v]   predicted factor                  cdkf_time_update
- *    6  y- = h(x-), C = H S-                                outputs are states, so D = 0      cdkf_measurement_update
- *    7  S_y = tria[C, S_n]                                  innovation covariance             cdkf_measurement_update
- *    8  K = (S- C^T / S_y^T) / S_y                          gain                              cdkf_measurement_update
- *    9  x = x- + K (y - y-)                                 state                             cdkf_measurement_update
- *   10  S = tria[S- - K C, K S_n]                           factor, in Carlson's form         cdkf_measurement_update
- *   11  8 to 10 for w with G(w) = h(f(x, u; w)), S_e = S_y  parameters                        cdkf_learn
- *   12  R_r, S_n, S_v adapted                               adaptation.h, noise_estimation.h
+ *   paper   step                                                here
+ *   1, 3    S_w- = tria[S_w, sqrt(R_r)] or S_w / sqrt(lambda)   cdkf_walk, cdkf_forget: random walk, or forgetting
+ *   4       Cholesky factor of P_w                              none: S_w is carried
+ *   5       W = [w, w + h S_w,j, w - h S_w,j]                   cdkf_draw: sigma points of the parameters, each block
+ *   6       F = f(x, u, W), x moved by S_xw with each point     cdkf_time_update, model_t.respond
+ *   7       x- = F0 + m sum (F+ + F- - 2 F0)                    cdkf_time_update: predicted mean
+ *   8       S- = tria[c1 (F+ - F-), c2 (F+ + F- - 2 F0), S_v]   cdkf_time_update: predicted factor. S_xx has no sigma
+ *                                                               points: it moves by the slope of the step
+ *   8       y- = h(x-), C = H S-, S_y = tria[C, S_n]            cdkf_measurement_update: outputs are states, so D = 0
+ *   9, 10   K = (S- C^T / S_y^T) / S_y                          cdkf_measurement_update: gain
+ *   11      x = x- + K (y - y-), S = tria[S- - K C, K S_n]      cdkf_measurement_update, in Carlson's form
+ *   9 - 11  the same for w, with S_e = S_y                      cdkf_learn, each block
+ *   2, 12   loop over the samples                               app/estimator.c
+ *   -       R_r, S_n, S_v adapted                               adaptation.h, noise_estimation.h
  *
- * Line 11 is not done with x held fixed, as dual filters are often written: a parameter error would show in one step
+ * The step for w is not done with x held fixed, as dual filters are often written: a parameter error would show in one step
  * only, and standard deviations come out four times too large. S_xw S_ww^-1 is the recurrent derivative dx/dw
  * (Nelson 2000), also the blending matrix of the two-stage filter (Friedland 1969). The joint filter differs in one
  * line: see cdkf_walk.
@@ -133,14 +135,14 @@ typedef struct cdkf_grip {
     bool learn;                   /* as in cdkf_measurement_update() */
 } cdkf_grip_t;
 
-/* Lines 2 to 5: one step of the model. The parameters stand still. `error`: what a unit of each considered error takes
+/* Lines 6 to 8: one step of the model. The parameters stand still. `error`: what a unit of each considered error takes
  * from the inputs, [m/s^2] per unit for those of the base, [N m] per unit for the others; of CDKF_STEP what it adds to
  * the acceleration. `grip` is NULL where the force is not measured; a force beyond 8 standard deviations is not
  * taken. */
 void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const model_step_t *step,
     const float error[CDKF_CONSIDERED], const cdkf_grip_t *grip);
 
-/* Lines 6 to 10 for the outputs that are valid, one scalar at a time; y in the units of the state. With `learn` what
+/* Lines 8 to 11 for the outputs that are valid, one scalar at a time; y in the units of the state. With `learn` what
  * the sample says of w is added to the pending information. An output that is not valid has the innovation 0. */
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS]);
@@ -172,7 +174,7 @@ void cdkf_end_step(cdkf_t *cdkf);
  * deviations shrinks with it. Returns true when a parameter rests on a bound. */
 bool cdkf_learn_step(cdkf_t *cdkf, const score_t *score);
 
-/* Line 11: conditions w, and x with it, on the pending information of the last `period` seconds. From the start, or
+/* Lines 9 to 11 for w: conditions w, and x with it, on the pending information of the last `period` seconds. From the start, or
  * an opened covariance, on it counts in part only, and fully after `caution` seconds of information: far from the
  * truth the sensitivities are wrong, and would make the filter certain of what the samples do not tell (the common
  * scale of the parameters). */

@@ -1,5 +1,5 @@
 /* The grip force in a time update (cdkf_grip_t in cdkf.h): it sees the change of theta_dot over the step, of which the
- * process noise of the step is a part. So it is taken between lines 4 and 5 of Algorithm 1, before the columns of the
+ * process noise of the step is a part. So it is taken between the mean and the factor (cdkf.h), before the columns of the
  * state's factor are compressed. Only the files of the filter include this.
  */
 #ifndef FILTER_GRIP_H

@@ -39,7 +39,9 @@ def cell(text: str) -> str:
     words = re.sub(r"ON\(EVIDENCE_(\w+)\)", r"\1", text)
     words = re.sub(r"^(EVIDENCE|VERDICT|LEVER_FAULT)_", "", words).replace(" |", ",")
     number = re.fullmatch(r"(-?[\d.]+)f", words)
-    return {"NOTHING": "", "0": "", "1": "yes"}.get(words, f"{float(number[1]):g}" if number else words.lower())
+    return {"NOTHING": "", "0": "", "0u": "", "1": "yes"}.get(
+        words, f"{float(number[1]):g}" if number else words.lower()
+    )
 
 
 def table(name: str) -> str:
