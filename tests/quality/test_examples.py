@@ -21,6 +21,7 @@ NOT_RUN = {
     r"lever soak --json": "takes minutes",
     r"lever (bounce|envelope|faults) --quick": "is what tests/python/{bounce,envelope,faults} do",
     r"lever (bounce|envelope|figures) --only|lever soak --hours": "README.md has the same",
+    r"lever compare --(score|data)|lever (compare|figures) --paper": "sil/lever_sil/study/PAPER.md has the same",
     r"lever compare --scenarios|lever sim steady --seed": "sil/README.md has the same",
     r"lever replay (session.log($| -o)|monday/|flight.blf)": "host_tools/lever_cdkf/replay/README.md has the same",
     r"lever (tune|map) flight.blf --dbc a": "host_tools/lever_cdkf/replay/README.md has the same",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.errors import LeverError
 from lever_cdkf.extras import require
@@ -15,6 +15,9 @@ from lever_cdkf.progress import Progress
 from lever_cdkf.tables import Row, add_json_option
 
 from .names import check_names
+
+if TYPE_CHECKING:
+    from ..study.compare.cases import Plan
 
 _DESCRIPTION = """\
 Runs the firmware's estimators and published ones on the same data and ranks them in each case: errors, errors against
@@ -32,7 +35,13 @@ also writes into DIR
 
 With --paper instead: the experiment of the paper that the estimator comes from (sil/lever_sil/study/PAPER.md), by 20
 seeds: parameters that stay, drift or jump, two levels of noise in each channel, each kind of parameter noise. A table
-for each model; cells are median / worst of all runs and levels of noise. Two minutes of processor time.
+for each model; cells are median / worst of all runs and levels of noise. Some minutes of processor time.
+
+With --data alone: writes the runs into DIR as Parquet, with their truth, and an index with checksums, for estimators
+that are not in Python. With --score: an estimator of yours takes part, a class with the methods start(config),
+step(sample) and estimate() (sil/lever_sil/study/PAPER.md has an example), beside two others unless --estimators names
+some, on 20 runs each of lever_trim_dither_rough and step_up unless --scenarios and --seeds say otherwise; with both
+options, on the runs in DIR.
 
 With --envelope instead: the firmware beside joint EKF and UKF in the conditions of `lever envelope` (8 pilots each),
 these given the true process noise and the trim, with and without a fourth-order high-pass (_hp) in front.
@@ -47,6 +56,8 @@ examples:
   lever compare --models lever --estimators dual joint joint_ekf --seeds 20 --out out/lever
   lever compare --out out/compare                the whole campaign, some ten minutes of processor time
   lever compare --paper --seeds 4                some runs of the experiment of the paper
+  lever compare --score mine:Ukf --scenarios step_up --seeds 8        an estimator of yours beside two of these
+  lever compare --data out/runs                                       the runs of two cases as files, for others
   lever compare --envelope --quick               some conditions of `lever envelope`, a minute on two cores
   lever compare --envelope --scenarios steady retrim --estimators firmware joint_ekf_hp
 
@@ -55,6 +66,10 @@ Times per sample are processor times, batched over runs for the baselines: compa
 _QUICK_CASES = ("lever_fixed_dither_rough", "linear_black_box_trim_base_rough", "step_up", "steady")
 _QUICK_SEEDS, _QUICK_DURATION, _SEEDS = 8, 12.0, 40
 _SEED = 1
+_SCORED = 20
+"""Seeds of the files, and with --score."""
+_BESIDE = ("dual_shipped", "joint_ekf")
+"""Beside a --score."""
 _LIST = "lever compare --list"
 
 
@@ -67,7 +82,14 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "--envelope", action="store_true", help="joint EKF and UKF in the conditions of lever envelope"
     )
     compare.add_argument("--paper", action="store_true", help="the experiment of the paper, as a table for each model")
-    compare.add_argument("--scenarios", nargs="+", metavar="NAME", help="cases of --list (default: all but paper_*)")
+    compare.add_argument("--score", metavar="MODULE:CLASS", help="an estimator of yours, as one more")
+    compare.add_argument("--data", metavar="DIR", type=Path, help="write the runs there; with --score read them")
+    compare.add_argument(
+        "--scenarios",
+        nargs="+",
+        metavar="NAME",
+        help="cases of --list (default: all but those of --paper, wrong_tuning_*, remnant_*, square_wave)",
+    )
     compare.add_argument("--models", nargs="+", metavar="MODEL", help="only cases of these models (default: all)")
     compare.add_argument("--estimators", nargs="+", metavar="NAME", help="estimators of --list (default: all)")
     compare.add_argument("--seeds", type=int, metavar="N", help=f"runs of each case (default: {_SEEDS})")
@@ -90,10 +112,6 @@ def run(args: argparse.Namespace) -> int:
         print_tables(_listed(), args.json)
         return 0
     require("study")
-
-    from ..study.compare import campaign, evaluation, table, verdicts
-    from ..study.compare.cases import Plan
-
     if args.envelope:
         from . import compare_envelope
 
@@ -101,11 +119,21 @@ def run(args: argparse.Namespace) -> int:
         return compare_envelope.run(args)
     if args.paper:
         return _paper(args)
-    names, estimators = _cases(args), _estimators(args)
-    seeds = args.seeds if args.seeds is not None else (_QUICK_SEEDS if args.quick else _SEEDS)
-    duration = args.duration if args.duration is not None else (_QUICK_DURATION if args.quick else None)
-    _check(seeds, duration, args.jobs)
-    todo = campaign.tasks(names, estimators, Plan(seeds, duration, _SEED if args.seed is None else args.seed))
+    if args.data is not None and args.score is None:
+        return _data(args)
+    return _compare(args)
+
+
+def _compare(args: argparse.Namespace) -> int:
+    """Run all estimators that take part on all cases that were asked for."""
+    from lever_cdkf.tables import print_tables
+
+    from ..study.compare import campaign, entrants, evaluation, table, verdicts
+
+    if args.score is not None:
+        entrants.enter(args.score)
+    plan, names = _drawn(args) if args.data is None else _of_files(args)
+    todo = campaign.tasks(names, _estimators(args), plan)
     if not todo:
         raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
     if args.out is not None:
@@ -142,6 +170,17 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _drawn(args: argparse.Namespace) -> tuple[Plan, list[str]]:
+    """Return the plan and the cases that the command line asks for."""
+    from ..study.compare.cases import Plan
+
+    usual = _SEEDS if args.score is None and args.data is None else _SCORED
+    seeds = args.seeds if args.seeds is not None else (_QUICK_SEEDS if args.quick else usual)
+    duration = args.duration if args.duration is not None else (_QUICK_DURATION if args.quick else None)
+    _check(seeds, duration, args.jobs)
+    return Plan(seeds, duration, _SEED if args.seed is None else args.seed), _cases(args)
+
+
 def _paper(args: argparse.Namespace) -> int:
     """Run `lever compare --paper`."""
     from lever_cdkf.tables import print_tables
@@ -149,7 +188,7 @@ def _paper(args: argparse.Namespace) -> int:
     from ..study.compare import campaign, paper
     from ..study.compare.cases import Plan
 
-    for option in ("scenarios", "models", "out", "quick"):
+    for option in ("scenarios", "models", "out", "quick", "score", "data"):
         if getattr(args, option):
             raise LeverError(f"--{option} does not go with --paper, which prints one fixed experiment; leave it out")
     seeds = paper.SEEDS if args.seeds is None else args.seeds
@@ -160,6 +199,36 @@ def _paper(args: argparse.Namespace) -> int:
         results = campaign.run(todo, args.jobs, progress.show)
     print_tables(paper.tables(results), args.json)
     return 0
+
+
+def _data(args: argparse.Namespace) -> int:
+    """Run `lever compare --data`."""
+    from ..study.compare import dataset
+
+    for option in ("estimators", "out", "quick"):
+        if getattr(args, option):
+            raise LeverError(f"--{option} does not go with --data alone, which only writes runs; add --score")
+    plan, names = _drawn(args)
+    with Progress("data") as progress:
+        for done, name in enumerate(dataset.write(args.data, names, plan), 1):
+            progress.show(done, len(names), name)
+    say(f"Written to {args.data}: {dataset.INDEX}, {', '.join(f'{name}.parquet' for name in names)}")
+    return 0
+
+
+def _of_files(args: argparse.Namespace) -> tuple[Plan, list[str]]:
+    """Return plan and cases of the files that --data names."""
+    from ..study.compare import dataset
+    from ..study.compare.cases import cases
+
+    for option in ("seeds", "seed", "duration", "quick", "models"):
+        if getattr(args, option):
+            raise LeverError(f"--{option} does not go with --data, which has its own runs; leave it out")
+    plan, there = dataset.plan_of(args.data)
+    check_names("scenario", there, cases(), _LIST)
+    names: list[str] = args.scenarios or there
+    check_names("scenario", names, there, f"{args.data / dataset.INDEX}")
+    return plan, names
 
 
 def _listed() -> dict[str, list[Row]]:
@@ -174,10 +243,13 @@ def _listed() -> dict[str, list[Row]]:
 
 
 def _cases(args: argparse.Namespace) -> list[str]:
-    from ..study.compare.cases import cases
+    from ..study.compare import dataset
+    from ..study.compare.cases import ON_REQUEST, cases
 
-    all_but_the_paper = [name for name, case in cases().items() if case.kind != "paper"]
-    chosen = args.scenarios or (_QUICK_CASES if args.quick else all_but_the_paper)
+    usual = [name for name, case in cases().items() if case.kind not in ON_REQUEST]
+    if args.score is not None or args.data is not None:
+        usual = list(dataset.BENCHMARK)
+    chosen = args.scenarios or (_QUICK_CASES if args.quick else usual)
     check_names("scenario", chosen, cases(), _LIST)
     models = {case.model for case in cases().values()}
     check_names("model", args.models or (), models, _LIST)
@@ -190,6 +262,8 @@ def _estimators(args: argparse.Namespace) -> list[str]:
 
     names = list(dict.fromkeys(name for case in cases().values() for name in entrants(case)))
     check_names("estimator", args.estimators or (), names, _LIST)
+    if args.score is not None:
+        return [*(args.estimators or _BESIDE), args.score]
     return list(args.estimators or names)
 
 

@@ -15,7 +15,7 @@ from ..study.peers.filters import PEERS
 from .names import check_names
 
 SEEDS = 8
-_NOT_HERE = ("models", "duration", "seed", "out")
+_NOT_HERE = ("models", "duration", "seed", "out", "score", "data")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -24,7 +24,7 @@ from lever_cdkf.models.lever import Lever
 from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
 from lever_cdkf.units import GRAVITY
 
-from .data import OUTPUTS, STATES, Batch, Knowledge, Model, Truth, rest_angle
+from .data import OUTPUTS, PARAMETERS, STATES, Batch, Knowledge, Model, Truth, rest_angle
 from .draws import excitation, streams
 
 _MOST_DRAWS = 1000  # of the parameters of one run
@@ -117,12 +117,12 @@ def matched(condition: Condition, runs: int, duration: float, seed: int) -> Batc
     return Batch(model, period, y, u, trim, assumed, Truth(x, p, dynamics), raw_y, u)
 
 
-def tightened(batch: Batch, moment: int, factors: Array) -> Batch:
-    """The same runs, with the parameters from sample `moment` on times `factors` (3,): same inputs, same noises."""
+def tightened(batch: Batch, factors: Array) -> Batch:
+    """The same runs, with the parameters times `factors` (K, 3): same inputs, same noises."""
     truth = batch.truth
     assert truth.p is not None
-    p = truth.p.copy()
-    p[:, moment:] *= factors
+    p = truth.p * factors
+    moment = int(np.argmax((factors != 1.0).any(axis=1)))  # the first that differs
     mean, x = 0.5 * (batch.u[:, 1:] + batch.u[:, :-1]), truth.x.copy()
 
     def step(states: Array, parameters: Array, k: int | slice) -> Array:
@@ -137,6 +137,13 @@ def tightened(batch: Batch, moment: int, factors: Array) -> Batch:
     dynamics = batch.model.dynamics(moved, rest_angle(batch.model, moved, batch.trim, batch.period))
     changed = replace(truth, x=x, p=p, dynamics=np.moveaxis(dynamics, 0, -1))
     return replace(batch, y=batch.y + x - truth.x, raw_y=batch.raw_y + x - truth.x, truth=changed)
+
+
+def jump(samples: int, moment: int, factors: Array) -> Array:
+    """(K, 3) factors for `tightened`: from sample `moment` on those given (3,)."""
+    held = np.ones((samples, PARAMETERS))
+    held[moment:] = factors
+    return held
 
 
 def _bounds(kind: Kind) -> Array:

@@ -117,7 +117,7 @@ def test_one_is_a_run_not_runs(lever: Run, tmp_path: Path) -> None:
         (["quick", "-o", "out", "--workers", "2", "--scheduler", "tcp://x:1"], "does not go with --scheduler"),
         (["quick", "--run", "300"], "--run 300: the campaign has the runs 0 to 299"),
         (["no.toml", "-o", "out"], "no.toml: no such file"),
-        (["what"], "no spec 'what'; there are quick, tracking"),
+        (["what"], "no spec 'what'; there are mismatch, quick, tracking"),
     ],
 )
 def test_refused(

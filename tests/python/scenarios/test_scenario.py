@@ -17,8 +17,8 @@ from lever_sil.toml_tables import ScenarioError
 REQUIRED = {
     "steady", "fatigue_drift", "sudden_grip", "base_only", "base_dither", "poor_excitation", "sensor_dropout",
     "re_trim", "high_noise", "demo", "linear_physical", "linear_black_box", "two_dof", "mayo_ectomorphic",
-    "mayo_mesomorphic", "moving_pilot", "grip_moves", "friction", "hands_off", "rough_air", "sensor_faults",
-    "unknown_torque", "ramp_of_damping", "hysteretic", "reflex",
+    "mayo_mesomorphic", "relaxed_hand", "moving_pilot", "grip_moves", "friction", "hands_off", "rough_air",
+    "sensor_faults", "unknown_torque", "ramp_of_damping", "hysteretic", "reflex",
 }  # fmt: skip
 NOTHING_PROMISED = {"moving_pilot", "rough_air", "sensor_faults", "unknown_torque"}
 """Scenarios in which the estimator cannot be right all the time."""

@@ -97,25 +97,28 @@ def test_slow_things_are_passed_over_as_by_a_first_order_high_pass() -> None:
 # --- least squares ---------------------------------------------------------------------------------------------------
 
 
-def least_squares(data: Equations, run: int, prior: tuple[Array, Array], forget: float) -> tuple[Array, Array]:
-    """q and its covariance by numpy: rows weighted by age, the first guess the oldest of them."""
+def least_squares(
+    data: Equations, run: int, prior: tuple[Array, Array], forget: float, regularised: bool
+) -> tuple[Array, Array]:
+    """q and its covariance by numpy: rows weighted by age, the first guess the oldest of them, or of no age."""
     count = data.target.shape[1]
     weight = np.sqrt(forget ** np.arange(count - 1, -1, -1) / data.variance)[:, np.newaxis]
-    root = np.linalg.cholesky(np.linalg.inv(prior[1])).T * np.sqrt(forget**count)
+    root = np.linalg.cholesky(np.linalg.inv(prior[1])).T * (1.0 if regularised else np.sqrt(forget**count))
     rows = np.concatenate((root, weight * data.regressors[run]))
     right = np.concatenate((root @ prior[0], weight[:, 0] * data.target[run]))
     return np.linalg.lstsq(rows, right)[0], np.linalg.inv(rows.T @ rows)
 
 
+@pytest.mark.parametrize("regularised", [False, True])
 @pytest.mark.parametrize("name", ["black_box-trim", "lever-trim", "lever-fixed"])
-def test_rls_is_weighted_least_squares(name: str) -> None:
+def test_rls_is_weighted_least_squares(name: str, regularised: bool) -> None:
     batch = simulate(PLANS[name])
-    known, rls = batch.knowledge, Rls(0.01, 2.0)
+    known, rls = batch.knowledge, Rls(0.01, 2.0, regularised=regularised)
     data = equations(batch, rls.window, rls.corner)
     estimates = rls(batch, np.array([batch.samples - 1]))
     assert estimates.covariance is not None
     for run in range(batch.runs):
-        q, covariance = least_squares(data, run, data.first_guess(known), np.exp(-0.01 / 2.0))
+        q, covariance = least_squares(data, run, data.first_guess(known), np.exp(-0.01 / 2.0), regularised)
         w = known.scaled(data.coefficients.parameters(q))
         np.testing.assert_allclose(estimates.w[run, 0], w, atol=1e-8)
         change = 1e-6 * np.diag(q)

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from lever_cdkf import interrupts
+from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.native import enum_names, settings_table
 from lever_cdkf.provenance import provenance
 from lever_cdkf.report import figure as drawing
@@ -31,8 +32,8 @@ from lever_sil.study.compare import (
     verdicts,
 )
 from lever_sil.study.compare.campaign import Outcome, Results
-from lever_sil.study.compare.cases import Matched, Plan, References, Stepped, cases
-from lever_sil.study.compare.entrants import entrants
+from lever_sil.study.compare.cases import ON_REQUEST, Matched, Plan, References, Stepped, cases
+from lever_sil.study.compare.entrants import entrants, tuning_name, wrongly_tuned
 from lever_sil.study.compare.evaluation import Row
 from lever_sil.study.data import Batch, Estimates
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ def test_walks_and_steps_are_as_the_comparison_was_asked_for() -> None:
     for name, case in cases().items():
         if isinstance(case, Matched):
             fixed, dithered, rough = (word in name for word in ("fixed", "dither", "rough"))
-            if case.kind == "wrong noise":
+            if case.kind.startswith("wrong"):
                 dithered, noise = True, 0.05
             else:
                 noise = 0.1 if rough else 0.01
@@ -103,11 +104,28 @@ def test_told_the_wrong_noise_in_all_combinations() -> None:
         assert {f"{name}_r{r}_q{q}" for r, q in combinations} <= by_name.keys()
         assert by_name[f"{name}_r10_q0.1"].reference == name
         misinformed: Any = by_name[f"{name}_r10_q0.1"].make(cases()["wrong_noise_fixed"])
-        for setting, factor in (("theta_noise", 10.0), ("theta_dot_noise", 10.0), ("theta_dot_process_noise", 0.1)):
-            assert misinformed.settings[setting] == factor * default[setting]
+        for told, factor in (("theta_noise", 10.0), ("theta_dot_noise", 10.0), ("theta_dot_process_noise", 0.1)):
+            assert misinformed.settings[told] == factor * default[told]
 
 
-@pytest.mark.parametrize("name", ["lever_fixed_dither_quiet", "lever_trim_base_rough", "wrong_noise_trim", "step_up"])
+def test_tuned_wrong_alone_and_in_pairs() -> None:
+    """Of two things each, both ways; what leaves the range of its setting stays at the end of it."""
+    case = cases()["wrong_tuning_trim"]
+    assert len(list(wrongly_tuned())) == 1 + 4 * 2 + 6 * 2 * 2
+    assert len({tuning_name(wrong) for wrong in wrongly_tuned()}) == 1 + 4 * 2 + 6 * 2 * 2
+    made: Any = entrants(case)["dual_prior10_walk0.1"].make(case)
+    assert made.settings == {
+        **{f"{name}_sigma": 1.5 for name in ("m_p", "c_p", "k_p")},
+        **{f"{name}_walk": 0.1 * setting(f"{name}_walk").default for name in ("m_p", "c_p", "k_p")},
+    }
+    made = entrants(case)["dual_prior0.1"].make(case)
+    assert made.settings["m_p_sigma"] == pytest.approx(0.025)
+    assert not {"paper", "wrong tuning"} - set(ON_REQUEST)
+
+
+@pytest.mark.parametrize(
+    "name", ["lever_fixed_dither_quiet", "lever_trim_base_rough", "wrong_noise_trim", "wrong_tuning_fixed", "step_up"]
+)
 def test_the_firmware_takes_the_settings_of_each_entrant(name: str) -> None:
     case, plan = cases()[name], Plan(1, 1.0)
     batch = case.batch(plan)

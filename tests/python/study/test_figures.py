@@ -17,7 +17,7 @@ from lever_sil.study.data import Batch
 from lever_sil.study.figures import catalogue, runs
 from lever_sil.study.figures.description import LOOKS, Band, Curve, Points, Row, Surface, Trace, number
 from lever_sil.study.firmware import EXACT
-from lever_sil.study.matched import Condition, matched, tightened
+from lever_sil.study.matched import Condition, jump, matched, tightened
 from numpy.typing import NDArray
 from python.study.shown import SEED, SHORT, figure_of
 from scipy.integrate import solve_ivp
@@ -292,7 +292,8 @@ def grips() -> tuple[Batch, Batch, int]:
     """Runs before and after the grip tightens, and the sample at which it does."""
     condition = Condition("lever", "trim", dither_rms=0.4, settings=PRIOR)
     calm = matched(condition, SHORT.runs, SHORT.duration, SEED)
-    return calm, tightened(calm, calm.samples // 2, np.array((1.0, 1.3, 1.3))), calm.samples // 2
+    moment = calm.samples // 2
+    return calm, tightened(calm, jump(calm.samples, moment, np.array((1.0, 1.3, 1.3)))), moment
 
 
 def test_a_tightened_grip_is_the_same_run_with_other_parameters() -> None:
@@ -310,7 +311,7 @@ def test_a_tightened_grip_is_the_same_run_with_other_parameters() -> None:
         moved = batch.model.step(x[:-1].T, p[:-1].T, (mean[0], mean[1]), batch.trim[0, :-1], batch.period)
         kicks.append(x[1:] - moved.T)
     np.testing.assert_allclose(kicks[1], kicks[0], atol=1e-12)
-    untouched = tightened(calm, moment, np.ones(3))
+    untouched = tightened(calm, np.ones((calm.samples, 3)))
     np.testing.assert_allclose(untouched.truth.x, calm.truth.x, atol=1e-12)
     m_p, _, k_p = tight.truth.p[0, -1]
     length, cosine = DEFAULTS["lever_length"], math.cos(math.radians(20.0))

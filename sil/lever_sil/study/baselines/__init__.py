@@ -66,6 +66,13 @@ BASELINES = {
             Rls(),
             LINEAR_IN_COEFFICIENTS,
         ),
+        Baseline(
+            "rls_regularised",
+            "the same, without forgetting the first guess",
+            "Gunnarsson 1996",
+            Rls(regularised=True),
+            LINEAR_IN_COEFFICIENTS,
+        ),
         Baseline("lms", "normalised least mean squares", "Elliott 2001", Nlms(), LINEAR_IN_COEFFICIENTS),
     )
 }

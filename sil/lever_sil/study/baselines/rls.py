@@ -10,6 +10,9 @@ noise for white and the parameters for constant. As its users would: started wit
 remedy against wind-up, and the defaults the best (within 5 %, error of m_p, c_p, k_p) of windows of 5 to 60 ms,
 forgetting of 0.5 to 20 s and corners of 0 to 1 Hz, for both preloads, on 20 runs of 30 s of a lever whose parameters
 walk by 1, 2, 2 % per √s, shaken by 0.1 g and 0.3 N m.
+
+Regularised, it does not forget the first guess (S. Gunnarsson, "Combining tracking and regularization in recursive
+least squares identification", IEEE CDC 1996): the information of each window is λ P⁻¹ + φ φᵀ / r + (1 - λ) P_0⁻¹.
 """
 
 from __future__ import annotations
@@ -18,20 +21,25 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from lever_cdkf.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import PARAMETERS, Batch, Estimates
-from .recursion import repeated
-from .regression import equations
+from .recursion import apply, repeated
+from .regression import Equations, equations
 
 
 @dataclass(frozen=True)
 class Rls:
-    """Learns once in `window` [s] from what is faster than `corner` [Hz]; what is `forgetting` [s] old counts 1/e."""
+    """Learns once in `window` [s] from what is faster than `corner` [Hz]; what is `forgetting` [s] old counts 1/e.
+
+    `regularised`: the first guess is not forgotten.
+    """
 
     window: float = 0.02
     forgetting: float = 8.0
     corner: float = 1.0
+    regularised: bool = False
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
         data = equations(batch, self.window, self.corner)
@@ -39,6 +47,8 @@ class Rls:
         shape = (batch.runs, len(data.ends) + 1)
         q, covariance = np.empty((*shape, PARAMETERS)), np.empty((*shape, PARAMETERS, PARAMETERS))
         q[:, 0], covariance[:, 0] = (repeated(prior, batch.runs) for prior in data.first_guess(batch.knowledge))
+        if self.regularised:
+            return data.estimates(at, batch.knowledge, *_regularised(data, forget, q, covariance))
         with np.errstate(over="ignore", invalid="ignore"):
             for j in range(len(data.ends)):
                 phi, p = data.regressors[:, j], covariance[:, j]
@@ -48,3 +58,18 @@ class Rls:
                 q[:, j + 1] = q[:, j] + k * error[:, np.newaxis]
                 covariance[:, j + 1] = (p - k[:, :, np.newaxis] * cross[:, np.newaxis]) / forget
         return data.estimates(at, batch.knowledge, q, covariance)
+
+
+def _regularised(data: Equations, forget: float, q: Array, covariance: Array) -> tuple[Array, Array]:
+    """Fill q (B, J + 1, 3) and its covariance from their first entries on."""
+    prior = np.linalg.inv(covariance[:, 0])
+    information, vector = prior, apply(prior, q[:, 0])
+    first = vector
+    for j in range(len(data.ends)):
+        phi = data.regressors[:, j]
+        more = phi[:, :, np.newaxis] * phi[:, np.newaxis] / data.variance
+        information = forget * information + more + (1.0 - forget) * prior
+        vector = forget * vector + phi * data.target[:, j, np.newaxis] / data.variance + (1.0 - forget) * first
+        covariance[:, j + 1] = np.linalg.inv(information)
+        q[:, j + 1] = apply(covariance[:, j + 1], vector)
+    return q, covariance

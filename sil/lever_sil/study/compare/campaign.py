@@ -10,6 +10,7 @@ import time as clock
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from lever_cdkf import interrupts
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 from ..data import PARAMETERS, Batch, Estimates
 from ..scores import errors, normalised_squares
 from ..transitions import dynamics_gradient, with_dynamics
+from . import dataset
 from .cases import Case, Matched, Plan, References, cases
-from .entrants import entrants
+from .entrants import enter, entrants, is_candidate
 
 Progress = Callable[[int, int, str], None]
 """Called after each task: how many are done, of how many, and what the last one was."""
@@ -99,6 +101,8 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Result
 
 def do(task: Task) -> tuple[Task, Outcome | References | None]:
     """One task."""
+    if task.entrant is not None and is_candidate(task.entrant):
+        enter(task.entrant)  # in this process
     case = cases()[task.case]
     batch = _batch(task.case, task.plan)
     at = samples(case, batch)
@@ -113,7 +117,7 @@ def do(task: Task) -> tuple[Task, Outcome | References | None]:
 
 @lru_cache(maxsize=1)
 def _batch(case: str, plan: Plan) -> Batch:
-    return cases()[case].batch(plan)
+    return cases()[case].batch(plan) if plan.data is None else dataset.read(Path(plan.data), case)
 
 
 def samples(case: Case, batch: Batch) -> NDArray[np.int64]:

@@ -16,7 +16,7 @@ from ...scenarios import scenario as scenarios
 from .. import bound, linearised
 from ..data import Batch
 from ..detrended import detrended
-from ..matched import KINDS, Condition, knowledge, matched, tightened
+from ..matched import KINDS, Condition, jump, knowledge, matched, tightened
 from ..recorded import recorded, usable
 from ..steps import Step, stepped
 
@@ -52,6 +52,8 @@ class Plan:
     duration: float | None = None
     """[s]; None: each case's own. Moments inside a run move in proportion."""
     seed: int = 1
+    data: str | None = None
+    """Folder of files that batches are read from (dataset.py); None: they are drawn."""
 
     @property
     def is_whole(self) -> bool:
@@ -164,6 +166,13 @@ class WrongNoise(Matched):
 
 
 @dataclass(frozen=True, kw_only=True)
+class WrongTuning(Matched):
+    """A matched case for firmware whose noise, first uncertainty or walk is wrong, alone and in pairs."""
+
+    kind: str = "wrong tuning"
+
+
+@dataclass(frozen=True, kw_only=True)
 class Stepped(Case):
     """A step of stiffness and damping (steps.py); errors are judged from 15 s to the step, while nothing happens."""
 
@@ -220,10 +229,16 @@ class Paper(Case):
         told = knowledge(Condition(self.model, settings=settings).all_settings(), KINDS[self.model])
         condition = Condition(self.model, dither_rms=_PUSH[self.model], settings={**settings, **walks})
         exact = replace(matched(condition, self.runs(plan), self.length(plan), plan.seed), knowledge=told)
-        if (change := self.change(plan)) is not None:
-            exact = tightened(exact, round(change / exact.period), np.array(_JUMP[self.model]))
+        if (factors := self.factors(exact, plan)) is not None:
+            exact = tightened(exact, factors)
         defaults = {row.name: row.default for row in settings_table()}
         return detrended(exact, defaults["trim_corner"], defaults["align_time"])
+
+    def factors(self, batch: Batch, plan: Plan) -> Array | None:
+        """(K, 3) of the parameters of the runs; None where they are as drawn."""
+        if (change := self.change(plan)) is None:
+            return None
+        return jump(batch.samples, round(change / batch.period), np.array(_JUMP[self.model]))
 
     def judged(self, time: Array, plan: Plan) -> BoolArray:
         settled: BoolArray = time >= self.scaled(10.0, plan)
@@ -233,6 +248,34 @@ class Paper(Case):
 
     def change(self, plan: Plan) -> float | None:
         return self.scaled(20.0, plan) if self.truth == "jump" else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Protocol(Paper):
+    """What others have tried time-varying estimators on (../PAPER.md), on the lever: `truth` is "constant", "jump",
+    "slow" (damping and stiffness rise as in the jump, within half of the run) or "square wave" (stiffness alone, 5 s
+    high and 5 s low from 10 s on). The remnant is process noise."""
+
+    kind: str = "protocol"
+    output_noise: float = 1.0
+
+    def factors(self, batch: Batch, plan: Plan) -> Array | None:
+        time = np.arange(batch.samples) * batch.period
+        if self.truth == "slow":
+            start, length = self.scaled(10.0, plan), self.scaled(20.0, plan)
+            rise = np.clip((time - start) / length, 0.0, 1.0)
+            slow: Array = 1.0 + rise[:, np.newaxis] * (np.array(_JUMP[self.model]) - 1.0)
+            return slow
+        if self.truth == "square wave":
+            square: Array = 1.0 + self.high(time, plan)[:, np.newaxis] * np.array((0.0, 0.0, SQUARE - 1.0))
+            return square
+        return super().factors(batch, plan)
+
+    def high(self, time: Array, plan: Plan) -> BoolArray:
+        """(T,) at which of the times [s] the square wave is high."""
+        halves = np.floor((time / self.scaled(1.0, plan) - 10.0) / 5.0 + 1e-9)
+        high: BoolArray = (halves >= 0.0) & (halves % 2.0 == 0.0)
+        return high
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,13 +312,22 @@ class Recorded(Case):
         return jumps[-1] if jumps else None
 
 
+ON_REQUEST = ("paper", "wrong tuning", "protocol")
+"""Kinds of cases that are run only where they are named: they belong to ../PAPER.md."""
+
+
 @cache
 def cases() -> Mapping[str, Case]:
     """All there are, by name."""
-    return {case.name: case for case in (*_matched(), *_steps(), *_wrong_noise(), *_paper(), *_recorded())}
+    return {
+        case.name: case
+        for case in (*_matched(), *_steps(), *_wrong_noise(), *_wrong_tuning(), *_paper(), *_protocols(), *_recorded())
+    }
 
 
 _WITH_TORQUE = ("lever", "linear_physical")
+REMNANTS, SQUARE = (0.02, 0.05, 0.2), 1.3
+"""Of the protocols of others: process noise [rad/s/√s]; factor of the stiffness in the square wave."""
 _PUSH = {"lever": DITHER, "linear_physical": 2.0, "linear_black_box": 0.0}
 """Known torque [N m] or force [N] in the experiment of the paper, rms."""
 _JUMP = {
@@ -323,6 +375,12 @@ def _wrong_noise() -> Iterator[Case]:
         yield WrongNoise(name=f"wrong_noise_{preload}", title=title, preload=preload, dither_rms=DITHER)
 
 
+def _wrong_tuning() -> Iterator[Case]:
+    for preload in ("fixed", "trim"):
+        title = f"R, Q, prior, walk wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither"
+        yield WrongTuning(name=f"wrong_tuning_{preload}", title=title, preload=preload, dither_rms=DITHER)
+
+
 def _paper() -> Iterator[Case]:
     for model in ("linear_physical", "linear_black_box", "lever"):
         for truth in ("constant", "drift", "jump"):
@@ -337,6 +395,23 @@ def _paper() -> Iterator[Case]:
                         output_noise=factor,
                         process_noise=noise,
                     )
+
+
+def _protocols() -> Iterator[Case]:
+    for truth in ("constant", "slow", "jump"):
+        for remnant in REMNANTS:
+            yield Protocol(
+                name=f"remnant_{truth}_{remnant:g}",
+                title=f"as Olivari et al. 2014: parameters: {truth}, remnant {remnant:g} rad/s/√s",
+                truth=truth,
+                process_noise=remnant,
+            )
+    yield Protocol(
+        name="square_wave",
+        title=f"as van de Ruit et al. 2018: k_p × {SQUARE:g} and back, remnant {REMNANTS[1]:g} rad/s/√s",
+        truth="square wave",
+        process_noise=REMNANTS[1],
+    )
 
 
 def _recorded() -> Iterator[Case]:

@@ -86,8 +86,9 @@ def _lanes(
 
 
 def _colour(estimator: str) -> str:
-    """dual_shipped is a dual."""
-    return COLOURS.get(estimator) or next(COLOURS[name] for name in OURS if estimator.startswith(f"{name}_"))
+    """dual_shipped is a dual; what is not in the registry has the last colour."""
+    ours = next((COLOURS[name] for name in OURS if estimator.startswith(f"{name}_")), SERIES[-1])
+    return COLOURS.get(estimator, ours)
 
 
 def _marks(

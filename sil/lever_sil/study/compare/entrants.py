@@ -2,18 +2,21 @@
 
 The firmware's are `ours`. Names: dual and joint are told the true noise and adapt nothing; *_shipped have every default
 but what is known beforehand (the first guess, the lever); *_no_change are the same without change detection; *_r…_q…
-are shipped, too, and told a measurement noise (r) and a process noise (q) wrong by a factor; *_fixed, *_annealing and
-*_robbins_monro are told the noise, and move the parameters by that kind of walk.
+are shipped, too, and told a measurement noise (r) and a process noise (q) wrong by a factor, or an uncertainty of the
+first guess (prior) and a walk; *_fixed, *_annealing and *_robbins_monro are told the noise, and move the parameters by
+that kind of walk.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
-from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.config import setting, settings_table
 
 from ..baselines import BASELINES
+from ..candidate import candidate
 from ..data import Estimator
 from ..firmware import Firmware
 from ..matched import KINDS
@@ -37,17 +40,35 @@ class Entrant:
     """The entrant against which errors are told besides."""
 
 
+_CANDIDATES: dict[str, Entrant] = {}
+
+
+def is_candidate(name: str) -> bool:
+    """Return whether the name is that of somebody's class, MODULE:CLASS (../candidate.py)."""
+    return ":" in name
+
+
+def enter(name: str) -> None:
+    """Let the class MODULE:CLASS take part in every case, in this process. Raises LeverError."""
+    if name not in _CANDIDATES:
+        _CANDIDATES[name] = Entrant(name, f"class {name}", False, _always(candidate(name)))
+
+
 def entrants(case: Case) -> dict[str, Entrant]:
     """Those of a case, by name, ours first."""
     if case.kind == "paper":
         chosen = _adaptations() + [each for each in _baselines(case) if each.name in _OF_THE_PAPER]
+    elif case.kind == "protocol":
+        chosen = _shipped()[:1] + [each for each in _baselines(case) if not each.name.startswith("algorithm1")]
     elif case.kind == "wrong noise":
         chosen = _given_noise() + _wrong()
+    elif case.kind == "wrong tuning":
+        chosen = _given_noise()[:1] + _wrongly_tuned()
     elif case.kind == "matched":
         chosen = _given_noise() + _shipped() + _baselines(case)
     else:
         chosen = _shipped() + _no_change() + _baselines(case)
-    return {entrant.name: entrant for entrant in chosen}
+    return {entrant.name: entrant for entrant in (*chosen, *_CANDIDATES.values())}
 
 
 def _given_noise() -> list[Entrant]:
@@ -124,6 +145,55 @@ def _wrong() -> list[Entrant]:
         for name in OURS
         for r, r_factor in _FACTORS.items()
         for q, q_factor in _FACTORS.items()
+    ]
+
+
+TUNED = {
+    "r": ("theta_noise", "theta_dot_noise"),
+    "q": ("theta_dot_process_noise",),
+    "prior": ("m_p_sigma", "c_p_sigma", "k_p_sigma"),
+    "walk": ("m_p_walk", "c_p_walk", "k_p_walk"),
+}
+"""What is set wrong together, by the word for it in a name: R, Q, uncertainty of the first guess, walk of the lever."""
+
+
+def wrongly_tuned() -> Iterator[dict[str, str]]:
+    """Yield the factors of what is set wrong: nothing, each of TUNED by 0.1 and by 10, and all pairs of these."""
+    wrong = [(name, factor) for name in TUNED for factor in _FACTORS if factor != "1"]
+    yield {}
+    yield from ({name: factor} for name, factor in wrong)
+    yield from (dict(pair) for pair in combinations(wrong, 2) if len(dict(pair)) == 2)
+
+
+def tuning_name(wrong: Mapping[str, str]) -> str:
+    """Return the name of the entrant that has these set wrong."""
+    return "_".join(("dual", *(name + factor for name, factor in wrong.items()))) if wrong else "dual_shipped"
+
+
+def _wrongly_tuned() -> list[Entrant]:
+    """The shipped firmware; what leaves the range of its setting stays at the end of it."""
+
+    def maker(wrong: Mapping[str, str]) -> Callable[[Case], Estimator]:
+        def make(case: Case) -> Estimator:
+            set_wrong = {}
+            for group, factor in wrong.items():
+                for name in TUNED[group]:
+                    row = setting(name)
+                    value = _FACTORS[factor] * case.own_settings.get(name, row.default)
+                    set_wrong[name] = min(max(value, row.least), row.greatest)
+            return _with("dual", set_wrong)(case)
+
+        return make
+
+    return [
+        Entrant(
+            tuning_name(wrong),
+            ", ".join(["firmware, dual, as shipped", *(f"{name} × {factor}" for name, factor in wrong.items())]),
+            True,
+            maker(wrong),
+            reference="dual",
+        )
+        for wrong in wrongly_tuned()
     ]
 
 

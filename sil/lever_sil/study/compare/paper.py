@@ -1,4 +1,4 @@
-"""The experiment of the paper as one table for each model: `lever compare --paper`, for ../PAPER.md."""
+"""The tables of ../PAPER.md: the experiment of the paper, by model (`lever compare --paper`), and wrong tuning."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.arrays import Array
-from lever_cdkf.tables import Row
+from lever_cdkf.tables import Cell, Row
 
 from ..data import PARAMETERS
 from ..scores import settling_times
-from .campaign import Results
-from .cases import Paper, cases
+from .campaign import Outcome, Results
+from .cases import Case, Paper, Plan, cases
+from .entrants import tuning_name, wrongly_tuned
 from .evaluation import FREQUENCY
 
 SEEDS = 20
+TUNING = ("wrong_tuning_fixed", "wrong_tuning_trim")
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Figures:
 
 def names() -> list[str]:
     """Return the cases of the experiment."""
-    return [name for name, case in cases().items() if isinstance(case, Paper)]
+    return [name for name, case in cases().items() if case.kind == "paper"]
 
 
 def tables(results: Results) -> dict[str, list[Row]]:
@@ -47,13 +49,47 @@ def tables(results: Results) -> dict[str, list[Row]]:
             {
                 "parameters": truth,
                 "estimator": estimator,
-                "rms [%]": _pair(100.0 * figures.rms),
-                "bias [%]": _pair(100.0 * figures.bias),
-                "±2σ covers [%]": _pair(-100.0 * figures.covered),
-                "f_n to 5 % [s]": _pair(np.where(np.isnan(figures.followed), np.inf, figures.followed)),
+                "rms [%]": pair(100.0 * figures.rms),
+                "bias [%]": pair(100.0 * figures.bias),
+                "±2σ covers [%]": pair(-100.0 * figures.covered),
+                "f_n to 5 % [s]": pair(np.where(np.isnan(figures.followed), np.inf, figures.followed)),
             }
         )
     return by_title
+
+
+def tuning(results: Results) -> list[Row]:
+    """Return a row for each wrong tuning of the cases wrong_tuning_*, the right one first; cells as in `tables`."""
+    rows: list[Row] = []
+    for wrong in wrongly_tuned():
+        row: dict[str, Cell] = {"wrong": ", ".join(f"{name} × {factor}" for name, factor in wrong.items()) or "nothing"}
+        for name in TUNING:
+            preload = cases()[name].preload
+            figures = of_runs(results.outcomes[name, tuning_name(wrong)], cases()[name], results.plan)
+            row |= {
+                f"{preload}: rms [%]": pair(100.0 * figures.rms),
+                f"{preload}: ±2σ covers [%]": pair(-100.0 * figures.covered),
+            }
+        rows.append(row)
+    return rows
+
+
+def of_runs(outcome: Outcome, case: Case, plan: Plan) -> Figures:
+    """Return the figures of each run of an estimator in a case."""
+    judged = case.judged(outcome.time, plan)
+    relative = outcome.relative[:, judged, :PARAMETERS]
+    covered = np.full(len(relative), np.nan)
+    if outcome.stated is not None:
+        inside = np.square(outcome.errors[:, judged]) <= 4.0 * outcome.stated[:, judged]
+        covered = inside[..., :PARAMETERS].mean(axis=1).min(axis=-1)
+    change = case.change(plan)
+    elapsed = np.empty(0) if change is None else outcome.time - change
+    return Figures(
+        np.sqrt(np.square(relative).mean(axis=(1, 2))),
+        np.abs(relative.mean(axis=1)).max(axis=-1),
+        covered,
+        settling_times(outcome.errors[..., FREQUENCY], elapsed) if len(elapsed) else elapsed,
+    )
 
 
 def _gathered(results: Results) -> Mapping[tuple[str, str, str], Figures]:
@@ -61,21 +97,7 @@ def _gathered(results: Results) -> Mapping[tuple[str, str, str], Figures]:
     for (name, estimator), outcome in results.outcomes.items():
         case = cases()[name]
         assert isinstance(case, Paper)
-        judged = case.judged(outcome.time, results.plan)
-        relative = outcome.relative[:, judged, :PARAMETERS]
-        covered = np.full(len(relative), np.nan)
-        if outcome.stated is not None:
-            inside = np.square(outcome.errors[:, judged]) <= 4.0 * outcome.stated[:, judged]
-            covered = inside[..., :PARAMETERS].mean(axis=1).min(axis=-1)
-        change = case.change(results.plan)
-        elapsed = np.empty(0) if change is None else outcome.time - change
-        figures = Figures(
-            np.sqrt(np.square(relative).mean(axis=(1, 2))),
-            np.abs(relative.mean(axis=1)).max(axis=-1),
-            covered,
-            settling_times(outcome.errors[..., FREQUENCY], elapsed) if len(elapsed) else elapsed,
-        )
-        parts.setdefault((case.model, case.truth, estimator), []).append(figures)
+        parts.setdefault((case.model, case.truth, estimator), []).append(of_runs(outcome, case, results.plan))
     return {key: Figures(*map(np.concatenate, zip(*map(_columns, each), strict=True))) for key, each in parts.items()}
 
 
@@ -83,7 +105,7 @@ def _columns(figures: Figures) -> Iterator[Array]:
     yield from (figures.rms, figures.bias, figures.covered, figures.followed)
 
 
-def _pair(values: Array) -> str | None:
+def pair(values: Array) -> str | None:
     """Median and greatest of the values, of negative ones without their sign; infinity stands for never."""
     if not len(values) or np.isnan(values).all():
         return None

@@ -11,7 +11,7 @@ from lever_cdkf.firmware.native import Config, lib
 from numpy.typing import NDArray
 
 from ..data import Batch
-from ..matched import Condition, matched, tightened
+from ..matched import Condition, jump, matched, tightened
 from ..scores import median_and_worst, settling_times
 from .description import Band, Column, Curve, Figure, Row, interval, number, percent
 from .runs import DITHER, PRIOR, Extent, estimates, held, shown
@@ -41,7 +41,7 @@ def grip(seed: int, extent: Extent) -> Figure:
     condition = Condition("lever", "trim", dither_rms=DITHER, settings=PRIOR)
     calm = matched(condition, extent.runs, extent.duration, seed)
     moment = calm.samples // 2
-    batch = tightened(calm, moment, _FACTORS)
+    batch = tightened(calm, jump(calm.samples, moment, _FACTORS))
     at = shown(batch)
     time, change = at * batch.period, moment * batch.period
     cases = {title: _case(batch, condition, threshold, at) for title, threshold in _CASES.items()}

@@ -1,0 +1,121 @@
+"""The tables in sil/lever_sil/study/PAPER.md, from runs of 20 and 100 seeds.
+
+`cmake --build build --target paper-tables` makes all of them and compares, paper-accept makes and writes, in
+half an hour. --only NAME takes some.
+
+Exit status: 0; 1 when a figure differs by more than one in its last digit; 2 when a table cannot be read or written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+if __name__ == "__main__":
+    sys.path[0] = str(ROOT / "tests")
+
+from accuracy import tables  # noqa: E402
+from accuracy.tables import Place  # noqa: E402
+from lever_cdkf.errors import LeverError  # noqa: E402
+from lever_cdkf.files import write_text  # noqa: E402
+from lever_cdkf.progress import Progress  # noqa: E402
+from lever_cdkf.tables import Row  # noqa: E402
+from lever_sil.run import seeds  # noqa: E402
+from lever_sil.study import no_accelerometer  # noqa: E402
+from lever_sil.study.compare import campaign, paper, protocols  # noqa: E402
+from lever_sil.study.compare.cases import Plan  # noqa: E402
+
+SEEDS = paper.SEEDS
+FILE = "sil/lever_sil/study/PAPER.md"
+ACCEPT = "paper-accept"
+MODELS = ("linear_physical", "linear_black_box", "lever")
+
+
+def _ran(names: Sequence[str], count: int = SEEDS) -> campaign.Results:
+    todo = campaign.tasks(names, None, Plan(count))
+    with Progress("paper") as progress:
+        return campaign.run(todo, os.cpu_count() or 1, progress.show)
+
+
+@cache
+def _experiment() -> Mapping[str, Sequence[Row]]:
+    return paper.tables(_ran(paper.names()))
+
+
+def _tuning() -> Sequence[Row]:
+    return paper.tuning(_ran(paper.TUNING))
+
+
+RELAXED = tables.Table(
+    Place(FILE, "relaxed hand", ACCEPT), ("relaxed_hand",), tables.TABLES[0].columns, tables.TABLES[0].cells
+)
+
+
+def relaxed() -> list[Row]:
+    """The row of the relaxed hand, as in the README's table of scenarios."""
+    (name,) = RELAXED.scenarios
+    tasks = [seeds.Task(name, seed) for seed in range(1, SEEDS + 1)]
+    with Progress("paper") as progress:
+        done = seeds.run(tasks, os.cpu_count() or 1, progress.show)
+    header, _, row = tables.rows(RELAXED.text({name: done}))
+    return [dict(zip(header, row, strict=True))]
+
+
+TABLES: Mapping[Place, Callable[[], Sequence[Row]]] = {
+    **{
+        Place(FILE, f"experiment, {model}", ACCEPT): partial(lambda model: _experiment()[f"{model}, 20 seeds"], model)
+        for model in MODELS
+    },
+    Place(FILE, "wrong tuning", ACCEPT): _tuning,
+    Place(FILE, "no accelerometer", ACCEPT): no_accelerometer.rows,
+    Place(FILE, "remnant", ACCEPT): lambda: protocols.remnants(_ran(protocols.names(), protocols.SEEDS)),
+    Place(FILE, "square wave", ACCEPT): lambda: protocols.square_wave(_ran([protocols.SQUARE_WAVE], protocols.SEEDS)),
+    RELAXED.place: relaxed,
+}
+
+
+def text(rows: Sequence[Row]) -> str:
+    """A table as Markdown."""
+    cells = [tuple("–" if row.get(name) is None else str(row[name]) for name in rows[0]) for row in rows]
+    return tables.markdown(tuple(rows[0]), cells)
+
+
+def main() -> int:
+    """Compares, or with --accept writes the tables."""
+    parser = argparse.ArgumentParser(
+        prog="python tests/accuracy/paper.py",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--accept", action="store_true", help="write the tables into the file")
+    parser.add_argument("--only", metavar="NAME", nargs="+", help=f"of {', '.join(place.name for place in TABLES)}")
+    args = parser.parse_args()
+    wrong: list[str] = []
+    for place, make in TABLES.items():
+        if args.only is None or place.name in args.only:
+            page = (ROOT / FILE).read_text(encoding="utf-8")
+            there = tables.written(page, place)  # before runs that could then not be compared
+            made = text(make())
+            wrong += [f"{place}: {each}" for each in tables.differences(there, made)]
+            if args.accept:
+                write_text(ROOT / FILE, tables.replaced(page, place, made))
+    if args.accept:
+        print(f"Written to {FILE}")
+        return 0
+    for line in wrong:
+        print(f"paper: {line}", file=sys.stderr)
+    print(f"{len(wrong)} figures differ from {FILE}; `cmake --build build --target {ACCEPT}` writes those made now")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except LeverError as error:
+        print(f"paper: {error}", file=sys.stderr)
+        sys.exit(2)
