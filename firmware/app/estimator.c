@@ -204,11 +204,11 @@ static bool note_states(estimator_t *estimator, const checked_t *sample)
     evidence_t *evidence = &estimator->learning.evidence;
     const lever_settings_t *s = estimator->setup.settings;
     const bool measured = sample->valid[0] || sample->valid[1];
+    const bool rests = evidence_is_at_rest(evidence, s->excitation_least, estimator->cdkf.output_noise[1]);
     evidence_note(evidence, EVIDENCE_MISSING, !measured || (estimator->base_missing > 0.0f));
     evidence_note(evidence, EVIDENCE_UNSETTLED, estimator->trim.unsettled >= (0.5f * s->sample_period));
-    evidence_note(
-        evidence, EVIDENCE_REST, evidence_is_at_rest(evidence, s->excitation_least, estimator->cdkf.output_noise[1]));
-    note(estimator, evidence_has(evidence, EVIDENCE_REST), LEVER_FAULT_EXCITATION);
+    evidence_note(evidence, EVIDENCE_REST, rests);
+    note(estimator, rests, LEVER_FAULT_EXCITATION);
     return measured;
 }
 
@@ -247,7 +247,9 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     }
     restart_if_invalid(estimator, sample, learnt);
     add_motion(estimator, sample, elapsed);
-    estimator->restarts -= estimator->restarts * lesser(elapsed * RESTARTS_FORGOTTEN, 1.0f);
+    if (estimator->restarts > 0.0f) {
+        estimator->restarts -= estimator->restarts * lesser(elapsed * RESTARTS_FORGOTTEN, 1.0f);
+    }
     note(estimator, estimator->trim.unsettled > 0.0f, LEVER_FAULT_SETTLING);
     estimator->faults |= learning->evidence.faults;
     estimator->mode = mode_of(estimator, measured);

@@ -19,7 +19,6 @@
 #define TORQUE_MEMORY 0.5f     /* [s] */
 #define TORQUE_MIN 4e-4f       /* mean square of the command from which on it says anything [N^2 m^2] */
 #define TORQUE_SURE 1.6f       /* torque of other origin over the command, both rms, that this is allowed times */
-#define NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: what a mean of products may be by chance */
 #define AWAKE 0.3f             /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
 #define REGRIP_TIME 0.038f     /* two blocks: a new grip is complete [s] [grip_step] */
 #define PROBATION 0.29f        /* until then a change has to explain the innovations [s] [rough_on_off] */
@@ -113,12 +112,6 @@ void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float ela
     }
 }
 
-bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise)
-{
-    const float square = (least * least) + (NOISE_LIKE_MOTION * (noise * noise));
-    return (evidence->motion.slow < square) || (evidence->motion.fast < (0.25f * square));
-}
-
 /* --- at the end of a block ---------------------------------------------------------------------------------------- */
 
 static void judge_stillness(evidence_t *evidence, enum signal signal, float period)
@@ -190,13 +183,15 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
 static void judge_noise(evidence_t *evidence, const evidence_block_t *block)
 {
     const float since = evidence->since_change;
-    const bool ends = (since > PROBATION) && (since < (PROBATION + (1.01f * block->period)));
     const bool tests = block->known && (block->verdict != (uint8_t)VERDICT_REGRIP) && (since <= PROBATION);
-    float statistic = (tests || evidence_has(evidence, EVIDENCE_NOISE)) ? evidence->nis_fast : 0.0f;
-    if (ends && block->known) {
-        statistic = (1.0f / EXPLAINED) * evidence->nis_fast;
+    const bool ends = block->known && (since > PROBATION) && (since < (PROBATION + (1.01f * block->period)));
+    if (ends) {
+        (void)evidence_set(evidence, EVIDENCE_NOISE, (1.0f / EXPLAINED) * evidence->nis_fast);
+    } else if (tests || evidence_has(evidence, EVIDENCE_NOISE)) {
+        (void)evidence_set(evidence, EVIDENCE_NOISE, evidence->nis_fast);
+    } else {
+        evidence->ratio[EVIDENCE_NOISE] = 0.0f;
     }
-    (void)evidence_set(evidence, EVIDENCE_NOISE, statistic);
 }
 
 static void judge_states(evidence_t *evidence, const cdkf_t *cdkf, const evidence_block_t *block)

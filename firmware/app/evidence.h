@@ -71,8 +71,9 @@ typedef struct evidence {
     bool opened;             /* the last change was to another pilot */
 } evidence_t;
 
-#define EVIDENCE_LONG_AGO 1.0e3f /* [s] */
-#define CHANGE_REPORTED 3.0f     /* a change is reported, and its step estimated, until then [s] */
+#define EVIDENCE_NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: a mean of products by chance */
+#define EVIDENCE_LONG_AGO 1.0e3f        /* [s] */
+#define CHANGE_REPORTED 3.0f            /* a change is reported, and its step estimated, until then [s] */
 
 void evidence_start(evidence_t *evidence);
 
@@ -131,7 +132,11 @@ void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float sl
 void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float slow_time);
 
 /* Whether there is motion enough to learn from, beyond what the noise of theta_dot looks like. */
-bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise);
+static inline bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise)
+{
+    const float square = (least * least) + (EVIDENCE_NOISE_LIKE_MOTION * (noise * noise));
+    return (evidence->motion.slow < square) || (evidence->motion.fast < (0.25f * square));
+}
 
 /* --- at the end of a block ---------------------------------------------------------------------------------------- */
 
