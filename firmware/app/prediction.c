@@ -10,7 +10,7 @@
 #define UNSETTLED 4.0f    /* innovations while levels settle, in squares: as much larger as they may be */
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
 #define RATE_MOST 1.0e4f  /* [rad/s] */
-#define REST_TIME 1.0f    /* mean of the trim angle, which follows motion of 1 to 3 Hz with its whole amplitude [s] */
+#define REST_RATE 1.0f    /* of the mean of the trim angle, which itself follows motion of 1 to 3 Hz in full [1/s] */
 #define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is
@@ -91,7 +91,7 @@ static bool subtract_trim(estimator_t *estimator, float y[CDKF_OUTPUTS], const b
     const bool back = trim_outputs(&estimator->trim, y, valid, period);
     const float angle = trim_angle(&estimator->trim);
     estimator->trim_sine_cosine = sine_cosine(angle);
-    estimator->rest_angle += lesser(period * (1.0f / REST_TIME), 1.0f) * (angle - estimator->rest_angle);
+    estimator->rest_angle += lesser(period * REST_RATE, 1.0f) * (angle - estimator->rest_angle);
     return back;
 }
 

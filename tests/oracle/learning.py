@@ -203,7 +203,7 @@ class Learning:
         return correction, np.sum(factor**2 - self.belief.w_factor**2, axis=1)
 
     def _follow(self, lesson: Lesson) -> float:
-        """A known arm has changed, and grips anew; of an unknown one, torque is unknown. Returns seconds of the walk."""
+        """Follow a change: a known arm grips anew; of an unknown one, torque is unknown. Return seconds of the walk."""
         if self.kept[1].trust >= 1.0:
             self.since_change = seconds(0.0)
             return self._turn("regrip", lesson)

@@ -55,7 +55,7 @@ class NoiseEstimation:
         self.response_square += float(response @ response)
 
     def end_block(self, period: np.float32, part: float = 1.0) -> bool:
-        """After `period` [s]: at the end of that part of a window sets the noise. Returns whether it was far too small."""
+        """Set the noise at the end of that part of a window, `period` [s] later; return whether it was far too small."""
         self.elapsed += period
         if self.window <= 0.0 or self.elapsed < np.float32(self.window) * np.float32(part):
             return False

@@ -85,7 +85,7 @@ def test_help_fits(command: str, width: int, shown: Shown) -> None:
 
 
 def test_every_command_is_tried_here(shown: Shown) -> None:
-    named = re.findall(r"^    (\w+)  ", shown("--help"), re.MULTILINE)
+    named = re.findall(r"^      (\w+)  ", shown("--help"), re.MULTILINE)
     assert set(named) == set(COMMANDS)
 
 

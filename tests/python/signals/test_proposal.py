@@ -91,7 +91,7 @@ def test_what_has_no_unit_is_proposed_with_one(
     time = np.arange(0.0, 30.0, 0.002)
     random = np.random.default_rng(1)
     waves = [(random.uniform(1.0, 8.0), random.uniform(0.0, 6.0)) for _ in range(20)]
-    base = sum(0.3 * np.sin(2.0 * np.pi * hertz * time + phase) for hertz, phase in waves)
+    base = np.sum([0.3 * np.sin(2.0 * np.pi * hertz * time + phase) for hertz, phase in waves], axis=0)
     theta, theta_dot = np.zeros_like(time), np.zeros_like(time)
     for k in range(1, len(time)):
         theta_dot[k] = theta_dot[k - 1] - 0.002 * (2.1 * base[k] + 13.0 * theta_dot[k - 1] + 500.0 * theta[k - 1])
