@@ -84,7 +84,7 @@ void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate
     estimate->theta_dot = estimator_state(estimator, 1u);
     estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->setup.settings->trim_corner));
     estimate->theta_dot_sigma = state_sigma(estimator, 1u, 1.0f);
-    estimate->trim = trim_angle(&estimator->trim);
+    estimate->trim = estimator->rest_angle;
     estimate->nis = estimator->nis;
     estimate->nis_size = estimator->nis_size;
     estimator_parameters(estimator, estimate->parameter);

@@ -444,6 +444,6 @@ def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, ever
         estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index], force)
         if (index - first) % every == 0:
             x = (estimator.origin + estimator.belief.x, estimator.state_deviations())
-            others = (*estimator.parameters(), *estimator.dynamics(), (estimator.trim, estimator.nis))
+            others = (*estimator.parameters(), *estimator.dynamics(), (estimator.rest, estimator.nis))
             rows.append(np.concatenate((*x, *others)))
     return dict(zip(columns(estimator), np.array(rows).T, strict=True))

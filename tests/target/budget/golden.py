@@ -18,7 +18,7 @@ LIMITS = {
     "instructions.dual.lever.worst": 7700,
     "instructions.dual.lever.start_up_worst": 7500,
     "instructions.tick.dual.lever.mean": 4040,
-    "instructions.bounce.dual.lever.mean": 3660,
+    "instructions.bounce.dual.lever.mean": 3700,
     "instructions_after_gap.dual": 20000,
     "cycles.dual.lever.mean": 4150,
     "init.instructions": 100_000,
